@@ -1,0 +1,239 @@
+//! The way from a drive to its line: [`Port`], the terms of a call, and what can go wrong on the way.
+
+use std::{fmt, io, time::Duration};
+
+use tokio_modbus::client::{Client, Context};
+
+/// How urgent a call is. A line serves a higher class first, always.
+///
+/// The order of the variants is the order of urgency: `Class::Stop > Class::Background`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum Class {
+    /// What nobody waits for: parameters, histories, slow measurements.
+    Background,
+    /// The cyclic poll of what control and safety need.
+    #[default]
+    Status,
+    /// A frame sent so that the drive's own communication watchdog does not trip.
+    KeepAlive,
+    /// Start, setpoint, reset.
+    Command,
+    /// A stop. Nothing overtakes it.
+    Stop,
+}
+
+impl Class {
+    /// Every class, the most urgent first.
+    pub const ALL: [Self; 5] = [Self::Stop, Self::Command, Self::KeepAlive, Self::Status, Self::Background];
+}
+
+impl fmt::Display for Class {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Background => "background",
+            Self::Status => "status",
+            Self::KeepAlive => "keep-alive",
+            Self::Command => "command",
+            Self::Stop => "stop",
+        })
+    }
+}
+
+/// What sending a write twice would do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Effect {
+    /// The value is a level: writing it twice does what writing it once does. It may be retried inside its
+    /// lifetime.
+    #[default]
+    Level,
+    /// The write is an edge (reset, EEPROM save, emergency stop): it is sent once, and never again by itself.
+    Edge,
+}
+
+/// The terms under which the calls that follow travel: how urgent, for how long, and whether a write may be
+/// repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Terms {
+    /// How urgent.
+    pub class: Class,
+    /// From the call on, how long it may wait until its first bit is sent. What has not been sent by then never
+    /// is: the call ends with [`PortError::Expired`]. `None`: it waits as long as its caller does.
+    pub lifetime: Option<Duration>,
+    /// Whether a write may be repeated.
+    pub effect: Effect,
+    /// A key under which a later call to the same slave replaces this one while it is not yet sent; the replaced
+    /// call ends with [`PortError::Superseded`]. Used for setpoints, where only the latest counts.
+    pub replaces: Option<u16>,
+}
+
+impl Terms {
+    /// The terms of a class, without a lifetime, for levels, replaced by nothing.
+    #[must_use]
+    pub const fn of(class: Class) -> Self {
+        Self { class, lifetime: None, effect: Effect::Level, replaces: None }
+    }
+
+    /// These terms with a lifetime.
+    #[must_use]
+    pub const fn within(self, lifetime: Duration) -> Self {
+        Self { lifetime: Some(lifetime), ..self }
+    }
+
+    /// These terms for a write that is an edge.
+    #[must_use]
+    pub const fn edge(self) -> Self {
+        Self { effect: Effect::Edge, ..self }
+    }
+
+    /// These terms with a replacement key.
+    #[must_use]
+    pub const fn replacing(self, key: u16) -> Self {
+        Self { replaces: Some(key), ..self }
+    }
+}
+
+/// One slave as a drive sees it: a tokio-modbus [`Client`] that also takes the [`Terms`] of the calls that follow.
+///
+/// # For callers
+/// Set the terms, then call. The terms hold until they are set anew.
+///
+/// # For implementors
+/// A line with a schedule **must** honour class, lifetime, effect and key as [`Terms`] says. A plain connection has
+/// nothing to schedule and keeps the default body, which ignores them; that is how a drive runs on any tokio-modbus
+/// [`Context`]. What is special about a failure is carried as a [`PortError`] inside
+/// [`tokio_modbus::Error::Transport`], see [`PortError::into_io`]. `call` **should** be safe to drop: the exchange
+/// that is under way finishes on the line and its answer is discarded.
+pub trait Port: Client {
+    /// Sets the terms of the calls that follow.
+    fn set_terms(&mut self, terms: Terms) {
+        let _ = terms;
+    }
+}
+
+impl Port for Context {}
+
+/// Why a call brought no answer, as far as the line knows.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PortError {
+    /// Sent, and no answer came in time. A read: nothing is known. A write reports
+    /// [`OutcomeUnknown`](Self::OutcomeUnknown) instead.
+    #[error("no answer within {after:?}")]
+    Timeout {
+        /// How long the line waited after the last bit of the request.
+        after: Duration,
+    },
+    /// An answer came and was damaged (CRC, LRC, BCC, framing), also after the retries that its kind allows.
+    #[error("the answer was damaged ({0})")]
+    Damaged(&'static str),
+    /// An intact answer came that does not fit the request: another function, address, quantity or echoed value.
+    #[error("the answer does not fit the request ({0})")]
+    Mismatch(String),
+    /// A write was sent and nothing valid came back: it may or may not have been carried out. Read it back.
+    #[error("the outcome of the write is unknown ({0})")]
+    OutcomeUnknown(&'static str),
+    /// The lifetime ran out before the request was sent. Nothing was sent.
+    #[error("expired before it was sent")]
+    Expired,
+    /// A later call with the same key took its place. Nothing was sent.
+    #[error("superseded by a later call before it was sent")]
+    Superseded,
+    /// The slave has not answered for several requests; the line asks it again by itself. Nothing was sent.
+    #[error("the slave is off-line, next probe in {retry_in:?}")]
+    Offline {
+        /// Until the line's next probe.
+        retry_in: Duration,
+    },
+    /// Too many requests wait on this line. Nothing was sent.
+    #[error("the queue of the line is full ({0} requests wait)")]
+    QueueFull(usize),
+    /// The port is gone (unplugged, closed, refused) and has not come back. Nothing was sent.
+    #[error("the line is down ({0})")]
+    LineDown(String),
+    /// The line was closed by its owner.
+    #[error("the line is closed")]
+    Closed,
+    /// The line cannot carry this request (for instance a function that its protocol has no form for).
+    #[error("the line cannot carry this request ({0})")]
+    NotCarried(String),
+    /// An error of a connection that is not one of ours, in its own words.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl PortError {
+    /// Wraps this error for the way through tokio-modbus; [`from_modbus`](Self::from_modbus) takes it out again.
+    #[must_use]
+    pub fn into_io(self) -> io::Error {
+        let kind = match &self {
+            Self::Timeout { .. } | Self::Expired | Self::OutcomeUnknown(_) => io::ErrorKind::TimedOut,
+            Self::Damaged(_) | Self::Mismatch(_) => io::ErrorKind::InvalidData,
+            Self::Offline { .. } => io::ErrorKind::HostUnreachable,
+            Self::Superseded => io::ErrorKind::Interrupted,
+            Self::QueueFull(_) => io::ErrorKind::ResourceBusy,
+            Self::LineDown(_) | Self::Closed => io::ErrorKind::NotConnected,
+            Self::NotCarried(_) => io::ErrorKind::Unsupported,
+            Self::Other(_) => io::ErrorKind::Other,
+        };
+        io::Error::new(kind, self)
+    }
+
+    /// Whether nothing of the request can have reached the slave.
+    #[must_use]
+    pub const fn nothing_sent(&self) -> bool {
+        matches!(
+            self,
+            Self::Expired
+                | Self::Superseded
+                | Self::Offline { .. }
+                | Self::QueueFull(_)
+                | Self::LineDown(_)
+                | Self::Closed
+                | Self::NotCarried(_)
+        )
+    }
+
+    /// What a tokio-modbus error says in our terms.
+    #[must_use]
+    pub fn from_modbus(error: tokio_modbus::Error) -> Self {
+        match error {
+            tokio_modbus::Error::Protocol(error) => Self::Mismatch(error.to_string()),
+            tokio_modbus::Error::Transport(error) => Self::from_io(error),
+        }
+    }
+
+    fn from_io(error: io::Error) -> Self {
+        match error.downcast::<Self>() {
+            Ok(ours) => ours,
+            Err(error) => match error.kind() {
+                io::ErrorKind::BrokenPipe
+                | io::ErrorKind::NotConnected
+                | io::ErrorKind::ConnectionReset
+                | io::ErrorKind::ConnectionAborted
+                | io::ErrorKind::UnexpectedEof => Self::LineDown(error.to_string()),
+                io::ErrorKind::InvalidData => Self::Mismatch(error.to_string()),
+                _ => Self::Other(error.to_string()),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_outranks_every_other_class() {
+        let mut classes = Class::ALL;
+        classes.sort();
+        assert_eq!(classes.last(), Some(&Class::Stop));
+        assert!(Class::ALL.windows(2).all(|pair| pair[0] > pair[1]));
+    }
+
+    #[test]
+    fn a_port_error_survives_the_way_through_tokio_modbus() {
+        let error = PortError::Offline { retry_in: Duration::from_millis(500) };
+        let through = tokio_modbus::Error::Transport(error.clone().into_io());
+        assert_eq!(PortError::from_modbus(through), error);
+    }
+}
