@@ -1,6 +1,38 @@
 //! What a variable-speed drive on Modbus is.
+//!
+//! This crate is the contract between the drives and everything else: the [`Drive`] trait, what a drive says
+//! ([`Status`], [`Measurements`], [`Faults`]), what is asked of it ([`Setpoint`], [`Direction`], [`StopMode`]), what
+//! can go wrong ([`Error`]), the register tables ([`registers`]) and the way to the line ([`Port`]). It has no task,
+//! no port and no clock.
+//!
+//! A program that uses drives reads [`Drive`]. A crate that adds a family lists its registers with
+//! [`registers!`](crate::registers!), reaches them through [`Registers`] and implements [`Drive`]. A crate that adds
+//! a line implements [`Port`].
 
+mod access;
+mod capabilities;
+mod drive;
+pub mod drivecom;
+mod error;
+mod faults;
 pub mod port;
+pub mod registers;
 pub mod serial;
+mod setpoint;
+mod status;
+mod units;
 
+pub use access::{Calls, Lifetimes, Registers};
+pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
+pub use drive::{BroadcastWrite, Drive, Identity, Written};
+pub use error::{
+    Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SetpointProblem, SlaveAddress,
+    SlaveAddressError,
+};
+pub use faults::{Fault, FaultEntry, Faults};
 pub use port::{Class, Effect, Port, PortError, Terms};
+pub use registers::Row;
+pub use serial::SerialSettings;
+pub use setpoint::{Command, Direction, Setpoint, StopMode};
+pub use status::{Control, Measurements, RawWord, State, Status};
+pub use units::{Current, Frequency, Percent, Power, Speed, Voltage};

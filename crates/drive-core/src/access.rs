@@ -1,0 +1,319 @@
+//! The one way in which families read and write: [`Registers`], typed, within the family's limits, every answer
+//! checked, every error naming slave and register.
+
+use std::{borrow::Cow, time::Duration};
+
+use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
+
+use crate::{
+    capabilities::Capabilities,
+    drive::Identity,
+    error::{Error, ExceptionMeaning, Exchange, Result, SlaveAddress},
+    port::{Class, Effect, Port, PortError, Terms},
+    registers::{
+        Register, Row,
+        access::{Readable, Writable},
+    },
+};
+
+/// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lifetimes {
+    /// Stops. They do not expire by default.
+    pub stop: Option<Duration>,
+    /// Starts, setpoints, resets: 1 s by default, so that none is carried out late.
+    pub command: Option<Duration>,
+    /// Keep-alives.
+    pub keep_alive: Option<Duration>,
+    /// Status polls; a daemon sets its poll period.
+    pub status: Option<Duration>,
+    /// Parameters, histories, slow measurements.
+    pub background: Option<Duration>,
+}
+
+impl Lifetimes {
+    /// The lifetime of a class.
+    #[must_use]
+    pub const fn of(&self, class: Class) -> Option<Duration> {
+        match class {
+            Class::Stop => self.stop,
+            Class::Command => self.command,
+            Class::KeepAlive => self.keep_alive,
+            Class::Status => self.status,
+            Class::Background => self.background,
+        }
+    }
+}
+
+impl Default for Lifetimes {
+    fn default() -> Self {
+        Self {
+            stop: None,
+            command: Some(Duration::from_secs(1)),
+            keep_alive: None,
+            status: None,
+            background: None,
+        }
+    }
+}
+
+/// The registers of one slave behind a port.
+#[derive(Debug)]
+pub struct Registers<P> {
+    port: P,
+    slave: SlaveAddress,
+    capabilities: &'static Capabilities,
+    meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
+    /// How long calls may wait.
+    pub lifetimes: Lifetimes,
+}
+
+impl<P: Port> Registers<P> {
+    /// The registers of `slave`. `meaning` says what an exception means on this family.
+    #[must_use]
+    pub fn new(
+        mut port: P,
+        slave: SlaveAddress,
+        capabilities: &'static Capabilities,
+        meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
+    ) -> Self {
+        port.set_slave(Slave(slave.number()));
+        Self { port, slave, capabilities, meaning, lifetimes: Lifetimes::default() }
+    }
+
+    /// The slave.
+    #[must_use]
+    pub const fn slave(&self) -> SlaveAddress {
+        self.slave
+    }
+
+    /// What the family can do.
+    #[must_use]
+    pub const fn capabilities(&self) -> &'static Capabilities {
+        self.capabilities
+    }
+
+    /// The calls that follow travel in this class, with its lifetime.
+    pub const fn at(&mut self, class: Class) -> Calls<'_, P> {
+        let terms = Terms { lifetime: self.lifetimes.of(class), ..Terms::of(class) };
+        Calls { registers: self, terms }
+    }
+
+    /// Gives the port back.
+    #[must_use]
+    pub fn into_port(self) -> P {
+        self.port
+    }
+}
+
+/// Calls to one slave under the same terms.
+///
+/// # Errors
+/// Every method fails with [`Error::Port`] when no valid answer came and [`Error::Exception`] when the drive refused.
+///
+/// # Cancellation
+/// Dropping a future of these leaves the line whole: what is on the wire finishes there and its answer is discarded.
+/// Whether a dropped write was carried out is unknown.
+#[derive(Debug)]
+pub struct Calls<'a, P> {
+    registers: &'a mut Registers<P>,
+    terms: Terms,
+}
+
+impl<P: Port> Calls<'_, P> {
+    /// The same calls as edges: a write is sent once and never repeated.
+    #[must_use]
+    pub const fn edge(mut self) -> Self {
+        self.terms = self.terms.edge();
+        self
+    }
+
+    /// The same calls under a replacement key, see [`Terms::replaces`].
+    #[must_use]
+    pub const fn replacing(mut self, key: u16) -> Self {
+        self.terms = self.terms.replacing(key);
+        self
+    }
+
+    /// Reads one register.
+    pub async fn read(&mut self, register: Register<impl Readable>) -> Result<u16> {
+        self.read_word(register.address()).await
+    }
+
+    /// Reads one word at an address.
+    pub async fn read_word(&mut self, address: u16) -> Result<u16> {
+        let words = self.read_words(address, 1).await?;
+        words.first().copied().ok_or_else(|| self.answer(Self::reading(address), "the answer holds no word"))
+    }
+
+    /// Reads `count` consecutive words in one request.
+    ///
+    /// # Errors
+    /// Also [`Error::TooManyWords`] when the family's limit forbids the request; nothing is sent then.
+    pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>> {
+        self.check_words(usize::from(count), self.registers.capabilities.read_words)?;
+        let exchange = Self::reading(first);
+        let response = self.request(Request::ReadHoldingRegisters(first, count), exchange).await?;
+        let Response::ReadHoldingRegisters(words) = response else {
+            return Err(self.answer(exchange, "the answer is of another function"));
+        };
+        if words.len() != usize::from(count) {
+            return Err(self.answer(exchange, "the answer holds another number of words"));
+        }
+        Ok(words)
+    }
+
+    /// Writes one register, with function 06 where the family has it and function 16 where it has not. When it is
+    /// not known whether the write arrived, a register that can be read is read back: the write succeeds if the
+    /// value stands there. An edge is never read back, because its bit may clear itself.
+    pub async fn write<A: Writable>(&mut self, register: Register<A>, value: u16) -> Result<()> {
+        let result = self.write_word(register.address(), value).await;
+        let readable = A::ACCESS.is_readable();
+        match result {
+            Err(Error::Port { problem: ref problem @ PortError::OutcomeUnknown(_), .. })
+                if readable && self.terms.effect == Effect::Level =>
+            {
+                let problem = problem.clone();
+                if self.read_word(register.address()).await? == value {
+                    return Ok(());
+                }
+                Err(self.port_error(Self::writing(register.address(), self.single_write()), problem))
+            }
+            result => result,
+        }
+    }
+
+    /// Writes one word at an address; the confirmation must echo it.
+    pub async fn write_word(&mut self, address: u16, value: u16) -> Result<()> {
+        if !self.has_single_write() {
+            return self.write_words(address, &[value]).await;
+        }
+        let exchange = Self::writing(address, 0x06);
+        match self.request(Request::WriteSingleRegister(address, value), exchange).await? {
+            Response::WriteSingleRegister(at, echoed) if (at, echoed) == (address, value) => Ok(()),
+            _ => Err(self.answer(exchange, "the confirmation does not echo the write")),
+        }
+    }
+
+    /// Writes consecutive words in one request (function 16); the confirmation must name the same words.
+    ///
+    /// # Errors
+    /// Also [`Error::TooManyWords`] when the family's limit forbids the request; nothing is sent then.
+    pub async fn write_words(&mut self, first: u16, words: &[u16]) -> Result<()> {
+        self.check_words(words.len(), self.registers.capabilities.write_words)?;
+        let exchange = Self::writing(first, 0x10);
+        match self.request(Request::WriteMultipleRegisters(first, Cow::Borrowed(words)), exchange).await? {
+            Response::WriteMultipleRegisters(at, count)
+                if at == first && usize::from(count) == words.len() =>
+            {
+                Ok(())
+            }
+            _ => Err(self.answer(exchange, "the confirmation does not name the written words")),
+        }
+    }
+
+    /// Reads the register of a row, if its access allows it.
+    ///
+    /// # Errors
+    /// Also [`Error::AccessForbidden`]; nothing is sent then.
+    pub async fn read_row(&mut self, row: &Row) -> Result<u16> {
+        if !row.access.is_readable() {
+            return Err(self.access_forbidden(row));
+        }
+        self.read_word(row.address).await
+    }
+
+    /// Writes the register of a row, if its access and range allow it.
+    ///
+    /// # Errors
+    /// Also [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`]; nothing is sent then.
+    pub async fn write_row(&mut self, row: &Row, word: u16) -> Result<()> {
+        if !row.access.is_writable() {
+            return Err(self.access_forbidden(row));
+        }
+        let value = row.unit.number(word);
+        if !row.range.allows(value) {
+            let slave = self.registers.slave;
+            return Err(Error::ValueNotAllowed { slave, register: row.address, code: row.code, value });
+        }
+        self.write_word(row.address, word).await
+    }
+
+    /// Sends `data` round by function 08, sub-function 00, and checks that it comes back: the cheapest proof that the
+    /// slave hears and speaks.
+    pub async fn echo(&mut self, data: u16) -> Result<()> {
+        let exchange = Exchange { function: 0x08, register: None };
+        let [high, low] = data.to_be_bytes();
+        let payload = [0, 0, high, low];
+        match self.request(Request::Custom(0x08, Cow::Borrowed(&payload)), exchange).await? {
+            Response::Custom(0x08, echoed) if echoed.as_ref() == payload => Ok(()),
+            _ => Err(self.answer(exchange, "the echo differs")),
+        }
+    }
+
+    /// Asks what the device is, by function 43/14 from object 00 on.
+    pub async fn identification(&mut self, code: ReadCode) -> Result<Identity> {
+        let exchange = Exchange { function: 0x2B, register: None };
+        let response = self.request(Request::ReadDeviceIdentification(code, 0), exchange).await?;
+        let Response::ReadDeviceIdentification(response) = response else {
+            return Err(self.answer(exchange, "the answer is of another function"));
+        };
+        let object = |id| {
+            let found = response.device_id_objects.iter().find(|object| object.id == id)?;
+            Some(String::from_utf8_lossy(&found.value).trim_end_matches(['\0', ' ']).to_owned())
+        };
+        Ok(Identity { vendor: object(0), model: object(1), version: object(2), codes: Vec::new() })
+    }
+
+    /// Sends any request and returns the response as tokio-modbus decodes it. What the typed methods do not cover.
+    pub async fn request(&mut self, request: Request<'_>, exchange: Exchange) -> Result<Response> {
+        self.registers.port.set_terms(self.terms);
+        match self.registers.port.call(request).await {
+            Ok(Ok(response)) => Ok(response),
+            Ok(Err(exception)) => {
+                let code = u8::from(exception);
+                let meaning = (self.registers.meaning)(exchange.function, code);
+                Err(Error::Exception { slave: self.registers.slave, exchange, code, meaning })
+            }
+            Err(error) => Err(self.port_error(exchange, PortError::from_modbus(error))),
+        }
+    }
+
+    /// An answer that breaks what the manual says.
+    #[must_use]
+    pub const fn answer(&self, exchange: Exchange, reason: &'static str) -> Error {
+        Error::Answer { slave: self.registers.slave, exchange, reason }
+    }
+
+    const fn port_error(&self, exchange: Exchange, problem: PortError) -> Error {
+        Error::Port { slave: self.registers.slave, exchange, problem }
+    }
+
+    const fn access_forbidden(&self, row: &Row) -> Error {
+        let slave = self.registers.slave;
+        Error::AccessForbidden { slave, register: row.address, code: row.code, access: row.access }
+    }
+
+    const fn check_words(&self, words: usize, limit: u16) -> Result<()> {
+        if words == 0 || words > limit as usize {
+            return Err(Error::TooManyWords { slave: self.registers.slave, words, limit });
+        }
+        Ok(())
+    }
+
+    fn has_single_write(&self) -> bool {
+        self.registers.capabilities.functions.contains(&0x06)
+    }
+
+    fn single_write(&self) -> u8 {
+        if self.has_single_write() { 0x06 } else { 0x10 }
+    }
+
+    const fn reading(register: u16) -> Exchange {
+        Exchange { function: 0x03, register: Some(register) }
+    }
+
+    const fn writing(register: u16, function: u8) -> Exchange {
+        Exchange { function, register: Some(register) }
+    }
+}

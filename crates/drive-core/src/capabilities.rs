@@ -1,0 +1,175 @@
+//! What a family of drives can do, as data: for choosing, for checking a configuration, for the README's table.
+
+use std::{fmt, time::Duration};
+
+use crate::{
+    error::SlaveAddress,
+    serial::{CharacterFormat, SerialSettings},
+    setpoint::StopMode,
+};
+
+/// What a family can do. What stands here the drive does; what does not is
+/// [`Error::Unsupported`](crate::Error::Unsupported), never a silent no-op.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capabilities {
+    /// The name that configurations use, such as `atv312`.
+    pub key: &'static str,
+    /// The vendor's name, such as `Schneider Altivar 312`.
+    pub name: &'static str,
+    /// The Modbus functions it answers.
+    pub functions: &'static [u8],
+    /// Words that one read may ask for.
+    pub read_words: u16,
+    /// Words that one write (function 16) may carry.
+    pub write_words: u16,
+    /// The highest slave address it can have; the lowest is 1.
+    pub highest_address: u8,
+    /// The speeds it can be set to, in bit/s.
+    pub speeds: &'static [u32],
+    /// The character formats it can be set to.
+    pub formats: &'static [CharacterFormat],
+    /// Its factory setting, or a usual setting where the manual prints none.
+    pub factory: SerialSettings,
+    /// The stop modes it has.
+    pub stop_modes: &'static [StopMode],
+    /// Whether it takes a setpoint in rpm besides one in hertz.
+    pub speed_setpoint: bool,
+    /// The smallest step of a frequency setpoint as the manual prints it.
+    pub frequency_step: &'static str,
+    /// How a fault is reset over the bus.
+    pub fault_reset: &'static str,
+    /// Its communication watchdog, where it has one that the bus can read or set.
+    pub watchdog: Option<WatchdogCapability>,
+    /// How it says what it is, where it does.
+    pub identification: Option<&'static str>,
+    /// Whether control can be given back to the panel or the terminals over the bus.
+    pub release: bool,
+    /// How parameters are saved to EEPROM over the bus, where that is a command of its own.
+    pub persist: Option<&'static str>,
+    /// Stop modes that can be sent to all slaves at once.
+    pub broadcast_stops: &'static [StopMode],
+    /// The fault history's length.
+    pub fault_history: u8,
+    /// The silence that a slave of this family needs after its answer before the next request, above t3.5.
+    pub turnaround: Duration,
+    /// Exchanges of one [`Drive::status`](crate::Drive::status) when the drive is set up for the fewest.
+    pub status_exchanges: u8,
+    /// Exchanges of one [`Drive::measurements`](crate::Drive::measurements).
+    pub measurement_exchanges: u8,
+}
+
+impl Capabilities {
+    /// Checks that a drive of this family can have this address on a line with these settings.
+    ///
+    /// # Errors
+    /// [`LineMismatch`] with what the family can have instead.
+    pub fn check_line(&self, slave: SlaveAddress, settings: SerialSettings) -> Result<(), LineMismatch> {
+        if slave.number() > self.highest_address {
+            return Err(LineMismatch::Address { family: self.name, slave, highest: self.highest_address });
+        }
+        if !self.speeds.contains(&settings.baud()) {
+            return Err(LineMismatch::Speed {
+                family: self.name,
+                baud: settings.baud(),
+                speeds: self.speeds,
+            });
+        }
+        if !self.formats.contains(&settings.format()) {
+            return Err(LineMismatch::Format {
+                family: self.name,
+                format: settings.format(),
+                formats: self.formats,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What a family's communication watchdog can be set to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchdogCapability {
+    /// The shortest time.
+    pub min: Duration,
+    /// The longest time.
+    pub max: Duration,
+    /// The step of the time.
+    pub step: Duration,
+    /// What the drive can do when it runs out.
+    pub reactions: &'static [Reaction],
+    /// Whether the bus can set it, or only read it.
+    pub settable: bool,
+}
+
+/// What a drive does when its communication watchdog runs out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Reaction {
+    /// Nothing: the watchdog is off.
+    Ignore,
+    /// It trips and the motor coasts.
+    Freewheel,
+    /// It trips and stops along the ramp.
+    Ramp,
+    /// It trips and stops along the short ramp.
+    Fast,
+    /// It trips and stops by DC injection.
+    DcInjection,
+    /// A value that the manual does not explain.
+    Unknown(u16),
+}
+
+impl fmt::Display for Reaction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ignore => f.write_str("nothing"),
+            Self::Freewheel => f.write_str("freewheel"),
+            Self::Ramp => f.write_str("ramp stop"),
+            Self::Fast => f.write_str("fast stop"),
+            Self::DcInjection => f.write_str("DC injection"),
+            Self::Unknown(value) => write!(f, "unknown ({value})"),
+        }
+    }
+}
+
+/// A drive's communication watchdog as it is set now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Watchdog {
+    /// The time without a message after which it acts; `None`: it is off.
+    pub timeout: Option<Duration>,
+    /// What it does then; `None` where the drive does not tell.
+    pub reaction: Option<Reaction>,
+}
+
+/// A drive that cannot live on this line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LineMismatch {
+    /// The address.
+    #[error("address {slave}: a {family} has addresses 1 to {highest}")]
+    Address {
+        /// The family's name.
+        family: &'static str,
+        /// The address that was asked for.
+        slave: SlaveAddress,
+        /// The highest it can have.
+        highest: u8,
+    },
+    /// The speed.
+    #[error("{baud} bit/s: a {family} has {speeds:?}")]
+    Speed {
+        /// The family's name.
+        family: &'static str,
+        /// The speed that was asked for.
+        baud: u32,
+        /// The speeds it can have.
+        speeds: &'static [u32],
+    },
+    /// The character format.
+    #[error("format {format}: a {family} has {}", formats.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+    Format {
+        /// The family's name.
+        family: &'static str,
+        /// The format that was asked for.
+        format: CharacterFormat,
+        /// The formats it can have.
+        formats: &'static [CharacterFormat],
+    },
+}

@@ -1,0 +1,209 @@
+//! The [`Drive`] trait: what every family does, and what is promised about it.
+
+use std::time::Duration;
+
+use async_trait::async_trait;
+
+use crate::{
+    access::Lifetimes,
+    capabilities::{Capabilities, Reaction, Watchdog},
+    error::{Error, Result, SlaveAddress},
+    faults::Faults,
+    registers::{Row, Storage},
+    setpoint::{Direction, Setpoint, StopMode},
+    status::{Measurements, RawWord, Status},
+};
+
+/// What a drive says it is. Two drives that differ in any part are different drives.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Identity {
+    /// The vendor's name.
+    pub vendor: Option<String>,
+    /// The model or reference.
+    pub model: Option<String>,
+    /// The version of its firmware, as it writes it.
+    pub version: Option<String>,
+    /// Words that tell one model from another, where the family has registers for it.
+    pub codes: Vec<RawWord>,
+}
+
+/// What became of a written parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Written {
+    /// Whether the drive held another value before; an equal value is not written again.
+    pub changed: bool,
+    /// Where the value lives now.
+    pub storage: Storage,
+}
+
+/// A write to all slaves at once: no slave answers, so nothing is confirmed by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct BroadcastWrite {
+    /// The function code that the family takes for it, 06 or 16.
+    pub function: u8,
+    /// The register.
+    pub register: u16,
+    /// The word.
+    pub value: u16,
+}
+
+/// A variable-speed drive on a line.
+///
+/// One value stands for one slave. It knows the family's registers and nothing of the line: every exchange goes
+/// through a [`Port`](crate::Port), whose class and lifetime each method sets by itself: `stop` is a stop, `start`,
+/// `set_setpoint` and `reset_faults` are commands, `status` is a status poll, everything else is background.
+///
+/// # For callers
+/// - Nothing is called done because it was sent. A command that returns `Ok` was seen in the drive's own words; one
+///   that returns [`Error::NotConfirmed`] was sent and not seen; [`ErrorKind::OutcomeUnknown`](crate::ErrorKind) means
+///   that nobody knows.
+/// - Nothing restarts by itself. No method retries a start, and none clears a fault but `reset_faults`.
+/// - A setpoint is refused when the drive's limits forbid it or its register cannot hold it exactly; it is never
+///   clamped or rounded.
+/// - `&mut self` is one conversation with the drive. Share a drive by giving it to one task.
+///
+/// # For implementors
+/// - `start` **must** read a fresh status before it writes anything, and refuse with [`Error::Refused`] when the drive
+///   has a fault or somebody else controls it.
+/// - An edge (reset, emergency stop, EEPROM save) **must** be written once and then cleared, never held.
+/// - What the family cannot do **must** be [`Error::Unsupported`] and **must** be absent from
+///   [`capabilities`](Self::capabilities).
+/// - What is read once (units, limits, block configuration) **must** be read again after [`forget`](Self::forget).
+/// - What a drive sends **must not** panic, in debug or release.
+///
+/// # Cancellation
+/// Dropping the future of any method leaves the line whole and the drive as the last exchange left it. A dropped
+/// command may have been carried out, in part; read the status.
+///
+/// # Errors
+/// Every method that talks to the drive returns [`Error::Port`] when no valid answer came and [`Error::Exception`]
+/// when the drive refused; the methods say what else they return.
+#[async_trait]
+pub trait Drive: Send {
+    /// The slave that it talks to.
+    fn slave(&self) -> SlaveAddress;
+
+    /// What this family can do.
+    fn capabilities(&self) -> &'static Capabilities;
+
+    /// Every register of the family.
+    fn rows(&self) -> &'static [Row];
+
+    /// How long its calls may wait on the line until they are sent.
+    fn lifetimes_mut(&mut self) -> &mut Lifetimes;
+
+    /// Forgets everything that was read once (units, limits, block configuration) and is true only as long as the
+    /// drive is the same and was not switched off. Call it after a reconnect.
+    fn forget(&mut self);
+
+    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges when the drive is set up for the fewest.
+    async fn status(&mut self) -> Result<Status>;
+
+    /// Reads the slow set.
+    async fn measurements(&mut self) -> Result<Measurements>;
+
+    /// Reads the present faults, the alarms and the history.
+    async fn faults(&mut self) -> Result<Faults>;
+
+    /// Starts the motor in a direction, or turns a running motor to that direction, at the setpoint that the drive
+    /// holds. Returns the status in which the drive shows that the run command is in force; the speed is then on its
+    /// way, not reached.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the drive has tripped, is not ready or is commanded by somebody else;
+    /// [`Error::NotConfirmed`] when the run command does not show.
+    async fn start(&mut self, direction: Direction) -> Result<Status>;
+
+    /// Stops the motor. Returns the status in which the drive shows that no run command is in force any more; the
+    /// motor may still be coming down. It never refuses for the drive's state: a stop is sent whatever is known.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a mode that the family or its settings do not have: **nothing is stopped then**,
+    /// choose among [`Capabilities::stop_modes`]; [`Error::NotConfirmed`] when the stop does not show: repeat it.
+    async fn stop(&mut self, mode: StopMode) -> Result<Status>;
+
+    /// Gives the drive a setpoint. `Ok` means that the drive confirmed the value; the motor follows its ramp if it
+    /// runs. A setpoint that is not yet sent is replaced by a later one.
+    ///
+    /// # Errors
+    /// [`Error::Setpoint`] when the drive's limits or its register forbid the value; [`Error::Unsupported`] for a kind
+    /// of setpoint that the family does not take.
+    async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()>;
+
+    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start.
+    ///
+    /// # Errors
+    /// [`Error::NotConfirmed`] when the drive still shows a fault: its cause is not gone.
+    async fn reset_faults(&mut self) -> Result<Status>;
+
+    /// Asks the drive what it is.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families that cannot say.
+    async fn identify(&mut self) -> Result<Identity> {
+        Err(Error::Unsupported {
+            what: "identification",
+            reason: "the family has no function and no register for it",
+        })
+    }
+
+    /// Gives control back to the panel or the terminals. The motor must stand, so that nobody is surprised by what the
+    /// other channel says.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families in which the bus cannot do it; [`Error::Refused`] while the motor runs.
+    async fn release(&mut self) -> Result<Status> {
+        Err(Error::Unsupported { what: "release", reason: "the family's bus cannot give control back" })
+    }
+
+    /// Sends the cheapest request that feeds the drive's communication watchdog.
+    async fn keep_alive(&mut self) -> Result<()>;
+
+    /// Reads how the drive's communication watchdog is set.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families that have none or do not tell.
+    async fn watchdog(&mut self) -> Result<Watchdog> {
+        Err(Error::Unsupported { what: "watchdog", reason: "the manual gives no register for it" })
+    }
+
+    /// Sets the drive's communication watchdog and reads it back.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families or reactions that cannot be set; [`Error::WatchdogTime`] for a time that the
+    /// drive cannot keep; [`Error::NotConfirmed`] when it reads back otherwise.
+    async fn arm_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        let _ = (timeout, reaction);
+        Err(Error::Unsupported { what: "watchdog", reason: "the manual gives no register for it" })
+    }
+
+    /// Reads the register of a row.
+    ///
+    /// # Errors
+    /// [`Error::AccessForbidden`] for a register that can only be written.
+    async fn read_parameter(&mut self, row: &'static Row) -> Result<u16>;
+
+    /// Writes the register of a row, unless the drive holds the value already, and reads it back.
+    ///
+    /// # Errors
+    /// [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`] before anything is sent; [`Error::NotConfirmed`] when
+    /// it reads back otherwise.
+    async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written>;
+
+    /// Saves the drive's parameters to EEPROM, if one was changed since the last save. Returns how many saves this
+    /// value has made.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families without such a command;
+    /// [`Refusal::NothingToSave`](crate::Refusal::NothingToSave) when nothing was changed.
+    async fn persist(&mut self) -> Result<u32> {
+        Err(Error::Unsupported { what: "saving parameters", reason: "the family has no command for it" })
+    }
+
+    /// The write that stops every drive of this family on a line at once, for the modes in
+    /// [`Capabilities::broadcast_stops`]. Nobody confirms it: follow it by a `stop` to each.
+    fn broadcast_stop(&self, mode: StopMode) -> Option<BroadcastWrite> {
+        let _ = mode;
+        None
+    }
+}

@@ -1,0 +1,382 @@
+//! What can go wrong with a drive: which slave, which register, why.
+
+use std::{fmt, time::Duration};
+
+use crate::{
+    port::PortError,
+    setpoint::{Command, Setpoint},
+    status::{Control, State, Status},
+    units::{Frequency, Speed},
+};
+
+/// The result of everything that talks to a drive.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// The address of one slave, 1 to 247.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SlaveAddress(u8);
+
+impl SlaveAddress {
+    /// The address as a number.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+}
+
+impl TryFrom<u8> for SlaveAddress {
+    type Error = SlaveAddressError;
+
+    fn try_from(number: u8) -> Result<Self, SlaveAddressError> {
+        if (1..=247).contains(&number) { Ok(Self(number)) } else { Err(SlaveAddressError(number)) }
+    }
+}
+
+impl fmt::Display for SlaveAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// A number that is no slave's address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is not a slave address: expected 1 to 247 (0 is the broadcast, 248 to 255 are reserved)")]
+pub struct SlaveAddressError(u8);
+
+/// Which exchange failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Exchange {
+    /// The function code.
+    pub function: u8,
+    /// The first register, for the functions that have one.
+    pub register: Option<u16>,
+}
+
+impl fmt::Display for Exchange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verb = match self.function {
+            0x03 | 0x04 => "reading",
+            0x06 | 0x10 => "writing",
+            _ => "function",
+        };
+        match self.register {
+            Some(register) => write!(f, "{verb} register {register} ({register:04X}h)"),
+            None => write!(f, "function {:02X}h", self.function),
+        }
+    }
+}
+
+/// What an exception means on a drive of this family, and so what to do about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ExceptionMeaning {
+    /// The drive does not have this function.
+    NoSuchFunction,
+    /// The drive does not have this register, or not for this access.
+    NoSuchRegister,
+    /// The value or the quantity is outside what the drive takes.
+    ValueRefused,
+    /// The drive refuses it now: the motor runs (stop first), or it is under undervoltage or busy with a factory
+    /// setting.
+    NotNow,
+    /// The drive began and could not complete; a retry may help.
+    Failed,
+    /// A code that the manual does not list.
+    Unknown,
+}
+
+impl ExceptionMeaning {
+    /// Whether the same request may succeed later without anybody changing anything.
+    #[must_use]
+    pub const fn is_worth_a_retry(self) -> bool {
+        matches!(self, Self::Failed)
+    }
+}
+
+impl fmt::Display for ExceptionMeaning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoSuchFunction => "the drive does not have this function",
+            Self::NoSuchRegister => "the drive does not have this register, or not for this access",
+            Self::ValueRefused => "the drive does not take this value or quantity",
+            Self::NotNow => {
+                "the drive refuses it now: stop the motor first, and see that it is supplied and not busy"
+            }
+            Self::Failed => "the drive could not complete it",
+            Self::Unknown => "a code that the manual does not list",
+        })
+    }
+}
+
+/// Why a command was refused before anything was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The drive has tripped; reset it first.
+    Fault(u16),
+    /// The drive has tripped and did not say why in the words that were read; reset it first.
+    Tripped,
+    /// Somebody else commands the drive.
+    NotInControl(Control),
+    /// The drive is in a state that does not allow it.
+    State(State),
+    /// This direction is not authorised by the drive's settings.
+    DirectionForbidden,
+    /// The drive's settings do not let the bus command it; the text says which setting.
+    Settings(&'static str),
+    /// Nothing has changed since the last save: the EEPROM is not written.
+    NothingToSave,
+    /// The EEPROM's life is used up by this drive's own count of saves.
+    EepromLife,
+    /// The motor runs and this needs it stopped.
+    MotorRunning,
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(code) => write!(f, "the drive has tripped (fault {code}); reset it first"),
+            Self::Tripped => f.write_str("the drive has tripped; reset it first"),
+            Self::NotInControl(control) => write!(f, "the drive is controlled by {control}"),
+            Self::State(state) => write!(f, "the drive is in state {state}"),
+            Self::DirectionForbidden => f.write_str("the drive's settings forbid this direction"),
+            Self::Settings(which) => write!(f, "the drive's settings do not allow it: {which}"),
+            Self::NothingToSave => f.write_str("nothing has changed since the last save"),
+            Self::EepromLife => f.write_str("the EEPROM's life is used up"),
+            Self::MotorRunning => f.write_str("the motor runs; stop it first"),
+        }
+    }
+}
+
+/// Why a setpoint cannot be given to the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SetpointProblem {
+    /// The drive's own limits forbid it.
+    OutsideFrequencyLimits {
+        /// The lowest that is allowed.
+        low: Frequency,
+        /// The highest that is allowed.
+        high: Frequency,
+    },
+    /// The drive's own limits forbid it.
+    OutsideSpeedLimits {
+        /// The lowest that is allowed.
+        low: Speed,
+        /// The highest that is allowed.
+        high: Speed,
+    },
+    /// The register's resolution cannot hold it exactly.
+    Resolution(&'static str),
+    /// The register cannot hold a number this large.
+    TooLarge,
+}
+
+impl fmt::Display for SetpointProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutsideFrequencyLimits { low, high } => write!(f, "the drive allows {low} to {high}"),
+            Self::OutsideSpeedLimits { low, high } => write!(f, "the drive allows {low} to {high}"),
+            Self::Resolution(step) => write!(f, "the drive takes steps of {step}"),
+            Self::TooLarge => f.write_str("the register cannot hold it"),
+        }
+    }
+}
+
+/// What went wrong with a drive.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The line brought no valid answer.
+    #[error("slave {slave}, {exchange}: {problem}")]
+    Port {
+        /// The slave that was asked.
+        slave: SlaveAddress,
+        /// What was asked.
+        exchange: Exchange,
+        /// What happened.
+        problem: PortError,
+    },
+    /// The drive refused the request.
+    #[error("slave {slave}, {exchange}: exception {code:02X}h, {meaning}")]
+    Exception {
+        /// The slave that refused.
+        slave: SlaveAddress,
+        /// What was asked.
+        exchange: Exchange,
+        /// The exception code.
+        code: u8,
+        /// What it means on this family.
+        meaning: ExceptionMeaning,
+    },
+    /// The drive answered intact and outside what its manual allows.
+    #[error("slave {slave}, {exchange}: {reason}")]
+    Answer {
+        /// The slave that answered.
+        slave: SlaveAddress,
+        /// What was asked.
+        exchange: Exchange,
+        /// What is wrong with the answer.
+        reason: &'static str,
+    },
+    /// This family, or this drive as it is set up, cannot do it.
+    #[error("{what} is not supported: {reason}")]
+    Unsupported {
+        /// What was asked.
+        what: &'static str,
+        /// Why it cannot be.
+        reason: &'static str,
+    },
+    /// More words than one request of this family may carry. Nothing was sent.
+    #[error("slave {slave}: {words} words in one request, the family takes {limit}")]
+    TooManyWords {
+        /// The slave.
+        slave: SlaveAddress,
+        /// Words asked for.
+        words: usize,
+        /// Words the family takes.
+        limit: u16,
+    },
+    /// The register does not take this value. Nothing was sent.
+    #[error("slave {slave}, {code} ({register}): the value {value} is not allowed")]
+    ValueNotAllowed {
+        /// The slave.
+        slave: SlaveAddress,
+        /// The register's address.
+        register: u16,
+        /// The register's mnemonic.
+        code: &'static str,
+        /// The refused value, in counts.
+        value: i32,
+    },
+    /// The register's access forbids it. Nothing was sent.
+    #[error("slave {slave}, {code} ({register}): the register is {access}")]
+    AccessForbidden {
+        /// The slave.
+        slave: SlaveAddress,
+        /// The register's address.
+        register: u16,
+        /// The register's mnemonic.
+        code: &'static str,
+        /// Its access.
+        access: crate::registers::Access,
+    },
+    /// The setpoint cannot be given to this drive. Nothing was sent.
+    #[error("slave {slave}: setpoint {setpoint}: {problem}")]
+    Setpoint {
+        /// The slave.
+        slave: SlaveAddress,
+        /// The refused setpoint.
+        setpoint: Setpoint,
+        /// Why.
+        problem: SetpointProblem,
+    },
+    /// A duration that the drive's watchdog cannot be set to. Nothing was sent.
+    #[error(
+        "slave {slave}: a watchdog time of {timeout:?}: the drive takes {min:?} to {max:?} in steps of {step:?}"
+    )]
+    WatchdogTime {
+        /// The slave.
+        slave: SlaveAddress,
+        /// The refused time.
+        timeout: Duration,
+        /// The shortest.
+        min: Duration,
+        /// The longest.
+        max: Duration,
+        /// The step.
+        step: Duration,
+    },
+    /// The command was refused before the motion was asked for.
+    #[error("slave {slave}: {command} refused: {reason}")]
+    Refused {
+        /// The slave.
+        slave: SlaveAddress,
+        /// What was asked.
+        command: Command,
+        /// Why not.
+        reason: Refusal,
+    },
+    /// The command was sent and the drive's own words do not show it.
+    #[error("slave {slave}: {command} not confirmed: the drive says {status}")]
+    NotConfirmed {
+        /// The slave.
+        slave: SlaveAddress,
+        /// What was asked.
+        command: Command,
+        /// The last status that was read.
+        status: Box<Status>,
+    },
+}
+
+/// The kind of an [`Error`], for who decides by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// No valid answer: the drive may be mute, the line disturbed.
+    NoAnswer,
+    /// It is not known whether the drive carried it out.
+    OutcomeUnknown,
+    /// Nothing was sent: expired, superseded, off-line, queue full, line down.
+    NotSent,
+    /// The drive answered that it will not.
+    Exception,
+    /// The drive's answer breaks its manual.
+    Answer,
+    /// Refused here, by what is known of the drive.
+    Refused,
+    /// Sent and not seen in the drive's words.
+    NotConfirmed,
+    /// The family cannot do it.
+    Unsupported,
+}
+
+impl Error {
+    /// Its kind.
+    #[must_use]
+    pub const fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Port { problem: PortError::OutcomeUnknown(_), .. } => ErrorKind::OutcomeUnknown,
+            Self::Port { problem, .. } if problem.nothing_sent() => ErrorKind::NotSent,
+            Self::Port { .. } => ErrorKind::NoAnswer,
+            Self::Exception { .. } => ErrorKind::Exception,
+            Self::Answer { .. } => ErrorKind::Answer,
+            Self::Unsupported { .. } => ErrorKind::Unsupported,
+            Self::TooManyWords { .. }
+            | Self::ValueNotAllowed { .. }
+            | Self::AccessForbidden { .. }
+            | Self::Setpoint { .. }
+            | Self::WatchdogTime { .. }
+            | Self::Refused { .. } => ErrorKind::Refused,
+            Self::NotConfirmed { .. } => ErrorKind::NotConfirmed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_1_to_247() {
+        assert!(SlaveAddress::try_from(0).is_err());
+        assert!(SlaveAddress::try_from(1).is_ok());
+        assert!(SlaveAddress::try_from(247).is_ok());
+        assert!(SlaveAddress::try_from(248).is_err());
+    }
+
+    #[test]
+    fn an_error_names_slave_register_and_reason() {
+        let slave = SlaveAddress::try_from(7).unwrap();
+        let error = Error::Exception {
+            slave,
+            exchange: Exchange { function: 6, register: Some(8501) },
+            code: 4,
+            meaning: ExceptionMeaning::Failed,
+        };
+        assert_eq!(
+            error.to_string(),
+            "slave 7, writing register 8501 (2135h): exception 04h, the drive could not complete it"
+        );
+    }
+}

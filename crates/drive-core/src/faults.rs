@@ -1,0 +1,80 @@
+//! Faults as the vendor lists them, in a form that a person can act on.
+
+use std::fmt;
+
+/// What is known of one fault code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FaultEntry {
+    /// The vendor's code.
+    pub code: u16,
+    /// The mnemonic on the keypad.
+    pub mnemonic: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+    /// What to do first.
+    pub remedy: &'static str,
+}
+
+impl FaultEntry {
+    /// A row of a family's fault table.
+    #[must_use]
+    pub const fn new(code: u16, mnemonic: &'static str, meaning: &'static str, remedy: &'static str) -> Self {
+        Self { code, mnemonic, meaning, remedy }
+    }
+}
+
+/// A fault that a drive reported: its number always, and what the manual says of it where it says something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Fault {
+    /// The vendor's code.
+    pub code: u16,
+    /// The manual's entry; `None` for a code that the manual does not list.
+    pub entry: Option<&'static FaultEntry>,
+}
+
+impl Fault {
+    /// The fault with this code, looked up in a family's table.
+    #[must_use]
+    pub fn lookup(table: &'static [FaultEntry], code: u16) -> Self {
+        Self { code, entry: table.iter().find(|entry| entry.code == code) }
+    }
+
+    /// The mnemonic, or `?` for a code that the manual does not list.
+    #[must_use]
+    pub fn mnemonic(&self) -> &'static str {
+        self.entry.map_or("?", |entry| entry.mnemonic)
+    }
+
+    /// The meaning, or a sentence that says that the manual has none.
+    #[must_use]
+    pub fn meaning(&self) -> &'static str {
+        self.entry.map_or("a code that the manual does not list", |entry| entry.meaning)
+    }
+
+    /// What to do first, where it is known.
+    #[must_use]
+    pub fn remedy(&self) -> Option<&'static str> {
+        self.entry.map(|entry| entry.remedy)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}: {}", self.code, self.mnemonic(), self.meaning())
+    }
+}
+
+/// The faults of a drive.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Faults {
+    /// The present faults. Most drives have at most one; the 3G3EV and the Altivar 58 report bits, so several can be
+    /// present at once.
+    pub present: Vec<Fault>,
+    /// The history, in the order in which the drive keeps it (its README says which end is the newest). Empty where
+    /// the family has none.
+    pub history: Vec<Fault>,
+    /// Alarms that do not trip.
+    pub warnings: Vec<Fault>,
+    /// Whether the drive says that a reset would be accepted; `None` where it does not say.
+    pub reset_allowed: Option<bool>,
+}

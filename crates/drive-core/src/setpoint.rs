@@ -1,0 +1,121 @@
+//! What is asked of a drive: direction, setpoint, stop mode.
+
+use std::fmt;
+
+use crate::units::{Frequency, Speed};
+
+/// Direction of rotation, as the drive names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// Forward.
+    Forward,
+    /// Reverse.
+    Reverse,
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Forward => "forward",
+            Self::Reverse => "reverse",
+        })
+    }
+}
+
+/// The setpoint: how fast, never which way. The direction is part of [`Drive::start`](crate::Drive::start).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Setpoint {
+    /// Output frequency.
+    Frequency(Frequency),
+    /// Motor speed, for drives that take one.
+    Speed(Speed),
+}
+
+impl From<Frequency> for Setpoint {
+    fn from(frequency: Frequency) -> Self {
+        Self::Frequency(frequency)
+    }
+}
+
+impl From<Speed> for Setpoint {
+    fn from(speed: Speed) -> Self {
+        Self::Speed(speed)
+    }
+}
+
+impl fmt::Display for Setpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Frequency(frequency) => frequency.fmt(f),
+            Self::Speed(speed) => speed.fmt(f),
+        }
+    }
+}
+
+/// How to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum StopMode {
+    /// Along the deceleration ramp.
+    Ramp,
+    /// Along the drive's short ramp.
+    Fast,
+    /// By cutting the output: the motor coasts.
+    Freewheel,
+    /// By injecting direct current.
+    DcInjection,
+}
+
+impl StopMode {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Ramp, Self::Fast, Self::Freewheel, Self::DcInjection];
+}
+
+impl fmt::Display for StopMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Ramp => "ramp",
+            Self::Fast => "fast",
+            Self::Freewheel => "freewheel",
+            Self::DcInjection => "DC injection",
+        })
+    }
+}
+
+/// A command, as errors and logs name it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// Start in a direction.
+    Start(Direction),
+    /// Stop.
+    Stop(StopMode),
+    /// Change the setpoint.
+    Setpoint(Setpoint),
+    /// Reset the present fault.
+    ResetFaults,
+    /// Give control back to the panel or the terminals.
+    Release,
+    /// Set up the drive's communication watchdog.
+    ArmWatchdog,
+    /// Write a parameter.
+    WriteParameter(u16),
+    /// Save the parameters to EEPROM.
+    Persist,
+    /// Set up something of the family's own, named here.
+    Configure(&'static str),
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Start(direction) => write!(f, "start {direction}"),
+            Self::Stop(mode) => write!(f, "stop by {mode}"),
+            Self::Setpoint(setpoint) => write!(f, "setpoint {setpoint}"),
+            Self::ResetFaults => f.write_str("fault reset"),
+            Self::Release => f.write_str("release"),
+            Self::ArmWatchdog => f.write_str("watchdog set-up"),
+            Self::WriteParameter(address) => write!(f, "parameter {address}"),
+            Self::Persist => f.write_str("save to EEPROM"),
+            Self::Configure(what) => f.write_str(what),
+        }
+    }
+}

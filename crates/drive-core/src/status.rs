@@ -1,0 +1,268 @@
+//! What a drive says of itself: [`Status`], the fast set that control and safety need, and [`Measurements`], the slow
+//! set.
+
+use std::{fmt, time::Duration};
+
+use crate::{
+    setpoint::{Direction, Setpoint},
+    units::{Current, Frequency, Percent, Power, Speed, Voltage},
+};
+
+/// The state of a drive, in terms that all families share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum State {
+    /// It cannot start now: initialising, undervoltage, or locked by something that is not a fault.
+    NotReady,
+    /// It stands, without output, and needs its start ladder first; [`Drive::start`](crate::Drive::start) climbs it.
+    Disabled,
+    /// It stands and takes a start at once.
+    Ready,
+    /// A run command is in force, whether it accelerates, holds its speed or changes it.
+    Running,
+    /// It is coming to a stop: no run command is in force and the output still turns the motor.
+    Stopping,
+    /// It is stopping or has stopped by its quick stop, and holds that state until it is told otherwise.
+    QuickStop,
+    /// It is reacting to a fault.
+    FaultReaction,
+    /// It has tripped. Nothing moves until the fault is reset.
+    Fault,
+    /// The words it sent are none that its manual explains; they stand in [`Status::raw`].
+    #[default]
+    Unknown,
+}
+
+impl State {
+    /// Whether it has tripped or is about to.
+    #[must_use]
+    pub const fn is_fault(self) -> bool {
+        matches!(self, Self::Fault | Self::FaultReaction)
+    }
+
+    /// Whether a run command is in force or the motor is still being driven.
+    #[must_use]
+    pub const fn is_moving(self) -> bool {
+        matches!(self, Self::Running | Self::Stopping | Self::QuickStop | Self::FaultReaction)
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::NotReady => "not ready",
+            Self::Disabled => "disabled",
+            Self::Ready => "ready",
+            Self::Running => "running",
+            Self::Stopping => "stopping",
+            Self::QuickStop => "quick stop",
+            Self::FaultReaction => "fault reaction",
+            Self::Fault => "fault",
+            Self::Unknown => "unknown",
+        })
+    }
+}
+
+/// Who commands the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Control {
+    /// This bus.
+    Bus,
+    /// The terminal strip.
+    Terminals,
+    /// The panel, built in or remote.
+    Panel,
+    /// The terminals or the panel: the drive does not say which.
+    Local,
+    /// Another bus, through another port of the drive.
+    OtherBus,
+}
+
+impl fmt::Display for Control {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Bus => "bus",
+            Self::Terminals => "terminals",
+            Self::Panel => "panel",
+            Self::Local => "local",
+            Self::OtherBus => "other bus",
+        })
+    }
+}
+
+/// One word as the drive sent it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RawWord {
+    /// Its address.
+    pub address: u16,
+    /// The manual's mnemonic.
+    pub code: &'static str,
+    /// The word.
+    pub value: u16,
+}
+
+/// The fast set: what control and safety need, in the fewest exchanges that the family's limits allow.
+///
+/// A field is `None` when the family has no such value or it cannot be known in these exchanges. Nothing is guessed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Status {
+    /// The state.
+    pub state: State,
+    /// The direction of the output, or of the run command where the drive only tells that.
+    pub direction: Option<Direction>,
+    /// The output frequency.
+    pub output_frequency: Option<Frequency>,
+    /// The motor current.
+    pub current: Option<Current>,
+    /// The motor current as a share of the drive's own base, where that is what the drive gives.
+    pub current_share: Option<Percent>,
+    /// Whether the output has reached the reference.
+    pub at_reference: Option<bool>,
+    /// Whether an alarm that does not trip is present.
+    pub warning: Option<bool>,
+    /// The vendor's code of the present fault, where the fast set holds it.
+    pub fault_code: Option<u16>,
+    /// Who commands the drive.
+    pub control: Option<Control>,
+    /// Every word that was read for this status.
+    pub raw: Vec<RawWord>,
+}
+
+impl Status {
+    /// The word read at `address`.
+    #[must_use]
+    pub fn raw(&self, address: u16) -> Option<u16> {
+        self.raw.iter().find(|word| word.address == address).map(|word| word.value)
+    }
+
+    /// Whether it has tripped or is about to.
+    #[must_use]
+    pub const fn is_fault(&self) -> bool {
+        self.state.is_fault()
+    }
+
+    /// Whether the drive itself shows that the motor is not driven: a state without motion, and an output of zero
+    /// where the drive tells one.
+    #[must_use]
+    pub fn is_standstill(&self) -> bool {
+        let turning = self.output_frequency.is_some_and(|frequency| frequency > Frequency::ZERO);
+        matches!(
+            self.state,
+            State::NotReady | State::Disabled | State::Ready | State::Fault | State::QuickStop
+        ) && !turning
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.state)?;
+        if let Some(direction) = self.direction {
+            write!(f, ", {direction}")?;
+        }
+        if let Some(frequency) = self.output_frequency {
+            write!(f, ", {frequency}")?;
+        }
+        if let Some(current) = self.current {
+            write!(f, ", {current}")?;
+        }
+        if let Some(share) = self.current_share {
+            write!(f, ", {share} current")?;
+        }
+        if self.at_reference == Some(true) {
+            f.write_str(", at reference")?;
+        }
+        if self.warning == Some(true) {
+            f.write_str(", warning")?;
+        }
+        if let Some(control) = self.control {
+            write!(f, ", control: {control}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The slow set: what a person or a trend wants to see.
+///
+/// `None` where the family has no such value.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Measurements {
+    /// The reference before the ramp.
+    pub reference: Option<Setpoint>,
+    /// The motor speed.
+    pub speed: Option<Speed>,
+    /// The output voltage.
+    pub output_voltage: Option<Voltage>,
+    /// The output voltage as a share of the drive's own base.
+    pub output_voltage_share: Option<Percent>,
+    /// The line voltage.
+    pub line_voltage: Option<Voltage>,
+    /// The DC bus voltage.
+    pub dc_bus_voltage: Option<Voltage>,
+    /// The DC bus voltage as a share of the drive's own base.
+    pub dc_bus_voltage_share: Option<Percent>,
+    /// The torque as a share of the nominal torque.
+    pub torque: Option<Percent>,
+    /// The power as a share of the nominal power.
+    pub power_share: Option<Percent>,
+    /// The power taken from the line.
+    pub input_power: Option<Power>,
+    /// The power given to the motor.
+    pub output_power: Option<Power>,
+    /// The thermal state of the drive; 100 % is nominal.
+    pub drive_thermal: Option<Percent>,
+    /// The thermal state of the motor; 100 % is nominal.
+    pub motor_thermal: Option<Percent>,
+    /// The load of the drive.
+    pub drive_load: Option<Percent>,
+    /// The load of the motor.
+    pub motor_load: Option<Percent>,
+    /// Energy counted at the input, in the drive's own counts where its manual names no unit.
+    pub input_energy: Option<u32>,
+    /// Energy counted at the output, in the drive's own counts where its manual names no unit.
+    pub output_energy: Option<u32>,
+    /// Hours with the motor running.
+    pub running_time: Option<Duration>,
+    /// Hours with the drive powered.
+    pub powered_time: Option<Duration>,
+    /// The logic inputs, bit by bit as the family's manual lists them.
+    pub inputs: Option<u16>,
+    /// The logic outputs, bit by bit as the family's manual lists them.
+    pub outputs: Option<u16>,
+    /// Every word that was read.
+    pub raw: Vec<RawWord>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tripped_drive_that_still_shows_an_output_is_not_at_standstill() {
+        let mut status = Status {
+            state: State::Fault,
+            output_frequency: Some(Frequency::from_hertz(3)),
+            ..Status::default()
+        };
+        assert!(!status.is_standstill());
+        status.output_frequency = Some(Frequency::ZERO);
+        assert!(status.is_standstill());
+    }
+
+    #[test]
+    fn an_unknown_state_is_never_taken_for_standstill() {
+        assert!(!Status::default().is_standstill());
+    }
+
+    #[test]
+    fn a_status_reads_as_a_sentence() {
+        let status = Status {
+            state: State::Running,
+            direction: Some(Direction::Reverse),
+            output_frequency: Some(Frequency::from_hertz(50)),
+            current: Some(Current::from_deciamperes(42)),
+            at_reference: Some(true),
+            control: Some(Control::Bus),
+            ..Status::default()
+        };
+        assert_eq!(status.to_string(), "running, reverse, 50.00 Hz, 4.2 A, at reference, control: bus");
+    }
+}

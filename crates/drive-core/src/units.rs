@@ -1,0 +1,198 @@
+//! Units as types: integers at the wire's own resolution, so that nothing is rounded on the way.
+
+use std::fmt;
+
+/// A frequency in hundredths of a hertz, without a sign: the direction is said apart.
+///
+/// ```
+/// use drive_core::Frequency;
+///
+/// assert_eq!(Frequency::from_hertz(50), Frequency::from_centihertz(5_000));
+/// assert_eq!(Frequency::from_centihertz(4_750).to_string(), "47.50 Hz");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Frequency(u32);
+
+impl Frequency {
+    /// Standstill.
+    pub const ZERO: Self = Self(0);
+
+    /// From hundredths of a hertz.
+    #[must_use]
+    pub const fn from_centihertz(centihertz: u32) -> Self {
+        Self(centihertz)
+    }
+
+    /// From tenths of a hertz, the resolution of most Altivar registers.
+    #[must_use]
+    pub const fn from_decihertz(decihertz: u16) -> Self {
+        Self(decihertz as u32 * 10)
+    }
+
+    /// From whole hertz.
+    #[must_use]
+    pub const fn from_hertz(hertz: u16) -> Self {
+        Self(hertz as u32 * 100)
+    }
+
+    /// In hundredths of a hertz.
+    #[must_use]
+    pub const fn centihertz(self) -> u32 {
+        self.0
+    }
+
+    /// In tenths of a hertz, if it is a whole number of them and fits a signed word; a setpoint that the register
+    /// cannot hold is not rounded.
+    #[must_use]
+    pub const fn exact_decihertz(self) -> Option<u16> {
+        if self.0.is_multiple_of(10) && self.0 / 10 <= i16::MAX as u32 {
+            Some((self.0 / 10) as u16)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for Frequency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{:02} Hz", self.0 / 100, self.0 % 100)
+    }
+}
+
+/// A speed in revolutions per minute, without a sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Speed(u32);
+
+impl Speed {
+    /// From revolutions per minute.
+    #[must_use]
+    pub const fn from_rpm(rpm: u32) -> Self {
+        Self(rpm)
+    }
+
+    /// In revolutions per minute.
+    #[must_use]
+    pub const fn rpm(self) -> u32 {
+        self.0
+    }
+}
+
+impl fmt::Display for Speed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} rpm", self.0)
+    }
+}
+
+/// Declares a unit that is an integer with a fixed number of decimals.
+macro_rules! decimal_unit {
+    ($(#[$meta:meta])* $name:ident($inner:ty), $from:ident, $to:ident, $decimals:literal, $symbol:literal) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+        pub struct $name($inner);
+
+        impl $name {
+            #[doc = concat!("From the integer that counts its smallest step; prints with ", $decimals, " decimals in ", $symbol, ".")]
+            #[must_use]
+            pub const fn $from(value: $inner) -> Self {
+                Self(value)
+            }
+
+            /// As the integer that counts its smallest step.
+            #[must_use]
+            pub const fn $to(self) -> $inner {
+                self.0
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write_decimal(f, i64::from(self.0), $decimals)?;
+                f.write_str(concat!(" ", $symbol))
+            }
+        }
+    };
+}
+
+decimal_unit! {
+    /// A current in tenths of an ampere.
+    Current(u32), from_deciamperes, deciamperes, 1, "A"
+}
+decimal_unit! {
+    /// A voltage in tenths of a volt.
+    Voltage(u32), from_decivolts, decivolts, 1, "V"
+}
+decimal_unit! {
+    /// A share in hundredths of a percent, signed (torque has a direction).
+    Percent(i32), from_hundredths, hundredths, 2, "%"
+}
+decimal_unit! {
+    /// A power in tens of watts (0.01 kW).
+    Power(i32), from_decawatts, decawatts, 2, "kW"
+}
+
+impl Percent {
+    /// From whole percents.
+    #[must_use]
+    pub const fn from_percent(percent: i16) -> Self {
+        Self(percent as i32 * 100)
+    }
+}
+
+/// Writes `value` × 10^-`decimals` without passing through a float.
+pub(crate) fn write_decimal(f: &mut impl fmt::Write, value: i64, decimals: u8) -> fmt::Result {
+    let scale = 10_u64.pow(u32::from(decimals));
+    let magnitude = value.unsigned_abs();
+    if value < 0 {
+        f.write_char('-')?;
+    }
+    if decimals == 0 {
+        return write!(f, "{magnitude}");
+    }
+    write!(f, "{}.{:0width$}", magnitude / scale, magnitude % scale, width = usize::from(decimals))
+}
+
+/// Reads a decimal number as an integer of `decimals` places; `None` when it is none or has more places.
+pub(crate) fn read_decimal(text: &str, decimals: u8) -> Option<i64> {
+    let (negative, digits) = match text.strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text),
+    };
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    let decimals = usize::from(decimals);
+    let only_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
+    if whole.is_empty() || fraction.len() > decimals || !only_digits(whole) || !only_digits(fraction) {
+        return None;
+    }
+    let value: i64 = format!("{whole}{fraction:0<decimals$}").parse().ok()?;
+    Some(if negative { -value } else { value })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_prints_with_its_decimals_and_its_sign() {
+        assert_eq!(Current::from_deciamperes(23).to_string(), "2.3 A");
+        assert_eq!(Percent::from_hundredths(-5).to_string(), "-0.05 %");
+        assert_eq!(Percent::from_percent(-118).to_string(), "-118.00 %");
+        assert_eq!(Power::from_decawatts(75).to_string(), "0.75 kW");
+    }
+
+    #[test]
+    fn a_frequency_that_tenths_cannot_hold_is_not_rounded() {
+        assert_eq!(Frequency::from_centihertz(1_234).exact_decihertz(), None);
+        assert_eq!(Frequency::from_centihertz(1_230).exact_decihertz(), Some(123));
+        assert_eq!(Frequency::from_centihertz(u32::MAX / 10 * 10).exact_decihertz(), None);
+    }
+
+    #[test]
+    fn a_decimal_reads_back_and_rejects_what_it_cannot_hold() {
+        assert_eq!(read_decimal("50", 1), Some(500));
+        assert_eq!(read_decimal("-50.5", 1), Some(-505));
+        assert_eq!(read_decimal("50.55", 1), None);
+        for text in ["", "-", ".5", "5,0", "+5", "1e3", "99999999999999999999"] {
+            assert_eq!(read_decimal(text, 1), None, "{text}");
+        }
+    }
+}
