@@ -1,0 +1,1 @@
+//! The simulated drives, one module a family.
