@@ -1,0 +1,203 @@
+//! Register tables: one register, one row, with its source; typed constants made from the same rows.
+//!
+//! A family lists its registers once with [`registers!`](crate::registers!). The rows serve the drive, its
+//! simulator and the program's parameter commands, so the three cannot disagree.
+//!
+//! ```
+//! use drive_core::registers;
+//!
+//! registers! {
+//!     /// The registers of a drive with two of them.
+//!     pub const ROWS;
+//!
+//!     ETA: Read(3201, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
+//!     ACC: ReadWrite(9001, "ACC", "acceleration", RamUntilSaved, Unit::scaled("s", 1), Range::Within(1, 32_760), Factory::Value(30), Elsewhere, "BBV51701 p. 38");
+//! }
+//!
+//! assert_eq!(ROWS.len(), 2);
+//! assert_eq!(ACC.row().unit.show(30), "3.0 s");
+//! ```
+//!
+//! Two rows with one address do not compile:
+//!
+//! ```compile_fail
+//! use drive_core::registers;
+//!
+//! registers! {
+//!     /// Twice the same address.
+//!     pub const ROWS;
+//!
+//!     ETA: Read(3201, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "p. 21");
+//!     ETB: Read(3201, "ETB", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "p. 21");
+//! }
+//! ```
+//!
+//! Nor does writing a register that can only be read, because [`Registers::write`](crate::Registers::write) takes
+//! a `Register<impl Writable>`:
+//!
+//! ```compile_fail
+//! use drive_core::{registers, registers::{Register, access::Writable}};
+//!
+//! registers! {
+//!     /// One register.
+//!     pub const ROWS;
+//!
+//!     ETA: Read(3201, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "p. 21");
+//! }
+//!
+//! fn write(_: Register<impl Writable>) {}
+//! write(ETA);
+//! ```
+
+pub mod access;
+mod row;
+mod unit;
+
+use std::{fmt, marker::PhantomData};
+
+pub use access::Access;
+pub use row::{Choice, Confidence, Factory, Range, Row, Storage};
+pub use unit::{Form, Unit};
+
+/// A register with its access in its type.
+pub struct Register<A> {
+    row: &'static Row,
+    access: PhantomData<fn() -> A>,
+}
+
+impl<A: access::Kind> Register<A> {
+    /// Made by [`registers!`](crate::registers!).
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn new(row: &'static Row) -> Self {
+        Self { row, access: PhantomData }
+    }
+
+    /// Everything that is known of it.
+    #[must_use]
+    pub const fn row(self) -> &'static Row {
+        self.row
+    }
+
+    /// The address on the wire.
+    #[must_use]
+    pub const fn address(self) -> u16 {
+        self.row.address
+    }
+}
+
+impl<A> Clone for Register<A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for Register<A> {}
+
+impl<A> fmt::Debug for Register<A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.row.code, self.row.address)
+    }
+}
+
+/// Fails the build when two rows have one address. Called by [`registers!`](crate::registers!).
+#[doc(hidden)]
+pub const fn assert_addresses_differ(rows: &[Row]) {
+    let mut left = 0;
+    while left < rows.len() {
+        let mut right = left + 1;
+        while right < rows.len() {
+            assert!(rows[left].address != rows[right].address, "two rows have one address");
+            right += 1;
+        }
+        left += 1;
+    }
+}
+
+/// Declares the registers of a family: a typed constant for each row, and a slice of all rows.
+///
+/// A row is `CONSTANT: Access(address, mnemonic, name, Storage, unit, range, factory, Confidence, source);` with the
+/// variants of [`Access`](crate::registers::Access), [`Storage`](crate::registers::Storage) and
+/// [`Confidence`](crate::registers::Confidence) by their bare names. See the [module](crate::registers) for examples.
+#[macro_export]
+macro_rules! registers {
+    (
+        $(#[$rows_meta:meta])*
+        $visibility:vis const $rows:ident;
+        $(
+            $(#[$meta:meta])*
+            $constant:ident: $access:ident(
+                $address:expr, $code:expr, $name:expr, $storage:ident, $unit:expr, $range:expr, $factory:expr,
+                $confidence:ident, $source:expr $(,)?
+            );
+        )*
+    ) => {
+        $(
+            #[doc = concat!("`", $code, "`, ", $name, " (", $source, ").")]
+            $(#[$meta])*
+            $visibility const $constant: $crate::registers::Register<$crate::registers::access::$access> = {
+                #[allow(unused_imports)]
+                use $crate::registers::{Factory, Range, Unit};
+                $crate::registers::Register::new(&$crate::registers::Row {
+                    address: $address,
+                    code: $code,
+                    name: $name,
+                    access: $crate::registers::Access::$access,
+                    storage: $crate::registers::Storage::$storage,
+                    unit: $unit,
+                    range: $range,
+                    factory: $factory,
+                    confidence: $crate::registers::Confidence::$confidence,
+                    source: $source,
+                })
+            };
+        )*
+
+        $(#[$rows_meta])*
+        $visibility const $rows: &[$crate::registers::Row] = &[$(*$constant.row()),*];
+
+        const _: () = $crate::registers::assert_addresses_differ($rows);
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIST: &[Choice] = &[Choice::new(0, "nO", "ignored"), Choice::new(1, "YES", "freewheel")];
+
+    registers! {
+        /// Rows for these tests.
+        pub(crate) const ROWS;
+
+        RFR: Read(3202, "rFr", "output frequency", Volatile, Unit::scaled("Hz", 1).signed(), Range::Any, Factory::None, Elsewhere, "p. 21");
+        SLL: WriteStopped(7010, "SLL", "reaction to SLF", RamUntilSaved, Unit::CODE, Range::OneOf(LIST), Factory::Value(1), Elsewhere, "p. 53");
+    }
+
+    #[test]
+    fn a_row_is_found_by_mnemonic_decimal_or_hexadecimal_address() {
+        for text in ["rFr", "3202", "W3202", "0C82h"] {
+            assert_eq!(Row::find(ROWS, text), Some(RFR.row()), "{text}");
+        }
+        assert_eq!(Row::find(ROWS, "RFR"), None);
+    }
+
+    #[test]
+    fn a_word_is_shown_in_its_unit_and_read_back() {
+        let unit = RFR.row().unit;
+        assert_eq!(unit.show(0xFE0C), "-50.0 Hz");
+        for text in ["-50", "-50.0", "-50.0 Hz", "-50.0Hz", "FE0Ch", "0xFE0C"] {
+            assert_eq!(unit.read(text), Some(0xFE0C), "{text}");
+        }
+        for text in ["50.05", "4000", "Hz", "", "h", "0x", "12345h"] {
+            assert_eq!(unit.read(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_listed_value_is_shown_with_its_meaning_and_read_by_its_mnemonic() {
+        assert_eq!(SLL.row().show(1), "1 YES (freewheel)");
+        assert_eq!(SLL.row().read("YES"), Some(1));
+        assert!(!SLL.row().range.allows(2));
+    }
+}

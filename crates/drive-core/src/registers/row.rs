@@ -1,0 +1,172 @@
+//! One register: everything that is known of it, and from where.
+
+use std::fmt;
+
+use super::{access::Access, unit::Unit};
+
+/// Where a written value lives, and so what a power cycle and a write cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// Lost at power-off: commands, references, monitored values.
+    Volatile,
+    /// Taken at once in RAM and lost at power-off, unless the drive is told to save its parameters to EEPROM.
+    RamUntilSaved,
+    /// Each write goes to EEPROM, whose life is counted in writes.
+    Eeprom,
+    /// The manual does not say; treat each write as one to EEPROM.
+    Unknown,
+}
+
+impl fmt::Display for Storage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Volatile => "RAM",
+            Self::RamUntilSaved => "RAM until saved",
+            Self::Eeprom => "EEPROM",
+            Self::Unknown => "unknown",
+        })
+    }
+}
+
+/// One value of a list-type register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Choice {
+    /// The word.
+    pub value: u16,
+    /// The manual's mnemonic, as the keypad shows it.
+    pub code: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+impl Choice {
+    /// A value of a list.
+    #[must_use]
+    pub const fn new(value: u16, code: &'static str, meaning: &'static str) -> Self {
+        Self { value, code, meaning }
+    }
+}
+
+/// Which words a register takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Range {
+    /// The manual gives no range (bit words, monitored values).
+    Any,
+    /// From and to, in counts.
+    Within(i32, i32),
+    /// Only the values of a list.
+    OneOf(&'static [Choice]),
+    /// The values of a list, or a number from and to.
+    OneOfOr(&'static [Choice], i32, i32),
+    /// From and to in counts as far as they are fixed, and the rest of the rule in words ("LSP to tFr"): the drive
+    /// itself judges.
+    Described(i32, i32, &'static str),
+}
+
+impl Range {
+    /// Whether `number` can be taken at all. For [`Range::Described`] the drive has the last word.
+    #[must_use]
+    pub fn allows(self, number: i32) -> bool {
+        let listed = |choices: &[Choice]| choices.iter().any(|choice| i32::from(choice.value) == number);
+        match self {
+            Self::Any => true,
+            Self::Within(min, max) | Self::Described(min, max, _) => (min..=max).contains(&number),
+            Self::OneOf(choices) => listed(choices),
+            Self::OneOfOr(choices, min, max) => listed(choices) || (min..=max).contains(&number),
+        }
+    }
+
+    /// The listed values, if there are any.
+    #[must_use]
+    pub const fn choices(self) -> &'static [Choice] {
+        match self {
+            Self::OneOf(choices) | Self::OneOfOr(choices, _, _) => choices,
+            Self::Any | Self::Within(..) | Self::Described(..) => &[],
+        }
+    }
+}
+
+/// The factory setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Factory {
+    /// There is none (monitored values), or the manual prints none.
+    None,
+    /// The word.
+    Value(u16),
+    /// A rule in words ("0.7 In").
+    Described(&'static str),
+}
+
+/// How sure a fact is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Confidence {
+    /// Printed in the drive's communication manual.
+    Manual,
+    /// Not there, but confirmed by another public document or by a program used in production.
+    Elsewhere,
+}
+
+/// One register: everything that is known of it, and from where.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Row {
+    /// The address on the wire.
+    pub address: u16,
+    /// The manual's mnemonic.
+    pub code: &'static str,
+    /// What it is, in plain English.
+    pub name: &'static str,
+    /// Who may write it.
+    pub access: Access,
+    /// Where a written value lives.
+    pub storage: Storage,
+    /// What a count means.
+    pub unit: Unit,
+    /// Which values it takes.
+    pub range: Range,
+    /// The factory setting.
+    pub factory: Factory,
+    /// How sure the row is.
+    pub confidence: Confidence,
+    /// Document and page or section.
+    pub source: &'static str,
+}
+
+impl Row {
+    /// The listed value that `word` stands for, if the register has a list and the word is on it.
+    #[must_use]
+    pub fn choice(&self, word: u16) -> Option<&'static Choice> {
+        self.range.choices().iter().find(|choice| choice.value == word)
+    }
+
+    /// The word as a person reads it, with the meaning of a listed value.
+    #[must_use]
+    pub fn show(&self, word: u16) -> String {
+        match self.choice(word) {
+            Some(choice) if choice.meaning.is_empty() => format!("{word} {}", choice.code),
+            Some(choice) => format!("{word} {} ({})", choice.code, choice.meaning),
+            None => self.unit.show(word),
+        }
+    }
+
+    /// The word that a person's text means for this register: a number in its unit, a hexadecimal word, or the
+    /// mnemonic of a listed value. `None` when it is none of them.
+    #[must_use]
+    pub fn read(&self, text: &str) -> Option<u16> {
+        let text = text.trim();
+        let listed = self.range.choices().iter().find(|choice| choice.code == text);
+        listed.map(|choice| choice.value).or_else(|| self.unit.read(text))
+    }
+
+    /// The row whose mnemonic or decimal or hexadecimal address is `text`.
+    #[must_use]
+    pub fn find(rows: &'static [Self], text: &str) -> Option<&'static Self> {
+        let by_code = rows.iter().find(|row| row.code == text);
+        by_code.or_else(|| {
+            let address = match text.strip_suffix(['h', 'H']) {
+                Some(digits) => u16::from_str_radix(digits, 16).ok()?,
+                None => text.strip_prefix('W').unwrap_or(text).parse().ok()?,
+            };
+            rows.iter().find(|row| row.address == address)
+        })
+    }
+}
