@@ -7,13 +7,15 @@ use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 
 use crate::{
     capabilities::Capabilities,
-    drive::Identity,
+    drive::{Identity, Written},
     error::{Error, ExceptionMeaning, Exchange, Result, SlaveAddress},
     port::{Class, Effect, Port, PortError, Terms},
     registers::{
         Register, Row,
         access::{Readable, Writable},
     },
+    setpoint::Command,
+    status::{RawWord, Status},
 };
 
 /// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
@@ -228,15 +230,34 @@ impl<P: Port> Calls<'_, P> {
     /// # Errors
     /// Also [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`]; nothing is sent then.
     pub async fn write_row(&mut self, row: &Row, word: u16) -> Result<()> {
-        if !row.access.is_writable() {
-            return Err(self.access_forbidden(row));
-        }
-        let value = row.unit.number(word);
-        if !row.range.allows(value) {
-            let slave = self.registers.slave;
-            return Err(Error::ValueNotAllowed { slave, register: row.address, code: row.code, value });
-        }
+        self.check_row(row, word)?;
         self.write_word(row.address, word).await
+    }
+
+    /// Writes the register of a row as a parameter: reads it first, leaves an equal value alone, and reads back what it
+    /// wrote.
+    ///
+    /// # Errors
+    /// Also [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`] before anything is sent, and
+    /// [`Error::NotConfirmed`] when it reads back otherwise; the status of that error holds the word and nothing else.
+    pub async fn change_row(&mut self, row: &Row, word: u16) -> Result<Written> {
+        self.check_row(row, word)?;
+        if row.access.is_readable() && self.read_row(row).await? == word {
+            return Ok(Written { changed: false, storage: row.storage });
+        }
+        self.write_word(row.address, word).await?;
+        let written = Written { changed: true, storage: row.storage };
+        if !row.access.is_readable() {
+            return Ok(written);
+        }
+        let value = self.read_row(row).await?;
+        if value == word {
+            return Ok(written);
+        }
+        let raw = vec![RawWord { address: row.address, code: row.code, value }];
+        let status = Box::new(Status { raw, ..Status::default() });
+        let command = Command::WriteParameter(row.address);
+        Err(Error::NotConfirmed { slave: self.registers.slave, command, status })
     }
 
     /// Sends `data` round by function 08, sub-function 00, and checks that it comes back: the cheapest proof that the
@@ -287,6 +308,18 @@ impl<P: Port> Calls<'_, P> {
 
     const fn port_error(&self, exchange: Exchange, problem: PortError) -> Error {
         Error::Port { slave: self.registers.slave, exchange, problem }
+    }
+
+    fn check_row(&self, row: &Row, word: u16) -> Result<()> {
+        if !row.access.is_writable() {
+            return Err(self.access_forbidden(row));
+        }
+        let value = row.unit.number(word);
+        if !row.range.allows(value) {
+            let slave = self.registers.slave;
+            return Err(Error::ValueNotAllowed { slave, register: row.address, code: row.code, value });
+        }
+        Ok(())
     }
 
     const fn access_forbidden(&self, row: &Row) -> Error {
