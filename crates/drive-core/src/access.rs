@@ -8,7 +8,7 @@ use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 use crate::{
     capabilities::Capabilities,
     drive::{Identity, Written},
-    error::{Error, ExceptionMeaning, Exchange, Result, SlaveAddress},
+    error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
     port::{Class, Effect, Port, PortError, Terms},
     registers::{
         Register, Row,
@@ -245,10 +245,16 @@ impl<P: Port> Calls<'_, P> {
         if row.access.is_readable() && self.read_row(row).await? == word {
             return Ok(Written { changed: false, storage: row.storage });
         }
-        self.write_word(row.address, word).await?;
+        let outcome = self.write_word(row.address, word).await;
         let written = Written { changed: true, storage: row.storage };
         if !row.access.is_readable() {
-            return Ok(written);
+            return outcome.map(|()| written);
+        }
+        // Whether an ambiguous write arrived, the reading tells.
+        if let Err(error) = outcome
+            && error.kind() != ErrorKind::OutcomeUnknown
+        {
+            return Err(error);
         }
         let value = self.read_row(row).await?;
         if value == word {

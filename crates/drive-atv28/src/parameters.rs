@@ -1,0 +1,93 @@
+//! Setpoints and parameters.
+
+use drive_core::{Class, Error, Frequency, Port, Result, Row, Setpoint, SetpointProblem, Speed, Written};
+
+use crate::{
+    Atv28,
+    registers::{CMD, CMDD, HSP, LFR, LFRD, LSP, SMIL_LOW},
+};
+
+/// The drive's own limits, read when the first setpoint needs them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Limits {
+    frequency: Option<(Frequency, Frequency)>,
+    speed: Option<(Speed, Speed)>,
+}
+
+impl<P: Port> Atv28<P> {
+    pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        let (register, word) = match setpoint {
+            Setpoint::Frequency(frequency) => (LFR, self.frequency_word(frequency).await?),
+            Setpoint::Speed(speed) => (LFRD, self.speed_word(speed).await?),
+        };
+        let mut calls = self.registers.at(Class::Command).replacing(register.address());
+        calls.write(register, word).await
+    }
+
+    async fn frequency_word(&mut self, frequency: Frequency) -> Result<u16> {
+        let setpoint = Setpoint::Frequency(frequency);
+        if !frequency.centihertz().is_multiple_of(10) {
+            return Err(self.setpoint(setpoint, SetpointProblem::Resolution("0.1 Hz")));
+        }
+        let word = frequency.exact_decihertz();
+        let word = word.ok_or_else(|| self.setpoint(setpoint, SetpointProblem::TooLarge))?;
+        let (low, high) = self.frequency_limits().await?;
+        if frequency < low || frequency > high {
+            return Err(self.setpoint(setpoint, SetpointProblem::OutsideFrequencyLimits { low, high }));
+        }
+        Ok(word)
+    }
+
+    async fn speed_word(&mut self, speed: Speed) -> Result<u16> {
+        let setpoint = Setpoint::Speed(speed);
+        let word = i16::try_from(speed.rpm()).map(i16::cast_unsigned);
+        let word = word.map_err(|_| self.setpoint(setpoint, SetpointProblem::TooLarge))?;
+        let (low, high) = self.speed_limits().await?;
+        if speed < low || speed > high {
+            return Err(self.setpoint(setpoint, SetpointProblem::OutsideSpeedLimits { low, high }));
+        }
+        Ok(word)
+    }
+
+    /// LSP and HSP, which stand side by side.
+    async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
+        if let Some(limits) = self.limits.frequency {
+            return Ok(limits);
+        }
+        let words = self.registers.at(Class::Command).read_words(HSP.address(), 2).await?;
+        let word = |at: u16| words.get(usize::from(at - HSP.address())).copied().unwrap_or(0);
+        let frequency = |at| Frequency::from_decihertz(word(at));
+        let limits = (frequency(LSP.address()), frequency(HSP.address()));
+        self.limits.frequency = Some(limits);
+        Ok(limits)
+    }
+
+    /// SMIL and SMAL, each of two words, the low one first.
+    async fn speed_limits(&mut self) -> Result<(Speed, Speed)> {
+        if let Some(limits) = self.limits.speed {
+            return Ok(limits);
+        }
+        let words = self.registers.at(Class::Command).read_words(SMIL_LOW.address(), 4).await?;
+        let double =
+            |at: usize| words.iter().skip(at).take(2).rev().fold(0, |all, &word| all << 16 | u32::from(word));
+        let limits = (Speed::from_rpm(double(0)), Speed::from_rpm(double(2)));
+        self.limits.speed = Some(limits);
+        Ok(limits)
+    }
+
+    pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        if [CMD.address(), CMDD.address()].contains(&row.address) {
+            return Err(Error::Unsupported {
+                what: "writing a control word as a parameter",
+                reason: "start, stop and fault reset check the drive first; use them",
+            });
+        }
+        // HSP, LSP, nominal values: limits that were read once may change with it.
+        self.limits = Limits::default();
+        self.registers.at(Class::Background).change_row(row, word).await
+    }
+
+    const fn setpoint(&self, setpoint: Setpoint, problem: SetpointProblem) -> Error {
+        Error::Setpoint { slave: self.registers.slave(), setpoint, problem }
+    }
+}

@@ -1,0 +1,162 @@
+//! Reading the mapped words, and what they say.
+
+use drive_core::{
+    Calls, Class, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
+    Setpoint, State, Status, Voltage, drivecom::ChartState,
+};
+
+use crate::{
+    Atv58, Atv58Map, CAPABILITIES, ROWS,
+    registers::{CMD, W483},
+    words::FaultRegister,
+};
+
+/// Words as they were read, each with its address.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Words {
+    words: Vec<RawWord>,
+}
+
+impl Words {
+    /// Reads these words: in one request from the lowest to the highest where the limit of words allows it, else one by
+    /// one.
+    pub(crate) async fn read<P: Port>(calls: &mut Calls<'_, P>, addresses: &[u16]) -> Result<Self> {
+        let mut words = Self::default();
+        let (Some(&first), Some(&last)) = (addresses.iter().min(), addresses.iter().max()) else {
+            return Ok(words);
+        };
+        if last - first < CAPABILITIES.read_words {
+            words.append(calls, first, last - first + 1).await?;
+        } else {
+            for &address in addresses {
+                words.append(calls, address, 1).await?;
+            }
+        }
+        Ok(words)
+    }
+
+    /// Reads `count` more words from `first` on.
+    pub(crate) async fn append<P: Port>(
+        &mut self,
+        calls: &mut Calls<'_, P>,
+        first: u16,
+        count: u16,
+    ) -> Result<()> {
+        let values = calls.read_words(first, count).await?;
+        let words = (first..=u16::MAX).zip(values);
+        self.words.extend(words.map(|(address, value)| RawWord { address, code: code(address), value }));
+        Ok(())
+    }
+
+    pub(crate) fn at(&self, address: Option<u16>) -> Option<u16> {
+        self.words.iter().find(|word| Some(word.address) == address).map(|word| word.value)
+    }
+
+    pub(crate) fn eta(&self, map: &Atv58Map) -> u16 {
+        self.at(Some(map.status)).unwrap_or(0)
+    }
+
+    pub(crate) fn chart(&self, map: &Atv58Map) -> Option<ChartState> {
+        ChartState::of(self.eta(map))
+    }
+
+    pub(crate) fn is_tripped(&self, map: &Atv58Map) -> bool {
+        matches!(self.chart(map), Some(ChartState::Fault | ChartState::FaultReactionActive))
+    }
+
+    /// Whether the output turns the motor, where a word tells it.
+    pub(crate) fn is_turning(&self, map: &Atv58Map) -> bool {
+        self.at(map.output_frequency).is_some_and(|word| word != 0)
+    }
+
+    pub(crate) fn control(&self, map: &Atv58Map) -> Option<Control> {
+        // While local control is not forced, nothing tells whether the line commands or the terminals.
+        (self.flag(map, map.remote) == Some(false)).then_some(Control::Local)
+    }
+
+    pub(crate) fn status(&self, map: &Atv58Map) -> Status {
+        let reverse = self.flag(map, map.reverse_status);
+        Status {
+            state: self.state(map),
+            direction: reverse.map(|reverse| if reverse { Direction::Reverse } else { Direction::Forward }),
+            output_frequency: self
+                .at(map.output_frequency)
+                .map(|word| Frequency::from_decihertz(word.cast_signed().unsigned_abs())),
+            current: self.at(map.current).map(|word| Current::from_deciamperes(u32::from(word))),
+            current_share: None,
+            at_reference: self.flag(map, map.at_reference),
+            warning: self.flag(map, map.alarm),
+            fault_code: self
+                .at(Some(W483.address()))
+                .filter(|_| self.is_tripped(map))
+                .and_then(|word| FaultRegister(word).bits().next()),
+            control: self.control(map),
+            raw: self.words.clone(),
+        }
+    }
+
+    pub(crate) fn measurements(self, map: &Atv58Map) -> Measurements {
+        let percent = |word: u16| Percent::from_hundredths(i32::from(word) * 100);
+        let reference = |word: u16| Setpoint::Frequency(Frequency::from_decihertz(word));
+        Measurements {
+            reference: self.at(map.reference).map(reference),
+            line_voltage: self.at(map.line_voltage).map(|word| Voltage::from_decivolts(u32::from(word))),
+            drive_thermal: self.at(map.drive_thermal).map(percent),
+            motor_thermal: self.at(map.motor_thermal).map(percent),
+            raw: self.words,
+            ..Measurements::default()
+        }
+    }
+
+    fn flag(&self, map: &Atv58Map, mask: u16) -> Option<bool> {
+        (mask != 0).then(|| self.eta(map) & mask != 0)
+    }
+
+    fn state(&self, map: &Atv58Map) -> State {
+        match self.chart(map) {
+            None => State::Unknown,
+            Some(ChartState::NotReadyToSwitchOn) => State::NotReady,
+            Some(ChartState::SwitchOnDisabled | ChartState::ReadyToSwitchOn) => State::Disabled,
+            Some(ChartState::SwitchedOn) if self.is_turning(map) => State::Stopping,
+            Some(ChartState::SwitchedOn) => State::Ready,
+            Some(ChartState::OperationEnabled) => self.enabled(map),
+            Some(ChartState::QuickStopActive) => State::QuickStop,
+            Some(ChartState::FaultReactionActive) => State::FaultReaction,
+            Some(ChartState::Fault) => State::Fault,
+        }
+    }
+
+    /// In the state "operation enabled" a run command is in force, unless the control word was read with these words and
+    /// is the ramp stop.
+    fn enabled(&self, map: &Atv58Map) -> State {
+        let stop = self.at(Some(CMD.address())).filter(|command| Some(*command) == map.ramp_stop);
+        match stop {
+            Some(_) if self.is_turning(map) => State::Stopping,
+            Some(_) => State::Ready,
+            None => State::Running,
+        }
+    }
+}
+
+impl<P: Port> Atv58<P> {
+    pub(crate) async fn read_words(&mut self, class: Class) -> Result<Words> {
+        let map = self.map;
+        let addresses: Vec<u16> =
+            [Some(map.status), map.output_frequency, map.current].into_iter().flatten().collect();
+        let mut calls = self.registers.at(class);
+        let mut words = Words::read(&mut calls, &addresses).await?;
+        if words.is_tripped(&map) {
+            words.append(&mut calls, W483.address(), 1).await?;
+        }
+        Ok(words)
+    }
+
+    pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
+        Ok(self.read_words(class).await?.status(&self.map))
+    }
+}
+
+fn code(address: u16) -> &'static str {
+    let row: Option<&Row> = ROWS.iter().find(|row| row.address == address);
+    row.map_or("?", |row| row.code)
+}
