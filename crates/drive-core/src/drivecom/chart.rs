@@ -1,8 +1,4 @@
-//! The DRIVECOM state chart that the Altivar 28, 58 and 312 share, from the master's side: status word to state, and
-//! state and goal to the next control word (BBV51701 p. 10–13). Pure functions.
-//!
-//! The chart's control word is a level: writing a step twice does what writing it once does, so a ladder can be
-//! climbed again after an answer was lost.
+//! The chart itself, as pure functions.
 
 /// A state of the chart, from the status word ETA under the mask 006Fh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

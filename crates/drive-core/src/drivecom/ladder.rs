@@ -1,0 +1,297 @@
+//! Commands carried through the chart: write a step, read the status, go on from what it says.
+
+use async_trait::async_trait;
+
+use super::chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, Goal, Step, next_step};
+use crate::{
+    error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
+    port::{Class, Effect},
+    setpoint::{Command, Direction, StopMode},
+    status::{State, Status},
+};
+
+/// How often the status is read for a command to show before it counts as not confirmed. There is no clock here: the
+/// line's own pace makes a time of it.
+pub const CONFIRMING_READS: usize = 20;
+
+/// A drive that follows the chart, as the sequences see it.
+///
+/// # For implementors
+/// The status that [`read_status`](Self::read_status) returns **must** hold the status word, at the address
+/// [`ETA`](Self::ETA), among its raw words. [`write_control`](Self::write_control) writes the control word to the
+/// drive's `CMD` and nothing else.
+#[async_trait]
+pub trait Drivecom: Send {
+    /// The address of the status word in [`Status::raw`].
+    const ETA: u16;
+
+    /// The slave, for errors.
+    fn address(&self) -> SlaveAddress;
+
+    /// Reads the fast set in this class.
+    async fn read_status(&mut self, class: Class) -> Result<Status>;
+
+    /// Writes the control word in this class.
+    async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()>;
+
+    /// Why this drive is not to be started, from a fresh status: local control, a forbidden direction, settings. That
+    /// it has not tripped and is in a known state is checked apart. May read more of the drive.
+    async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>>;
+
+    /// Whether the drive shows that it took the run command `word`, in the state operation enabled. May read more of
+    /// the drive, and add to the status what it read.
+    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool>;
+}
+
+/// The state of the chart in a status; `None` for a pattern that the manual's table does not have.
+fn chart_of<D: Drivecom>(status: &Status) -> Option<ChartState> {
+    status.raw(D::ETA).and_then(ChartState::of)
+}
+
+/// Climbs to operation enabled and gives the run command `word`, which must hold the bits of
+/// [`ENABLE_OPERATION`]; the direction and the family's other bits stand above them.
+///
+/// # Errors
+/// [`Error::Refused`] before anything is written, or when a fault appears on the way;
+/// [`Error::NotConfirmed`] when the drive does not show the run command within [`CONFIRMING_READS`] reads.
+pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) -> Result<Status> {
+    let command = Command::Start(direction);
+    let slave = drive.address();
+    let refused = |reason| Error::Refused { slave, command, reason };
+
+    let mut status = drive.read_status(Class::Command).await?;
+    // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
+    match chart_of::<D>(&status) {
+        None => return Err(refused(Refusal::State(State::Unknown))),
+        Some(state) if next_step(state, Goal::OperationEnabled) == Step::Faulted => {
+            return Err(refused(tripped(&status)));
+        }
+        Some(_) => {}
+    }
+    if let Some(reason) = drive.refuses_start(direction, &status).await? {
+        return Err(refused(reason));
+    }
+    let mut given = false;
+    for _ in 0..CONFIRMING_READS {
+        let state = chart_of::<D>(&status).ok_or_else(|| refused(Refusal::State(State::Unknown)))?;
+        match next_step(state, Goal::OperationEnabled) {
+            Step::Faulted => return Err(refused(tripped(&status))),
+            Step::Wait => {}
+            Step::Reached if given => {
+                if drive.shows_run(word, &mut status).await? {
+                    return Ok(status);
+                }
+            }
+            // Operation enabled is also the state of a stopped drive that keeps its voltage, or of one whose terminals
+            // command it: the run command is given there like on the last rung.
+            Step::Reached | Step::Write(ENABLE_OPERATION) => {
+                drive.write_control(Class::Command, word, Effect::Level).await?;
+                given = true;
+            }
+            Step::Write(step) => drive.write_control(Class::Command, step, Effect::Level).await?,
+        }
+        status = drive.read_status(Class::Command).await?;
+    }
+    Err(Error::NotConfirmed { slave, command, status: Box::new(status) })
+}
+
+/// Writes the stop `word`, whatever the drive's state, and then reads until `shows` finds it in the drive's words.
+///
+/// # Errors
+/// [`Error::NotConfirmed`] when it does not show within [`CONFIRMING_READS`] reads.
+pub async fn stop<D: Drivecom>(
+    drive: &mut D,
+    mode: StopMode,
+    word: u16,
+    shows: impl Fn(&Status) -> bool + Send,
+) -> Result<Status> {
+    drive.write_control(Class::Stop, word, Effect::Level).await?;
+    let mut status = drive.read_status(Class::Stop).await?;
+    for _ in 1..CONFIRMING_READS {
+        if shows(&status) {
+            return Ok(status);
+        }
+        status = drive.read_status(Class::Stop).await?;
+    }
+    if shows(&status) {
+        return Ok(status);
+    }
+    let command = Command::Stop(mode);
+    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status) })
+}
+
+/// One rising edge of the fault reset, cleared at once. A drive without a fault is left alone. Both words disable the
+/// voltage, so nothing starts by a reset.
+///
+/// # Errors
+/// [`Error::NotConfirmed`] when the drive still shows a fault after [`CONFIRMING_READS`] reads.
+pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
+    let healthy = |status: &Status| {
+        chart_of::<D>(status).is_some_and(|state| next_step(state, Goal::SwitchOnDisabled) != Step::Faulted)
+    };
+    let mut status = drive.read_status(Class::Command).await?;
+    if healthy(&status) {
+        return Ok(status);
+    }
+    let edge = drive.write_control(Class::Command, FAULT_RESET, Effect::Edge).await;
+    // An edge that may have arrived is cleared as well, so that the next one rises; the status tells the outcome.
+    if let Err(error) = edge
+        && error.kind() != ErrorKind::OutcomeUnknown
+    {
+        return Err(error);
+    }
+    drive.write_control(Class::Command, DISABLE_VOLTAGE, Effect::Level).await?;
+    for _ in 0..CONFIRMING_READS {
+        status = drive.read_status(Class::Command).await?;
+        if healthy(&status) {
+            return Ok(status);
+        }
+    }
+    let command = Command::ResetFaults;
+    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status) })
+}
+
+const fn tripped(status: &Status) -> Refusal {
+    match status.fault_code {
+        Some(code) if code != 0 => Refusal::Fault(code),
+        _ => Refusal::Tripped,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{
+        drivecom::{QUICK_STOP, SHUTDOWN, SWITCH_ON},
+        port::PortError,
+        status::RawWord,
+    };
+
+    use super::*;
+
+    const ETA: u16 = 3201;
+
+    /// The chart from the drive's side, one status word per state.
+    #[derive(Debug)]
+    struct Chart {
+        eta: u16,
+        written: Vec<u16>,
+        refuses: Option<Refusal>,
+        deaf: bool,
+        loses_edge: bool,
+    }
+
+    impl Chart {
+        fn at(eta: u16) -> Self {
+            Self { eta, written: Vec::new(), refuses: None, deaf: false, loses_edge: false }
+        }
+    }
+
+    #[async_trait]
+    impl Drivecom for Chart {
+        const ETA: u16 = ETA;
+
+        fn address(&self) -> SlaveAddress {
+            SlaveAddress::try_from(1).unwrap()
+        }
+
+        async fn read_status(&mut self, _: Class) -> Result<Status> {
+            let raw = vec![RawWord { address: ETA, code: "ETA", value: self.eta }];
+            Ok(Status { raw, ..Status::default() })
+        }
+
+        async fn write_control(&mut self, _: Class, word: u16, effect: Effect) -> Result<()> {
+            assert_eq!(effect == Effect::Edge, word == FAULT_RESET);
+            let rises = word & !self.written.last().copied().unwrap_or(0) & FAULT_RESET != 0;
+            self.written.push(word);
+            if !self.deaf {
+                self.eta = match (self.eta, word) {
+                    (0x0008, _) if rises => 0x0040,
+                    (0x0008, _) => 0x0008,
+                    (_, DISABLE_VOLTAGE) => 0x0040,
+                    (0x0040 | 0x0027, SHUTDOWN) => 0x0021,
+                    (0x0021 | 0x0027, SWITCH_ON) => 0x0023,
+                    (0x0023 | 0x0027, run) if run & ENABLE_OPERATION == ENABLE_OPERATION => 0x0027,
+                    (0x0027, QUICK_STOP) => 0x0007,
+                    (eta, _) => eta,
+                };
+            }
+            if effect == Effect::Edge && self.loses_edge {
+                return Err(Error::Port {
+                    slave: self.address(),
+                    exchange: crate::Exchange { function: 6, register: Some(8501) },
+                    problem: PortError::OutcomeUnknown("no answer"),
+                });
+            }
+            Ok(())
+        }
+
+        async fn refuses_start(&mut self, _: Direction, _: &Status) -> Result<Option<Refusal>> {
+            Ok(self.refuses)
+        }
+
+        async fn shows_run(&mut self, word: u16, _: &mut Status) -> Result<bool> {
+            Ok(self.written.last() == Some(&word))
+        }
+    }
+
+    #[tokio::test]
+    async fn a_start_climbs_every_rung_from_where_the_drive_stands() {
+        for (eta, written) in [
+            (0x0040, vec![SHUTDOWN, SWITCH_ON, ENABLE_OPERATION]),
+            (0x0023, vec![ENABLE_OPERATION]),
+            (0x0027, vec![ENABLE_OPERATION]),
+            (0x0007, vec![DISABLE_VOLTAGE, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION]),
+        ] {
+            let mut drive = Chart::at(eta);
+            start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap();
+            assert_eq!(drive.written, written, "{eta:04X}h");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_refused_start_writes_nothing() {
+        for (eta, refuses, reason) in [
+            (0x0008, None, Refusal::Tripped),
+            (0x0001, None, Refusal::State(State::Unknown)),
+            (0x0040, Some(Refusal::DirectionForbidden), Refusal::DirectionForbidden),
+        ] {
+            let mut drive = Chart { refuses, ..Chart::at(eta) };
+            let error = start(&mut drive, Direction::Reverse, ENABLE_OPERATION).await.unwrap_err();
+            assert!(matches!(error, Error::Refused { reason: told, .. } if told == reason), "{error}");
+            assert!(drive.written.is_empty());
+        }
+    }
+
+    #[tokio::test]
+    async fn a_drive_that_does_not_follow_is_not_confirmed() {
+        let mut drive = Chart { deaf: true, ..Chart::at(0x0040) };
+        let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+        assert!(drive.written.iter().all(|&word| word == SHUTDOWN), "{:04X?}", drive.written);
+    }
+
+    #[tokio::test]
+    async fn a_stop_is_written_once_and_before_anything_is_read() {
+        let mut drive = Chart::at(0x0027);
+        let shows = |status: &Status| chart_of::<Chart>(status) == Some(ChartState::QuickStopActive);
+        stop(&mut drive, StopMode::Fast, QUICK_STOP, shows).await.unwrap();
+        assert_eq!(drive.written, [QUICK_STOP]);
+
+        let mut deaf = Chart { deaf: true, ..Chart::at(0x0027) };
+        let error = stop(&mut deaf, StopMode::Fast, QUICK_STOP, shows).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+        assert_eq!(deaf.written, [QUICK_STOP]);
+    }
+
+    #[tokio::test]
+    async fn a_reset_is_one_edge_that_is_cleared_also_when_its_answer_was_lost() {
+        for loses_edge in [false, true] {
+            let mut drive = Chart { loses_edge, ..Chart::at(0x0008) };
+            reset_fault(&mut drive).await.unwrap();
+            assert_eq!(drive.written, [FAULT_RESET, DISABLE_VOLTAGE]);
+        }
+        let mut healthy = Chart::at(0x0023);
+        reset_fault(&mut healthy).await.unwrap();
+        assert!(healthy.written.is_empty(), "a drive without a fault is left alone");
+    }
+}
