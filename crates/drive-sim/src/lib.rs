@@ -1,12 +1,29 @@
 //! Simulated variable-speed drives on a simulated line.
 
 mod bank;
+mod fault;
+mod framing;
+mod line;
 mod model;
 pub mod models;
 mod motor;
+mod pdu;
+mod record;
+mod rtu;
+mod serve;
+mod slave;
+mod state;
 mod watchdog;
+mod wire;
 
 pub use bank::{Bank, Refusal};
+pub use fault::{ALWAYS, Fault, Faults, PerMillion};
+pub use line::{AddressError, Protocol, SimLine, SimSlave, Wiring};
 pub use model::{Block, Cast, Exception, Model, Observation, Panel, Rules};
 pub use motor::{Motor, Nameplate, Ramp, Ramps};
+pub use pdu::identification;
+pub use record::{Breach, LineStats, Violation};
+pub use serve::Serving;
+pub use slave::Received;
 pub use watchdog::Watchdog;
+pub use wire::Delivery;

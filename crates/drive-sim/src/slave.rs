@@ -1,0 +1,283 @@
+//! One slave of the line: a model, the counters of its serial port, and what a test does to it.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    time::Duration,
+};
+
+use bytes::Bytes;
+use tokio::time::Instant;
+
+use crate::{
+    model::{Cast, Exception, Model, Observation},
+    pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
+};
+
+/// Requests that a slave remembers.
+const REMEMBERED: usize = 256;
+/// Line feed, the last character of an ASCII frame until function 08/03 changes it.
+const LINE_FEED: u8 = b'\n';
+
+/// A request that a slave took.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Received {
+    /// When its last bit was on the wire.
+    pub at: Instant,
+    /// To it alone or to all.
+    pub cast: Cast,
+    /// The request from the function code on, without address and check. For UNI-TELWAY the UNI-TE request.
+    pub pdu: Bytes,
+}
+
+/// The counters that function 08 reads (MODBUS over Serial Line V1.02 p. 35; VVDED397054 p. 19). What the line
+/// counts for all its slaves is passed in and kept here as the value at the last reset.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counters {
+    line_base: LineCounters,
+    exceptions: u16,
+    addressed: u16,
+    broadcasts: u16,
+    /// Of function 0Bh: messages carried out, without exceptions and without the request for this counter itself.
+    events: u16,
+}
+
+/// What every slave counts alike, because every slave hears every frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LineCounters {
+    pub(crate) good: u64,
+    pub(crate) bad: u64,
+}
+
+/// What a test has ordered for the answers of a slave.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+enum Hold {
+    #[default]
+    No,
+    Next,
+    Held(Vec<u8>),
+}
+
+pub(crate) struct Slave {
+    model: Box<dyn Model>,
+    /// Until when the model's time has passed.
+    advanced: Instant,
+    counters: Counters,
+    listen_only: bool,
+    delimiter: u8,
+    turnaround: Option<Duration>,
+    connected: bool,
+    hold: Hold,
+    refuses: Option<Exception>,
+    requests: BTreeMap<u8, u64>,
+    received: VecDeque<Received>,
+}
+
+impl Slave {
+    pub(crate) fn new(model: Box<dyn Model>, now: Instant, line: LineCounters) -> Self {
+        Self {
+            model,
+            advanced: now,
+            counters: Counters { line_base: line, ..Counters::default() },
+            listen_only: false,
+            delimiter: LINE_FEED,
+            turnaround: None,
+            connected: true,
+            hold: Hold::No,
+            refuses: None,
+            requests: BTreeMap::new(),
+            received: VecDeque::new(),
+        }
+    }
+
+    /// The model at this moment. Time never runs back: a frame is carried out at the moment of its last bit, which is
+    /// a little ahead of whoever looks at the same time.
+    pub(crate) fn at(&mut self, now: Instant) -> &mut dyn Model {
+        let elapsed = now.saturating_duration_since(self.advanced);
+        if !elapsed.is_zero() {
+            self.model.advance(elapsed);
+            self.advanced = now;
+        }
+        &mut *self.model
+    }
+
+    /// Takes a request; the PDU of the answer, if one is given.
+    pub(crate) fn request(
+        &mut self,
+        now: Instant,
+        request: &[u8],
+        cast: Cast,
+        line: LineCounters,
+    ) -> Option<Vec<u8>> {
+        let &function = request.first()?;
+        if !self.hears(now, request, cast) {
+            return None;
+        }
+        let allowed = cast == Cast::Unicast || self.model.rules().broadcast.contains(&function);
+        let answer = match function {
+            _ if !allowed => return None,
+            DIAGNOSTICS if !self.model.rules().diagnostics.is_empty() => self.diagnose(request, line),
+            _ if self.listen_only => return None,
+            EVENT_COUNTER if self.model.rules().event_counter => {
+                let [high, low] = self.counters.events.to_be_bytes();
+                Ok(Some(vec![EVENT_COUNTER, 0, 0, high, low]))
+            }
+            _ => pdu::answer(&mut *self.model, request, cast).map(Some),
+        };
+        let answer = match self.refuses.take() {
+            Some(exception) if cast == Cast::Unicast => Err(exception),
+            _ => answer,
+        };
+        match &answer {
+            Ok(_) if function != EVENT_COUNTER => self.counters.events = self.counters.events.wrapping_add(1),
+            Ok(_) => {}
+            Err(_) => self.counters.exceptions = self.counters.exceptions.wrapping_add(1),
+        }
+        if cast == Cast::Broadcast {
+            return None;
+        }
+        let answer = answer.unwrap_or_else(|Exception(code)| Some(vec![function | EXCEPTION, code]))?;
+        self.unless_held(answer)
+    }
+
+    /// Notes that a frame for this slave came, unless it cannot hear it; the model is then at `now`.
+    pub(crate) fn hears(&mut self, now: Instant, request: &[u8], cast: Cast) -> bool {
+        let model = self.at(now);
+        if !model.listens() || !self.connected {
+            return false;
+        }
+        self.model.frame_seen(cast);
+        let counter = match cast {
+            Cast::Unicast => &mut self.counters.addressed,
+            Cast::Broadcast => &mut self.counters.broadcasts,
+        };
+        *counter = counter.wrapping_add(1);
+        if let Some(&function) = request.first() {
+            *self.requests.entry(function).or_default() += 1;
+        }
+        if self.received.len() == REMEMBERED {
+            self.received.pop_front();
+        }
+        self.received.push_back(Received { at: now, cast, pdu: Bytes::copy_from_slice(request) });
+        true
+    }
+
+    /// The answer itself, or nothing while a test holds it.
+    pub(crate) fn unless_held(&mut self, answer: Vec<u8>) -> Option<Vec<u8>> {
+        if self.hold == Hold::Next {
+            self.hold = Hold::Held(answer);
+            return None;
+        }
+        Some(answer)
+    }
+
+    /// Function 08. `Ok(None)`: carried out, and no answer is due.
+    fn diagnose(&mut self, request: &[u8], line: LineCounters) -> Result<Option<Vec<u8>>, Exception> {
+        let [_, high, low, ref data @ ..] = *request else { return Err(Exception::ILLEGAL_VALUE) };
+        let sub_code = u16::from_be_bytes([high, low]);
+        if self.listen_only && sub_code != 0x01 {
+            return Ok(None);
+        }
+        if !self.model.rules().diagnostics.contains(&sub_code) {
+            return Err(Exception::ILLEGAL_FUNCTION);
+        }
+        let counter = match (sub_code, data) {
+            (0x00, _) => return Ok(Some(request.to_vec())),
+            (0x01, [0x00 | 0xFF, 0x00]) => {
+                self.reset_counters(line);
+                self.listen_only = false;
+                return Ok(Some(request.to_vec()));
+            }
+            (0x03, &[delimiter, 0x00]) => {
+                self.delimiter = delimiter;
+                return Ok(Some(request.to_vec()));
+            }
+            (0x04, [0x00, 0x00]) => {
+                self.listen_only = true;
+                return Ok(None);
+            }
+            (0x0A, [0x00, 0x00]) => {
+                self.reset_counters(line);
+                return Ok(Some(request.to_vec()));
+            }
+            (0x0B, [0x00, 0x00]) => since(line.good, self.counters.line_base.good),
+            (0x0C, [0x00, 0x00]) => since(line.bad, self.counters.line_base.bad),
+            (0x0D, [0x00, 0x00]) => self.counters.exceptions,
+            (0x0E, [0x00, 0x00]) => self.counters.addressed,
+            (0x0F, [0x00, 0x00]) => self.counters.broadcasts,
+            // Negative acknowledges, busy answers and lost characters: a simulated drive has none.
+            (0x10..=0x12, [0x00, 0x00]) => 0,
+            _ => return Err(Exception::ILLEGAL_VALUE),
+        };
+        let [first, second] = counter.to_be_bytes();
+        Ok(Some(vec![DIAGNOSTICS, high, low, first, second]))
+    }
+
+    fn reset_counters(&mut self, line: LineCounters) {
+        self.counters = Counters { line_base: line, ..Counters::default() };
+    }
+
+    pub(crate) fn turnaround(&self) -> Duration {
+        self.turnaround.unwrap_or(self.model.rules().turnaround)
+    }
+
+    pub(crate) const fn delimiter(&self) -> u8 {
+        self.delimiter
+    }
+
+    pub(crate) fn observe(&mut self, now: Instant) -> Observation {
+        self.at(now).observe()
+    }
+
+    pub(crate) fn power_cycle(&mut self, now: Instant, line: LineCounters) {
+        self.at(now).power_cycle();
+        self.reset_counters(line);
+        self.listen_only = false;
+        self.delimiter = LINE_FEED;
+        self.hold = Hold::No;
+    }
+
+    pub(crate) const fn set_turnaround(&mut self, turnaround: Option<Duration>) {
+        self.turnaround = turnaround;
+    }
+
+    pub(crate) const fn connect(&mut self, connected: bool) {
+        self.connected = connected;
+    }
+
+    pub(crate) const fn refuse_next(&mut self, exception: Exception) {
+        self.refuses = Some(exception);
+    }
+
+    pub(crate) fn hold_next(&mut self) {
+        self.hold = Hold::Next;
+    }
+
+    /// Ends the hold; the answer that was held.
+    pub(crate) fn release(&mut self) -> Option<Vec<u8>> {
+        match std::mem::take(&mut self.hold) {
+            Hold::Held(answer) => Some(answer),
+            Hold::No | Hold::Next => None,
+        }
+    }
+
+    pub(crate) const fn is_holding(&self) -> bool {
+        matches!(self.hold, Hold::Held(_))
+    }
+
+    pub(crate) fn requests(&self, function: u8) -> u64 {
+        self.requests.get(&function).copied().unwrap_or(0)
+    }
+
+    pub(crate) fn all_requests(&self) -> u64 {
+        self.requests.values().sum()
+    }
+
+    pub(crate) fn received(&self) -> Vec<Received> {
+        self.received.iter().cloned().collect()
+    }
+}
+
+/// What a counter of the line grew by, as the 16-bit counter of a slave shows it.
+fn since(now: u64, base: u64) -> u16 {
+    u16::try_from(now.saturating_sub(base) & 0xFFFF).unwrap_or(u16::MAX)
+}

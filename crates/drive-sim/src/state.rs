@@ -1,0 +1,100 @@
+//! What all endpoints of a line share: the slaves, the faults, and what was recorded.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use fastrand::Rng;
+use tokio::time::Instant;
+
+use crate::{
+    fault::Faults,
+    framing::{Content, Speech},
+    model::Cast,
+    record::{Breach, KEPT, LineStats, Violation},
+    slave::{LineCounters, Slave},
+};
+
+/// The address that every slave hears and none answers.
+pub(crate) const BROADCAST: u8 = 0;
+
+#[derive(Default)]
+pub(crate) struct State {
+    slaves: BTreeMap<u8, Slave>,
+    counters: LineCounters,
+    /// Answers that a test held and has released, for an endpoint to send.
+    released: Vec<(u8, Vec<u8>)>,
+    pub(crate) faults: Faults,
+    pub(crate) stats: LineStats,
+    pub(crate) violations: VecDeque<Violation>,
+}
+
+impl State {
+    /// Puts a slave on the line; `false` when the address is taken.
+    pub(crate) fn add(&mut self, address: u8, slave: Slave) -> bool {
+        if self.slaves.contains_key(&address) {
+            return false;
+        }
+        self.slaves.insert(address, slave);
+        true
+    }
+
+    pub(crate) fn slave(&mut self, address: u8) -> Option<&mut Slave> {
+        self.slaves.get_mut(&address)
+    }
+
+    pub(crate) fn addresses(&self) -> Vec<u8> {
+        self.slaves.keys().copied().collect()
+    }
+
+    pub(crate) const fn counters(&self) -> LineCounters {
+        self.counters
+    }
+
+    /// An intact frame whose last bit was on the wire at `at`: carried out, and answered unless it is for all.
+    pub(crate) fn request(&mut self, at: Instant, address: u8, request: &[u8]) -> Option<Speech> {
+        self.good_frame();
+        if address == BROADCAST {
+            self.stats.broadcasts += 1;
+            for slave in self.slaves.values_mut() {
+                let _ = slave.request(at, request, Cast::Broadcast, self.counters);
+            }
+            return None;
+        }
+        let slave = self.slaves.get_mut(&address)?;
+        let answer = slave.request(at, request, Cast::Unicast, self.counters)?;
+        let turnaround = slave.turnaround();
+        Some(Speech { slave: address, content: Content::Message(answer), heard: at, turnaround })
+    }
+
+    pub(crate) const fn good_frame(&mut self) {
+        self.stats.requests += 1;
+        self.counters.good += 1;
+    }
+
+    pub(crate) const fn bad_frame(&mut self) {
+        self.stats.bad_frames += 1;
+        self.counters.bad += 1;
+    }
+
+    pub(crate) fn breach(&mut self, at: Instant, breach: Breach) {
+        self.stats.violations += 1;
+        if self.violations.len() < KEPT {
+            self.violations.push_back(Violation { at, breach });
+        }
+    }
+
+    pub(crate) fn release(&mut self, address: u8) {
+        if let Some(answer) = self.slaves.get_mut(&address).and_then(Slave::release) {
+            self.released.push((address, answer));
+        }
+    }
+
+    pub(crate) fn take_released(&mut self) -> Vec<(u8, Vec<u8>)> {
+        std::mem::take(&mut self.released)
+    }
+
+    /// Another slave than this one, for an answer in a wrong name: one that is there if there is one.
+    pub(crate) fn stranger(&self, address: u8, random: &mut Rng) -> u8 {
+        let others: Vec<_> = self.slaves.keys().copied().filter(|other| *other != address).collect();
+        random.choice(others).unwrap_or(if address == 1 { 2 } else { 1 })
+    }
+}

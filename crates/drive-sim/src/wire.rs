@@ -1,0 +1,432 @@
+//! The wire: which character is on it when, who speaks, and what rule is broken. No clock and no I/O: `now` is an
+//! argument.
+
+use std::{collections::VecDeque, time::Duration};
+
+use drive_core::SerialSettings;
+use fastrand::Rng;
+use tokio::time::Instant;
+
+use crate::{
+    fault::{Fault, flip},
+    framing::{Content, Framing, Speech},
+    pdu::is_confirmation,
+    record::Breach,
+    state::State,
+};
+
+/// How time passes on a wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pacing {
+    /// Characters take their time here, because what carries them (memory, a pty, TCP) takes none.
+    Simulated,
+    /// A real port paces what we write; what we read has just ended.
+    Hardware,
+    /// Characters take no time: for measurements of everything else.
+    None,
+}
+
+/// In which pieces an answer reaches the master.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delivery {
+    /// Whole, when its last bit has arrived.
+    #[default]
+    Whole,
+    /// So many characters at a time, each piece when its last bit has arrived; 1: character by character.
+    Pieces(usize),
+}
+
+/// What the wire's task does next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Hand these characters to the master now.
+    Send(Vec<u8>),
+    /// Nothing before this moment, or before something is received.
+    Wait(Option<Instant>),
+}
+
+/// One end of a half-duplex line, with the slaves' side of its protocol.
+pub(crate) struct Wire {
+    settings: SerialSettings,
+    pacing: Pacing,
+    delivery: Delivery,
+    framing: Box<dyn Framing>,
+    /// The master's characters that follow each other without a pause: when the first began, and how many.
+    run: Option<(Instant, usize)>,
+    /// When the last character of anybody ended.
+    quiet_since: Option<Instant>,
+    /// In the order of their starts.
+    transmissions: VecDeque<Transmission>,
+    speech: Vec<Speech>,
+    /// Characters of the frame that is being received, for the ideal time of its exchange.
+    frame_characters: usize,
+}
+
+/// What is or will be on the wire towards the master.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Transmission {
+    slave: u8,
+    start: Instant,
+    bytes: Vec<u8>,
+    delivered: usize,
+    late: bool,
+    /// The adapter's echo of the master's own characters: it is no use of the line.
+    echo: bool,
+}
+
+impl Wire {
+    pub(crate) fn new(
+        settings: SerialSettings,
+        pacing: Pacing,
+        delivery: Delivery,
+        framing: Box<dyn Framing>,
+    ) -> Self {
+        Self {
+            settings,
+            pacing,
+            delivery,
+            framing,
+            run: None,
+            quiet_since: None,
+            transmissions: VecDeque::new(),
+            speech: Vec::new(),
+            frame_characters: 0,
+        }
+    }
+
+    /// Characters that the master sent, all at once, seen at `now`.
+    pub(crate) fn receive(&mut self, now: Instant, bytes: &[u8], line: &mut State) {
+        let ended = self.run.map(|(start, count)| start + self.time(count));
+        let begins = match self.pacing {
+            Pacing::Simulated => now,
+            // What a port hands over has just ended, all of it.
+            Pacing::Hardware => now.checked_sub(self.time(bytes.len())).unwrap_or(now),
+            Pacing::None => now,
+        };
+        let begins = ended.map_or(begins, |ended| ended.max(begins));
+        if let Some(ended) = ended {
+            self.pause(begins, begins - ended, line);
+        }
+        if ended != Some(begins) {
+            self.run = Some((begins, 0));
+        }
+        line.stats.characters_in += count_of(bytes.len());
+        line.stats.first.get_or_insert(begins);
+        let mut heard = bytes.to_vec();
+        self.disturb(begins, &mut heard, line);
+        self.collide(begins, &mut heard, line);
+        for byte in heard {
+            self.hear(byte, line);
+        }
+        if self.pacing == Pacing::None && self.framing.keeps_silences() && !self.framing.awaits_more() {
+            // Without time there is no silence to wait for: a frame of unknown length ends with what came at once.
+            self.framing.silence(line, &mut self.speech);
+            self.answer(line);
+        }
+    }
+
+    /// What is to be done at `now`.
+    pub(crate) fn poll(&mut self, now: Instant, line: &mut State) -> Step {
+        for (slave, answer) in line.take_released() {
+            self.speech.push(Speech {
+                slave,
+                content: Content::Message(answer),
+                heard: now,
+                turnaround: Duration::ZERO,
+            });
+        }
+        let silence_due = self.silence_due();
+        if silence_due.is_some_and(|due| due <= now) {
+            self.framing.silence(line, &mut self.speech);
+        }
+        self.answer(line);
+        if let Some((index, end, due)) = self.next_delivery()
+            && due <= now
+        {
+            return Step::Send(self.deliver(index, end, due, now, line));
+        }
+        let delivery_due = self.next_delivery().map(|(_, _, due)| due);
+        Step::Wait(self.silence_due().into_iter().chain(delivery_due).min())
+    }
+
+    /// t3.5 of this wire.
+    fn t3_5(&self) -> Duration {
+        if self.pacing == Pacing::None { Duration::ZERO } else { self.settings.t3_5() }
+    }
+
+    /// t1.5 of this wire: 1.5 characters, and a fixed 750 µs above 19200 bit/s (MODBUS over Serial Line V1.02 p. 13).
+    fn t1_5(&self) -> Duration {
+        if self.settings.baud() > 19_200 {
+            Duration::from_micros(750)
+        } else {
+            self.settings.bits(self.settings.format().bits() * 3) / 2
+        }
+    }
+
+    fn time(&self, characters: usize) -> Duration {
+        if self.pacing == Pacing::None { Duration::ZERO } else { self.settings.characters(characters) }
+    }
+
+    /// When a frame that is being received would be over by silence.
+    fn silence_due(&self) -> Option<Instant> {
+        let waits = self.framing.keeps_silences() && !self.framing.is_between_frames();
+        let (start, count) = self.run.filter(|_| waits)?;
+        Some(start + self.time(count) + self.t3_5())
+    }
+
+    /// A pause between two characters of the master.
+    fn pause(&mut self, at: Instant, paused: Duration, line: &mut State) {
+        if self.framing.is_between_frames() || !self.framing.keeps_silences() || self.pacing == Pacing::None {
+            return;
+        }
+        if paused >= self.t3_5() {
+            self.framing.silence(line, &mut self.speech);
+            self.answer(line);
+        } else if paused > self.t1_5() {
+            line.breach(at, Breach::Gap { paused, allowed: self.t1_5() });
+        }
+    }
+
+    /// One character of the master: checks the silence before a frame, and hands it to the protocol.
+    fn hear(&mut self, byte: u8, line: &mut State) {
+        let Some((start, count)) = self.run else { return };
+        let (begins, ends) = (start + self.time(count), start + self.time(count + 1));
+        self.run = Some((start, count + 1));
+        if self.framing.is_between_frames() {
+            self.frame_characters = 0;
+            self.check_silence(begins, line);
+        }
+        self.frame_characters += 1;
+        self.quiet_since = self.quiet_since.max(Some(ends));
+        line.stats.last = line.stats.last.max(Some(ends));
+        let requests = line.stats.requests;
+        self.framing.byte(byte, ends, line, &mut self.speech);
+        if line.stats.requests > requests {
+            line.stats.ideal += self.time(self.frame_characters) + self.t3_5();
+        }
+        self.answer(line);
+    }
+
+    fn check_silence(&self, begins: Instant, line: &mut State) {
+        let Some(quiet_since) = self.quiet_since else { return };
+        let (kept, required) = (begins.saturating_duration_since(quiet_since), self.t3_5());
+        let shortest = line.stats.shortest_silence.get_or_insert(kept);
+        *shortest = kept.min(*shortest);
+        if self.framing.keeps_silences() && kept < required {
+            line.breach(begins, Breach::Silence { kept, required });
+        }
+    }
+
+    /// What the faults do to the master's characters.
+    fn disturb(&mut self, begins: Instant, heard: &mut Vec<u8>, line: &mut State) {
+        if line.faults.strikes(Fault::Echo).is_some() {
+            self.transmissions.push_back(Transmission {
+                slave: 0,
+                start: begins,
+                bytes: heard.clone(),
+                delivered: 0,
+                late: false,
+                echo: true,
+            });
+        }
+        if let Some(random) = line.faults.strikes(Fault::RequestFlipped) {
+            flip(heard, self.settings.format().data_bits(), random);
+        }
+        if line.faults.strikes(Fault::RequestLost).is_some() {
+            heard.clear();
+        }
+    }
+
+    /// Damages what overlaps with the master's characters, on both sides.
+    fn collide(&mut self, begins: Instant, heard: &mut [u8], line: &mut State) {
+        if self.pacing != Pacing::Simulated {
+            return;
+        }
+        let ends = begins + self.time(heard.len());
+        let (settings, mut hit) = (self.settings, None);
+        for transmission in self.transmissions.iter_mut().filter(|transmission| !transmission.echo) {
+            let overlap = Overlap::of(transmission, begins, ends, settings);
+            if let Some(overlap) = overlap {
+                hit = hit.or(Some((transmission.slave, transmission.late)));
+                transmission.damage(overlap, settings);
+                for (index, byte) in heard.iter_mut().enumerate() {
+                    if overlap.touches(begins + settings.characters(index), settings) {
+                        *byte = !*byte;
+                    }
+                }
+            }
+        }
+        if let Some((slave, late)) = hit {
+            line.breach(begins, Breach::Collision { slave, late });
+        }
+    }
+
+    /// Puts on the wire what the slaves have to say.
+    fn answer(&mut self, line: &mut State) {
+        for speech in std::mem::take(&mut self.speech) {
+            self.say(speech, line);
+        }
+    }
+
+    /// One answer, with what the faults make of it.
+    fn say(&mut self, speech: Speech, line: &mut State) {
+        let Speech { slave, content, heard, turnaround } = speech;
+        let start = heard + turnaround;
+        let (bytes, start) = match content {
+            Content::Signal(signal) => (signal, start),
+            Content::Message(message) => self.message(slave, message, start, line),
+        };
+        line.stats.ideal += turnaround + self.time(bytes.len());
+        let bytes = self.garble(bytes, line);
+        let late = line.faults.strikes(Fault::Late).is_some();
+        let start = if late { start + line.faults.lateness() } else { start };
+        if line.faults.strikes(Fault::Lost).is_some() {
+            return;
+        }
+        if line.faults.strikes(Fault::Duplicated).is_some() {
+            let again = start + self.time(bytes.len()) + self.t3_5();
+            self.transmit(slave, start, bytes.clone(), late, line);
+            self.transmit(slave, again, bytes, late, line);
+        } else {
+            self.transmit(slave, start, bytes, late, line);
+        }
+    }
+
+    /// The frame of a message and its start, after the faults that need to understand it.
+    fn message(
+        &mut self,
+        slave: u8,
+        mut message: Vec<u8>,
+        start: Instant,
+        line: &mut State,
+    ) -> (Vec<u8>, Instant) {
+        if is_confirmation(&message)
+            && let Some(random) = line.faults.strikes(Fault::WrongEcho)
+            && let Some(data) = message.get_mut(1..)
+        {
+            flip(data, 8, random);
+        }
+        let foreign = line.faults.strikes(Fault::Foreign).map(Rng::fork);
+        let Some(mut random) = foreign else { return (self.framing.encode(slave, &message, line), start) };
+        let stranger = line.stranger(slave, &mut random);
+        let frame = self.framing.encode(stranger, &message, line);
+        let after = start + self.time(frame.len()) + self.t3_5();
+        self.transmit(stranger, start, frame, false, line);
+        (self.framing.encode(slave, &message, line), after)
+    }
+
+    /// What the faults that only see characters make of a frame.
+    fn garble(&self, mut bytes: Vec<u8>, line: &mut State) -> Vec<u8> {
+        if let Some(random) = line.faults.strikes(Fault::Flipped) {
+            flip(&mut bytes, self.settings.format().data_bits(), random);
+        }
+        if let Some(random) = line.faults.strikes(Fault::Truncated) {
+            bytes.truncate(random.usize(0..bytes.len().max(1)));
+        }
+        if let Some(random) = line.faults.strikes(Fault::Noise) {
+            let noise = random.usize(1..=4);
+            bytes.splice(0..0, std::iter::repeat_with(|| random.u8(..)).take(noise));
+        }
+        bytes
+    }
+
+    fn transmit(&mut self, slave: u8, start: Instant, bytes: Vec<u8>, late: bool, line: &mut State) {
+        let mut transmission = Transmission { slave, start, bytes, delivered: 0, late, echo: false };
+        let (settings, ends) = (self.settings, start + self.time(transmission.bytes.len()));
+        if self.pacing == Pacing::Simulated {
+            for other in self.transmissions.iter_mut().filter(|other| !other.echo) {
+                if let Some(overlap) = Overlap::of(other, start, ends, settings) {
+                    line.stats.slave_collisions += 1;
+                    other.damage(overlap, settings);
+                    transmission.damage(overlap, settings);
+                }
+            }
+        }
+        line.stats.answers += 1;
+        if !transmission.bytes.is_empty() {
+            self.transmissions.push_back(transmission);
+        }
+    }
+
+    /// The transmission that has something to deliver first: its index, up to which character, and when.
+    fn next_delivery(&self) -> Option<(usize, usize, Instant)> {
+        let next = |(index, transmission): (usize, &Transmission)| {
+            let whole = transmission.bytes.len();
+            let upto = match self.delivery {
+                Delivery::Whole => whole,
+                Delivery::Pieces(size) => (transmission.delivered + size.max(1)).min(whole),
+            };
+            // A real port paces by itself what it is given.
+            let (upto, taken) = if self.pacing == Pacing::Hardware { (whole, 0) } else { (upto, upto) };
+            (index, upto, transmission.start + self.time(taken))
+        };
+        self.transmissions.iter().enumerate().map(next).min_by_key(|(_, _, due)| *due)
+    }
+
+    fn deliver(
+        &mut self,
+        index: usize,
+        upto: usize,
+        due: Instant,
+        now: Instant,
+        line: &mut State,
+    ) -> Vec<u8> {
+        let wire_time = self.time(upto);
+        let Some(transmission) = self.transmissions.get_mut(index) else { return Vec::new() };
+        let piece = transmission.bytes.get(transmission.delivered..upto).unwrap_or_default().to_vec();
+        transmission.delivered = upto;
+        let is_over = upto == transmission.bytes.len();
+        if !transmission.echo {
+            // Nobody can hear a character before it is handed over, so a late hand-over is a later end.
+            let ends = (transmission.start + wire_time).max(now);
+            self.quiet_since = self.quiet_since.max(Some(ends));
+            line.stats.last = line.stats.last.max(Some(ends));
+            line.stats.characters_out += count_of(piece.len());
+            line.stats.lag += if is_over { now.saturating_duration_since(due) } else { Duration::ZERO };
+        }
+        if is_over {
+            self.transmissions.remove(index);
+        }
+        piece
+    }
+}
+
+impl Transmission {
+    /// Inverts the characters that fall into a span and are not yet delivered.
+    fn damage(&mut self, overlap: Overlap, settings: SerialSettings) {
+        for (index, byte) in self.bytes.iter_mut().enumerate().skip(self.delivered) {
+            if overlap.touches(self.start + settings.characters(index), settings) {
+                *byte = !*byte;
+            }
+        }
+    }
+}
+
+/// A span of time in which two parties send.
+#[derive(Debug, Clone, Copy)]
+struct Overlap {
+    begins: Instant,
+    ends: Instant,
+}
+
+impl Overlap {
+    fn of(
+        transmission: &Transmission,
+        begins: Instant,
+        ends: Instant,
+        settings: SerialSettings,
+    ) -> Option<Self> {
+        let over = transmission.start + settings.characters(transmission.bytes.len());
+        let span = Self { begins: begins.max(transmission.start), ends: ends.min(over) };
+        (span.begins < span.ends).then_some(span)
+    }
+
+    /// Whether a character that begins at this moment falls into it.
+    fn touches(self, character: Instant, settings: SerialSettings) -> bool {
+        character < self.ends && character + settings.characters(1) > self.begins
+    }
+}
+
+fn count_of(length: usize) -> u64 {
+    u64::try_from(length).unwrap_or(u64::MAX)
+}

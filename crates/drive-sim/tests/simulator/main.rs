@@ -1,0 +1,6 @@
+//! The simulator seen from a master and from a test, with a small drive and a master of its own.
+
+mod endpoints;
+mod faults;
+mod line;
+mod support;
