@@ -1,137 +1,75 @@
 //! Start, stop, reset: what is written to `CMD`, and how it is seen to act.
 
+use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Calls, Class, Command, Control, Direction, Error, ErrorKind, Port, Refusal, Result,
-    State, Status, StopMode,
-    drivecom::{self, ChartState, Goal, Step},
+    BroadcastWrite, Class, Control, Direction, Effect, Port, Refusal, Result, SlaveAddress, State, Status,
+    StopMode,
+    drivecom::{self, ChartState, Drivecom},
 };
 
 use crate::{
     Atv28,
-    registers::CMD,
+    registers::{CMD, ETA},
     status::{FastWords, raw_command},
     words::{ControlWord, ExtendedStatus, StatusWord},
 };
 
-/// How often the status is read for a command to show, before it counts as not confirmed.
-const READS: usize = 20;
-
 impl<P: Port> Atv28<P> {
-    /// Climbs the chart and gives the run command. The drive shows it by "operation enabled" and by holding the
-    /// control word; "operation enabled" alone would also be the state of a drive that its terminals have just
-    /// powered up in.
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
-        let command = Command::Start(direction);
-        let run = ControlWord::run(direction);
-        let mut words = self.fast_words(Class::Command).await?;
-        self.check_start(&words, command)?;
-        let mut given = false;
-        for _ in 0..READS {
-            let chart = words.chart().ok_or_else(|| self.refused(command, Refusal::State(State::Unknown)))?;
-            match drivecom::next_step(chart, Goal::OperationEnabled) {
-                Step::Faulted => return Err(self.refused(command, tripped(&words))),
-                Step::Wait => {}
-                Step::Reached if given && self.held_command(Class::Command).await? == run => {
-                    let mut status = words.status(self.command);
-                    status.raw.push(raw_command(run.bits()));
-                    return Ok(status);
-                }
-                Step::Reached | Step::Write(drivecom::ENABLE_OPERATION) => {
-                    self.give_command(Class::Command, run).await?;
-                    given = true;
-                }
-                Step::Write(word) => {
-                    self.give_command(Class::Command, ControlWord::from_bits_retain(word)).await?;
-                }
-            }
-            words = self.fast_words(Class::Command).await?;
-        }
-        Err(self.not_confirmed(command, &words))
+        drivecom::start(self, direction, ControlWord::run(direction).bits()).await
     }
 
-    /// Writes the stop first, whatever the drive's state, and then reads until the drive shows it.
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        let command = Command::Stop(mode);
-        let stop = stop_word(mode);
-        self.give_command(Class::Stop, stop).await?;
-        let mut words = self.fast_words(Class::Stop).await?;
-        for _ in 1..READS {
-            if shows_stop(&words, mode) {
-                break;
-            }
-            words = self.fast_words(Class::Stop).await?;
-        }
-        if shows_stop(&words, mode) {
-            Ok(words.status(self.command))
-        } else {
-            Err(self.not_confirmed(command, &words))
-        }
+        drivecom::stop(self, mode, stop_word(mode).bits(), |status| shows_stop(status, mode)).await
+    }
+}
+
+#[async_trait]
+impl<P: Port> Drivecom for Atv28<P> {
+    const ETA: u16 = ETA.address();
+
+    fn address(&self) -> SlaveAddress {
+        self.registers.slave()
     }
 
-    /// One rising edge of the reset bit, cleared at once. A drive without a fault is left alone.
-    pub(crate) async fn reset_once(&mut self) -> Result<Status> {
-        let mut words = self.fast_words(Class::Command).await?;
-        if !is_tripped(&words) {
-            return Ok(words.status(self.command));
-        }
-        let edge = self.registers.at(Class::Command).edge().write(CMD, drivecom::FAULT_RESET).await;
-        // An edge that may have arrived is cleared as well, so that the next one rises; the status tells the outcome.
-        if let Err(error) = edge
-            && error.kind() != ErrorKind::OutcomeUnknown
-        {
-            return Err(error);
-        }
-        self.give_command(Class::Command, ControlWord::empty()).await?;
-        for _ in 0..READS {
-            words = self.fast_words(Class::Command).await?;
-            if words.chart().is_some() && !is_tripped(&words) {
-                return Ok(words.status(self.command));
-            }
-        }
-        Err(self.not_confirmed(Command::ResetFaults, &words))
+    async fn read_status(&mut self, class: Class) -> Result<Status> {
+        let words = self.fast_words(class).await?;
+        Ok(words.status(self.command))
     }
 
-    fn check_start(&self, words: &FastWords, command: Command) -> Result<()> {
-        let turning = words.eti().contains(ExtendedStatus::MOTOR_RUNNING);
-        let forced_local = !words.eta().contains(StatusWord::REMOTE);
-        // At power-up the terminals command and the motor stands; the first command of the line takes over then. A
-        // motor that somebody else has running is not taken away from him.
-        let taken = turning && words.control() != Control::Bus;
-        match words.chart() {
-            None => Err(self.refused(command, Refusal::State(State::Unknown))),
-            Some(ChartState::Fault | ChartState::FaultReactionActive) => {
-                Err(self.refused(command, tripped(words)))
-            }
-            _ if forced_local || taken => Err(self.refused(command, Refusal::NotInControl(words.control()))),
-            Some(ChartState::QuickStopActive) if turning => {
-                Err(self.refused(command, Refusal::State(State::QuickStop)))
-            }
-            Some(_) => Ok(()),
-        }
-    }
-
-    /// Writes the control word and remembers it; not known while the outcome is not known.
-    async fn give_command(&mut self, class: Class, word: ControlWord) -> Result<()> {
+    /// Remembers the word as the one that the drive holds; while the outcome is not known, none is.
+    async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         self.command = None;
-        self.registers.at(class).write(CMD, word.bits()).await?;
-        self.command = Some(word);
+        let calls = self.registers.at(class);
+        let mut calls = if effect == Effect::Edge { calls.edge() } else { calls };
+        calls.write(CMD, word).await?;
+        self.command = Some(ControlWord::from_bits_retain(word));
         Ok(())
     }
 
-    async fn held_command(&mut self, class: Class) -> Result<ControlWord> {
-        let mut calls: Calls<'_, P> = self.registers.at(class);
-        let held = ControlWord::from_bits_retain(calls.read(CMD).await?);
-        self.command = Some(held);
-        Ok(held)
+    async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
+        let words = FastWords::of_raw(&status.raw);
+        let turning = words.eti().contains(ExtendedStatus::MOTOR_RUNNING);
+        let forced_local = !words.eta().contains(StatusWord::REMOTE);
+        // At power-up the terminals command and the motor stands; the first command of the line takes over then. A motor
+        // that somebody else has running is not taken away from him.
+        let taken = turning && words.control() != Control::Bus;
+        if forced_local || taken {
+            return Ok(Some(Refusal::NotInControl(words.control())));
+        }
+        // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
+        let braking = turning && words.chart() == Some(ChartState::QuickStopActive);
+        Ok(braking.then_some(Refusal::State(State::QuickStop)))
     }
 
-    const fn refused(&self, command: Command, reason: Refusal) -> Error {
-        Error::Refused { slave: self.registers.slave(), command, reason }
-    }
-
-    fn not_confirmed(&self, command: Command, words: &FastWords) -> Error {
-        let status = Box::new(words.status(self.command));
-        Error::NotConfirmed { slave: self.registers.slave(), command, status }
+    /// "Operation enabled" is also the state of a drive that its terminals have just powered up in, so the drive must
+    /// hold the control word too.
+    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
+        let held = self.registers.at(Class::Command).read(CMD).await?;
+        self.command = Some(ControlWord::from_bits_retain(held));
+        *status = FastWords::of_raw(&status.raw).status(self.command);
+        status.raw.push(raw_command(held));
+        Ok(held == word)
     }
 }
 
@@ -153,9 +91,10 @@ const fn stop_word(mode: StopMode) -> ControlWord {
 
 /// Whether the drive itself shows that no run command acts: it has left "operation enabled", or there the motor stands,
 /// slows down or is braked.
-fn shows_stop(words: &FastWords, mode: StopMode) -> bool {
+fn shows_stop(status: &Status, mode: StopMode) -> bool {
     const BRAKES: ExtendedStatus =
         ExtendedStatus::DECELERATING.union(ExtendedStatus::FAST_STOP).union(ExtendedStatus::DC_INJECTION);
+    let words = FastWords::of_raw(&status.raw);
     match words.chart() {
         None => false,
         Some(ChartState::OperationEnabled) => {
@@ -164,16 +103,5 @@ fn shows_stop(words: &FastWords, mode: StopMode) -> bool {
         }
         Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
         Some(_) => true,
-    }
-}
-
-fn is_tripped(words: &FastWords) -> bool {
-    matches!(words.chart(), Some(ChartState::Fault | ChartState::FaultReactionActive))
-}
-
-fn tripped(words: &FastWords) -> Refusal {
-    match words.status(None).fault_code {
-        Some(code) if code != 0 => Refusal::Fault(code),
-        _ => Refusal::Tripped,
     }
 }

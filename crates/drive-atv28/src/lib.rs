@@ -15,7 +15,7 @@ use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, ExceptionMeaning, Fault, Faults, Identity,
     Lifetimes, Measurements, Percent, Port, RawWord, Registers, Result, Row, SerialSettings, Setpoint,
     SlaveAddress, Speed, Status, StopMode, Voltage, Written,
-    drivecom::ChartState,
+    drivecom::{self, ChartState, Drivecom},
     registers::{Register, access::Readable},
     serial::CharacterFormat,
 };
@@ -132,8 +132,7 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn status(&mut self) -> Result<Status> {
-        let words = self.fast_words(Class::Status).await?;
-        Ok(words.status(self.command))
+        self.read_status(Class::Status).await
     }
 
     /// Six exchanges: W450 to W456 in one, and the five others one by one, because what stands between them is not
@@ -206,7 +205,7 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn reset_faults(&mut self) -> Result<Status> {
-        self.reset_once().await
+        drivecom::reset_fault(self).await
     }
 
     /// The drive does not say what it is; its nominal current tells one rating from another.

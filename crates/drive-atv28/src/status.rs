@@ -48,6 +48,15 @@ impl FastWords {
         Some(Self { words })
     }
 
+    /// From the raw words of a status that [`status`](Self::status) made.
+    pub(crate) fn of_raw(raw: &[RawWord]) -> Self {
+        let mut words = [0; 11];
+        for (word, read) in words.iter_mut().zip(raw) {
+            *word = read.value;
+        }
+        Self { words }
+    }
+
     pub(crate) fn word<A: drive_core::registers::access::Kind>(&self, register: Register<A>) -> u16 {
         let index = register.address().checked_sub(FIRST_BLOCK.0).map(usize::from);
         index.and_then(|index| self.words.get(index)).copied().unwrap_or(0)

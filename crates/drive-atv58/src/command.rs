@@ -1,57 +1,35 @@
 //! Start, stop, reset, setpoint: what is written to `CMD` and `W401`, and how it is seen to act.
 
+use async_trait::async_trait;
 use drive_core::{
-    Class, Command, Direction, Error, ErrorKind, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem,
-    State, Status, StopMode,
-    drivecom::{self, ChartState, Goal, Step},
+    Class, Direction, Effect, Error, Frequency, Port, RawWord, Refusal, Result, Setpoint, SetpointProblem,
+    SlaveAddress, State, Status, StopMode,
+    drivecom::{self, ChartState, Drivecom},
 };
 
 use crate::{
-    Atv58,
-    registers::{CMD, W401},
+    Atv58, Atv58Map,
+    registers::{CMD, W401, W458, W483},
     status::Words,
 };
 
-/// How often the status is read for a command to show, before it counts as not confirmed.
-const READS: usize = 20;
-
 impl<P: Port> Atv58<P> {
-    /// Climbs the chart and gives the run command. The drive shows it by "operation enabled" and by holding the control
-    /// word.
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
-        let command = Command::Start(direction);
-        let run = drivecom::ENABLE_OPERATION | self.direction_bit(direction)?;
-        let mut words = self.read_words(Class::Command).await?;
-        self.check_start(&words, command)?;
-        let mut given = false;
-        for _ in 0..READS {
-            let chart = words.chart(&self.map);
-            let chart = chart.ok_or_else(|| self.refused(command, Refusal::State(State::Unknown)))?;
-            match drivecom::next_step(chart, Goal::OperationEnabled) {
-                Step::Faulted => return Err(self.refused(command, self.tripped(&words))),
-                Step::Wait => {}
-                Step::Reached if given => {
-                    words.append(&mut self.registers.at(Class::Command), CMD.address(), 1).await?;
-                    if words.at(Some(CMD.address())) == Some(run) {
-                        return Ok(words.status(&self.map));
-                    }
-                    self.give_command(Class::Command, run).await?;
-                }
-                Step::Reached | Step::Write(drivecom::ENABLE_OPERATION) => {
-                    self.give_command(Class::Command, run).await?;
-                    given = true;
-                }
-                Step::Write(word) => self.give_command(Class::Command, word).await?,
+        let bit = match direction {
+            Direction::Forward => 0,
+            Direction::Reverse if self.map.reverse_command != 0 => self.map.reverse_command,
+            Direction::Reverse => {
+                return Err(Error::Unsupported {
+                    what: "start in reverse",
+                    reason: "the drive's map names no bit of the control word for it",
+                });
             }
-            words = self.read_words(Class::Command).await?;
-        }
-        Err(self.not_confirmed(command, &words))
+        };
+        drivecom::start(self, direction, drivecom::ENABLE_OPERATION | bit).await
     }
 
-    /// Writes the stop first, whatever the drive's state, and then reads until the drive shows it.
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        let command = Command::Stop(mode);
-        let stop = self.stop_word(mode).ok_or(match mode {
+        let word = self.stop_word(mode).ok_or(match mode {
             StopMode::DcInjection => Error::Unsupported {
                 what: "stop by DC injection",
                 reason: "the manual names no bit of the control word for it",
@@ -61,41 +39,8 @@ impl<P: Port> Atv58<P> {
                 reason: "the drive's map names no control word for it",
             },
         })?;
-        self.give_command(Class::Stop, stop).await?;
-        let mut words = self.read_words(Class::Stop).await?;
-        for _ in 1..READS {
-            if self.shows_stop(&mut words, mode).await? {
-                return Ok(words.status(&self.map));
-            }
-            words = self.read_words(Class::Stop).await?;
-        }
-        if self.shows_stop(&mut words, mode).await? {
-            return Ok(words.status(&self.map));
-        }
-        Err(self.not_confirmed(command, &words))
-    }
-
-    /// One rising edge of the reset bit, cleared at once. A drive without a fault is left alone.
-    pub(crate) async fn reset_once(&mut self) -> Result<Status> {
-        let mut words = self.read_words(Class::Command).await?;
-        if !words.is_tripped(&self.map) {
-            return Ok(words.status(&self.map));
-        }
-        let edge = self.registers.at(Class::Command).edge().write(CMD, drivecom::FAULT_RESET).await;
-        // An edge that may have arrived is cleared as well, so that the next one rises; the status tells the outcome.
-        if let Err(error) = edge
-            && error.kind() != ErrorKind::OutcomeUnknown
-        {
-            return Err(error);
-        }
-        self.give_command(Class::Command, drivecom::DISABLE_VOLTAGE).await?;
-        for _ in 0..READS {
-            words = self.read_words(Class::Command).await?;
-            if words.chart(&self.map).is_some() && !words.is_tripped(&self.map) {
-                return Ok(words.status(&self.map));
-            }
-        }
-        Err(self.not_confirmed(Command::ResetFaults, &words))
+        let map = self.map;
+        drivecom::stop(self, mode, word, |status| shows_stop(&map, status, mode)).await
     }
 
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
@@ -143,64 +88,69 @@ impl<P: Port> Atv58<P> {
         }
         Ok(self.limits)
     }
+}
 
-    fn direction_bit(&self, direction: Direction) -> Result<u16> {
-        match direction {
-            Direction::Forward => Ok(0),
-            Direction::Reverse if self.map.reverse_command != 0 => Ok(self.map.reverse_command),
-            Direction::Reverse => Err(Error::Unsupported {
-                what: "start in reverse",
-                reason: "the drive's map names no bit of the control word for it",
-            }),
+#[async_trait]
+impl<P: Port> Drivecom for Atv58<P> {
+    const ETA: u16 = W458.address();
+
+    fn status_register(&self) -> u16 {
+        self.map.status
+    }
+
+    fn address(&self) -> SlaveAddress {
+        self.registers.slave()
+    }
+
+    async fn read_status(&mut self, class: Class) -> Result<Status> {
+        let map = self.map;
+        let fast = [Some(map.status), map.output_frequency, map.current];
+        let addresses: Vec<u16> = fast.into_iter().flatten().collect();
+        let mut calls = self.registers.at(class);
+        let mut words = Words::read(&mut calls, &addresses).await?;
+        if words.is_tripped(&map) {
+            words.append(&mut calls, W483.address(), 1).await?;
         }
-    }
-
-    fn check_start(&self, words: &Words, command: Command) -> Result<()> {
-        if let Some(control) = words.control(&self.map) {
-            return Err(self.refused(command, Refusal::NotInControl(control)));
+        // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
+        // that it holds tells the stop from the run.
+        if class == Class::Stop && words.chart(&map) == Some(ChartState::OperationEnabled) {
+            words.append(&mut calls, CMD.address(), 1).await?;
         }
-        match words.chart(&self.map) {
-            None => Err(self.refused(command, Refusal::State(State::Unknown))),
-            Some(ChartState::Fault | ChartState::FaultReactionActive) => {
-                Err(self.refused(command, self.tripped(words)))
-            }
-            // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
-            Some(ChartState::QuickStopActive) if words.is_turning(&self.map) => {
-                Err(self.refused(command, Refusal::State(State::QuickStop)))
-            }
-            Some(_) => Ok(()),
+        Ok(words.status(&map))
+    }
+
+    async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
+        let calls = self.registers.at(class);
+        let mut calls = if effect == Effect::Edge { calls.edge() } else { calls };
+        calls.write(CMD, word).await
+    }
+
+    async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
+        if let Some(control) = status.control {
+            return Ok(Some(Refusal::NotInControl(control)));
         }
+        // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
+        let turning = status.output_frequency.is_some_and(|frequency| frequency > Frequency::ZERO);
+        let braking = turning && status.state == State::QuickStop;
+        Ok(braking.then_some(Refusal::State(State::QuickStop)))
     }
 
-    /// Whether the drive itself shows that no run command is in force. Whether it leaves "operation enabled" at once or at
-    /// the end of its ramp is not known, so a ramp stop also shows by the control word that the drive holds.
-    async fn shows_stop(&mut self, words: &mut Words, mode: StopMode) -> Result<bool> {
-        Ok(match words.chart(&self.map) {
-            None => false,
-            Some(ChartState::OperationEnabled) if mode == StopMode::Ramp => {
-                words.append(&mut self.registers.at(Class::Stop), CMD.address(), 1).await?;
-                words.at(Some(CMD.address())) == self.map.ramp_stop
-            }
-            Some(ChartState::OperationEnabled) => false,
-            Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
-            Some(_) => true,
-        })
+    /// The drive shows a run command by holding it in the state "operation enabled".
+    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
+        let value = self.registers.at(Class::Command).read(CMD).await?;
+        status.raw.push(RawWord { address: CMD.address(), code: CMD.row().code, value });
+        Ok(value == word)
     }
+}
 
-    async fn give_command(&mut self, class: Class, word: u16) -> Result<()> {
-        self.registers.at(class).write(CMD, word).await
-    }
-
-    fn tripped(&self, words: &Words) -> Refusal {
-        words.status(&self.map).fault_code.map_or(Refusal::Tripped, Refusal::Fault)
-    }
-
-    const fn refused(&self, command: Command, reason: Refusal) -> Error {
-        Error::Refused { slave: self.registers.slave(), command, reason }
-    }
-
-    fn not_confirmed(&self, command: Command, words: &Words) -> Error {
-        let status = Box::new(words.status(&self.map));
-        Error::NotConfirmed { slave: self.registers.slave(), command, status }
+/// Whether the drive itself shows that no run command is in force.
+fn shows_stop(map: &Atv58Map, status: &Status, mode: StopMode) -> bool {
+    match status.raw(map.status).and_then(ChartState::of) {
+        None => false,
+        Some(ChartState::OperationEnabled) => {
+            mode == StopMode::Ramp && status.raw(CMD.address()) == map.ramp_stop
+        }
+        Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
+        Some(_) => true,
     }
 }

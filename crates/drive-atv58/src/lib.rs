@@ -13,7 +13,9 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, Error, ExceptionMeaning, Fault, Faults, Frequency,
     Lifetimes, Measurements, Port, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status,
-    StopMode, Watchdog, WatchdogCapability, Written, serial::CharacterFormat,
+    StopMode, Watchdog, WatchdogCapability, Written,
+    drivecom::{self, Drivecom},
+    serial::CharacterFormat,
 };
 
 pub use crate::{diagnostics::Counters, map::Atv58Map, registers::ROWS};
@@ -193,7 +195,7 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn reset_faults(&mut self) -> Result<Status> {
-        self.reset_once().await
+        drivecom::reset_fault(self).await
     }
 
     async fn keep_alive(&mut self) -> Result<()> {

@@ -1,12 +1,12 @@
 //! Reading the mapped words, and what they say.
 
 use drive_core::{
-    Calls, Class, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
+    Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
     Setpoint, State, Status, Voltage, drivecom::ChartState,
 };
 
 use crate::{
-    Atv58, Atv58Map, CAPABILITIES, ROWS,
+    Atv58Map, CAPABILITIES, ROWS,
     registers::{CMD, W483},
     words::FaultRegister,
 };
@@ -135,24 +135,6 @@ impl Words {
             Some(_) => State::Ready,
             None => State::Running,
         }
-    }
-}
-
-impl<P: Port> Atv58<P> {
-    pub(crate) async fn read_words(&mut self, class: Class) -> Result<Words> {
-        let map = self.map;
-        let addresses: Vec<u16> =
-            [Some(map.status), map.output_frequency, map.current].into_iter().flatten().collect();
-        let mut calls = self.registers.at(class);
-        let mut words = Words::read(&mut calls, &addresses).await?;
-        if words.is_tripped(&map) {
-            words.append(&mut calls, W483.address(), 1).await?;
-        }
-        Ok(words)
-    }
-
-    pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
-        Ok(self.read_words(class).await?.status(&self.map))
     }
 }
 

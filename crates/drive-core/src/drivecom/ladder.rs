@@ -18,12 +18,17 @@ pub const CONFIRMING_READS: usize = 20;
 ///
 /// # For implementors
 /// The status that [`read_status`](Self::read_status) returns **must** hold the status word, at the address
-/// [`ETA`](Self::ETA), among its raw words. [`write_control`](Self::write_control) writes the control word to the
+/// [`status_register`](Self::status_register), among its raw words. [`write_control`](Self::write_control) writes the control word to the
 /// drive's `CMD` and nothing else.
 #[async_trait]
 pub trait Drivecom: Send {
-    /// The address of the status word in [`Status::raw`].
+    /// The address of the status word in the family's map.
     const ETA: u16;
+
+    /// The address of the status word in [`Status::raw`]: the family's, unless this drive was told another.
+    fn status_register(&self) -> u16 {
+        Self::ETA
+    }
 
     /// The slave, for errors.
     fn address(&self) -> SlaveAddress;
@@ -44,8 +49,8 @@ pub trait Drivecom: Send {
 }
 
 /// The state of the chart in a status; `None` for a pattern that the manual's table does not have.
-fn chart_of<D: Drivecom>(status: &Status) -> Option<ChartState> {
-    status.raw(D::ETA).and_then(ChartState::of)
+fn chart_of(eta: u16, status: &Status) -> Option<ChartState> {
+    status.raw(eta).and_then(ChartState::of)
 }
 
 /// Climbs to operation enabled and gives the run command `word`, which must hold the bits of
@@ -57,11 +62,12 @@ fn chart_of<D: Drivecom>(status: &Status) -> Option<ChartState> {
 pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) -> Result<Status> {
     let command = Command::Start(direction);
     let slave = drive.address();
+    let eta = drive.status_register();
     let refused = |reason| Error::Refused { slave, command, reason };
 
     let mut status = drive.read_status(Class::Command).await?;
     // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
-    match chart_of::<D>(&status) {
+    match chart_of(eta, &status) {
         None => return Err(refused(Refusal::State(State::Unknown))),
         Some(state) if next_step(state, Goal::OperationEnabled) == Step::Faulted => {
             return Err(refused(tripped(&status)));
@@ -73,7 +79,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     }
     let mut given = false;
     for _ in 0..CONFIRMING_READS {
-        let state = chart_of::<D>(&status).ok_or_else(|| refused(Refusal::State(State::Unknown)))?;
+        let state = chart_of(eta, &status).ok_or_else(|| refused(Refusal::State(State::Unknown)))?;
         match next_step(state, Goal::OperationEnabled) {
             Step::Faulted => return Err(refused(tripped(&status))),
             Step::Wait => {}
@@ -126,8 +132,9 @@ pub async fn stop<D: Drivecom>(
 /// # Errors
 /// [`Error::NotConfirmed`] when the drive still shows a fault after [`CONFIRMING_READS`] reads.
 pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
+    let eta = drive.status_register();
     let healthy = |status: &Status| {
-        chart_of::<D>(status).is_some_and(|state| next_step(state, Goal::SwitchOnDisabled) != Step::Faulted)
+        chart_of(eta, status).is_some_and(|state| next_step(state, Goal::SwitchOnDisabled) != Step::Faulted)
     };
     let mut status = drive.read_status(Class::Command).await?;
     if healthy(&status) {
@@ -273,7 +280,7 @@ mod tests {
     #[tokio::test]
     async fn a_stop_is_written_once_and_before_anything_is_read() {
         let mut drive = Chart::at(0x0027);
-        let shows = |status: &Status| chart_of::<Chart>(status) == Some(ChartState::QuickStopActive);
+        let shows = |status: &Status| chart_of(ETA, status) == Some(ChartState::QuickStopActive);
         stop(&mut drive, StopMode::Fast, QUICK_STOP, shows).await.unwrap();
         assert_eq!(drive.written, [QUICK_STOP]);
 
