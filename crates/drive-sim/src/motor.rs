@@ -13,7 +13,7 @@ const MAGNETISING: i64 = 30;
 const ACTIVE: i64 = 95;
 
 /// How fast a ramp is: the time from standstill to a frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ramp {
     /// The frequency that the time is measured to, in hundredths of a hertz.
     pub full_scale: u32,
@@ -37,7 +37,7 @@ impl Ramp {
 }
 
 /// Acceleration and deceleration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ramps {
     /// Away from standstill.
     pub acceleration: Ramp,

@@ -1,1 +1,3 @@
-//! The simulated drives, one module a family.
+//! The simulated drives, one module a family, and what families share.
+
+pub mod drivecom;
