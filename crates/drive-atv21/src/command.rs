@@ -1,0 +1,341 @@
+//! What moves the motor, stops it, or decides who may.
+
+use drive_core::{
+    Class, Command, Control, Direction, Error, ErrorKind, ExceptionMeaning, Frequency, Port, PortError,
+    Refusal, Result, Setpoint, SetpointProblem, Speed, State, Status, StopMode,
+};
+
+use crate::{
+    Atv21, Authority,
+    blocks::WRITE_BLOCK,
+    registers as map,
+    words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
+};
+
+/// Statuses that are read for a confirmation before it is given up.
+const CONFIRMATIONS: usize = 20;
+/// FA13 takes no more (Altivar 21 Modbus §8.2).
+const HIGHEST_SPEED: Speed = Speed::from_rpm(24_000);
+/// CMOD: the serial link commands.
+const SERIAL_COMMAND: u16 = 2;
+
+/// What a setpoint is written to.
+type Reference = (drive_core::registers::Register<drive_core::registers::access::ReadWrite>, u16);
+
+impl<P: Port> Atv21<P> {
+    /// Starts the motor at a frequency. Where the write block holds FA00 and FA01 the drive takes both in one
+    /// exchange; else the setpoint is given first.
+    ///
+    /// # Errors
+    /// Those of [`set_setpoint`](drive_core::Drive::set_setpoint) and [`start`](drive_core::Drive::start).
+    pub async fn start_at(&mut self, direction: Direction, frequency: Frequency) -> Result<Status> {
+        let setpoint = Setpoint::Frequency(frequency);
+        let reference = self.reference(setpoint).await?;
+        let blocks = self.known_blocks(Class::Command).await?;
+        let word = self.word(CommandWord::run(direction));
+        let block = blocks.and_then(|blocks| blocks.command_and_reference(word.bits(), reference.1));
+        if block.is_none() {
+            self.write_setpoint(setpoint).await?;
+        }
+        let status = self.start_motor(direction, block).await?;
+        if block.is_some() {
+            self.confirm_reference(setpoint, reference).await?;
+        }
+        Ok(status)
+    }
+
+    /// Gives the drive's emergency stop (FA00 bit 12) once, then a word without it. The drive trips with fault E,
+    /// also when it is not commanded by the bus; it needs a reset afterwards. Returns the status that shows it.
+    ///
+    /// # Errors
+    /// [`Error::NotConfirmed`] when no trip and no emergency stop shows: the motor was ordered to stop along its ramp
+    /// in any case.
+    pub async fn emergency_stop(&mut self) -> Result<Status> {
+        let edge = self.word(CommandWord::EMERGENCY_STOP).bits();
+        let clear = self.word(CommandWord::empty()).bits();
+        let sent = self.registers.at(Class::Stop).edge().write(map::COMMAND_WORD, edge).await;
+        // Whatever became of the edge: a word without it clears it, and stops along the ramp.
+        let cleared = self.registers.at(Class::Stop).write(map::COMMAND_WORD, clear).await;
+        for _ in 1..CONFIRMATIONS {
+            let status = self.read_status(Class::Stop).await?;
+            if status.is_fault() || status.state == State::QuickStop {
+                return Ok(status);
+            }
+        }
+        sent.and(cleared)?;
+        let status = self.read_status(Class::Stop).await?;
+        Err(self.not_confirmed(Command::Configure("emergency stop"), status))
+    }
+
+    pub(crate) async fn start_motor(
+        &mut self,
+        direction: Direction,
+        block: Option<[u16; 2]>,
+    ) -> Result<Status> {
+        let command = Command::Start(direction);
+        self.check_start(command).await?;
+        let word = self.word(CommandWord::run(direction));
+        let mut calls = self.registers.at(Class::Command);
+        let sent = match block {
+            Some(words) => calls.write_words(WRITE_BLOCK, &words).await,
+            None => calls.write(map::COMMAND_WORD, word.bits()).await,
+        };
+        // An ambiguous write of the block is read back by what follows.
+        match sent {
+            Err(error) if block.is_none() || error.kind() != ErrorKind::OutcomeUnknown => return Err(error),
+            _ => {}
+        }
+        let mut last = None;
+        for _ in 0..CONFIRMATIONS {
+            let status = self.read_status(Class::Command).await?;
+            let runs = status_word(&status).contains(StatusWord::RUN) && !status.is_fault();
+            if runs && (status.direction == Some(direction) || self.is_in_force(word, Class::Command).await?)
+            {
+                return Ok(status);
+            }
+            last = Some(status);
+        }
+        sent?;
+        Err(self.not_confirmed(command, last.unwrap_or_default()))
+    }
+
+    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
+        let word = self.stop_word(mode)?;
+        self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
+        let mut last = None;
+        for _ in 0..CONFIRMATIONS {
+            let mut status = self.read_status(Class::Stop).await?;
+            if !status_word(&status).contains(StatusWord::RUN) {
+                return Ok(status);
+            }
+            // The manual does not say whether FD01 shows "run" until the motor stands, so the order itself counts.
+            if self.is_in_force(word, Class::Stop).await? {
+                if status.state == State::Running {
+                    status.state = State::Stopping;
+                }
+                return Ok(status);
+            }
+            last = Some(status);
+        }
+        Err(self.not_confirmed(Command::Stop(mode), last.unwrap_or_default()))
+    }
+
+    /// The word that stops in this mode.
+    pub(crate) fn stop_word(&self, mode: StopMode) -> Result<CommandWord> {
+        match mode {
+            StopMode::Ramp => Ok(self.word(CommandWord::empty())),
+            StopMode::Freewheel => Ok(self.word(CommandWord::FREEWHEEL)),
+            StopMode::DcInjection => Ok(self.word(CommandWord::DC_BRAKING)),
+            StopMode::Fast => Err(Error::Unsupported {
+                what: "fast stop",
+                reason: "the drive's emergency stop trips it; ask for emergency_stop, or stop by ramp",
+            }),
+        }
+    }
+
+    pub(crate) async fn write_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        let reference @ (register, word) = self.reference(setpoint).await?;
+        let command = Command::Setpoint(setpoint);
+        self.check_preset(command).await?;
+        let mut calls = self.registers.at(Class::Command).replacing(register.address());
+        calls.write(register, word).await?;
+        self.confirm_reference(setpoint, reference).await
+    }
+
+    pub(crate) async fn reset_trip(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        if !status.is_fault() && status.state != State::QuickStop {
+            return Ok(status);
+        }
+        let edge = self.word(CommandWord::FAULT_RESET).bits();
+        let sent = self.registers.at(Class::Command).edge().write(map::COMMAND_WORD, edge).await;
+        match &sent {
+            Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return sent.map(|()| status),
+            _ => {}
+        }
+        // The edge is cleared whether or not the drive is already starting up again and hears nothing: then it clears
+        // the word by itself.
+        let clear = self.word(CommandWord::empty()).bits();
+        let cleared = self.registers.at(Class::Command).write(map::COMMAND_WORD, clear).await;
+        let mut last = None;
+        for _ in 0..CONFIRMATIONS {
+            // The drive is mute while it starts up, so a read without an answer is one more reason to read again.
+            let Ok(status) = self.read_status(Class::Command).await else { continue };
+            if !status.is_fault() && status.state != State::QuickStop {
+                return Ok(status);
+            }
+            last = Some(status);
+        }
+        match last {
+            Some(status) => {
+                sent.and(cleared)?;
+                Err(self.not_confirmed(Command::ResetFaults, status))
+            }
+            None => Err(Error::Port {
+                slave: self.registers.slave(),
+                exchange: drive_core::Exchange {
+                    function: 0x06,
+                    register: Some(map::COMMAND_WORD.address()),
+                },
+                problem: PortError::OutcomeUnknown(
+                    "the drive is mute after the fault reset; read its status in 2 s",
+                ),
+            }),
+        }
+    }
+
+    pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        if status.state.is_moving() {
+            return Err(self.refused(Command::Release, Refusal::MotorRunning));
+        }
+        let mode = self.registers.at(Class::Command).read(map::COMMAND_MODE).await?;
+        if mode == SERIAL_COMMAND {
+            let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus");
+            return Err(self.refused(Command::Release, reason));
+        }
+        self.registers.at(Class::Command).write(map::COMMAND_WORD, 0).await?;
+        let mut last = status;
+        for _ in 0..CONFIRMATIONS {
+            last = self.read_status(Class::Command).await?;
+            if self.source(Class::Command).await? != CommandSource::Serial {
+                last.control = status_control(&last, self.source(Class::Command).await?);
+                return Ok(last);
+            }
+        }
+        Err(self.not_confirmed(Command::Release, last))
+    }
+
+    /// The command word with what this drive's owner has chosen.
+    fn word(&self, order: CommandWord) -> CommandWord {
+        let authority = match self.authority {
+            Authority::Priority => CommandWord::PRIORITIES,
+            Authority::Settings => CommandWord::empty(),
+        };
+        authority | self.selections | order
+    }
+
+    /// Refuses a start that the drive is not ready for.
+    async fn check_start(&mut self, command: Command) -> Result<()> {
+        let status = self.read_status(Class::Command).await?;
+        if status.is_fault() {
+            let reason = match self.fault_code(Class::Command).await? {
+                0 => Refusal::Tripped,
+                code => Refusal::Fault(code),
+            };
+            return Err(self.refused(command, reason));
+        }
+        if matches!(status.state, State::NotReady | State::QuickStop | State::Unknown) {
+            return Err(self.refused(command, Refusal::State(status.state)));
+        }
+        let source = self.source_of(&status).await?;
+        let word = status_word(&status);
+        let foreign = source != CommandSource::Serial
+            && (word.contains(StatusWord::RUN) || self.authority == Authority::Settings);
+        if word.contains(StatusWord::LOCAL) || foreign {
+            let control = status_control(&status, source).unwrap_or(Control::Local);
+            return Err(self.refused(command, Refusal::NotInControl(control)));
+        }
+        self.check_preset(command).await
+    }
+
+    /// Refuses what a preset speed from elsewhere would override. One that stands in FA00 is overwritten by the next
+    /// command word, and one of our own choice is meant.
+    async fn check_preset(&mut self, command: Command) -> Result<()> {
+        let is_start = matches!(command, Command::Start(_));
+        if is_start && self.selections.preset_speed() != 0 {
+            return Ok(());
+        }
+        let mut calls = self.registers.at(Class::Command);
+        if ReferenceSource::from(calls.read(map::REFERENCE_SOURCE).await?) != ReferenceSource::PresetSpeed {
+            return Ok(());
+        }
+        if is_start {
+            let present = CommandWord::from_bits_retain(calls.read(map::COMMAND_WORD).await?);
+            if present.preset_speed() != 0 {
+                return Ok(());
+            }
+        }
+        let reason = Refusal::Settings("a preset speed overrides the reference (FE46 = 255)");
+        Err(self.refused(command, reason))
+    }
+
+    /// Whether the bus commands the drive and this word is what it holds.
+    async fn is_in_force(&mut self, word: CommandWord, class: Class) -> Result<bool> {
+        if self.source(class).await? != CommandSource::Serial {
+            return Ok(false);
+        }
+        Ok(self.registers.at(class).read(map::COMMAND_WORD).await? == word.bits())
+    }
+
+    async fn source(&mut self, class: Class) -> Result<CommandSource> {
+        self.registers.at(class).read(map::COMMAND_SOURCE).await.map(CommandSource::from)
+    }
+
+    /// Who commands, from the status if it tells.
+    async fn source_of(&mut self, status: &Status) -> Result<CommandSource> {
+        match status.raw(map::COMMAND_SOURCE.address()) {
+            Some(word) => Ok(word.into()),
+            None => self.source(Class::Command).await,
+        }
+    }
+
+    /// The register and the word of a setpoint, if the drive's limits allow it.
+    async fn reference(&mut self, setpoint: Setpoint) -> Result<Reference> {
+        let slave = self.registers.slave();
+        let refuse = |problem| Error::Setpoint { slave, setpoint, problem };
+        match setpoint {
+            Setpoint::Frequency(frequency) => {
+                let high = self.upper_limit().await?;
+                if frequency > high {
+                    let low = Frequency::ZERO;
+                    return Err(refuse(SetpointProblem::OutsideFrequencyLimits { low, high }));
+                }
+                let word =
+                    u16::try_from(frequency.centihertz()).map_err(|_| refuse(SetpointProblem::TooLarge))?;
+                Ok((map::FREQUENCY_REFERENCE, word))
+            }
+            Setpoint::Speed(speed) => {
+                let low = Speed::default();
+                let outside = SetpointProblem::OutsideSpeedLimits { low, high: HIGHEST_SPEED };
+                match u16::try_from(speed.rpm()) {
+                    Ok(word) if speed <= HIGHEST_SPEED => Ok((map::SPEED_REFERENCE, word)),
+                    _ => Err(refuse(outside)),
+                }
+            }
+        }
+    }
+
+    /// The drive's UL, read once. A drive that has no such register judges the setpoint by itself.
+    async fn upper_limit(&mut self) -> Result<Frequency> {
+        if let Some(limit) = self.upper_limit {
+            return Ok(limit);
+        }
+        let limit = match self.registers.at(Class::Command).read(map::UPPER_LIMIT).await {
+            Ok(word) => Frequency::from_centihertz(word.into()),
+            Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
+                Frequency::from_centihertz(u16::MAX.into())
+            }
+            Err(error) => return Err(error),
+        };
+        self.upper_limit = Some(limit);
+        Ok(limit)
+    }
+
+    /// Reads a reference back.
+    async fn confirm_reference(&mut self, setpoint: Setpoint, (register, word): Reference) -> Result<()> {
+        if self.registers.at(Class::Command).read(register).await? == word {
+            return Ok(());
+        }
+        let status = self.read_status(Class::Command).await?;
+        Err(self.not_confirmed(Command::Setpoint(setpoint), status))
+    }
+}
+
+fn status_word(status: &Status) -> StatusWord {
+    StatusWord::from_bits_retain(status.raw(map::STATUS_WORD.address()).unwrap_or(0))
+}
+
+fn status_control(status: &Status, source: CommandSource) -> Option<Control> {
+    crate::status::control(status_word(status), Some(source))
+}

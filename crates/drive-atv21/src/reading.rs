@@ -1,0 +1,306 @@
+//! What is read and never written: the fast and the slow set, faults, the last trip, identity.
+
+use std::time::Duration;
+
+use drive_core::{
+    Class, Error, ExceptionMeaning, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power,
+    RawWord, Result, Setpoint, Speed, Status,
+    registers::{Register, access::Read},
+};
+use tokio_modbus::prelude::ReadCode;
+
+use crate::{
+    Atv21, KnownBlocks,
+    blocks::{Blocks, READ_BLOCK},
+    faults::{FAULTS, alarms},
+    model::ModelEntry,
+    registers as map, status,
+    words::{
+        Alarms, CommandSource, LogicInputs, LogicOutputs, MaintenanceAlarms, ReferenceSource, StatusWord,
+        StatusWord2, StatusWord3,
+    },
+};
+
+/// What control and safety need, the most important first.
+const FAST_SET: [Register<Read>; 3] = [map::STATUS_WORD, map::OUTPUT_FREQUENCY, map::OUTPUT_CURRENT];
+
+/// What a trend wants to see.
+pub(crate) const SLOW_SET: [Register<Read>; 15] = [
+    map::REFERENCE_BEFORE_RAMP,
+    map::OUTPUT_SPEED,
+    map::OUTPUT_VOLTAGE,
+    map::DC_BUS_VOLTAGE,
+    map::TORQUE,
+    map::INPUT_POWER,
+    map::OUTPUT_POWER,
+    map::MOTOR_LOAD,
+    map::DRIVE_LOAD,
+    map::INPUT_ENERGY,
+    map::OUTPUT_ENERGY,
+    map::RUNNING_TIME,
+    map::POWERED_TIME,
+    map::LOGIC_INPUTS,
+    map::LOGIC_OUTPUTS,
+];
+
+/// The words that §8.3 of the manual remarks as "value before the trip" and that have no address of their own for it.
+const FROZEN: [Register<Read>; 11] = [
+    map::ESTIMATED_SPEED,
+    map::REFERENCE_BEFORE_RAMP,
+    map::REFERENCE_AFTER_RAMP,
+    map::PID_FEEDBACK,
+    map::TORQUE_CURRENT,
+    map::EXCITATION_CURRENT,
+    map::OUTPUT_VOLTAGE,
+    map::INPUT_POWER,
+    map::OUTPUT_POWER,
+    map::MOTOR_LOAD,
+    map::DRIVE_LOAD,
+];
+
+const HISTORY: [Register<Read>; 4] =
+    [map::PAST_FAULT_1, map::PAST_FAULT_2, map::PAST_FAULT_3, map::PAST_FAULT_4];
+
+/// The drive as it was just before its last trip (Altivar 21 Modbus §8.3, §8.6, §8.8).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LastTrip {
+    /// The fault, FE10; `None` when the drive remembers none.
+    pub fault: Option<Fault>,
+    /// The output frequency, FE00.
+    pub output_frequency: Frequency,
+    /// The status word, FE01.
+    pub status: StatusWord,
+    /// The status word 2, FE42.
+    pub status_2: StatusWord2,
+    /// The status word 3, FE49.
+    pub status_3: StatusWord3,
+    /// The logic inputs, FE06.
+    pub inputs: LogicInputs,
+    /// The logic outputs, FE07.
+    pub outputs: LogicOutputs,
+    /// While the drive is tripped, also the monitored words that the manual remarks as "value before the trip";
+    /// empty when it is not, because they show the present then.
+    pub frozen: Vec<RawWord>,
+}
+
+impl<P: Port> Atv21<P> {
+    /// Reads the fast set in any class.
+    pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
+        let addresses = FAST_SET.map(Register::address);
+        let blocks = self.known_blocks(class).await?;
+        let mut words = Vec::with_capacity(5);
+        if let Some(blocks) = blocks.filter(|blocks| blocks.coverage(&addresses) > 1) {
+            words = self.read_block(class, &blocks).await?;
+        }
+        let whole = addresses.iter().all(|&address| find(&words, address).is_some());
+        if !whole {
+            self.read_missing(class, &FAST_SET, &mut words).await?;
+            self.read_missing(class, &[map::COMMAND_SOURCE], &mut words).await?;
+        }
+        Ok(status::status(words))
+    }
+
+    pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
+        let class = Class::Background;
+        let addresses = SLOW_SET.map(Register::address);
+        let blocks = self.known_blocks(class).await?;
+        let mut raw = Vec::with_capacity(SLOW_SET.len());
+        if let Some(blocks) = blocks.filter(|blocks| blocks.coverage(&addresses) > 1) {
+            raw = self.read_block(class, &blocks).await?;
+        }
+        self.read_missing(class, &SLOW_SET, &mut raw).await?;
+        let word = |register: Register<Read>| find(&raw, register.address());
+        let hundredths = |register| word(register).map(|word| Percent::from_hundredths(word.into()));
+        let percent = |register| word(register).map(|word| Percent::from_hundredths(i32::from(word) * 100));
+        let power = |register| word(register).map(|word| Power::from_decawatts(word.into()));
+        let hours = |register| word(register).map(|word| Duration::from_secs(u64::from(word) * 3_600));
+        let reference = word(map::REFERENCE_BEFORE_RAMP).map(|word| Frequency::from_centihertz(word.into()));
+        Ok(Measurements {
+            reference: reference.map(Setpoint::Frequency),
+            speed: word(map::OUTPUT_SPEED).map(|word| Speed::from_rpm(word.into())),
+            output_voltage_share: hundredths(map::OUTPUT_VOLTAGE),
+            dc_bus_voltage_share: hundredths(map::DC_BUS_VOLTAGE),
+            torque: hundredths(map::TORQUE),
+            input_power: power(map::INPUT_POWER),
+            output_power: power(map::OUTPUT_POWER),
+            drive_load: percent(map::DRIVE_LOAD),
+            motor_load: percent(map::MOTOR_LOAD),
+            input_energy: word(map::INPUT_ENERGY).map(u32::from),
+            output_energy: word(map::OUTPUT_ENERGY).map(u32::from),
+            running_time: hours(map::RUNNING_TIME),
+            powered_time: hours(map::POWERED_TIME),
+            inputs: word(map::LOGIC_INPUTS),
+            outputs: word(map::LOGIC_OUTPUTS),
+            raw,
+            ..Measurements::default()
+        })
+    }
+
+    pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
+        let mut calls = self.registers.at(Class::Background);
+        let present = fault(calls.read(map::FAULT_CODE).await?);
+        let mut history = Vec::with_capacity(HISTORY.len());
+        for register in HISTORY {
+            history.extend(fault(calls.read(register).await?));
+        }
+        let warnings = alarms(Alarms::from_bits_retain(calls.read(map::ALARM_CODE).await?));
+        Ok(Faults { present: present.into_iter().collect(), history, warnings, reset_allowed: None })
+    }
+
+    /// Reads the drive as it was just before its last trip: FE10, FE00, FE01, FE42, FE49, FE06, FE07, and while it is
+    /// tripped also the words that it holds still.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn last_trip(&mut self) -> Result<LastTrip> {
+        let mut calls = self.registers.at(Class::Background);
+        let mut trip = LastTrip {
+            fault: fault(calls.read(map::PAST_FAULT_1).await?),
+            output_frequency: Frequency::from_centihertz(
+                calls.read(map::TRIP_OUTPUT_FREQUENCY).await?.into(),
+            ),
+            status: StatusWord::from_bits_retain(calls.read(map::TRIP_STATUS_WORD).await?),
+            status_2: StatusWord2::from_bits_retain(calls.read(map::TRIP_STATUS_WORD_2).await?),
+            status_3: StatusWord3::from_bits_retain(calls.read(map::TRIP_STATUS_WORD_3).await?),
+            inputs: LogicInputs::from_bits_retain(calls.read(map::TRIP_LOGIC_INPUTS).await?),
+            outputs: LogicOutputs::from_bits_retain(calls.read(map::TRIP_LOGIC_OUTPUTS).await?),
+            frozen: Vec::new(),
+        };
+        let now = StatusWord::from_bits_retain(calls.read(map::STATUS_WORD).await?);
+        if now.contains(StatusWord::TRIPPED) {
+            self.read_missing(Class::Background, &FROZEN, &mut trip.frozen).await?;
+        }
+        Ok(trip)
+    }
+
+    /// Reads the maintenance alarms, FE79.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn maintenance(&mut self) -> Result<MaintenanceAlarms> {
+        let word = self.registers.at(Class::Background).read(map::MAINTENANCE_ALARM).await?;
+        Ok(MaintenanceAlarms::from_bits_retain(word))
+    }
+
+    /// Reads who commands the drive, FE45.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn command_source(&mut self) -> Result<CommandSource> {
+        self.registers.at(Class::Status).read(map::COMMAND_SOURCE).await.map(CommandSource::from)
+    }
+
+    /// Reads where the reference comes from, FE46: [`ReferenceSource::PresetSpeed`] means that no setpoint counts.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn reference_source(&mut self) -> Result<ReferenceSource> {
+        self.registers.at(Class::Status).read(map::REFERENCE_SOURCE).await.map(ReferenceSource::from)
+    }
+
+    /// Reads which model it is, FB05 and FB72; `None` for codes that the manual does not list.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn model(&mut self) -> Result<Option<&'static ModelEntry>> {
+        let [code, class] = self.model_codes().await?;
+        Ok(ModelEntry::lookup(code, class))
+    }
+
+    /// Reads how the indirect blocks are set up. What stands there is in effect only if the drive was reset since it
+    /// was written.
+    ///
+    /// # Errors
+    /// As every read.
+    pub async fn blocks(&mut self) -> Result<Blocks> {
+        self.read_block_configuration(Class::Background).await
+    }
+
+    pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
+        let identity = self.registers.at(Class::Background).identification(ReadCode::Basic).await?;
+        let [code, class] = self.model_codes().await?;
+        let raw = |register: Register<Read>, value| RawWord {
+            address: register.address(),
+            code: register.row().code,
+            value,
+        };
+        Ok(Identity { codes: vec![raw(map::MODEL_CODE, code), raw(map::MODEL_CLASS, class)], ..identity })
+    }
+
+    /// The present fault in a form for a refusal: FC90, 0 for none.
+    pub(crate) async fn fault_code(&mut self, class: Class) -> Result<u16> {
+        self.registers.at(class).read(map::FAULT_CODE).await
+    }
+
+    /// The block configuration, read once; `None` while the blocks are not to be used.
+    pub(crate) async fn known_blocks(&mut self, class: Class) -> Result<Option<Blocks>> {
+        match self.blocks {
+            KnownBlocks::Read(blocks) => Ok(Some(blocks)),
+            KnownBlocks::Unusable => Ok(None),
+            KnownBlocks::Unread => {
+                let blocks = self.read_block_configuration(class).await?;
+                self.blocks = KnownBlocks::Read(blocks);
+                Ok(Some(blocks))
+            }
+        }
+    }
+
+    async fn read_block_configuration(&mut self, class: Class) -> Result<Blocks> {
+        let mut calls = self.registers.at(class);
+        let mut blocks = Blocks::default();
+        for (slot, register) in blocks.read.iter_mut().zip(map::READ_SLOTS_IN_ORDER) {
+            *slot = calls.read(register).await?.into();
+        }
+        for (slot, register) in blocks.write.iter_mut().zip(map::WRITE_SLOTS_IN_ORDER) {
+            *slot = calls.read(register).await?.into();
+        }
+        Ok(blocks)
+    }
+
+    async fn model_codes(&mut self) -> Result<[u16; 2]> {
+        let mut calls = self.registers.at(Class::Background);
+        Ok([calls.read(map::MODEL_CODE).await?, calls.read(map::MODEL_CLASS).await?])
+    }
+
+    /// Reads the block. A drive that refuses it has not taken its set-up over yet: nothing is read then, and the
+    /// block not asked for again.
+    async fn read_block(&mut self, class: Class, blocks: &Blocks) -> Result<Vec<RawWord>> {
+        match self.registers.at(class).read_words(READ_BLOCK, blocks.read_count()).await {
+            Ok(answer) => Ok(blocks.words(&answer).collect()),
+            Err(Error::Exception {
+                meaning: ExceptionMeaning::ValueRefused | ExceptionMeaning::NoSuchRegister,
+                ..
+            }) => {
+                self.blocks = KnownBlocks::Unusable;
+                Ok(Vec::new())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Reads one by one what is not among the words yet.
+    async fn read_missing(
+        &mut self,
+        class: Class,
+        wanted: &[Register<Read>],
+        words: &mut Vec<RawWord>,
+    ) -> Result<()> {
+        let mut calls = self.registers.at(class);
+        for &register in wanted {
+            if find(words, register.address()).is_none() {
+                let value = calls.read(register).await?;
+                words.push(RawWord { address: register.address(), code: register.row().code, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn find(words: &[RawWord], address: u16) -> Option<u16> {
+    words.iter().find(|word| word.address == address).map(|word| word.value)
+}
+
+/// The fault with this code; 0 is NErr, no fault.
+fn fault(code: u16) -> Option<Fault> {
+    (code != 0).then(|| Fault::lookup(FAULTS, code))
+}
