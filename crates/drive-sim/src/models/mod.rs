@@ -1,3 +1,5 @@
 //! The simulated drives, one module a family, and what families share.
 
+pub mod atv28;
+pub mod atv58;
 pub mod drivecom;
