@@ -1,0 +1,158 @@
+//! The slow set, the faults, the identity.
+
+use std::time::Duration;
+
+use drive_core::{
+    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Result, Row,
+    Setpoint, Speed, Voltage, drivecom::ChartState,
+};
+use tokio_modbus::prelude::ReadCode;
+
+use crate::{
+    Atv312, FAULTS, PastFault, WARNINGS,
+    registers::{
+        ARE, DP1, DP2, DP3, DP4, EP1, EP2, EP3, EP4, ERRD, ETI, FRH, FRHD, INV, IOLR, LCR, LFT, LRS1, NCV,
+        OPR, OTR, RFRD, RTH, TDM, THD, THR, TSP, UDP, ULN, VCAL,
+    },
+    status::{FastWords, Resolution},
+    words::{ExtendedStatus, ExtendedStatus1, FaultState, LogicIo, StatusWord},
+};
+
+impl<P: Port> Atv312<P> {
+    /// Six requests: no list of the manual has the words between these.
+    pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
+        let resolution = self.resolution(Class::Background).await?;
+        let mut raw = Vec::new();
+        // W3206 ETI lies between and is shown by the status.
+        self.collect(&mut raw, &[FRH.row(), LCR.row(), OTR.row(), ETI.row(), ULN.row()]).await?;
+        self.collect(&mut raw, &[THD.row(), TDM.row(), OPR.row()]).await?;
+        self.collect(&mut raw, &[RTH.row()]).await?;
+        self.collect(&mut raw, &[IOLR.row()]).await?;
+        self.collect(&mut raw, &[RFRD.row(), FRHD.row()]).await?;
+        self.collect(&mut raw, &[THR.row()]).await?;
+        let word =
+            |row: &Row| raw.iter().find(|word| word.address == row.address).map_or(0, |word| word.value);
+        let percent = |row: &Row| Percent::from_percent(i16::try_from(word(row)).unwrap_or(i16::MAX));
+        let speed = Speed::from_rpm(u32::from(word(RFRD.row()).cast_signed().unsigned_abs()));
+        let io = LogicIo::from_bits_retain(word(IOLR.row()));
+        let outputs = LogicIo::R1 | LogicIo::R2 | LogicIo::LO | LogicIo::ANALOG_OUTPUT;
+        Ok(Measurements {
+            reference: Some(Setpoint::Frequency(Frequency::from_decihertz(word(FRH.row())))),
+            // At high resolution the word counts a frequency, and the motor's poles are no register.
+            speed: (resolution == Resolution::Normal).then_some(speed),
+            line_voltage: Some(Voltage::from_decivolts(u32::from(word(ULN.row())))),
+            torque: Some(percent(OTR.row())),
+            power_share: Some(percent(OPR.row())),
+            drive_thermal: Some(percent(THD.row())),
+            motor_thermal: Some(percent(THR.row())),
+            running_time: Some(Duration::from_secs(u64::from(word(RTH.row())) * 3_600)),
+            inputs: Some((io - outputs).bits()),
+            outputs: Some((io & outputs).bits()),
+            raw,
+            ..Measurements::default()
+        })
+    }
+
+    /// The status, `LFt`, the alarms and the four past faults: four requests.
+    pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
+        let words = self.fast_words(Class::Background).await?;
+        let mut calls = self.registers.at(Class::Background);
+        let last = calls.read(LFT).await?;
+        let past = calls.read_words(DP1.address(), 4).await?;
+        let lrs1 = ExtendedStatus1::from_bits_retain(calls.read(LRS1).await?);
+        // LFt keeps the last fault after it is gone: only the state says that it is present.
+        let tripped = matches!(words.chart(), Some(ChartState::Fault | ChartState::FaultReactionActive));
+        let present = tripped.then(|| Fault::lookup(FAULTS, last)).into_iter().collect();
+        let history = past.into_iter().filter(|&code| code != 0).map(|code| Fault::lookup(FAULTS, code));
+        Ok(Faults {
+            present,
+            history: history.collect(),
+            warnings: warnings(&words, lrs1),
+            reset_allowed: tripped.then(|| words.eti().contains(ExtendedStatus::RESET_AUTHORISED)),
+        })
+    }
+
+    /// The four past faults with the drive's state at each, in the drive's order. Which end is the newest is not
+    /// printed.
+    ///
+    /// # Errors
+    /// Those of [`Drive::faults`](drive_core::Drive::faults).
+    pub async fn past_faults(&mut self) -> Result<[PastFault; 4]> {
+        const LAYOUT: [(u16, u16); 4] = [
+            (DP1.address(), EP1.address()),
+            (DP2.address(), EP2.address()),
+            (DP3.address(), EP3.address()),
+            (DP4.address(), EP4.address()),
+        ];
+        let mut calls = self.registers.at(Class::Background);
+        let codes = calls.read_words(DP1.address(), 4).await?;
+        let states = calls.read_words(EP1.address(), 4).await?;
+        let word = |words: &[u16], base: u16, address: u16| {
+            let index = address.checked_sub(base).map(usize::from);
+            index.and_then(|index| words.get(index)).copied().unwrap_or(0)
+        };
+        Ok(LAYOUT.map(|(code, state)| {
+            let code = word(&codes, DP1.address(), code);
+            PastFault {
+                fault: (code != 0).then(|| Fault::lookup(FAULTS, code)),
+                state: FaultState::from_bits_retain(word(&states, EP1.address(), state)),
+            }
+        }))
+    }
+
+    /// The CiA 402 error code `ERRD` (W8606), 0 where the drive has saved none.
+    ///
+    /// # Errors
+    /// Those of [`Drive::faults`](drive_core::Drive::faults).
+    pub async fn error_code(&mut self) -> Result<u16> {
+        self.registers.at(Class::Background).read(ERRD).await
+    }
+
+    /// Function 43/14, then the words that tell one model from another. A drive that refuses the function is described
+    /// by the words alone.
+    pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
+        let asked = self.registers.at(Class::Background).identification(ReadCode::Basic).await;
+        let mut identity = match asked {
+            Err(Error::Exception { .. }) => Identity::default(),
+            asked => asked?,
+        };
+        let mut codes = Vec::new();
+        self.collect(&mut codes, &[ARE.row(), NCV.row(), VCAL.row()]).await?;
+        for row in [INV.row(), UDP.row(), TSP.row()] {
+            self.collect(&mut codes, &[row]).await?;
+        }
+        identity.codes = codes;
+        Ok(identity)
+    }
+
+    /// Reads the words of these rows, which must follow each other, in one request.
+    async fn collect(&mut self, raw: &mut Vec<RawWord>, rows: &[&'static Row]) -> Result<()> {
+        let Some(first) = rows.first() else { return Ok(()) };
+        let count = u16::try_from(rows.len()).unwrap_or(u16::MAX);
+        let words = self.registers.at(Class::Background).read_words(first.address, count).await?;
+        raw.extend(rows.iter().zip(words).map(|(row, value)| RawWord {
+            address: row.address,
+            code: row.code,
+            value,
+        }));
+        Ok(())
+    }
+}
+
+fn warnings(words: &FastWords, lrs1: ExtendedStatus1) -> Vec<Fault> {
+    let eti = words.eti();
+    let mut codes: Vec<u16> = [
+        (eti.contains(ExtendedStatus::MOTOR_THERMAL_ALARM), 7),
+        (eti.contains(ExtendedStatus::BRAKING_ALARM), 8),
+        (eti.contains(ExtendedStatus::CURRENT_LIMIT), 11),
+        (lrs1.contains(ExtendedStatus1::SIGNAL_LOST), 28),
+        (lrs1.contains(ExtendedStatus1::DRIVE_THERMAL_ALARM), 30),
+    ]
+    .into_iter()
+    .filter_map(|(present, code)| present.then_some(code))
+    .collect();
+    if codes.is_empty() && words.eta().contains(StatusWord::ALARM) {
+        codes.push(0);
+    }
+    codes.into_iter().map(|code| Fault::lookup(WARNINGS, code)).collect()
+}

@@ -1,0 +1,164 @@
+//! Parameters, their EEPROM, and the communication watchdog that is set by three of them.
+
+use std::time::Duration;
+
+use drive_core::{
+    Class, Command, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog, WatchdogCapability,
+    Written,
+    drivecom::CONFIRMING_READS,
+    registers::{Access, Storage},
+};
+
+use crate::{
+    Atv312,
+    registers::{CMI, ETI, SLL, TTO},
+    settings::Known,
+    words::{ExtendedControl, ExtendedStatus},
+};
+
+/// What the EEPROM takes in its life (p. 20).
+const EEPROM_LIFE: u32 = 1_000_000;
+/// Saving goes on while nothing else is read, so it is waited for longer than a state of the chart.
+const SAVING_READS: usize = 10 * CONFIRMING_READS;
+/// One count of `ttO`.
+const STEP: Duration = Duration::from_millis(100);
+
+/// `ttO` and `SLL`. The Modbus manual prints 0.1 to 30 s for `ttO`, the variables manual 1 to 100 counts of 0.1 s: the
+/// shorter is taken.
+pub(crate) const WATCHDOG: WatchdogCapability = WatchdogCapability {
+    min: STEP,
+    max: Duration::from_secs(10),
+    step: STEP,
+    reactions: &[Reaction::Ignore, Reaction::Freewheel, Reaction::Ramp, Reaction::Fast],
+    settable: true,
+};
+
+impl<P: Port> Atv312<P> {
+    /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs.
+    pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        if row.access == Access::WriteStopped {
+            self.check_standing(Command::WriteParameter(row.address)).await?;
+        }
+        let written = self.registers.at(Class::Background).change_row(row, word).await?;
+        self.note(written);
+        Ok(written)
+    }
+
+    /// What was read once may be otherwise now, and a parameter in RAM is worth saving.
+    pub(crate) fn note(&mut self, written: Written) {
+        if written.changed {
+            self.known = Known::default();
+            self.unsaved |= matches!(written.storage, Storage::RamUntilSaved | Storage::Unknown);
+        }
+    }
+
+    /// CMI bit 1, once: it clears itself when the drive begins, and ETI bit 0 tells when it has done.
+    pub(crate) async fn save_parameters(&mut self) -> Result<u32> {
+        if !self.unsaved {
+            return Err(self.refused(Command::Persist, Refusal::NothingToSave));
+        }
+        if self.saves >= EEPROM_LIFE {
+            return Err(self.refused(Command::Persist, Refusal::EepromLife));
+        }
+        let cmi = ExtendedControl::from_bits_retain(self.registers.at(Class::Background).read(CMI).await?);
+        let save = (cmi | ExtendedControl::SAVE).bits();
+        let edge = self.registers.at(Class::Background).edge().write(CMI, save).await;
+        match &edge {
+            Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return edge.map(|()| self.saves),
+            _ => self.saves = self.saves.saturating_add(1),
+        }
+        let mut seen = edge.is_ok();
+        for _ in 0..SAVING_READS {
+            let mut calls = self.registers.at(Class::Background);
+            let pending =
+                ExtendedControl::from_bits_retain(calls.read(CMI).await?).contains(ExtendedControl::SAVE);
+            let busy = ExtendedStatus::from_bits_retain(calls.read(ETI).await?)
+                .contains(ExtendedStatus::EEPROM_BUSY);
+            seen |= pending || busy;
+            if !pending && !busy {
+                // An order whose answer was lost and of which nothing showed may never have arrived.
+                if seen {
+                    self.unsaved = false;
+                }
+                return if seen { Ok(self.saves) } else { edge.map(|()| self.saves) };
+            }
+        }
+        // Refused by the drive, as with too low a supply: the order must not stay and act later.
+        self.registers.at(Class::Background).write(CMI, (cmi - ExtendedControl::SAVE).bits()).await?;
+        let status = self.fast_status(Class::Background).await?;
+        Err(self.not_confirmed(Command::Persist, status))
+    }
+
+    /// `ttO`, `SLL` and the NTO bit of `CMI`.
+    pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
+        let mut calls = self.registers.at(Class::Background);
+        let timeout = calls.read(TTO).await?;
+        let reaction = reaction(calls.read(SLL).await?);
+        let unwatched =
+            ExtendedControl::from_bits_retain(calls.read(CMI).await?).contains(ExtendedControl::NO_TIMEOUT);
+        let off = unwatched || reaction == Reaction::Ignore;
+        Ok(Watchdog { timeout: (!off).then(|| STEP * u32::from(timeout)), reaction: Some(reaction) })
+    }
+
+    /// Sets the three, reads them back and compares.
+    pub(crate) async fn set_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        let Some(sll) = reaction_code(reaction) else {
+            return Err(Error::Unsupported {
+                what: "this reaction of the watchdog",
+                reason: "SLL knows ignore, freewheel, ramp and fast stop",
+            });
+        };
+        let tto = self.time_out_counts(timeout)?;
+        let current = self.read_watchdog().await?;
+        let wanted =
+            Watchdog { timeout: (reaction != Reaction::Ignore).then_some(timeout), reaction: Some(reaction) };
+        if current == wanted {
+            return Ok(current);
+        }
+        self.check_standing(Command::ArmWatchdog).await?;
+        // The longer time is never in force with the new reaction unasked: time first, reaction second, watch last.
+        self.change(TTO, tto).await?;
+        self.change(SLL, sll).await?;
+        let mut calls = self.registers.at(Class::Background);
+        let cmi = ExtendedControl::from_bits_retain(calls.read(CMI).await?);
+        if cmi.contains(ExtendedControl::NO_TIMEOUT) {
+            calls.write(CMI, (cmi - ExtendedControl::NO_TIMEOUT).bits()).await?;
+        }
+        let armed = self.read_watchdog().await?;
+        if armed == wanted {
+            return Ok(armed);
+        }
+        let status = self.fast_status(Class::Background).await?;
+        Err(self.not_confirmed(Command::ArmWatchdog, status))
+    }
+
+    fn time_out_counts(&self, timeout: Duration) -> Result<u16> {
+        let WatchdogCapability { min, max, step, .. } = WATCHDOG;
+        let whole = timeout.as_nanos().is_multiple_of(step.as_nanos());
+        let counts = timeout.as_nanos() / step.as_nanos();
+        match u16::try_from(counts) {
+            Ok(counts) if whole && (min..=max).contains(&timeout) => Ok(counts),
+            _ => Err(Error::WatchdogTime { slave: self.registers.slave(), timeout, min, max, step }),
+        }
+    }
+}
+
+const fn reaction(sll: u16) -> Reaction {
+    match sll {
+        0 => Reaction::Ignore,
+        1 => Reaction::Freewheel,
+        6 => Reaction::Ramp,
+        7 => Reaction::Fast,
+        _ => Reaction::Unknown(sll),
+    }
+}
+
+const fn reaction_code(reaction: Reaction) -> Option<u16> {
+    match reaction {
+        Reaction::Ignore => Some(0),
+        Reaction::Freewheel => Some(1),
+        Reaction::Ramp => Some(6),
+        Reaction::Fast => Some(7),
+        Reaction::DcInjection | Reaction::Unknown(_) => None,
+    }
+}
