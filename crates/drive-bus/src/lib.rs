@@ -1,1 +1,76 @@
-//! Not yet written.
+//! One RS-485 line, shared by many drives.
+//!
+//! A [`Line`] owns the port. Each [`Slave`] of it is a tokio-modbus `Client`, turns into a tokio-modbus `Context`, and is
+//! the [`Port`](drive_core::Port) that a drive of any family runs on:
+//!
+//! ```
+//! use drive_bus::{Line, LineConfig};
+//! use drive_core::serial::SerialSettings;
+//! use tokio_modbus::{client::{Context, Reader}, prelude::Writer};
+//!
+//! # async fn on_a_real_port() -> Result<(), Box<dyn std::error::Error>> {
+//! let line = Line::open(LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT)).await?;
+//!
+//! let mut third: Context = line.slave(3).into();
+//! let state_word = third.read_holding_registers(3201, 1).await??;
+//! println!("ETA {:04X}h", state_word[0]);
+//!
+//! let mut all: Context = line.broadcast().into();
+//! all.write_single_register(8501, 0).await??; // returns after the turnaround, nobody answers
+//! line.close().await;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! In a test, or with any other stream:
+//!
+//! ```
+//! use drive_bus::{Line, LineConfig};
+//! use drive_core::{Class, Port, Terms, serial::SerialSettings};
+//! use std::time::Duration;
+//!
+//! # #[tokio::main(flavor = "current_thread", start_paused = true)]
+//! # async fn main() {
+//! let (ours, theirs) = tokio::io::duplex(512);
+//! let line = Line::over(ours, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+//! let mut slave = line.slave(1);
+//! slave.set_terms(Terms::of(Class::Command).within(Duration::from_secs(1)));
+//! # drop(theirs);
+//! # }
+//! ```
+//!
+//! What the line sees to:
+//! - **silences**: 3.5 characters of the real character length before each request, each slave's own pause
+//!   ([`SlaveSettings::turnaround`]), [`LineConfig::slave_change_gap`], the turnaround after a broadcast;
+//! - **the right answer**: every answer is checked against its request; late, foreign, damaged and echoed frames are
+//!   recognised and counted, never returned;
+//! - **order**: the classes of [`drive_core::Class`], see [`schedule`];
+//! - **slaves that do not answer**: timeouts learned per slave, fast failure while off-line, probes;
+//! - **the port**: opened again when it was lost.
+//!
+//! # Errors
+//! A slave's refusal is the inner error of a tokio-modbus call. Everything else comes as
+//! [`PortError`](drive_core::PortError) inside `tokio_modbus::Error::Transport`;
+//! [`PortError::from_modbus`](drive_core::PortError::from_modbus) takes it out.
+//!
+//! # Inside
+//! [`exchange`], [`schedule`] and [`master`] are pure: no clock, no port. One task per line reads, writes and waits.
+
+pub mod answer;
+pub mod config;
+pub mod exchange;
+mod line;
+pub mod master;
+pub mod pdu;
+pub mod schedule;
+mod slave;
+pub mod stats;
+mod task;
+pub mod timeout;
+mod transport;
+
+pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
+pub use line::Line;
+pub use slave::Slave;
+pub use stats::Stats;
+pub use transport::OpenError;

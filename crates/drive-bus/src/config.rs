@@ -1,0 +1,148 @@
+//! What a line is: where it goes, its timing, its limits.
+
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+
+use drive_core::serial::SerialSettings;
+
+/// Where a line goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Endpoint {
+    /// A serial port, by its path (`/dev/ttyUSB0`, `COM3`, a pty), opened exclusively.
+    Serial(PathBuf),
+    /// RTU frames over a TCP connection to `host:port`: a serial server.
+    RtuOverTcp(String),
+    /// Modbus TCP to `host:port`: a gateway or a device.
+    ModbusTcp(String),
+    /// A stream that the caller brings, see [`Line::over`](crate::Line::over).
+    Stream,
+}
+
+/// Whether the adapter gives back what we send (two-wire adapters whose receiver stays on while they transmit).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Echo {
+    /// It does not.
+    #[default]
+    Off,
+    /// It does: what we send comes back first and is taken away. An answer that equals its request (functions 05, 06,
+    /// 08, 16h) counts only when it comes a second time.
+    On,
+    /// Found out by the line. Where the first request after opening would have an answer equal to itself, the line
+    /// reads one register of that slave first, because only the echo of a read can be told from its answer.
+    Auto,
+}
+
+/// Configuration of a line. Start from one of the constructors and change what is special:
+///
+/// ```
+/// use std::time::Duration;
+/// use drive_bus::{LineConfig, SlaveSettings};
+/// use drive_core::serial::SerialSettings;
+///
+/// let config = LineConfig {
+///     response_timeout: Duration::from_millis(300),
+///     ..LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT)
+/// }
+/// .slave(7, SlaveSettings { turnaround: Duration::from_millis(10), ..SlaveSettings::default() });
+/// # let _ = config;
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LineConfig {
+    /// Where the line goes.
+    pub endpoint: Endpoint,
+    /// Speed and format. On RTU over TCP: those of the far serial side; all silences follow from them.
+    pub serial: SerialSettings,
+    /// The longest time from the end of a request to the first character of its answer. The ceiling of what the line
+    /// learns for each slave, and what holds for a slave that has not answered yet.
+    pub response_timeout: Duration,
+    /// The shortest response timeout that the line may learn. Too short a timeout makes a bystander mis-frame the next
+    /// request when an answer and it overlap.
+    pub timeout_floor: Duration,
+    /// Silence after a broadcast, in which the slaves act on it (MODBUS over Serial Line V1.02 p. 10: 100 to 200 ms).
+    pub broadcast_turnaround: Duration,
+    /// Extra silence before a request to another slave than the last.
+    pub slave_change_gap: Duration,
+    /// The longest pause that the adapter makes inside one frame (USB adapters deliver in chunks). A damaged answer is
+    /// given up after such a pause; a good one is never delayed by it.
+    pub chunk_gap: Duration,
+    /// Whether the adapter echoes.
+    pub echo: Echo,
+    /// How many requests may wait; more are refused with [`PortError::QueueFull`](drive_core::PortError::QueueFull).
+    pub queue_limit: usize,
+    /// How often a read, or a write of a level inside its lifetime, is sent again after silence or damage.
+    pub retries: u32,
+    /// After how many unanswered requests in a row a slave counts as off-line. 0: never.
+    pub offline_after: u32,
+    /// First and longest time between two probes of an off-line slave.
+    pub probe_backoff: (Duration, Duration),
+    /// Use the precise timer also on a stream that the caller brings. Not under a paused clock.
+    pub precise_timer: bool,
+    /// Settings of single slaves; the others have [`SlaveSettings::default`].
+    pub slaves: BTreeMap<u8, SlaveSettings>,
+}
+
+impl LineConfig {
+    /// A serial port, echo found out by the line.
+    #[must_use]
+    pub fn serial(path: impl Into<PathBuf>, serial: SerialSettings) -> Self {
+        Self { echo: Echo::Auto, ..Self::to(Endpoint::Serial(path.into()), serial) }
+    }
+
+    /// RTU over TCP to `host:port`; `serial` is the far side's speed and format.
+    #[must_use]
+    pub fn rtu_over_tcp(address: impl Into<String>, serial: SerialSettings) -> Self {
+        Self::to(Endpoint::RtuOverTcp(address.into()), serial)
+    }
+
+    /// Modbus TCP to `host:port`. The protocol has no silences; an answer is known by its transaction number.
+    #[must_use]
+    pub fn modbus_tcp(address: impl Into<String>) -> Self {
+        Self::to(Endpoint::ModbusTcp(address.into()), SerialSettings::MODBUS_DEFAULT)
+    }
+
+    /// RTU on a stream for [`Line::over`](crate::Line::over).
+    #[must_use]
+    pub fn stream(serial: SerialSettings) -> Self {
+        Self::to(Endpoint::Stream, serial)
+    }
+
+    fn to(endpoint: Endpoint, serial: SerialSettings) -> Self {
+        Self {
+            endpoint,
+            serial,
+            response_timeout: Duration::from_millis(500),
+            timeout_floor: Duration::from_millis(50),
+            broadcast_turnaround: Duration::from_millis(100),
+            slave_change_gap: Duration::ZERO,
+            chunk_gap: Duration::from_millis(20),
+            echo: Echo::Off,
+            queue_limit: 1_024,
+            retries: 2,
+            offline_after: 3,
+            probe_backoff: (Duration::from_millis(500), Duration::from_secs(10)),
+            precise_timer: false,
+            slaves: BTreeMap::new(),
+        }
+    }
+
+    /// This configuration with the settings of one slave.
+    #[must_use]
+    pub fn slave(mut self, slave: u8, settings: SlaveSettings) -> Self {
+        self.slaves.insert(slave, settings);
+        self
+    }
+
+    /// Whether frames need silences between them.
+    pub(crate) const fn is_paced(&self) -> bool {
+        !matches!(self.endpoint, Endpoint::ModbusTcp(_))
+    }
+}
+
+/// What is special about one slave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct SlaveSettings {
+    /// Silence that this slave needs after its answer before the next request **to it** (3G3EV: 24 bits + 10 ms).
+    /// Other slaves are served meanwhile. Shorter values than t3.5 have no effect.
+    pub turnaround: Duration,
+    /// Its own ceiling of the response timeout; `None`: the line's.
+    pub response_timeout: Option<Duration>,
+}

@@ -1,0 +1,145 @@
+//! Modbus TCP: a header with transaction number, length and unit, then the PDU.
+
+use std::sync::Arc;
+
+use bytes::{Buf, BufMut, Bytes, BytesMut};
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+use super::{Answer, Exchange, Failure, Step, Stray};
+use crate::{answer, pdu::MAX_PDU};
+
+/// Transaction number, protocol number, length (2 bytes each), unit.
+const HEADER: usize = 7;
+
+/// The machine: one request at a time, because behind a gateway there is one line.
+#[derive(Debug, Default)]
+pub struct Mbap {
+    transaction: u16,
+    current: Option<Current>,
+    received: BytesMut,
+    strays: Vec<Stray>,
+}
+
+#[derive(Debug)]
+struct Current {
+    unit: u8,
+    request: Arc<Request<'static>>,
+    answer_by: Option<Instant>,
+    misfit: Option<String>,
+}
+
+impl Mbap {
+    /// A machine that has sent nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The next whole frame: transaction, unit, PDU.
+    fn next_frame(&mut self) -> Option<(u16, u8, Bytes)> {
+        let mut noise = 0;
+        let frame = loop {
+            let Some(&[t1, t0, p1, p0, l1, l0, unit]) = self.received.first_chunk::<HEADER>() else {
+                break None;
+            };
+            let len = usize::from(u16::from_be_bytes([l1, l0]));
+            if (p1, p0) != (0, 0) || !(2..=MAX_PDU + 1).contains(&len) {
+                // No header: go on with the next byte until one fits.
+                self.received.advance(1);
+                noise += 1;
+                continue;
+            }
+            if self.received.len() < HEADER - 1 + len {
+                break None;
+            }
+            self.received.advance(HEADER);
+            break Some((u16::from_be_bytes([t1, t0]), unit, self.received.split_to(len - 1).freeze()));
+        };
+        if noise > 0 {
+            self.strays.push(Stray::Noise(noise));
+        }
+        frame
+    }
+
+    fn fits(&mut self, transaction: u16, unit: u8, pdu: &Bytes) -> Option<Answer> {
+        let stray = Stray::Frame { slave: unit, function: pdu.first().copied().unwrap_or_default() };
+        let Some(current) = self.current.as_mut().filter(|_| transaction == self.transaction) else {
+            self.strays.push(stray);
+            return None;
+        };
+        if unit != current.unit {
+            current.misfit = Some(format!("unit {unit} instead of {}", current.unit));
+            self.strays.push(stray);
+            return None;
+        }
+        answer::check(&current.request, pdu).map_err(|why| current.misfit = Some(why)).ok()
+    }
+}
+
+impl Exchange for Mbap {
+    fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
+        self.transaction = self.transaction.wrapping_add(1);
+        self.current = Some(Current { unit: slave, request, answer_by: None, misfit: None });
+        let mut frame = BytesMut::with_capacity(HEADER + pdu.len());
+        frame.put_u16(self.transaction);
+        frame.put_u16(0);
+        frame.put_u16(pdu.len() as u16 + 1);
+        frame.put_u8(slave);
+        frame.put_slice(pdu);
+        frame.freeze()
+    }
+
+    fn handle_sent(&mut self, answer_by: Instant) {
+        if let Some(current) = &mut self.current {
+            current.answer_by = Some(answer_by);
+        }
+    }
+
+    fn handle_bytes(&mut self, _now: Instant, bytes: &[u8]) -> Step {
+        self.received.extend_from_slice(bytes);
+        while let Some((transaction, unit, pdu)) = self.next_frame() {
+            if let Some(answer) = self.fits(transaction, unit, &pdu) {
+                self.current = None;
+                return Step::Done(Ok(answer));
+            }
+        }
+        Step::More
+    }
+
+    fn handle_timeout(&mut self, now: Instant) -> Step {
+        if self.deadline().is_none_or(|deadline| now < deadline) {
+            return Step::More;
+        }
+        // A frame that is half there when the time is over may never end: what follows begins anew.
+        if !self.received.is_empty() {
+            self.strays.push(Stray::Noise(self.received.len()));
+            self.received.clear();
+        }
+        match self.current.take().and_then(|current| current.misfit) {
+            Some(why) => Step::Done(Err(Failure::Mismatch(why))),
+            None => Step::Done(Err(Failure::Timeout)),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.current.as_ref()?.answer_by
+    }
+
+    fn abandon(&mut self) {
+        self.current = None;
+    }
+
+    fn reset(&mut self) {
+        self.current = None;
+        self.received.clear();
+    }
+
+    fn take_strays(&mut self) -> Vec<Stray> {
+        std::mem::take(&mut self.strays)
+    }
+
+    fn confuses_late_answers(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,95 @@
+//! Exchanges: one request and its answer, as bytes. Pure: time is an argument, bytes go in and come out.
+//!
+//! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
+
+pub mod mbap;
+pub mod rtu;
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use tokio::time::Instant;
+use tokio_modbus::{ExceptionCode, Request, Response};
+
+/// What a slave said: data, or its refusal.
+pub type Answer = Result<Response, ExceptionCode>;
+
+/// What an exchange wants next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// More bytes, or the passing of [`Exchange::deadline`].
+    More,
+    /// These bytes sent now; the exchange goes on.
+    Send(Bytes),
+    /// Nothing: it is over.
+    Done(Result<Answer, Failure>),
+}
+
+/// Why an exchange brought no answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Failure {
+    /// Nothing came.
+    Timeout,
+    /// Something came that may have been the answer, and is not whole.
+    Damaged(&'static str),
+    /// An intact answer came that does not fit the request.
+    Mismatch(String),
+}
+
+/// What came in and was no part of the exchange.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stray {
+    /// An intact frame: another slave's, another master's, or a late answer.
+    Frame {
+        /// Its address.
+        slave: u8,
+        /// Its function code.
+        function: u8,
+    },
+    /// Bytes that make no frame.
+    Noise(usize),
+    /// Our own request, given back by the adapter.
+    Echo,
+}
+
+/// The machine of one protocol, used for one exchange after another.
+pub trait Exchange: Send {
+    /// Begins an exchange and gives the bytes that open it. `pdu` is the request, encoded.
+    fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes;
+
+    /// The bytes have been written. The first character of the answer, and as many more as the answer likely has, are
+    /// due at `answer_by`.
+    fn handle_sent(&mut self, answer_by: Instant);
+
+    /// Bytes came in at `now`. Bytes that come when no exchange is under way are strays.
+    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step;
+
+    /// The [`deadline`](Self::deadline) has passed.
+    fn handle_timeout(&mut self, now: Instant) -> Step;
+
+    /// When [`handle_timeout`](Self::handle_timeout) is to be called, unless bytes come before.
+    fn deadline(&self) -> Option<Instant>;
+
+    /// Gives up the exchange that is under way. What still comes is stray.
+    fn abandon(&mut self);
+
+    /// Forgets everything: the stream is another one now.
+    fn reset(&mut self);
+
+    /// What came in that was no part of an exchange, since the last call.
+    fn take_strays(&mut self) -> Vec<Stray>;
+
+    /// Whether a late answer can be taken for the answer to a later request, so that a slave must be left alone after a
+    /// timeout.
+    fn confuses_late_answers(&self) -> bool;
+
+    /// Whether it is unknown if the adapter echoes, so that an answer that equals its request proves nothing yet.
+    fn echo_is_unknown(&self) -> bool {
+        false
+    }
+
+    /// Whether the adapter echoes, as far as is known.
+    fn echoes(&self) -> bool {
+        false
+    }
+}

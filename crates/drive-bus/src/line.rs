@@ -1,0 +1,158 @@
+//! [`Line`]: opening, sharing and closing one line.
+
+use std::{
+    fmt, io,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    sync::{Notify, watch},
+    time::Instant,
+};
+
+use crate::{
+    config::{LineConfig, SlaveSettings},
+    master::Master,
+    slave::{Caller, Slave},
+    stats::Stats,
+    task::Task,
+    transport::{BoxedStream, Connector, Given, OpenError},
+};
+
+/// One line and the task that owns its port. Cheap to clone; when the last handle ([`Line`] or [`Slave`]) is gone, the
+/// exchange that is under way finishes and the port is closed.
+#[derive(Clone)]
+pub struct Line {
+    pub(crate) handle: Arc<Handle>,
+}
+
+impl Line {
+    /// Opens the port and starts the line's task on the current tokio runtime.
+    ///
+    /// Later losses of the port (unplugged, closed) are repaired by the line itself; only the first opening is
+    /// reported here.
+    ///
+    /// # Errors
+    /// [`OpenError`] when the port cannot be opened: it says which and why.
+    pub async fn open(config: LineConfig) -> Result<Self, OpenError> {
+        let mut connector = Connector::to(&config)?;
+        let stream = connector.connect().ok_or(OpenError::NoPort)?.await?;
+        Ok(Self::spawn(config, connector, Some(stream)))
+    }
+
+    /// Starts the line without waiting for its port, which is opened as soon as it is there. Until then calls end with
+    /// [`PortError::LineDown`](drive_core::PortError::LineDown).
+    ///
+    /// # Errors
+    /// [`OpenError`] when the configuration names no port.
+    pub fn start(config: LineConfig) -> Result<Self, OpenError> {
+        let connector = Connector::to(&config)?;
+        Ok(Self::spawn(config, connector, None))
+    }
+
+    /// A line over a stream that the caller brings: one end of a `tokio::io::duplex`, a pty, a socket. When the stream
+    /// ends the line is down for good.
+    #[must_use]
+    pub fn over(stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static, config: LineConfig) -> Self {
+        Self::spawn(config, Connector::None, Some(Box::new(stream)))
+    }
+
+    /// A line over streams that `open` makes: called at once and again whenever the stream has ended.
+    #[must_use]
+    pub fn over_reopened<S, F>(mut open: impl FnMut() -> F + Send + 'static, config: LineConfig) -> Self
+    where
+        S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
+        F: Future<Output = io::Result<S>> + Send + 'static,
+    {
+        let given: Given = Box::new(move || {
+            let stream = open();
+            Box::pin(async move { stream.await.map(|stream| Box::new(stream) as BoxedStream) })
+        });
+        Self::spawn(config, Connector::Given(given), None)
+    }
+
+    fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>) -> Self {
+        let (finished, when_finished) = watch::channel(false);
+        let shared =
+            Arc::new(Shared { master: Mutex::new(Master::new(config.clone())), wake: Notify::new() });
+        let task = Task::new(&config, Arc::clone(&shared), connector, stream);
+        tokio::spawn(async move {
+            task.run().await;
+            let _ = finished.send(true);
+        });
+        Self { handle: Arc::new(Handle { shared, when_finished }) }
+    }
+
+    /// One slave of this line, 1 to 247. Address 0 is [`broadcast`](Self::broadcast).
+    #[must_use]
+    pub fn slave(&self, address: u8) -> Slave {
+        Slave::new(Arc::clone(&self.handle), address)
+    }
+
+    /// All slaves at once: writes return after [`LineConfig::broadcast_turnaround`] with a confirmation made up by the
+    /// line, because nobody answers a broadcast; reads are refused with
+    /// [`PortError::NotCarried`](drive_core::PortError::NotCarried).
+    #[must_use]
+    pub fn broadcast(&self) -> Slave {
+        self.slave(0)
+    }
+
+    /// Sets what is special about one slave, from its next request on.
+    pub fn configure_slave(&self, address: u8, settings: SlaveSettings) {
+        self.handle.shared.master().configure_slave(address, settings);
+    }
+
+    /// What the line has counted so far.
+    #[must_use]
+    pub fn stats(&self) -> Stats {
+        self.handle.shared.master().stats(Instant::now())
+    }
+
+    /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is
+    /// under way finishes, the port is closed. Returns when it is.
+    pub async fn close(&self) {
+        self.handle.shared.close();
+        let mut when_finished = self.handle.when_finished.clone();
+        // An error means that the task is gone with its runtime, and the port with it.
+        let _ = when_finished.wait_for(|finished| *finished).await;
+    }
+}
+
+impl fmt::Debug for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Line").field("endpoint", &self.handle.shared.master().config().endpoint).finish()
+    }
+}
+
+/// What every handle of a line shares; its end closes the line.
+pub(crate) struct Handle {
+    pub(crate) shared: Arc<Shared>,
+    when_finished: watch::Receiver<bool>,
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.shared.close();
+    }
+}
+
+/// What the handles and the task share.
+pub(crate) struct Shared {
+    master: Mutex<Master<Caller>>,
+    /// Tells the task that the master has something new to do.
+    pub(crate) wake: Notify,
+}
+
+impl Shared {
+    /// The master, locked for the moment of one decision; never across an await.
+    pub(crate) fn master(&self) -> MutexGuard<'_, Master<Caller>> {
+        // A panic elsewhere must not keep a stop from being sent.
+        self.master.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn close(&self) {
+        self.master().handle_close();
+        self.wake.notify_one();
+    }
+}

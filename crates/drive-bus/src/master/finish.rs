@@ -1,0 +1,181 @@
+//! How exchanges and waiting requests end.
+
+use std::time::Duration;
+
+use drive_core::{Class, Effect, PortError};
+use tokio::time::Instant;
+
+use super::{Flight, Job, Master, PROBE_REST, Purpose};
+use crate::{
+    answer,
+    exchange::{Answer, Failure},
+    schedule::Entry,
+};
+
+impl<C> Master<C> {
+    /// The exchange that is under way ends with `result`.
+    pub(super) fn finish(&mut self, now: Instant, result: Result<Answer, Failure>) {
+        let Some(flight) = self.flight.take() else { return };
+        self.to_send = None;
+        let slave = flight.slave;
+        let t3_5 = if self.config.is_paced() { self.config.serial.t3_5() } else { Duration::ZERO };
+        self.stats.busy += now.saturating_duration_since(flight.started) + t3_5;
+        match &result {
+            Ok(answer) => {
+                // The slave heard the end of our request, whatever was computed for it.
+                self.quiet_from = now;
+                self.note_answer(now, &flight, answer);
+            }
+            Err(failure) => self.note_failure(now, &flight, failure),
+        }
+        match flight.purpose {
+            Purpose::Call(Some(entry)) => match result {
+                Ok(answer) => self.outcomes.push_back((entry.work.caller, Ok(answer))),
+                Err(failure) => {
+                    let timeout = flight.sent.map_or(Duration::ZERO, |sent| sent.timeout);
+                    self.fail(now, entry, failure, timeout);
+                }
+            },
+            Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
+            Purpose::Probe => {
+                let took = now.saturating_duration_since(flight.started);
+                self.probe_free_at = Some(now + took * PROBE_REST);
+            }
+            Purpose::Settle => {
+                tracing::debug!(slave, echoes = self.exchange.echoes(), "adapter asked for its echo");
+            }
+        }
+    }
+
+    fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
+        let expected = answer::likely_len(&flight.request) + 3;
+        let characters =
+            if self.config.is_paced() { self.config.serial.characters(expected) } else { Duration::ZERO };
+        let station = self.station(flight.slave);
+        if let Some(sent) = flight.sent {
+            let after = now.saturating_duration_since(sent.end).saturating_sub(characters);
+            station.timeout.answered(after);
+            station.stats.response.record(after);
+        }
+        match answer {
+            Ok(_) => station.stats.outcomes.answered += 1,
+            Err(_) => station.stats.outcomes.exceptions += 1,
+        }
+        if station.answered(now) {
+            tracing::info!(slave = flight.slave, "slave answers again");
+        }
+    }
+
+    fn note_failure(&mut self, now: Instant, flight: &Flight<C>, failure: &Failure) {
+        let confuses = self.exchange.confuses_late_answers();
+        let Some(station) = self.stations.get_mut(&flight.slave) else { return };
+        match failure {
+            Failure::Damaged(_) => station.stats.outcomes.damaged += 1,
+            Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
+            Failure::Timeout => {
+                station.stats.outcomes.timeouts += 1;
+                if confuses {
+                    let ceiling = station.timeout.ceiling();
+                    let sent = flight.sent.map_or(now, |sent| sent.end);
+                    let until = (sent + ceiling).max(now + ceiling / 2);
+                    station.expect_late(flight.request.function_code().value(), until);
+                }
+                if station.missed(now, &self.config) {
+                    self.go_offline(now, flight.slave);
+                }
+            }
+        }
+    }
+
+    fn go_offline(&mut self, now: Instant, slave: u8) {
+        tracing::warn!(slave, "slave off-line");
+        let at = self.station(slave).probe_at().unwrap_or(now);
+        let retry_in = at.saturating_duration_since(now);
+        let waiting =
+            self.schedule.withdraw_all(|entry| entry.slave == slave && entry.terms.class != Class::Stop);
+        for entry in waiting {
+            self.drop_unsent(entry, PortError::Offline { retry_in });
+        }
+    }
+
+    /// An attempt has failed: once more, or the end.
+    fn fail(&mut self, now: Instant, mut entry: Entry<Job<C>>, failure: Failure, timeout: Duration) {
+        let write = entry.work.is_write;
+        let error = match failure {
+            Failure::Timeout if write => PortError::OutcomeUnknown("no answer"),
+            Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
+            Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),
+            Failure::Timeout => PortError::Timeout { after: timeout },
+            Failure::Damaged(why) => PortError::Damaged(why),
+            Failure::Mismatch(why) => PortError::Mismatch(why),
+        };
+        if self.may_retry(now, &entry) {
+            entry.work.attempts += 1;
+            entry.work.last = Some(error);
+            self.schedule.put_back(entry);
+        } else {
+            self.outcomes.push_back((entry.work.caller, Err(error)));
+        }
+    }
+
+    fn may_retry(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
+        let offline = self.stations.get(&entry.slave).is_some_and(|station| station.probe_at().is_some());
+        let edge = entry.work.is_write && entry.terms.effect == Effect::Edge;
+        // A command sent again behind a stop would undo it.
+        let stopped = entry.work.is_write
+            && entry.terms.class != Class::Stop
+            && self.schedule.any(|other| {
+                other.terms.class == Class::Stop && (other.slave == 0 || other.slave == entry.slave)
+            });
+        // A later request with the same key says that this value is not wanted any more.
+        let replaced = entry.terms.replaces.is_some()
+            && self
+                .schedule
+                .any(|other| other.slave == entry.slave && other.terms.replaces == entry.terms.replaces);
+        entry.work.attempts < self.config.retries
+            && entry.expires().is_none_or(|expires| now < expires)
+            && !(offline || edge || stopped || replaced || self.closing)
+    }
+
+    /// The time of a request that nobody answers is over.
+    pub(super) fn finish_unanswered(&mut self, now: Instant) {
+        let Some(flight) = self.flight.take() else { return };
+        self.exchange.abandon();
+        self.stats.broadcasts += u64::from(flight.slave == 0);
+        self.stats.busy += now.saturating_duration_since(flight.started);
+        let Purpose::Call(Some(entry)) = flight.purpose else { return };
+        let confirmation = answer::confirmation(&flight.request)
+            .map(Ok)
+            .ok_or_else(|| PortError::NotCarried("nobody answers it".to_owned()));
+        self.outcomes.push_back((entry.work.caller, confirmation));
+    }
+
+    /// The port is lost with an exchange under way. A read waits for the next port; a write has an unknown outcome and
+    /// is never sent again.
+    pub(super) fn fail_flight(&mut self, now: Instant, reason: &str) {
+        self.to_send = None;
+        let Some(flight) = self.flight.take() else { return };
+        let Purpose::Call(Some(mut entry)) = flight.purpose else { return };
+        if entry.work.is_write {
+            self.outcomes.push_back((entry.work.caller, Err(PortError::OutcomeUnknown("the line was lost"))));
+        } else if self.may_retry(now, &entry) {
+            entry.work.attempts += 1;
+            entry.work.last = Some(PortError::LineDown(reason.to_owned()));
+            self.schedule.put_back(entry);
+        } else {
+            self.outcomes.push_back((entry.work.caller, Err(PortError::LineDown(reason.to_owned()))));
+        }
+    }
+
+    /// A request leaves the queue. What was sent before, and waited to be sent again, ends as that attempt did.
+    pub(super) fn drop_unsent(&mut self, entry: Entry<Job<C>>, error: PortError) {
+        let outcomes = &mut self.station(entry.slave).stats.outcomes;
+        match error {
+            PortError::Expired => outcomes.expired += 1,
+            PortError::Superseded => outcomes.superseded += 1,
+            _ => outcomes.refused += 1,
+        }
+        let error = entry.work.last.unwrap_or(error);
+        self.outcomes.push_back((entry.work.caller, Err(error)));
+    }
+}

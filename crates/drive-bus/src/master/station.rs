@@ -1,0 +1,150 @@
+//! What the master knows of one slave: its timeout, its pauses, whether it answers at all.
+
+use std::{sync::Arc, time::Duration};
+
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+use crate::{
+    config::{LineConfig, SlaveSettings},
+    stats::SlaveStats,
+    timeout::LearnedTimeout,
+};
+
+/// How long a slave is probed after somebody last asked for it.
+const INTEREST: Duration = Duration::from_secs(60);
+
+/// One slave, as seen by the master.
+#[derive(Debug)]
+pub(super) struct Station {
+    pub(super) settings: SlaveSettings,
+    pub(super) timeout: LearnedTimeout,
+    pub(super) stats: SlaveStats,
+    /// Its own pause is over at this time.
+    pub(super) ready_at: Option<Instant>,
+    /// The functions whose answers may still come late, as bits, and until when.
+    late: Option<(u128, Instant)>,
+    failures: u32,
+    offline: Option<Offline>,
+    /// What a probe asks: the last read that was asked of this slave.
+    last_read: Option<Arc<Request<'static>>>,
+    asked: Option<Instant>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Offline {
+    probe_at: Instant,
+    backoff: Duration,
+}
+
+impl Station {
+    pub(super) fn new(config: &LineConfig, settings: SlaveSettings) -> Self {
+        let ceiling = settings.response_timeout.unwrap_or(config.response_timeout);
+        Self {
+            settings,
+            timeout: LearnedTimeout::new(config.timeout_floor, ceiling),
+            stats: SlaveStats::default(),
+            ready_at: None,
+            late: None,
+            failures: 0,
+            offline: None,
+            last_read: None,
+            asked: None,
+        }
+    }
+
+    pub(super) fn configure(&mut self, config: &LineConfig, settings: SlaveSettings) {
+        self.settings = settings;
+        self.timeout.limit(settings.response_timeout.unwrap_or(config.response_timeout));
+    }
+
+    /// Somebody asks for it.
+    pub(super) fn ask(&mut self, now: Instant, request: &Arc<Request<'static>>, is_write: bool) {
+        self.asked = Some(now);
+        if !is_write {
+            self.last_read = Some(Arc::clone(request));
+        }
+    }
+
+    /// A read that does no harm: the last that was asked, or one register.
+    pub(super) fn harmless_read(&self) -> Arc<Request<'static>> {
+        self.last_read.clone().unwrap_or_else(|| Arc::new(Request::ReadHoldingRegisters(0, 1)))
+    }
+
+    /// It has answered, at `now`. True: it had been off-line.
+    pub(super) fn answered(&mut self, now: Instant) -> bool {
+        self.failures = 0;
+        self.late = None;
+        self.ready_at = Some(now + self.settings.turnaround);
+        self.stats.offline = false;
+        self.offline.take().is_some()
+    }
+
+    /// An answer to this function may still come, until `until`.
+    pub(super) fn expect_late(&mut self, function: u8, until: Instant) {
+        let bit = 1_u128 << (function & 0x7F);
+        self.late = Some(match self.late {
+            Some((bits, before)) => (bits | bit, before.max(until)),
+            None => (bit, until),
+        });
+    }
+
+    /// Until when a request of this function must wait, because a late answer could be taken for its own.
+    pub(super) fn late_until(&self, function: u8) -> Option<Instant> {
+        self.late.filter(|(bits, _)| bits & 1 << (function & 0x7F) != 0).map(|(_, until)| until)
+    }
+
+    /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
+    pub(super) fn came_late(&mut self, function: u8) -> bool {
+        let Some((bits, until)) = self.late else { return false };
+        let bit = 1_u128 << (function & 0x7F);
+        if bits & bit == 0 {
+            return false;
+        }
+        // What was waited for has come: nothing more to be afraid of.
+        let rest = bits & !bit;
+        self.late = (rest != 0).then_some((rest, until));
+        self.stats.late += 1;
+        true
+    }
+
+    /// It did not answer. True: it goes off-line with this.
+    pub(super) fn missed(&mut self, now: Instant, config: &LineConfig) -> bool {
+        self.timeout.missed();
+        self.failures = self.failures.saturating_add(1);
+        let (first, longest) = config.probe_backoff;
+        match &mut self.offline {
+            Some(offline) => {
+                offline.backoff = offline.backoff.saturating_mul(2).min(longest);
+                offline.probe_at = now + offline.backoff;
+                false
+            }
+            None if config.offline_after > 0 && self.failures >= config.offline_after => {
+                self.offline = Some(Offline { probe_at: now + first, backoff: first });
+                self.stats.offline = true;
+                self.stats.went_offline += 1;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// When it is off-line: when it is asked next.
+    pub(super) fn probe_at(&self) -> Option<Instant> {
+        let offline = self.offline?;
+        Some(self.late.map_or(offline.probe_at, |(_, until)| until.max(offline.probe_at)))
+    }
+
+    /// [`probe_at`](Self::probe_at), as long as somebody cares.
+    pub(super) fn wanted_probe_at(&self) -> Option<Instant> {
+        let at = self.probe_at()?;
+        self.asked.is_some_and(|asked| at <= asked + INTEREST).then_some(at)
+    }
+
+    /// A probe that was under way is given up.
+    pub(super) fn probe_again(&mut self, at: Instant) {
+        if let Some(offline) = &mut self.offline {
+            offline.probe_at = at;
+        }
+    }
+}

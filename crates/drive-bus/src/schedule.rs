@@ -1,0 +1,302 @@
+//! The schedule of a line: which request is sent next. Pure: time is an argument.
+//!
+//! - A **higher class** goes first. A Stop is never overtaken, and while one waits, even for its slave's pause, nothing
+//!   else starts.
+//! - **Inside a class** the earliest deadline goes first, fair among slaves: the second request of one slave waits until
+//!   every other slave has had its first.
+//! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's.
+//! - **Background** gets every twentieth turn when it would otherwise get none.
+//! - What is not yet sent may be **replaced** by a later request with the same key, **expires** at its lifetime, and may
+//!   be **withdrawn**.
+//! - A slave that needs a pause does not hold up the others, except that nothing longer than the pause starts in front
+//!   of a Command.
+
+use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
+
+use drive_core::{Class, Terms};
+use tokio::time::Instant;
+
+/// At most every so-many-th turn goes to what has aged.
+const AGED_TURN: u32 = 4;
+
+/// At least every so-many-th turn goes to Background while some waits: 5 %.
+const BACKGROUND_TURN: u32 = 20;
+
+/// Names one queued request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket(u64);
+
+/// What the schedule may be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rules {
+    /// How many requests may wait. Stops may take as many places again.
+    pub limit: usize,
+    /// How long a request waits before it counts as aged.
+    pub aging: Duration,
+}
+
+/// One queued request.
+#[derive(Debug)]
+pub struct Entry<T> {
+    /// Its name.
+    pub ticket: Ticket,
+    /// For whom.
+    pub slave: u8,
+    /// Its terms.
+    pub terms: Terms,
+    /// When it came.
+    pub arrived: Instant,
+    /// What is to be done.
+    pub work: T,
+    /// Its place inside its class: turn of its slave, then deadline, then order of arrival.
+    rank: (u64, Instant, Ticket),
+}
+
+impl<T> Entry<T> {
+    /// When it must not be sent any more.
+    #[must_use]
+    pub fn expires(&self) -> Option<Instant> {
+        self.terms.lifetime.and_then(|lifetime| self.arrived.checked_add(lifetime))
+    }
+}
+
+/// When an entry could be sent, as its slave's pauses want it, and how long its exchange will take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Readiness {
+    /// Not before this.
+    pub at: Instant,
+    /// Expected length of the exchange.
+    pub takes: Duration,
+}
+
+/// What to do next.
+#[derive(Debug)]
+pub enum Choice<T> {
+    /// Send this.
+    Send(Entry<T>),
+    /// Choose again at this time, or when something arrives.
+    Wait(Instant),
+    /// Nothing waits.
+    Idle,
+}
+
+/// What is best.
+enum Best {
+    Now(usize),
+    At(Instant),
+}
+
+/// The queue of one line.
+#[derive(Debug)]
+pub struct Schedule<T> {
+    rules: Rules,
+    queued: Vec<Entry<T>>,
+    next_ticket: u64,
+    /// The turn that each slave's last request got, by class.
+    turns: BTreeMap<(Class, u8), u64>,
+    /// The turn that each class is in.
+    turn: BTreeMap<Class, u64>,
+    since_aged: u32,
+    since_background: u32,
+    /// Of each queued entry, while choosing.
+    readiness: Vec<Readiness>,
+}
+
+impl<T> Schedule<T> {
+    /// An empty queue.
+    #[must_use]
+    pub const fn new(rules: Rules) -> Self {
+        Self {
+            rules,
+            queued: Vec::new(),
+            next_ticket: 0,
+            turns: BTreeMap::new(),
+            turn: BTreeMap::new(),
+            since_aged: 0,
+            since_background: 0,
+            readiness: Vec::new(),
+        }
+    }
+
+    /// How many wait.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.queued.len()
+    }
+
+    /// Whether nothing waits.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.queued.is_empty()
+    }
+
+    /// Whether anything waits that `which` names.
+    #[must_use]
+    pub fn any(&self, which: impl FnMut(&Entry<T>) -> bool) -> bool {
+        self.queued.iter().any(which)
+    }
+
+    /// Whether a Stop waits.
+    #[must_use]
+    pub fn has_stop(&self) -> bool {
+        self.any(|entry| entry.terms.class == Class::Stop)
+    }
+
+    /// Queues a request. Gives its ticket and what it replaces.
+    ///
+    /// # Errors
+    /// The work back, when too many wait already.
+    pub fn push(
+        &mut self,
+        now: Instant,
+        slave: u8,
+        terms: Terms,
+        work: T,
+    ) -> Result<(Ticket, Option<Entry<T>>), T> {
+        let replaced = terms.replaces.and_then(|_| {
+            self.queued
+                .iter()
+                .position(|entry| entry.slave == slave && entry.terms.replaces == terms.replaces)
+        });
+        let limit =
+            if terms.class == Class::Stop { self.rules.limit.saturating_mul(2) } else { self.rules.limit };
+        if replaced.is_none() && self.queued.len() >= limit {
+            return Err(work);
+        }
+        let ticket = Ticket(self.next_ticket);
+        self.next_ticket += 1;
+        let replaced = replaced.map(|index| self.queued.swap_remove(index));
+        let rank = match &replaced {
+            // The successor takes the place in the queue, or a stream of setpoints would never be sent.
+            Some(old) if old.terms.class == terms.class => old.rank,
+            _ => self.rank(now, slave, terms, ticket),
+        };
+        self.queued.push(Entry { ticket, slave, terms, arrived: now, work, rank });
+        Ok((ticket, replaced))
+    }
+
+    fn rank(&mut self, now: Instant, slave: u8, terms: Terms, ticket: Ticket) -> (u64, Instant, Ticket) {
+        let current = self.turn.get(&terms.class).copied().unwrap_or_default();
+        let turn = match self.turns.get(&(terms.class, slave)) {
+            Some(last) => current.max(last + 1),
+            None => current,
+        };
+        self.turns.insert((terms.class, slave), turn);
+        let deadline = terms.lifetime.unwrap_or(match terms.class {
+            Class::Stop => Duration::ZERO,
+            Class::Command | Class::KeepAlive | Class::Status => Duration::from_secs(1),
+            Class::Background => Duration::from_secs(10),
+        });
+        (turn, now.checked_add(deadline).unwrap_or(now), ticket)
+    }
+
+    /// Puts back what [`choose`](Self::choose) gave, at its old place.
+    pub fn put_back(&mut self, entry: Entry<T>) {
+        self.queued.push(entry);
+    }
+
+    /// Takes one request out.
+    pub fn withdraw(&mut self, ticket: Ticket) -> Option<Entry<T>> {
+        let index = self.queued.iter().position(|entry| entry.ticket == ticket)?;
+        Some(self.queued.swap_remove(index))
+    }
+
+    /// Takes out everything that `which` names.
+    pub fn withdraw_all(&mut self, mut which: impl FnMut(&Entry<T>) -> bool) -> Vec<Entry<T>> {
+        self.queued.extract_if(.., |entry| which(entry)).collect()
+    }
+
+    /// Takes out what has outlived its lifetime.
+    pub fn expired(&mut self, now: Instant) -> Vec<Entry<T>> {
+        self.withdraw_all(|entry| entry.expires().is_some_and(|expires| expires <= now))
+    }
+
+    /// When the next request expires.
+    #[must_use]
+    pub fn next_expiry(&self) -> Option<Instant> {
+        self.queued.iter().filter_map(Entry::expires).min()
+    }
+
+    /// Chooses what is sent next at `now`; `readiness` says when each entry could be.
+    pub fn choose(&mut self, now: Instant, readiness: impl FnMut(&Entry<T>) -> Readiness) -> Choice<T> {
+        self.readiness.clear();
+        self.readiness.extend(self.queued.iter().map(readiness));
+        match self.best(now) {
+            Some(Best::Now(index)) => {
+                self.count_turn(now, index);
+                let entry = self.queued.swap_remove(index);
+                let turn = self.turn.entry(entry.terms.class).or_default();
+                *turn = (*turn).max(entry.rank.0);
+                Choice::Send(entry)
+            }
+            Some(Best::At(at)) => Choice::Wait(at),
+            None => Choice::Idle,
+        }
+    }
+
+    fn best(&self, now: Instant) -> Option<Best> {
+        let all = || self.queued.iter().zip(&self.readiness).enumerate();
+        let first = |class: Class| {
+            all()
+                .filter(|(_, (entry, readiness))| entry.terms.class == class && readiness.at <= now)
+                .min_by_key(|(_, (entry, _))| entry.rank)
+                .map(|(index, _)| Best::Now(index))
+        };
+        let next = |class: Class| {
+            all()
+                .filter(|(_, (entry, _))| entry.terms.class == class)
+                .map(|(_, (_, readiness))| readiness.at)
+                .min()
+        };
+        if let Some(at) = next(Class::Stop) {
+            return Some(first(Class::Stop).unwrap_or(Best::At(at)));
+        }
+        if self.since_aged + 1 >= AGED_TURN
+            && let Some((index, _)) = all()
+                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
+                .min_by_key(|(_, (entry, _))| (entry.arrived, entry.ticket))
+        {
+            return Some(Best::Now(index));
+        }
+        if self.since_background + 1 >= BACKGROUND_TURN
+            && let Some(background) = first(Class::Background)
+        {
+            return Some(background);
+        }
+        let best = all()
+            .filter(|(_, (_, readiness))| readiness.at <= now)
+            .min_by_key(|(_, (entry, _))| (Reverse(entry.terms.class), entry.rank));
+        let Some((index, (entry, readiness))) = best else {
+            return self.readiness.iter().map(|readiness| readiness.at).min().map(Best::At);
+        };
+        // What would still be on the line when a Command's pause is over does not start in front of it.
+        if entry.terms.class < Class::Command
+            && let Some(at) = next(Class::Command).filter(|at| *at < now + readiness.takes)
+        {
+            return Some(Best::At(at));
+        }
+        Some(Best::Now(index))
+    }
+
+    fn has_aged(&self, now: Instant, entry: &Entry<T>) -> bool {
+        now.saturating_duration_since(entry.arrived) >= self.rules.aging
+    }
+
+    fn count_turn(&mut self, now: Instant, chosen: usize) {
+        let Some(entry) = self.queued.get(chosen) else { return };
+        let class = entry.terms.class;
+        let count =
+            |others: bool, mine: bool, since: u32| if mine || !others { 0 } else { since.saturating_add(1) };
+        let aged = self.has_aged(now, entry) && class < Class::Stop;
+        let aged_waits = self.queued.iter().enumerate().any(|(index, entry)| {
+            index != chosen && entry.terms.class < Class::Stop && self.has_aged(now, entry)
+        });
+        let background_waits = self
+            .queued
+            .iter()
+            .enumerate()
+            .any(|(index, entry)| index != chosen && entry.terms.class == Class::Background);
+        self.since_aged = count(aged_waits, aged, self.since_aged);
+        self.since_background = count(background_waits, class == Class::Background, self.since_background);
+    }
+}

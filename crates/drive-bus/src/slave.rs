@@ -1,0 +1,135 @@
+//! [`Slave`]: one slave of a line as a tokio-modbus client and as a drive's port.
+
+use std::{fmt, io, sync::Arc};
+
+use async_trait::async_trait;
+use drive_core::{Port, PortError, Terms};
+use tokio::{sync::oneshot, time::Instant};
+use tokio_modbus::{
+    ExceptionCode, Request, Response,
+    client::{Client, Context},
+    slave::SlaveContext,
+};
+
+use crate::{line::Handle, master::Outcome, schedule::Ticket};
+
+/// One slave of a [`Line`](crate::Line): a tokio-modbus [`Client`] and a drive's [`Port`]. Cheap to clone; each clone has
+/// its own [`Terms`].
+///
+/// # Cancellation
+/// A call may be dropped at any time. What has not been sent never is; what is on the wire finishes there and its answer
+/// is discarded. The next call is not affected.
+///
+/// # Errors
+/// A slave's exception is the inner error of a call. Everything else is a [`PortError`] inside
+/// [`tokio_modbus::Error::Transport`]; [`PortError::from_modbus`] takes it out.
+#[derive(Clone)]
+pub struct Slave {
+    handle: Arc<Handle>,
+    address: u8,
+    terms: Terms,
+}
+
+impl Slave {
+    pub(crate) fn new(handle: Arc<Handle>, address: u8) -> Self {
+        Self { handle, address, terms: Terms::default() }
+    }
+
+    /// Its address, 0 for the broadcast.
+    #[must_use]
+    pub const fn address(&self) -> u8 {
+        self.address
+    }
+
+    /// This slave under other terms.
+    #[must_use]
+    pub fn with_terms(mut self, terms: Terms) -> Self {
+        self.terms = terms;
+        self
+    }
+}
+
+impl fmt::Debug for Slave {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Slave")
+            .field("address", &self.address)
+            .field("terms", &self.terms)
+            .finish_non_exhaustive()
+    }
+}
+
+#[async_trait]
+impl Client for Slave {
+    async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        let (caller, outcome) = oneshot::channel();
+        let submitted = self.handle.shared.master().submit(
+            Instant::now(),
+            self.address,
+            request.into_owned(),
+            self.terms,
+            Caller(caller),
+        );
+        let waiting = match submitted {
+            Ok(ticket) => Waiting { handle: &self.handle, ticket: Some(ticket) },
+            Err(error) => return Err(tokio_modbus::Error::Transport(error.into_io())),
+        };
+        self.handle.shared.wake.notify_one();
+        // The task drops a caller without an outcome only when its runtime goes down.
+        let outcome = outcome.await.unwrap_or(Err(PortError::Closed));
+        waiting.done();
+        outcome.map_err(|error| tokio_modbus::Error::Transport(error.into_io()))
+    }
+
+    async fn disconnect(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl SlaveContext for Slave {
+    fn set_slave(&mut self, slave: tokio_modbus::Slave) {
+        self.address = slave.0;
+    }
+}
+
+impl Port for Slave {
+    fn set_terms(&mut self, terms: Terms) {
+        self.terms = terms;
+    }
+}
+
+impl From<Slave> for Context {
+    fn from(slave: Slave) -> Self {
+        let client: Box<dyn Client> = Box::new(slave);
+        Self::from(client)
+    }
+}
+
+/// Who waits for an answer.
+pub(crate) struct Caller(oneshot::Sender<Result<Result<Response, ExceptionCode>, PortError>>);
+
+impl Caller {
+    pub(crate) fn answer(self, outcome: Outcome) {
+        // Whoever dropped the call does not want the answer.
+        let _ = self.0.send(outcome);
+    }
+}
+
+/// Withdraws a request whose caller drops it.
+struct Waiting<'a> {
+    handle: &'a Handle,
+    ticket: Option<Ticket>,
+}
+
+impl Waiting<'_> {
+    fn done(mut self) {
+        self.ticket = None;
+    }
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        if let Some(ticket) = self.ticket.take() {
+            self.handle.shared.master().withdraw(ticket);
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! What a line counts, always: per slave, per class, for the line as a whole.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use drive_core::Class;
+
+/// Buckets of an octave.
+const SUB: usize = 8;
+
+/// Octaves, from 1 µs on: up to 67 s.
+const OCTAVES: usize = 26;
+
+/// A histogram of durations with a resolution of 9 to 12 %, from 1 µs to 67 s, in less than a kilobyte.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Histogram {
+    buckets: [u32; SUB * OCTAVES],
+    count: u64,
+    sum: Duration,
+    max: Duration,
+}
+
+impl Histogram {
+    /// An empty histogram.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { buckets: [0; SUB * OCTAVES], count: 0, sum: Duration::ZERO, max: Duration::ZERO }
+    }
+
+    /// Counts one duration.
+    pub fn record(&mut self, duration: Duration) {
+        if let Some(bucket) = self.buckets.get_mut(bucket_of(duration)) {
+            *bucket = bucket.saturating_add(1);
+        }
+        self.count += 1;
+        self.sum = self.sum.saturating_add(duration);
+        self.max = self.max.max(duration);
+    }
+
+    /// How many were counted.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The longest, exactly.
+    #[must_use]
+    pub const fn max(&self) -> Duration {
+        self.max
+    }
+
+    /// The mean; zero when nothing was counted.
+    #[must_use]
+    pub fn mean(&self) -> Duration {
+        let nanos = self.sum.as_nanos().checked_div(u128::from(self.count)).unwrap_or_default();
+        Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+    }
+
+    /// The duration that `per_mille` of 1000 do not exceed: 500 is the median, 990 is p99, 999 is p99.9. Rounded up to
+    /// the end of its bucket, and never above the longest. Zero when nothing was counted.
+    #[must_use]
+    pub fn quantile(&self, per_mille: u32) -> Duration {
+        let rank = (self.count.saturating_mul(u64::from(per_mille.min(1_000)))).div_ceil(1_000).max(1);
+        let mut seen = 0;
+        for (index, &bucket) in self.buckets.iter().enumerate() {
+            seen += u64::from(bucket);
+            if seen >= rank {
+                return end_of(index).min(self.max);
+            }
+        }
+        self.max
+    }
+
+    /// Adds what another one counted.
+    pub fn add(&mut self, other: &Self) {
+        for (mine, theirs) in self.buckets.iter_mut().zip(other.buckets) {
+            *mine = mine.saturating_add(theirs);
+        }
+        self.count += other.count;
+        self.sum = self.sum.saturating_add(other.sum);
+        self.max = self.max.max(other.max);
+    }
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl std::fmt::Debug for Histogram {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Histogram")
+            .field("count", &self.count)
+            .field("p50", &self.quantile(500))
+            .field("p99", &self.quantile(990))
+            .field("max", &self.max)
+            .finish()
+    }
+}
+
+fn bucket_of(duration: Duration) -> usize {
+    let micros = u64::try_from(duration.as_micros()).unwrap_or(u64::MAX).max(1);
+    let octave = micros.ilog2() as usize;
+    let within = ((u128::from(micros) * SUB as u128) >> octave) as usize - SUB;
+    (octave * SUB + within).min(SUB * OCTAVES - 1)
+}
+
+fn end_of(bucket: usize) -> Duration {
+    let (octave, within) = (bucket / SUB, bucket % SUB);
+    Duration::from_nanos((((SUB + within + 1) as u64 * 1_000) << octave) / SUB as u64)
+}
+
+/// How the calls ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Outcomes {
+    /// With an answer.
+    pub answered: u64,
+    /// With the slave's exception.
+    pub exceptions: u64,
+    /// Without an answer in time.
+    pub timeouts: u64,
+    /// With a damaged answer.
+    pub damaged: u64,
+    /// With an answer that did not fit the request.
+    pub mismatches: u64,
+    /// Expired in the queue.
+    pub expired: u64,
+    /// Replaced in the queue by a later request.
+    pub superseded: u64,
+    /// Withdrawn by a caller that did not wait.
+    pub withdrawn: u64,
+    /// Refused at once: slave off-line, queue full, line down or closed.
+    pub refused: u64,
+}
+
+/// What the line knows of one slave.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct SlaveStats {
+    /// Requests sent, retries and probes included.
+    pub sent: u64,
+    /// How exchanges and waiting requests ended; one call with a retry counts each of its exchanges.
+    pub outcomes: Outcomes,
+    /// Requests sent again.
+    pub retries: u64,
+    /// Probes while it was off-line.
+    pub probes: u64,
+    /// Answers that came after their time was over.
+    pub late: u64,
+    /// How often it went off-line.
+    pub went_offline: u64,
+    /// Whether it is off-line now.
+    pub offline: bool,
+    /// The response timeout that holds now.
+    pub response_timeout: Duration,
+    /// From the end of a request to the first character of its answer, as computed from the answer's end and length.
+    pub response: Histogram,
+}
+
+/// What the line knows of one class.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct ClassStats {
+    /// Requests sent for the first time.
+    pub sent: u64,
+    /// From the call to the first bit on the line.
+    pub wait: Histogram,
+}
+
+/// What a line has counted since it was opened.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct Stats {
+    /// Since when, as a duration.
+    pub elapsed: Duration,
+    /// Time in which the line was needed: the characters of requests and answers, the silences that the protocol and
+    /// the slaves want, and the slaves' own time to answer. What is missing to `elapsed` was idle or lost to the host.
+    pub busy: Duration,
+    /// Per slave, those that were asked.
+    pub slaves: BTreeMap<u8, SlaveStats>,
+    /// Per class, the most urgent first, as [`Class::ALL`].
+    pub classes: [ClassStats; 5],
+    /// The silence kept before each request, from the end of the last activity to the write.
+    pub silence: Histogram,
+    /// How much later than allowed each request was written while one was waiting: what the host costs.
+    pub lag: Histogram,
+    /// Intact frames of somebody else.
+    pub foreign: u64,
+    /// Bytes that made no frame.
+    pub noise_bytes: u64,
+    /// Requests that the adapter gave back.
+    pub echoes: u64,
+    /// Whether the adapter echoes, as far as is known.
+    pub echoing: bool,
+    /// Broadcasts sent.
+    pub broadcasts: u64,
+    /// How often the port was opened, and lost.
+    pub opened: u64,
+    /// How often the port was lost.
+    pub lost: u64,
+    /// Requests that wait now.
+    pub queued: usize,
+}
+
+impl Stats {
+    /// One class.
+    #[must_use]
+    pub fn class(&self, class: Class) -> &ClassStats {
+        let [stop, command, keep_alive, status, background] = &self.classes;
+        match class {
+            Class::Stop => stop,
+            Class::Command => command,
+            Class::KeepAlive => keep_alive,
+            Class::Status => status,
+            Class::Background => background,
+        }
+    }
+
+    pub(crate) fn class_mut(&mut self, class: Class) -> &mut ClassStats {
+        let [stop, command, keep_alive, status, background] = &mut self.classes;
+        match class {
+            Class::Stop => stop,
+            Class::Command => command,
+            Class::KeepAlive => keep_alive,
+            Class::Status => status,
+            Class::Background => background,
+        }
+    }
+
+    /// `busy` by `elapsed`, in millionths.
+    #[must_use]
+    pub fn utilisation_ppm(&self) -> u32 {
+        let ppm = (self.busy.as_nanos() * 1_000_000).checked_div(self.elapsed.as_nanos()).unwrap_or_default();
+        u32::try_from(ppm).unwrap_or(u32::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantile_is_at_most_an_eighth_too_long_and_never_too_short() {
+        let mut histogram = Histogram::new();
+        for micros in 1..=10_000 {
+            histogram.record(Duration::from_micros(micros));
+        }
+        for (per_mille, exact) in [(1, 10), (500, 5_000), (990, 9_900), (999, 9_990), (1_000, 10_000)] {
+            let exact = Duration::from_micros(exact);
+            let got = histogram.quantile(per_mille);
+            assert!(
+                got >= exact && got <= exact + exact / 8 + Duration::from_micros(1),
+                "{per_mille}: {got:?}"
+            );
+        }
+        assert_eq!(histogram.max(), Duration::from_millis(10));
+        assert_eq!(histogram.mean(), Duration::from_nanos(5_000_500));
+    }
+
+    #[test]
+    fn the_extremes_have_a_bucket() {
+        let mut histogram = Histogram::new();
+        for duration in [Duration::ZERO, Duration::from_nanos(1), Duration::from_secs(67), Duration::MAX] {
+            histogram.record(duration);
+        }
+        assert_eq!(histogram.count(), 4);
+        assert_eq!(histogram.quantile(1_000).min(Duration::from_secs(1)), Duration::from_secs(1));
+    }
+
+    #[test]
+    fn an_empty_histogram_says_zero() {
+        assert_eq!(Histogram::new().quantile(500), Duration::ZERO);
+        assert_eq!(Histogram::new().mean(), Duration::ZERO);
+    }
+}

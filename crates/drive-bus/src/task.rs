@@ -1,0 +1,177 @@
+//! The task that owns the port: it writes, reads, waits, and does what the master decides.
+
+use std::{io, sync::Arc, time::Duration};
+
+use drive_clock::Timer;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    time::{Instant, timeout},
+};
+
+use crate::{
+    config::{Endpoint, LineConfig},
+    line::Shared,
+    master::Outcome,
+    slave::Caller,
+    transport::{BoxedStream, Connector, OpenError, Opening},
+};
+
+/// How long a frame may wait for room in the system's buffer. A port that takes none for so long is as good as gone.
+const WRITE_LIMIT: Duration = Duration::from_secs(1);
+
+/// First and longest time between two attempts to open the port again.
+const REOPEN_BACKOFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
+
+pub(crate) struct Task {
+    shared: Arc<Shared>,
+    connector: Connector,
+    port: Port,
+    timer: Timer,
+    /// Before the next attempt to open the port. It is shortest again once the port has given a byte, not when it
+    /// merely opens: some open and fail for ever.
+    backoff: Duration,
+    received: Vec<u8>,
+    ended: Vec<(Caller, Outcome)>,
+}
+
+enum Port {
+    Open(BoxedStream),
+    Opening(Opening<OpenError>),
+    Waiting(Instant),
+    Gone,
+}
+
+enum Event {
+    Received(io::Result<usize>),
+    Opened(Result<BoxedStream, OpenError>),
+    /// A deadline, a new request, the end.
+    Woken,
+}
+
+impl Task {
+    pub(crate) fn new(
+        config: &LineConfig,
+        shared: Arc<Shared>,
+        connector: Connector,
+        stream: Option<BoxedStream>,
+    ) -> Self {
+        let on_descriptor = matches!(config.endpoint, Endpoint::Serial(_) | Endpoint::RtuOverTcp(_));
+        let port = match stream {
+            Some(stream) => {
+                shared.master().handle_up(Instant::now());
+                Port::Open(stream)
+            }
+            None => Port::Waiting(Instant::now()),
+        };
+        Self {
+            shared,
+            connector,
+            port,
+            timer: if on_descriptor || config.precise_timer { Timer::precise() } else { Timer::tokio() },
+            backoff: REOPEN_BACKOFF.0,
+            received: vec![0; 512],
+            ended: Vec::new(),
+        }
+    }
+
+    pub(crate) async fn run(mut self) {
+        while let Some(deadline) = self.decide().await {
+            match self.next_event(deadline).await {
+                Event::Received(Ok(0)) => self.lose("the port was closed by its far end"),
+                Event::Received(Ok(len)) => {
+                    self.backoff = REOPEN_BACKOFF.0;
+                    let bytes = self.received.get(..len).unwrap_or_default();
+                    self.shared.master().handle_bytes(Instant::now(), bytes);
+                }
+                Event::Received(Err(error)) => self.lose(&error.to_string()),
+                Event::Opened(Ok(stream)) => {
+                    self.shared.master().handle_up(Instant::now());
+                    self.port = Port::Open(stream);
+                }
+                Event::Opened(Err(error)) => {
+                    self.shared.master().handle_down(&error.to_string());
+                    self.wait_to_open();
+                }
+                Event::Woken => {}
+            }
+        }
+    }
+
+    /// Lets the master decide and writes what it wants written, until there is nothing to do but wait. `None`: the end.
+    async fn decide(&mut self) -> Option<Option<Instant>> {
+        loop {
+            let (frame, deadline, finished) = {
+                let now = Instant::now();
+                let mut master = self.shared.master();
+                master.handle_timeout(now);
+                let frame = master.poll_transmit(now);
+                self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
+                (frame, master.deadline(), master.is_finished())
+            };
+            for (caller, outcome) in self.ended.drain(..) {
+                caller.answer(outcome);
+            }
+            let Some(frame) = frame else { return (!finished).then_some(deadline) };
+            let Port::Open(stream) = &mut self.port else { return Some(deadline) };
+            match timeout(WRITE_LIMIT, stream.write_all(&frame)).await {
+                Ok(Ok(())) => self.shared.master().handle_sent(Instant::now()),
+                Ok(Err(error)) => self.lose(&error.to_string()),
+                Err(_) => self.lose("the port takes no bytes"),
+            }
+        }
+    }
+
+    async fn next_event(&mut self, deadline: Option<Instant>) -> Event {
+        let Self { shared, connector, port, timer, received, .. } = self;
+        if let Port::Waiting(until) = port
+            && *until <= Instant::now()
+        {
+            *port = connector.connect().map_or(Port::Gone, Port::Opening);
+        }
+        let open_at = if let Port::Waiting(until) = port { Some(*until) } else { None };
+        let wake_at = [deadline, open_at].into_iter().flatten().min();
+        tokio::select! {
+            biased;
+            event = port_event(port, received) => event,
+            () = shared.wake.notified() => Event::Woken,
+            () = async {
+                match wake_at {
+                    Some(at) => timer.until(at).await,
+                    None => std::future::pending().await,
+                }
+            } => Event::Woken,
+        }
+    }
+
+    fn lose(&mut self, reason: &str) {
+        let now = Instant::now();
+        self.shared.master().handle_lost(now, reason);
+        // The first attempt is made at once: a plug that was pulled and put back, a server that started anew.
+        self.port = match self.connector.connect() {
+            Some(opening) if self.backoff == REOPEN_BACKOFF.0 => Port::Opening(opening),
+            Some(_) => Port::Waiting(now + self.backoff),
+            None => {
+                self.shared.master().handle_down(reason);
+                Port::Gone
+            }
+        };
+        self.lengthen_backoff();
+    }
+
+    fn wait_to_open(&mut self) {
+        self.port = Port::Waiting(Instant::now() + self.backoff);
+        self.lengthen_backoff();
+    }
+
+    fn lengthen_backoff(&mut self) {
+        self.backoff = (self.backoff * 2).min(REOPEN_BACKOFF.1);
+    }
+}
+
+async fn port_event(port: &mut Port, received: &mut [u8]) -> Event {
+    match port {
+        Port::Open(stream) => Event::Received(stream.read(received).await),
+        Port::Opening(opening) => Event::Opened(opening.await),
+        Port::Waiting(_) | Port::Gone => std::future::pending().await,
+    }
+}

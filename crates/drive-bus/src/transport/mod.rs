@@ -1,0 +1,123 @@
+//! Ways to the line: what can be opened, and what is read and written.
+
+mod serial;
+
+use std::{io, path::PathBuf, pin::Pin, time::Duration};
+
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    net::TcpStream,
+};
+
+use crate::config::{Endpoint, LineConfig};
+
+/// How long a connection may take to come about.
+const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+
+/// What a line reads and writes.
+pub(crate) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+
+pub(crate) type BoxedStream = Box<dyn Stream>;
+pub(crate) type Opening<E> = Pin<Box<dyn Future<Output = Result<BoxedStream, E>> + Send>>;
+pub(crate) type Given = Box<dyn FnMut() -> Opening<io::Error> + Send>;
+
+/// Why a line could not be opened.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// There is no such port.
+    #[error("there is no serial port {}", path.display())]
+    NotFound {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// Another program has the port.
+    #[error("serial port {} is in use by another program", path.display())]
+    InUse {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// The user may not open it.
+    #[error("no permission to open serial port {} (its group is usually dialout)", path.display())]
+    Denied {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// The port is there and cannot be used.
+    #[error("serial port {} cannot be opened: {reason}", path.display())]
+    Serial {
+        /// The path asked for.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// The far end of a connection cannot be reached.
+    #[error("cannot connect to {address}: {reason}")]
+    Connect {
+        /// Host and port asked for.
+        address: String,
+        /// What the system says.
+        reason: String,
+    },
+    /// A line over a given stream has nothing that could be opened.
+    #[error("the configuration names no port")]
+    NoPort,
+}
+
+/// Opens the stream of a line, again and again.
+pub(crate) enum Connector {
+    Serial(LineConfig),
+    Tcp(String),
+    Given(Given),
+    None,
+}
+
+impl Connector {
+    pub(crate) fn to(config: &LineConfig) -> Result<Self, OpenError> {
+        match &config.endpoint {
+            Endpoint::Serial(_) => Ok(Self::Serial(config.clone())),
+            Endpoint::RtuOverTcp(address) | Endpoint::ModbusTcp(address) => Ok(Self::Tcp(address.clone())),
+            Endpoint::Stream => Err(OpenError::NoPort),
+        }
+    }
+
+    /// Begins to open the stream; `None` when there is nothing to open.
+    pub(crate) fn connect(&mut self) -> Option<Opening<OpenError>> {
+        Some(match self {
+            Self::Serial(config) => {
+                let config = config.clone();
+                Box::pin(async move { serial::open(&config) })
+            }
+            Self::Tcp(address) => Box::pin(connect(address.clone())),
+            Self::Given(open) => {
+                let opening = open();
+                Box::pin(async move {
+                    opening.await.map_err(|error| OpenError::Connect {
+                        address: "the stream".to_owned(),
+                        reason: error.to_string(),
+                    })
+                })
+            }
+            Self::None => return None,
+        })
+    }
+}
+
+async fn connect(address: String) -> Result<BoxedStream, OpenError> {
+    let connected = tokio::time::timeout(CONNECT_LIMIT, TcpStream::connect(&address)).await;
+    let stream = match connected {
+        Ok(Ok(stream)) => stream,
+        Ok(Err(error)) => return Err(OpenError::Connect { address, reason: error.to_string() }),
+        Err(_) => {
+            return Err(OpenError::Connect {
+                address,
+                reason: format!("no answer within {CONNECT_LIMIT:?}"),
+            });
+        }
+    };
+    // A frame is one small write: it must not wait for the next.
+    let _ = stream.set_nodelay(true);
+    Ok(Box::new(stream))
+}
