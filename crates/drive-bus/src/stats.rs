@@ -16,6 +16,7 @@ pub struct Histogram {
     buckets: [u32; SUB * OCTAVES],
     count: u64,
     sum: Duration,
+    min: Duration,
     max: Duration,
 }
 
@@ -23,7 +24,13 @@ impl Histogram {
     /// An empty histogram.
     #[must_use]
     pub const fn new() -> Self {
-        Self { buckets: [0; SUB * OCTAVES], count: 0, sum: Duration::ZERO, max: Duration::ZERO }
+        Self {
+            buckets: [0; SUB * OCTAVES],
+            count: 0,
+            sum: Duration::ZERO,
+            min: Duration::MAX,
+            max: Duration::ZERO,
+        }
     }
 
     /// Counts one duration.
@@ -33,6 +40,7 @@ impl Histogram {
         }
         self.count += 1;
         self.sum = self.sum.saturating_add(duration);
+        self.min = self.min.min(duration);
         self.max = self.max.max(duration);
     }
 
@@ -40,6 +48,12 @@ impl Histogram {
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
+    }
+
+    /// The shortest, exactly; zero when nothing was counted.
+    #[must_use]
+    pub const fn min(&self) -> Duration {
+        if self.count == 0 { Duration::ZERO } else { self.min }
     }
 
     /// The longest, exactly.
@@ -77,6 +91,7 @@ impl Histogram {
         }
         self.count += other.count;
         self.sum = self.sum.saturating_add(other.sum);
+        self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
     }
 }
@@ -254,6 +269,7 @@ mod tests {
                 "{per_mille}: {got:?}"
             );
         }
+        assert_eq!(histogram.min(), Duration::from_micros(1));
         assert_eq!(histogram.max(), Duration::from_millis(10));
         assert_eq!(histogram.mean(), Duration::from_nanos(5_000_500));
     }
