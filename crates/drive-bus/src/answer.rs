@@ -278,7 +278,7 @@ mod tests {
             for cut in 0..pdu.len() {
                 match extent(&request, &pdu[..cut]) {
                     Extent::AtLeast(least) => {
-                        assert!(least > cut && least <= pdu.len(), "{request:?} at {cut}")
+                        assert!(least > cut && least <= pdu.len(), "{request:?} at {cut}");
                     }
                     Extent::Exactly(len) => assert_eq!(len, pdu.len(), "{request:?} at {cut}"),
                     other => panic!("{request:?} at {cut}: {other:?}"),

@@ -1,0 +1,234 @@
+//! A port that is lost, comes back, or never comes.
+
+mod support;
+
+use std::{
+    io,
+    sync::{Arc, Mutex},
+};
+
+use drive_bus::{Line, LineConfig, OpenError, exchange::rtu};
+use drive_core::{Class, PortError, Terms, serial::SerialSettings};
+use support::MS;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
+    sync::mpsc,
+    time::Instant,
+};
+use tokio_modbus::{Request, client::Client};
+
+/// A line whose port can be pulled and plugged: each opening gives its far end to the test, or fails while unplugged.
+fn pluggable() -> (Line, mpsc::UnboundedReceiver<DuplexStream>, Arc<Mutex<bool>>) {
+    let (far_ends, opened) = mpsc::unbounded_channel();
+    let plugged = Arc::new(Mutex::new(true));
+    let is_plugged = Arc::clone(&plugged);
+    let open = move || {
+        let (ours, theirs) = tokio::io::duplex(512);
+        let plugged = *is_plugged.lock().unwrap();
+        if plugged {
+            far_ends.send(theirs).unwrap();
+        }
+        async move { if plugged { Ok(ours) } else { Err(io::Error::from(io::ErrorKind::NotFound)) } }
+    };
+    (Line::over_reopened(open, LineConfig::stream(SerialSettings::MODBUS_DEFAULT)), opened, plugged)
+}
+
+async fn serve_one(port: &mut DuplexStream) -> Vec<u8> {
+    let mut bytes = vec![0; 512];
+    let len = port.read(&mut bytes).await.unwrap();
+    bytes.truncate(len);
+    let pdu: &[u8] = if bytes[1] == 3 { &[3, 2, 0, 1] } else { &bytes[1..6] };
+    port.write_all(&rtu::frame(bytes[0], pdu)).await.unwrap();
+    bytes
+}
+
+async fn read(line: &Line, terms: Terms) -> Result<(), PortError> {
+    let request = Request::ReadHoldingRegisters(0, 1);
+    let outcome = line.slave(1).with_terms(terms).call(request).await;
+    outcome.map(|answer| assert!(answer.is_ok())).map_err(PortError::from_modbus)
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_port_that_was_pulled_is_opened_again_and_the_line_goes_on() {
+    let (line, mut opened, plugged) = pluggable();
+    let call = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    let mut port = opened.recv().await.unwrap();
+    serve_one(&mut port).await;
+    assert_eq!(call.await.unwrap(), Ok(()));
+
+    *plugged.lock().unwrap() = false;
+    drop(port);
+    tokio::time::sleep(5_000 * MS).await;
+    assert!(matches!(read(&line, Terms::default()).await, Err(PortError::LineDown(_))));
+
+    *plugged.lock().unwrap() = true;
+    let mut port = opened.recv().await.unwrap();
+    tokio::time::sleep(MS).await;
+    let call = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    serve_one(&mut port).await;
+    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!((line.stats().opened, line.stats().lost), (2, 1));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_short_interruption_costs_a_waiting_read_nothing() {
+    let (line, mut opened, _plugged) = pluggable();
+    let call = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    let mut port = opened.recv().await.unwrap();
+    let mut bytes = [0; 64];
+    assert!(port.read(&mut bytes).await.unwrap() > 0);
+    drop(port);
+    let mut port = opened.recv().await.unwrap();
+    serve_one(&mut port).await;
+    assert_eq!(call.await.unwrap(), Ok(()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_under_way_when_the_port_is_lost_is_never_sent_again() {
+    let (line, mut opened, _plugged) = pluggable();
+    let call = tokio::spawn({
+        let mut slave = line.slave(1);
+        async move { slave.call(Request::WriteSingleRegister(8501, 15)).await.map_err(PortError::from_modbus) }
+    });
+    let mut port = opened.recv().await.unwrap();
+    let mut bytes = [0; 64];
+    assert!(port.read(&mut bytes).await.unwrap() > 0);
+    drop(port);
+    assert_eq!(call.await.unwrap(), Err(PortError::OutcomeUnknown("the line was lost")));
+    let mut port = opened.recv().await.unwrap();
+    let sent = tokio::time::timeout(5_000 * MS, port.read(&mut bytes)).await;
+    assert!(sent.is_err(), "{sent:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_queued_while_the_port_is_away_expires_and_is_not_sent_when_it_is_back() {
+    let (line, mut opened, plugged) = pluggable();
+    let mut port = opened.recv().await.unwrap();
+    // The line is busy, so that the command waits; then the port goes.
+    let busy = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    let mut bytes = [0; 64];
+    assert!(port.read(&mut bytes).await.unwrap() > 0);
+    let start = Instant::now();
+    let command = tokio::spawn({
+        let terms = Terms::of(Class::Command).within(1_000 * MS);
+        let mut slave = line.slave(2).with_terms(terms);
+        async move { slave.call(Request::WriteSingleRegister(8501, 15)).await.map_err(PortError::from_modbus) }
+    });
+    tokio::task::yield_now().await;
+    *plugged.lock().unwrap() = false;
+    drop(port);
+    assert_eq!(command.await.unwrap(), Err(PortError::Expired));
+    assert_eq!(start.elapsed(), 1_000 * MS);
+    assert!(matches!(busy.await.unwrap(), Err(PortError::LineDown(_))));
+    *plugged.lock().unwrap() = true;
+    let mut port = opened.recv().await.unwrap();
+    let sent = tokio::time::timeout(5_000 * MS, port.read(&mut bytes)).await;
+    assert!(sent.is_err(), "{sent:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_bad_frame_never_closes_the_port() {
+    let (line, mut opened, _plugged) = pluggable();
+    let call = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    let mut port = opened.recv().await.unwrap();
+    let mut bytes = [0; 64];
+    assert!(port.read(&mut bytes).await.unwrap() > 0);
+    port.write_all(&[1, 3, 2, 0, 1, 0xBA, 0xD0]).await.unwrap();
+    serve_one(&mut port).await;
+    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(line.stats().opened, 1);
+}
+
+#[tokio::test]
+async fn a_missing_port_is_named() {
+    let path = "/dev/no-such-port";
+    let error = Line::open(LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT)).await.unwrap_err();
+    assert_eq!(error, OpenError::NotFound { path: path.into() });
+    assert_eq!(error.to_string(), "there is no serial port /dev/no-such-port");
+}
+
+#[tokio::test]
+async fn a_server_that_refuses_is_named() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    drop(listener);
+    let error = Line::open(LineConfig::modbus_tcp(address.clone())).await.unwrap_err();
+    assert!(matches!(error, OpenError::Connect { address: named, .. } if named == address));
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_port_in_use_is_named_and_a_free_one_serves() {
+    use tokio_serial::{SerialPort, SerialStream};
+
+    let (mut far, near) = SerialStream::pair().unwrap();
+    let path = near.name().unwrap();
+    drop(near);
+    let config = LineConfig {
+        echo: drive_bus::Echo::Off,
+        ..LineConfig::serial(&path, SerialSettings::MODBUS_DEFAULT)
+    };
+    let line = Line::open(config.clone()).await.unwrap();
+    let error = Line::open(config).await.unwrap_err();
+    assert_eq!(error, OpenError::InUse { path: path.into() });
+
+    let call = tokio::spawn({
+        let line = line.clone();
+        async move { read(&line, Terms::default()).await }
+    });
+    let mut request = [0; 8];
+    far.read_exact(&mut request).await.unwrap();
+    assert_eq!(request[..], rtu::frame(1, &[3, 0, 0, 0, 1])[..]);
+    far.write_all(&rtu::frame(1, &[3, 2, 0, 1])).await.unwrap();
+    assert_eq!(call.await.unwrap(), Ok(()));
+    line.close().await;
+}
+
+#[tokio::test]
+async fn modbus_tcp_ignores_a_late_answer_by_its_number_and_a_foreign_unit_by_its_address() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let config = LineConfig {
+        response_timeout: 50 * MS,
+        retries: 0,
+        ..LineConfig::modbus_tcp(listener.local_addr().unwrap().to_string())
+    };
+    let line = Line::open(config).await.unwrap();
+    let (mut server, _) = listener.accept().await.unwrap();
+    let call = |line: &Line, address| {
+        let mut slave = line.slave(1);
+        tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(address, 1)).await })
+    };
+    let first = call(&line, 7);
+    let mut request = [0; 12];
+    server.read_exact(&mut request).await.unwrap();
+    assert_eq!(request, [0, 1, 0, 0, 0, 6, 1, 3, 0, 7, 0, 1]);
+    let error = PortError::from_modbus(first.await.unwrap().unwrap_err());
+    assert!(matches!(error, PortError::Timeout { .. }), "{error:?}");
+
+    let second = call(&line, 8);
+    server.read_exact(&mut request).await.unwrap();
+    assert_eq!(request[..2], [0, 2]);
+    let late = [0, 1, 0, 0, 0, 5, 1, 3, 2, 0xAA, 0xAA];
+    let other_unit = [0, 2, 0, 0, 0, 5, 9, 3, 2, 0xBB, 0xBB];
+    let right = [0, 2, 0, 0, 0, 5, 1, 3, 2, 0, 8];
+    for byte in [&late[..], &other_unit, &right].concat() {
+        server.write_all(&[byte]).await.unwrap();
+    }
+    let answer = second.await.unwrap().unwrap();
+    assert_eq!(answer, Ok(tokio_modbus::Response::ReadHoldingRegisters(vec![8])));
+}

@@ -1,0 +1,79 @@
+//! A scripted peer at the far end of an in-memory stream: it sees what the line sends and answers what the test says.
+
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, exchange::rtu};
+use drive_core::serial::SerialSettings;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
+    time::{Instant, sleep, sleep_until},
+};
+
+pub(crate) const MS: Duration = Duration::from_millis(1);
+
+/// One line at 19200 8E1 and the far end of its stream.
+pub(crate) fn line(change: impl FnOnce(LineConfig) -> LineConfig) -> (Line, Peer) {
+    let (ours, theirs) = tokio::io::duplex(4_096);
+    let line = Line::over(ours, change(LineConfig::stream(SerialSettings::MODBUS_DEFAULT)));
+    (line, Peer { stream: theirs, last: None })
+}
+
+/// The far end.
+pub(crate) struct Peer {
+    stream: DuplexStream,
+    last: Option<Instant>,
+}
+
+impl Peer {
+    /// The next request: everything that comes in one piece.
+    pub(crate) async fn request(&mut self) -> Vec<u8> {
+        let mut bytes = vec![0; 512];
+        let len = self.stream.read(&mut bytes).await.unwrap();
+        bytes.truncate(len);
+        assert!(rtu::is_frame(&bytes), "the line sent {bytes:02X?}");
+        // The line hands a frame over at once; on the wire it takes its characters.
+        self.last = Some(Instant::now() + characters(len));
+        bytes
+    }
+
+    /// The next request, answered at once with `pdu` by the slave that it was for.
+    pub(crate) async fn answer(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let request = self.request().await;
+        self.after(5 * MS, &rtu::frame(request[0], pdu)).await;
+        request
+    }
+
+    /// Bytes on the line, their last character `pause` and the characters' own time after the end of the last request.
+    pub(crate) async fn after(&mut self, pause: Duration, bytes: &[u8]) {
+        let from = self.last.unwrap_or_else(Instant::now);
+        sleep_until(from + pause + characters(bytes.len())).await;
+        self.stream.write_all(bytes).await.unwrap();
+    }
+
+    /// Bytes on the line, one by one, as a UART delivers them.
+    pub(crate) async fn one_by_one(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            sleep(characters(1)).await;
+            self.stream.write_all(&[*byte]).await.unwrap();
+        }
+    }
+
+    /// Bytes on the line now.
+    pub(crate) async fn now(&mut self, bytes: &[u8]) {
+        self.stream.write_all(bytes).await.unwrap();
+    }
+
+    /// Nothing comes for this long.
+    pub(crate) async fn hears_nothing_for(&mut self, time: Duration) {
+        let mut byte = [0];
+        let heard = tokio::time::timeout(time, self.stream.read(&mut byte)).await;
+        assert!(heard.is_err(), "the line sent {byte:02X?} too early");
+    }
+}
+
+/// The time of so many characters at 19200 8E1.
+pub(crate) fn characters(count: usize) -> Duration {
+    SerialSettings::MODBUS_DEFAULT.characters(count)
+}
