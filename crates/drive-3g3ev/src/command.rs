@@ -1,0 +1,109 @@
+//! Start and stop: what is written to 0001h, and how it is seen to act.
+
+use drive_core::{
+    Class, Command as Order, Control, Direction, Error, Port, RawWord, Refusal, Result, State, Status,
+    StopMode,
+};
+
+use crate::{
+    Drive3g3ev,
+    registers::COMMAND,
+    words::{Command, DriveState, Signals},
+};
+
+/// How often the drive is read until it shows what was ordered.
+pub(crate) const READS: usize = 20;
+
+impl<P: Port> Drive3g3ev<P> {
+    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+        let order = Order::Start(direction);
+        let status = self.read_status(Class::Command).await?;
+        if status.is_fault() {
+            let reason = status.fault_code.map_or(Refusal::Tripped, Refusal::Fault);
+            return Err(self.refused(order, reason));
+        }
+        self.check_run_source(order).await?;
+        self.check_direction(order, direction).await?;
+        if let Some(control) = status.control
+            && control != Control::Bus
+        {
+            return Err(self.refused(order, Refusal::NotInControl(control)));
+        }
+        if status.state == State::NotReady {
+            return Err(self.refused(order, Refusal::State(State::NotReady)));
+        }
+        self.write_command(Class::Command, Command::run(direction)).await?;
+        let mut shown = status;
+        for _ in 0..READS {
+            shown = self.read_status(Class::Command).await?;
+            if shown.is_fault() {
+                break;
+            }
+            if is_run(&shown) && shown.control == Some(Control::Bus) {
+                // RUN is the drive's, the direction may still be the old one: the order itself must stand too.
+                let held = self.read_command(Class::Command, &mut shown).await?;
+                if held == Command::run(direction) {
+                    return Ok(shown);
+                }
+                break;
+            }
+        }
+        Err(self.not_confirmed(order, shown))
+    }
+
+    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
+        if mode != StopMode::Ramp {
+            return Err(Error::Unsupported {
+                what: "this stop mode",
+                reason: "the bus has one stop, a run command of 0; how the motor stops is a setting of the drive",
+            });
+        }
+        let order = Order::Stop(mode);
+        self.write_command(Class::Stop, Command::empty()).await?;
+        let mut shown = self.read_status(Class::Stop).await?;
+        for _ in 1..READS {
+            if !is_run(&shown) {
+                return Ok(shown);
+            }
+            // RUN may stand until the motor does: it is on its way when the order stands and the bus commands.
+            let held = self.read_command(Class::Stop, &mut shown).await?;
+            if held.contains(Command::RUN) {
+                break;
+            }
+            if shown.control == Some(Control::Bus) {
+                return Ok(shown);
+            }
+            shown = self.read_status(Class::Stop).await?;
+        }
+        if is_run(&shown) { Err(self.not_confirmed(order, shown)) } else { Ok(shown) }
+    }
+
+    /// Writes 0001h and remembers the word; while the outcome is not known, none is.
+    pub(crate) async fn write_command(&mut self, class: Class, command: Command) -> Result<()> {
+        self.command = None;
+        self.registers.at(class).write(COMMAND, command.bits()).await?;
+        self.command = Some(command);
+        Ok(())
+    }
+
+    /// Reads 0001h back, and adds it to a status.
+    async fn read_command(&mut self, class: Class, status: &mut Status) -> Result<Command> {
+        let value = self.registers.at(class).read(COMMAND).await?;
+        status.raw.push(RawWord { address: COMMAND.address(), code: COMMAND.row().code, value });
+        let command = Command::from_bits_retain(value);
+        self.command = Some(command);
+        Ok(command)
+    }
+
+    pub(crate) fn not_confirmed(&self, command: Order, status: Status) -> Error {
+        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status) }
+    }
+}
+
+/// Whether the drive shows RUN in either of its words.
+fn is_run(status: &Status) -> bool {
+    let word = |address| status.raw(address).unwrap_or(0);
+    let signals = Signals::from_bits_retain(word(crate::registers::SIGNALS.address()));
+    let state = DriveState::from_bits_retain(word(crate::registers::STATE.address()));
+    signals.contains(Signals::RUN) || state.contains(DriveState::RUN)
+}

@@ -1,0 +1,81 @@
+//! Parameters, and their way to the EEPROM.
+
+use drive_core::{
+    Class, Command as Order, Error, ErrorKind, Port, Refusal, Result, Row, Written, registers::Storage,
+};
+
+use crate::{
+    Drive3g3ev,
+    registers::{COMMAND, ENTER, REFERENCE},
+};
+
+/// Saves that the EEPROM takes in its life (§4.5).
+pub const EEPROM_LIFE: u32 = 100_000;
+
+/// What the sample of §4.5 writes to ENTER.
+const ENTER_WORD: u16 = 0;
+
+/// What is known of the EEPROM.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Eeprom {
+    saves: u32,
+    /// Whether a parameter was changed since the last save.
+    changed: bool,
+}
+
+impl Eeprom {
+    /// An EEPROM that was written so many times already.
+    pub(crate) const fn after(saves: u32) -> Self {
+        Self { saves, changed: false }
+    }
+}
+
+impl<P: Port> Drive3g3ev<P> {
+    pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        if [COMMAND.address(), REFERENCE.address()].contains(&row.address) {
+            return Err(Error::Unsupported {
+                what: "writing a command as a parameter",
+                reason: "start, stop, reset and setpoint check the drive first; use them",
+            });
+        }
+        if row.address == ENTER.address() {
+            return Err(Error::Unsupported {
+                what: "writing ENTER as a parameter",
+                reason: "a save to EEPROM is counted and refused when nothing changed; use it",
+            });
+        }
+        let outcome = self.registers.at(Class::Background).change_row(row, word).await;
+        // Whatever was read before may be another now, also when it is not known whether the write arrived.
+        let may_have_changed = match &outcome {
+            Ok(written) => written.changed,
+            Err(error) => {
+                !matches!(error.kind(), ErrorKind::Refused | ErrorKind::Exception | ErrorKind::NotSent)
+            }
+        };
+        if may_have_changed && row.storage == Storage::RamUntilSaved {
+            self.settings.written(row);
+            self.eeprom.changed = true;
+        }
+        outcome
+    }
+
+    pub(crate) async fn enter(&mut self) -> Result<u32> {
+        if !self.eeprom.changed {
+            return Err(self.refused(Order::Persist, Refusal::NothingToSave));
+        }
+        if self.eeprom.saves >= EEPROM_LIFE {
+            return Err(self.refused(Order::Persist, Refusal::EepromLife));
+        }
+        let outcome = self.registers.at(Class::Background).edge().write(ENTER, ENTER_WORD).await;
+        let may_have_saved = match &outcome {
+            Ok(()) => true,
+            Err(error) => {
+                !matches!(error.kind(), ErrorKind::Refused | ErrorKind::Exception | ErrorKind::NotSent)
+            }
+        };
+        self.eeprom.saves += u32::from(may_have_saved);
+        outcome?;
+        self.eeprom.changed = false;
+        Ok(self.eeprom.saves)
+    }
+}

@@ -1,0 +1,162 @@
+//! What the drive is set up for: n02, n05, n39 and n40, read when they are first needed.
+
+use std::time::Duration;
+
+use drive_core::{
+    Class, Command, Direction, Error, Exchange, Port, Reaction, Refusal, Result, Watchdog,
+    registers::{Register, Row, access::Readable},
+};
+
+use crate::{
+    Drive3g3ev, TIME_OVER, TIME_OVER_TRIP,
+    frequency::FrequencyUnit,
+    registers::{N02, N05, N39, N40},
+};
+
+/// What was read once; `None`: not yet.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Settings {
+    n02: Option<u16>,
+    n05: Option<u16>,
+    n39: Option<u16>,
+    /// n39 was changed over the bus: until the drive is switched off, the old unit may still count (§2.1, note 3).
+    unit_changed: bool,
+}
+
+impl Settings {
+    /// Forgets what a write to this parameter may have changed.
+    pub(crate) fn written(&mut self, row: &Row) {
+        self.unit_changed |= row.address == N39.address();
+        *self = Self { unit_changed: self.unit_changed, ..Self::default() };
+    }
+}
+
+impl<P: Port> Drive3g3ev<P> {
+    /// What the frequencies that are read count; `None` when it is not certain.
+    pub(crate) async fn unit(&mut self, class: Class) -> Result<Option<FrequencyUnit>> {
+        if self.settings.unit_changed {
+            return Ok(None);
+        }
+        Ok(FrequencyUnit::of(self.n39(class).await?))
+    }
+
+    /// What the reference counts.
+    pub(crate) async fn reference_unit(&mut self, command: Command) -> Result<FrequencyUnit> {
+        if self.settings.unit_changed {
+            let reason = Refusal::Settings(
+                "n39 was changed, and acts when the drive has been switched off and on; forget() reads it again",
+            );
+            return Err(self.refused(command, reason));
+        }
+        let exchange = Exchange { function: 0x03, register: Some(N39.address()) };
+        FrequencyUnit::of(self.n39(Class::Command).await?).ok_or(Error::Answer {
+            slave: self.registers.slave(),
+            exchange,
+            reason: "n39 holds a unit that the manual does not list",
+        })
+    }
+
+    /// Refuses what needs the run command when n02 gives it to others.
+    pub(crate) async fn check_run_source(&mut self, command: Command) -> Result<()> {
+        match self.n02().await? {
+            2 | 5 => Ok(()),
+            _ => Err(self.refused(
+                command,
+                Refusal::Settings("n02 does not take the run command from the bus; 2 or 5 does"),
+            )),
+        }
+    }
+
+    /// Refuses what needs the reference when n02 gives it to others.
+    pub(crate) async fn check_reference_source(&mut self, command: Command) -> Result<()> {
+        match self.n02().await? {
+            4 | 5 => Ok(()),
+            _ => Err(self.refused(
+                command,
+                Refusal::Settings("n02 does not take the frequency reference from the bus; 4 or 5 does"),
+            )),
+        }
+    }
+
+    /// Refuses reverse where n05 forbids it: the drive would show OP6.
+    pub(crate) async fn check_direction(&mut self, command: Command, direction: Direction) -> Result<()> {
+        if direction == Direction::Reverse && self.n05().await? == 1 {
+            return Err(self.refused(command, Refusal::DirectionForbidden));
+        }
+        Ok(())
+    }
+
+    pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
+        let mut calls = self.registers.at(Class::Background);
+        match calls.read(N40).await? {
+            0 => Ok(Watchdog { timeout: Some(TIME_OVER), reaction: Some(TIME_OVER_TRIP) }),
+            1 => Ok(Watchdog { timeout: None, reaction: Some(Reaction::Ignore) }),
+            _ => {
+                let exchange = Exchange { function: 0x03, register: Some(N40.address()) };
+                Err(calls.answer(exchange, "n40 holds a value that the manual does not list"))
+            }
+        }
+    }
+
+    pub(crate) async fn check_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        let slave = self.registers.slave();
+        let off = reaction == Reaction::Ignore;
+        if !off && reaction != TIME_OVER_TRIP {
+            return Err(Error::Unsupported {
+                what: "a reaction of the watchdog",
+                reason: "the drive trips with BUS, and the manual does not say how the motor stops then",
+            });
+        }
+        if !off && timeout != TIME_OVER {
+            let (min, max, step) = (TIME_OVER, TIME_OVER, TIME_OVER);
+            return Err(Error::WatchdogTime { slave, timeout, min, max, step });
+        }
+        let watchdog = self.read_watchdog().await?;
+        if watchdog.timeout.is_none() == off {
+            return Ok(watchdog);
+        }
+        let how = if off {
+            "n40 detects time-over and acts at power-up only: write 1 to n40, save it, switch the drive off and on"
+        } else {
+            "n40 switches time-over off and acts at power-up only: write 0 to n40, save it, switch the drive off and on"
+        };
+        Err(self.refused(Command::ArmWatchdog, Refusal::Settings(how)))
+    }
+
+    pub(crate) const fn refused(&self, command: Command, reason: Refusal) -> Error {
+        Error::Refused { slave: self.registers.slave(), command, reason }
+    }
+
+    async fn n02(&mut self) -> Result<u16> {
+        let known = self.settings.n02;
+        let value = self.once(Class::Command, N02, known).await?;
+        self.settings.n02 = Some(value);
+        Ok(value)
+    }
+
+    async fn n05(&mut self) -> Result<u16> {
+        let known = self.settings.n05;
+        let value = self.once(Class::Command, N05, known).await?;
+        self.settings.n05 = Some(value);
+        Ok(value)
+    }
+
+    async fn n39(&mut self, class: Class) -> Result<u16> {
+        let known = self.settings.n39;
+        let value = self.once(class, N39, known).await?;
+        self.settings.n39 = Some(value);
+        Ok(value)
+    }
+
+    async fn once(
+        &mut self,
+        class: Class,
+        register: Register<impl Readable>,
+        known: Option<u16>,
+    ) -> Result<u16> {
+        match known {
+            Some(value) => Ok(value),
+            None => self.registers.at(class).read(register).await,
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The words of the fast set, and what they say.
+
+use drive_core::{Control, Current, Direction, RawWord, State, Status};
+
+use crate::{
+    frequency::FrequencyUnit,
+    reading::Words,
+    registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, SIGNALS, STATE},
+    words::{Command, DriveState, Errors, Signals},
+};
+
+/// The words of one status, read in two exchanges: they may be of two moments.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct FastWords {
+    signals: Signals,
+    errors: Errors,
+    state: DriveState,
+    output: u16,
+    current: u16,
+    raw: Vec<RawWord>,
+}
+
+impl FastWords {
+    pub(crate) fn of(words: Words) -> Self {
+        Self {
+            signals: Signals::from_bits_retain(words.word(SIGNALS)),
+            errors: Errors::from_bits_retain(words.word(ERRORS)),
+            state: DriveState::from_bits_retain(words.word(STATE)),
+            output: words.word(OUTPUT_FREQUENCY),
+            current: words.word(CURRENT),
+            raw: words.into_raw(),
+        }
+    }
+
+    /// The status. `command` is the word in 0001h, where it is known: RUN alone does not tell a motor that slows down
+    /// to stop from one that follows its reference.
+    pub(crate) fn status(self, unit: Option<FrequencyUnit>, command: Option<Command>) -> Status {
+        let warnings = DriveState::OVERTORQUE | DriveState::REFERENCE_ERROR | DriveState::LINK_FAULT;
+        let warning = self.state.intersects(warnings | DriveState::UNDERVOLTAGE)
+            || self.signals.contains(Signals::DATA_ERROR);
+        let reverse = self.signals.contains(Signals::REVERSE);
+        Status {
+            state: self.drive_state(command),
+            direction: Some(if reverse { Direction::Reverse } else { Direction::Forward }),
+            output_frequency: unit.and_then(|unit| unit.frequency(self.output)),
+            current: Some(Current::from_deciamperes(u32::from(self.current))),
+            current_share: None,
+            at_reference: Some(self.state.contains(DriveState::AT_REFERENCE)),
+            warning: Some(warning),
+            fault_code: (self.errors.bits() != 0).then(|| lowest_bit(self.errors)),
+            control: Some(self.control()),
+            raw: self.raw,
+        }
+    }
+
+    fn control(&self) -> Control {
+        if self.state.contains(DriveState::LOCAL_RUN) { Control::Local } else { Control::Bus }
+    }
+
+    fn drive_state(&self, command: Option<Command>) -> State {
+        let fault = self.signals.contains(Signals::FAULT)
+            || self.errors.bits() != 0
+            || self.state.contains(DriveState::MAJOR_FAULT);
+        let running = self.signals.contains(Signals::RUN) || self.state.contains(DriveState::RUN);
+        let turning = self.output != 0 && !self.state.contains(DriveState::OUTPUT_OFF);
+        let ready = self.signals.contains(Signals::READY)
+            && self.state.contains(DriveState::READY)
+            && !self.state.contains(DriveState::UNDERVOLTAGE);
+        let stop_ordered =
+            self.control() == Control::Bus && command.is_some_and(|command| !command.contains(Command::RUN));
+        if fault {
+            State::Fault
+        } else if running && stop_ordered {
+            State::Stopping
+        } else if running {
+            State::Running
+        } else if turning {
+            State::Stopping
+        } else if ready {
+            State::Ready
+        } else {
+            State::NotReady
+        }
+    }
+}
+
+/// The number of the lowest bit that is set: the first of the present faults.
+const fn lowest_bit(errors: Errors) -> u16 {
+    errors.bits().trailing_zeros() as u16
+}
