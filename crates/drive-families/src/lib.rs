@@ -11,6 +11,7 @@
 
 use std::{fmt, str::FromStr};
 
+use drive_3g3ev::Drive3g3ev;
 use drive_atv21::Atv21;
 use drive_atv28::Atv28;
 use drive_atv58::Atv58;
@@ -28,11 +29,13 @@ pub enum Family {
     Atv58,
     /// Schneider Altivar 312.
     Atv312,
+    /// Omron 3G3EV.
+    Omron3g3ev,
 }
 
 impl Family {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Atv21, Self::Atv28, Self::Atv58, Self::Atv312];
+    pub const ALL: [Self; 5] = [Self::Atv21, Self::Atv28, Self::Atv58, Self::Atv312, Self::Omron3g3ev];
 
     /// What it can do.
     #[must_use]
@@ -42,6 +45,7 @@ impl Family {
             Self::Atv28 => &drive_atv28::CAPABILITIES,
             Self::Atv58 => &drive_atv58::CAPABILITIES,
             Self::Atv312 => &drive_atv312::CAPABILITIES,
+            Self::Omron3g3ev => &drive_3g3ev::CAPABILITIES,
         }
     }
 
@@ -53,6 +57,7 @@ impl Family {
             Self::Atv28 => drive_atv28::ROWS,
             Self::Atv58 => drive_atv58::ROWS,
             Self::Atv312 => drive_atv312::ROWS,
+            Self::Omron3g3ev => drive_3g3ev::ROWS,
         }
     }
 
@@ -64,6 +69,7 @@ impl Family {
             Self::Atv28 => Box::new(Atv28::new(port, slave)),
             Self::Atv58 => Box::new(Atv58::new(port, slave)),
             Self::Atv312 => Box::new(Atv312::new(port, slave)),
+            Self::Omron3g3ev => Box::new(Drive3g3ev::new(port, slave)),
         }
     }
 }
