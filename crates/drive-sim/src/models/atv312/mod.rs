@@ -66,22 +66,9 @@ pub struct Atv312 {
 }
 
 impl Atv312 {
-    /// A drive as it is set up for command by the bus: access level L3, command and reference by Modbus, and the fast
-    /// stop and the DC injection on the bits 14 and 13 of the control word; all of it saved.
-    #[must_use]
-    pub fn new() -> Self {
-        let mut drive = Self::factory();
-        for &(address, value) in factory::SET_UP_FOR_THE_BUS {
-            drive.bank.set(address, value);
-        }
-        drive.bank.save();
-        drive.power_cycle();
-        drive
-    }
-
     /// A drive as it leaves the factory: access level L1, commanded by its terminals until the bus gives a command.
     #[must_use]
-    pub fn factory() -> Self {
+    pub fn new() -> Self {
         let mut bank = Bank::new(ROWS);
         for &(address, value) in factory::NUMBERS {
             bank.set_factory(address, value);
@@ -100,6 +87,19 @@ impl Atv312 {
             hottest: 0,
             time_base: Duration::ZERO,
         }
+    }
+
+    /// A drive as it is set up for command by the bus: access level L3, command and reference by Modbus, and the fast
+    /// stop and the DC injection on the bits 14 and 13 of the control word; all of it saved.
+    #[must_use]
+    pub fn under_bus_control() -> Self {
+        let mut drive = Self::new();
+        for &(address, value) in factory::SET_UP_FOR_THE_BUS {
+            drive.bank.set(address, value);
+        }
+        drive.bank.save();
+        drive.power_cycle();
+        drive
     }
 
     /// The same drive with the reference and the version that function 43 answers.

@@ -13,7 +13,7 @@ fn state(drive: &mut Atv312) -> u16 {
 
 /// Set up for the bus, climbed up the chart, at 50 Hz.
 fn running() -> Atv312 {
-    let mut drive = Atv312::new();
+    let mut drive = Atv312::under_bus_control();
     for word in [0x0006, 0x0007, 0x000F] {
         write(&mut drive, 8501, word).unwrap();
     }
@@ -23,7 +23,7 @@ fn running() -> Atv312 {
 }
 
 fn stopped() -> Atv312 {
-    Atv312::new()
+    Atv312::under_bus_control()
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn at_level_l3_it_comes_up_locked_and_follows_the_chart() {
 
 #[test]
 fn from_the_factory_the_terminals_command_until_the_bus_does() {
-    let mut drive = Atv312::factory();
+    let mut drive = Atv312::new();
     assert_eq!(state(&mut drive), 0x27);
     assert_eq!(drive.read(3206).unwrap() & 0x6000, 0x0000);
     write(&mut drive, 8502, 300).unwrap();
@@ -153,7 +153,7 @@ fn a_bit_that_is_assigned_to_preset_speeds_no_longer_reverses() {
 
 #[test]
 fn level_l3_changes_what_stands_in_the_manual_and_is_left_by_a_factory_setting_only() {
-    let mut drive = Atv312::factory();
+    let mut drive = Atv312::new();
     assert_eq!(write(&mut drive, 8413, 164), Err(Exception::ILLEGAL_VALUE), "Mdb needs L3");
     write(&mut drive, 8413, 2).unwrap();
     write(&mut drive, 3006, 2).unwrap();
