@@ -137,6 +137,16 @@ impl Atv21 {
         self
     }
 
+    /// The same drive with its indirect blocks set up as in the manual's examples, and in effect.
+    #[must_use]
+    pub fn with_blocks(mut self) -> Self {
+        for (address, slot) in (0x0875..).zip(1..=5).chain([(0x0870, 1), (0x0871, 3)]) {
+            self.bank.set(address, slot);
+        }
+        self.start_up(Duration::ZERO);
+        self
+    }
+
     /// What happens at power-up and when a trip was reset: the control registers fall back to 0, the block
     /// configuration and the protocol settings take effect.
     fn start_up(&mut self, duration: Duration) {
