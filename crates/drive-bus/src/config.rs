@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
+use crate::exchange::rtu;
+
 /// Where a line goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Endpoint {
@@ -57,6 +59,10 @@ pub struct LineConfig {
     /// The shortest response timeout that the line may learn. Too short a timeout makes a bystander mis-frame the next
     /// request when an answer and it overlap.
     pub timeout_floor: Duration,
+    /// How long after a request that brought no answer one may still come. For so long the slave is not asked anything
+    /// of the same function again, because a late answer could be taken for the new one; other slaves are served
+    /// meanwhile. Only the write of a Stop does not wait.
+    pub late_window: Duration,
     /// Silence after a broadcast, in which the slaves act on it (MODBUS over Serial Line V1.02 p. 10: 100 to 200 ms).
     pub broadcast_turnaround: Duration,
     /// Extra silence before a request to another slave than the last.
@@ -111,6 +117,7 @@ impl LineConfig {
             serial,
             response_timeout: Duration::from_millis(500),
             timeout_floor: Duration::from_millis(50),
+            late_window: Duration::from_millis(750),
             broadcast_turnaround: Duration::from_millis(100),
             slave_change_gap: Duration::ZERO,
             chunk_gap: Duration::from_millis(20),
@@ -129,6 +136,32 @@ impl LineConfig {
     pub fn slave(mut self, slave: u8, settings: SlaveSettings) -> Self {
         self.slaves.insert(slave, settings);
         self
+    }
+
+    /// The longest time from the call of a Stop to its first bit on the line, when no other Stop waits and requests and
+    /// answers are no longer than these PDUs (253 at most): the longest exchange that may be under way, whole, and the
+    /// silences after it. What the host itself adds, some tenths of a millisecond, comes on top.
+    ///
+    /// With [`Echo::Auto`] it includes the one read that finds out about the echo, though that happens only before the
+    /// first write after opening.
+    #[must_use]
+    pub fn worst_case_stop(&self, longest_request: usize, longest_answer: usize) -> Duration {
+        let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
+        let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
+        if !self.is_paced() {
+            return timeout.max(self.broadcast_turnaround);
+        }
+        let frame = |pdu: usize| self.serial.characters(pdu + 3);
+        let exchange = |request, answer| {
+            frame(request) + timeout + frame(answer) + rtu::overtime(self.serial, self.chunk_gap)
+        };
+        let broadcast = frame(longest_request) + self.broadcast_turnaround;
+        let under_way = exchange(longest_request, longest_answer).max(broadcast);
+        let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
+        let silence = self.serial.t3_5() + pauses.max(self.slave_change_gap);
+        let settling =
+            if self.echo == Echo::Auto { exchange(5, longest_answer) + silence } else { Duration::ZERO };
+        under_way + silence + settling
     }
 
     /// Whether frames need silences between them.

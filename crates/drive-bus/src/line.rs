@@ -3,6 +3,7 @@
 use std::{
     fmt, io,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
 };
 
 use tokio::{
@@ -14,6 +15,7 @@ use tokio::{
 use crate::{
     config::{LineConfig, SlaveSettings},
     master::Master,
+    pdu::MAX_PDU,
     slave::{Caller, Slave},
     stats::Stats,
     task::Task,
@@ -107,6 +109,13 @@ impl Line {
     #[must_use]
     pub fn stats(&self) -> Stats {
         self.handle.shared.master().stats(Instant::now())
+    }
+
+    /// The longest time from the call of a Stop to its first bit on the line, whatever is asked on it: see
+    /// [`LineConfig::worst_case_stop`], with the longest PDUs there are.
+    #[must_use]
+    pub fn worst_case_stop(&self) -> Duration {
+        self.handle.shared.master().config().worst_case_stop(MAX_PDU, MAX_PDU)
     }
 
     /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is

@@ -36,12 +36,6 @@ impl LearnedTimeout {
         self.smoothed.map_or(self.ceiling, |(mean, _)| mean)
     }
 
-    /// The longest it can become.
-    #[must_use]
-    pub const fn ceiling(&self) -> Duration {
-        self.ceiling
-    }
-
     /// Another ceiling; what was learned stays.
     pub fn limit(&mut self, ceiling: Duration) {
         self.ceiling = ceiling;

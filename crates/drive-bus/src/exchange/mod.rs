@@ -28,11 +28,11 @@ pub enum Step {
 /// Why an exchange brought no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Failure {
-    /// Nothing came.
+    /// No answer came in time. It may still come.
     Timeout,
-    /// Something came that may have been the answer, and is not whole.
+    /// What came looks like the answer and is not whole.
     Damaged(&'static str),
-    /// An intact answer came that does not fit the request.
+    /// No answer came in time, but an intact frame of the slave that does not fit the request. The answer may still come.
     Mismatch(String),
 }
 

@@ -8,6 +8,7 @@ use std::{sync::Arc, time::Duration};
 
 use bytes::{BufMut, Bytes, BytesMut};
 use crc::{CRC_16_MODBUS, Crc, Table};
+use drive_core::serial::SerialSettings;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
@@ -65,11 +66,19 @@ fn shortest_frame(bytes: &[u8]) -> Option<usize> {
     None
 }
 
+/// How long an exchange may go on after the time of its answer is over, because something is still coming in.
+#[must_use]
+pub fn overtime(serial: SerialSettings, chunk_gap: Duration) -> Duration {
+    serial.characters(MAX_FRAME) + chunk_gap.max(serial.t3_5())
+}
+
 /// The machine.
 #[derive(Debug)]
 pub struct Rtu {
     chunk_gap: Duration,
     t3_5: Duration,
+    /// How long an answer that has begun may go on after its time is over.
+    longest: Duration,
     echo: EchoState,
     configured: Echo,
     current: Option<Current>,
@@ -91,8 +100,6 @@ struct Current {
     received: usize,
     /// An intact frame came that did not fit.
     misfit: Option<String>,
-    /// Something came that was not intact.
-    garbled: bool,
     /// What is there ends in a CRC that fits, and the function has no length of its own: silence ends it.
     ends_with_silence: bool,
 }
@@ -126,10 +133,12 @@ enum Found {
 impl Rtu {
     /// A machine for an adapter that makes pauses of at most `chunk_gap` inside a frame.
     #[must_use]
-    pub fn new(t3_5: Duration, chunk_gap: Duration, echo: Echo) -> Self {
+    pub fn new(serial: SerialSettings, chunk_gap: Duration, echo: Echo) -> Self {
+        let t3_5 = serial.t3_5();
         Self {
             chunk_gap: chunk_gap.max(t3_5),
             t3_5,
+            longest: overtime(serial, chunk_gap),
             echo: echo.into(),
             configured: echo,
             current: None,
@@ -261,21 +270,18 @@ impl Rtu {
         }
         let resembled = self.current.as_ref().is_some_and(|current| current.resembles(&self.received));
         let garbled = self.judge(self.received.len());
-        let Some(current) = &mut self.current else { return Step::More };
-        current.garbled |= garbled;
+        let Some(current) = &self.current else { return Step::More };
         if garbled && resembled {
-            return self.fail();
+            self.current = None;
+            return Step::Done(Err(Failure::Damaged("CRC")));
         }
         if current.answer_by.is_some_and(|by| now >= by) { self.fail() } else { Step::More }
     }
 
+    /// The time for the answer is over.
     fn fail(&mut self) -> Step {
         let Some(current) = self.current.take() else { return Step::More };
-        let failure = match current.misfit {
-            Some(why) => Failure::Mismatch(why),
-            None if current.garbled => Failure::Damaged("CRC"),
-            None => Failure::Timeout,
-        };
+        let failure = current.misfit.map_or(Failure::Timeout, Failure::Mismatch);
         // An adapter that echoes would have echoed: silence is an answer to that question.
         if self.echo == EchoState::Unknown && failure == Failure::Timeout && current.received == 0 {
             self.echo = EchoState::Absent;
@@ -285,11 +291,11 @@ impl Rtu {
 }
 
 impl Current {
-    /// Whether these bytes look like this exchange's answer, damaged: so long, or with its first two bytes.
+    /// Whether these bytes are this exchange's answer, damaged: they begin as it does. Anything else may be somebody
+    /// else's damaged frame, with the answer still to come; to ask again then would leave one answer too many.
     fn resembles(&self, bytes: &[u8]) -> bool {
-        let function = self.request.function_code().value();
-        bytes.len() >= answer::likely_len(&self.request).min(MAX_PDU) + OVERHEAD
-            || bytes.windows(2).any(|pair| pair[0] == self.slave && pair[1] & 0x7F == function)
+        matches!(*bytes, [slave, function, ..]
+            if slave == self.slave && function & 0x7F == self.request.function_code().value())
     }
 }
 
@@ -333,7 +339,6 @@ impl Exchange for Rtu {
             echo_taken: false,
             received: 0,
             misfit: None,
-            garbled: false,
             ends_with_silence: false,
         });
         sent
@@ -384,7 +389,9 @@ impl Exchange for Rtu {
         match self.last_byte {
             Some(last) if !self.received.is_empty() => {
                 let silence = current.is_some_and(|current| current.ends_with_silence);
-                Some(last + if silence { self.t3_5 } else { self.chunk_gap })
+                let pause = last + if silence { self.t3_5 } else { self.chunk_gap };
+                let limit = current.and_then(|current| current.answer_by).map(|by| by + self.longest);
+                Some(limit.map_or(pause, |limit| limit.min(pause)))
             }
             _ => current?.answer_by,
         }

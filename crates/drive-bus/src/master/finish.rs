@@ -70,20 +70,19 @@ impl<C> Master<C> {
         let confuses = self.exchange.confuses_late_answers();
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
-            Failure::Damaged(_) => station.stats.outcomes.damaged += 1,
-            Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
-            Failure::Timeout => {
-                station.stats.outcomes.timeouts += 1;
-                if confuses {
-                    let ceiling = station.timeout.ceiling();
-                    let sent = flight.sent.map_or(now, |sent| sent.end);
-                    let until = (sent + ceiling).max(now + ceiling / 2);
-                    station.expect_late(flight.request.function_code().value(), until);
-                }
-                if station.missed(now, &self.config) {
-                    self.go_offline(now, flight.slave);
-                }
+            Failure::Damaged(_) => {
+                station.stats.outcomes.damaged += 1;
+                return;
             }
+            Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
+            Failure::Timeout => station.stats.outcomes.timeouts += 1,
+        }
+        if confuses {
+            let sent = flight.sent.map_or(now, |sent| sent.end);
+            station.expect_late(flight.request.function_code().value(), sent + self.config.late_window);
+        }
+        if *failure == Failure::Timeout && station.missed(now, &self.config) {
+            self.go_offline(now, flight.slave);
         }
     }
 

@@ -114,7 +114,7 @@ impl<C> Master<C> {
     #[must_use]
     pub fn new(config: LineConfig) -> Self {
         let exchange: Box<dyn Exchange> = if config.is_paced() {
-            Box::new(Rtu::new(config.serial.t3_5(), config.chunk_gap, config.echo))
+            Box::new(Rtu::new(config.serial, config.chunk_gap, config.echo))
         } else {
             Box::new(Mbap::new())
         };
@@ -229,8 +229,8 @@ impl<C> Master<C> {
         self.exchange.abandon();
         self.to_send = None;
         let function = flight.request.function_code().value();
+        let until = flight.sent.map_or(now, |sent| sent.end) + self.config.late_window;
         let station = self.station(flight.slave);
-        let until = now + station.timeout.ceiling();
         station.expect_late(function, until);
         station.probe_again(until);
         self.quiet_from = self.quiet_from.max(now);
@@ -290,7 +290,7 @@ impl<C> Master<C> {
             let mut takes = config.response_timeout;
             if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
-                if entry.terms.class != Class::Stop {
+                if entry.terms.class != Class::Stop || !entry.work.is_write {
                     at = at.max(station.late_until(request.function_code().value()).unwrap_or(at));
                 }
                 takes = station.timeout.typical();

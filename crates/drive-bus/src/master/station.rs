@@ -14,6 +14,9 @@ use crate::{
 /// How long a slave is probed after somebody last asked for it.
 const INTEREST: Duration = Duration::from_secs(60);
 
+/// How many late answers are kept in mind.
+const MOST_LATE: usize = 8;
+
 /// One slave, as seen by the master.
 #[derive(Debug)]
 pub(super) struct Station {
@@ -22,8 +25,8 @@ pub(super) struct Station {
     pub(super) stats: SlaveStats,
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
-    /// The functions whose answers may still come late, as bits, and until when.
-    late: Option<(u128, Instant)>,
+    /// The functions whose answers may still come late, and until when.
+    late: Vec<(u8, Instant)>,
     failures: u32,
     offline: Option<Offline>,
     /// What a probe asks: the last read that was asked of this slave.
@@ -45,7 +48,7 @@ impl Station {
             timeout: LearnedTimeout::new(config.timeout_floor, ceiling),
             stats: SlaveStats::default(),
             ready_at: None,
-            late: None,
+            late: Vec::new(),
             failures: 0,
             offline: None,
             last_read: None,
@@ -74,7 +77,7 @@ impl Station {
     /// It has answered, at `now`. True: it had been off-line.
     pub(super) fn answered(&mut self, now: Instant) -> bool {
         self.failures = 0;
-        self.late = None;
+        self.late.retain(|(_, until)| *until > now);
         self.ready_at = Some(now + self.settings.turnaround);
         self.stats.offline = false;
         self.offline.take().is_some()
@@ -82,28 +85,24 @@ impl Station {
 
     /// An answer to this function may still come, until `until`.
     pub(super) fn expect_late(&mut self, function: u8, until: Instant) {
-        let bit = 1_u128 << (function & 0x7F);
-        self.late = Some(match self.late {
-            Some((bits, before)) => (bits | bit, before.max(until)),
-            None => (bit, until),
-        });
+        if self.late.len() >= MOST_LATE {
+            self.late.remove(0);
+        }
+        self.late.push((function, until));
     }
 
     /// Until when a request of this function must wait, because a late answer could be taken for its own.
     pub(super) fn late_until(&self, function: u8) -> Option<Instant> {
-        self.late.filter(|(bits, _)| bits & 1 << (function & 0x7F) != 0).map(|(_, until)| until)
+        self.late.iter().filter(|(late, _)| *late == function).map(|(_, until)| *until).max()
     }
 
     /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
     pub(super) fn came_late(&mut self, function: u8) -> bool {
-        let Some((bits, until)) = self.late else { return false };
-        let bit = 1_u128 << (function & 0x7F);
-        if bits & bit == 0 {
+        // What was waited for has come: one thing less to be afraid of.
+        let Some(index) = self.late.iter().position(|(late, _)| *late == function & 0x7F) else {
             return false;
-        }
-        // What was waited for has come: nothing more to be afraid of.
-        let rest = bits & !bit;
-        self.late = (rest != 0).then_some((rest, until));
+        };
+        self.late.remove(index);
         self.stats.late += 1;
         true
     }
@@ -132,7 +131,7 @@ impl Station {
     /// When it is off-line: when it is asked next.
     pub(super) fn probe_at(&self) -> Option<Instant> {
         let offline = self.offline?;
-        Some(self.late.map_or(offline.probe_at, |(_, until)| until.max(offline.probe_at)))
+        Some(self.late.iter().map(|(_, until)| *until).fold(offline.probe_at, Instant::max))
     }
 
     /// [`probe_at`](Self::probe_at), as long as somebody cares.

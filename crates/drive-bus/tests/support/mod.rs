@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub(crate) mod rig;
+
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, exchange::rtu};
