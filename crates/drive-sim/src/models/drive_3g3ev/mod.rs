@@ -1,0 +1,360 @@
+//! A simulated Omron 3G3EV (3G3EV MODBUS, sections in brackets).
+//!
+//! What the manual leaves open is chosen here, and any drive of the field may differ:
+//! - reserved registers answer 0 ([`Drive3g3ev::refusing_reserved`]: exception 02), and 0 is in the word of inputs and
+//!   in every parameter that the manual does not name;
+//! - n06 to n08 hold 1, 2 and 3, and no number stands for "fault reset" until
+//!   [`Drive3g3ev::with_fault_reset_function`] says which;
+//! - 100 % is 60 Hz, both ramps are n20, measured to 60 Hz, n53 counts 0.1 Hz;
+//! - a fault cuts the output and the motor coasts; afterwards, and after the STOP key, a run command acts again when it
+//!   was 0 once;
+//! - RUN stands as long as the output feeds the motor;
+//! - bit 7 of 0020h is always 1, as in the only sample (§4.2.2).
+
+mod set_up;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::time::Duration;
+
+use drive_3g3ev::{
+    ROWS, TIME_OVER,
+    registers::{COMMAND, ENTER, N06, N07, N08, N20, N53, OUTPUTS, REFERENCE},
+    words::{BroadcastCommand, Command, Errors, LinkError},
+};
+
+use self::set_up::SetUp;
+use crate::{
+    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Refusal, Rules,
+    Watchdog,
+};
+
+/// Value outside its range (§4.4).
+const OUT_OF_RANGE: Exception = Exception(0x21);
+/// A constant written during run or undervoltage, or one that can only be read (§4.4).
+const NOT_WRITABLE_NOW: Exception = Exception(0x22);
+
+/// 100 % of the reference, in hundredths of a hertz.
+const MAX_FREQUENCY: u32 = 6_000;
+/// Words of a broadcast reference at 100 % (§5.1).
+const BROADCAST_FULL: u32 = 30_000;
+/// Nominal current in tenths of an ampere.
+const NOMINAL_CURRENT: u32 = 30;
+/// Settings that the manual does not print, and that have to differ from 0.
+const FACTORY: &[(u16, u16)] =
+    &[(N06.address(), 1), (N07.address(), 2), (N08.address(), 3), (N20.address(), 30), (N53.address(), 15)];
+/// The registers that §5.2 calls reserved.
+const RESERVED: &[std::ops::RangeInclusive<u16>] =
+    &[0x25..=0x26, 0x29..=0x2A, 0x2E..=0x30, 0x32..=0x3C, 0x3E..=0xFF];
+
+/// A simulated 3G3EV.
+#[derive(Debug, Clone)]
+pub struct Drive3g3ev {
+    bank: Bank,
+    motor: Motor,
+    watchdog: Watchdog,
+    rules: Rules,
+    /// The parameters of §2.1 as they were at power-up.
+    set_up: SetUp,
+    errors: Errors,
+    link_errors: LinkError,
+    /// A written value was outside its range (0022h bit 3).
+    limit_exceeded: bool,
+    /// The run command acts again when it was 0 once.
+    locked: bool,
+    local: bool,
+    fault_reset: Option<u16>,
+    refuses_reserved: bool,
+}
+
+impl Drive3g3ev {
+    /// A drive from the factory, with a light motor of its own size.
+    #[must_use]
+    pub fn new() -> Self {
+        let mut bank = Bank::new(ROWS);
+        for &(address, value) in FACTORY {
+            bank.set_factory(address, value);
+        }
+        let set_up = SetUp::of(&bank);
+        Self {
+            bank,
+            motor: Motor::new(Nameplate {
+                nominal_frequency: MAX_FREQUENCY,
+                ..Nameplate::light(NOMINAL_CURRENT)
+            }),
+            watchdog: Watchdog::new(set_up.detects_time_over.then_some(TIME_OVER)),
+            rules: set_up.rules(),
+            set_up,
+            errors: Errors::empty(),
+            link_errors: LinkError::empty(),
+            limit_exceeded: false,
+            locked: false,
+            local: false,
+            fault_reset: None,
+            refuses_reserved: false,
+        }
+    }
+
+    /// This drive with a number that stands for "fault reset" in n06 to n08.
+    #[must_use]
+    pub fn with_fault_reset_function(self, number: u16) -> Self {
+        Self { fault_reset: Some(number), ..self }
+    }
+
+    /// This drive, answering exception 02 to a read of a reserved register.
+    #[must_use]
+    pub fn refusing_reserved(self) -> Self {
+        Self { refuses_reserved: true, ..self }
+    }
+
+    fn command(&self) -> Command {
+        Command::from_bits_retain(self.bank.value(COMMAND.address()))
+    }
+
+    /// What 0001h orders: bits 4 to 6 are the inputs' functions.
+    fn obey_command(&mut self, before: Command) {
+        let command = self.command();
+        if !command.contains(Command::RUN) {
+            self.locked = false;
+        }
+        let risen = command.difference(before);
+        let inputs = [(Command::INPUT_1, N06), (Command::INPUT_2, N07), (Command::INPUT_3, N08)];
+        let resets = inputs.into_iter().any(|(input, function)| {
+            risen.contains(input) && self.fault_reset == Some(self.bank.value(function.address()))
+        });
+        if resets {
+            self.reset();
+        }
+    }
+
+    fn obey_broadcast(&mut self, word: u16) {
+        let command = BroadcastCommand::from_bits_retain(word);
+        let before = self.command();
+        let run = Command::RUN | Command::REVERSE;
+        self.bank.set(COMMAND.address(), word & run.bits());
+        self.obey_command(before);
+        if command.contains(BroadcastCommand::EXTERNAL_FAULT) {
+            self.fault(Errors::EF);
+        } else if command.contains(BroadcastCommand::FAULT_RESET) {
+            self.reset();
+        }
+    }
+
+    fn fault(&mut self, errors: Errors) {
+        self.errors |= errors;
+        self.locked = self.command().contains(Command::RUN);
+        self.motor.freewheel();
+    }
+
+    /// Clears the faults; the run command acts again when it was 0 once.
+    fn reset(&mut self) {
+        self.errors = Errors::empty();
+        self.link_errors = LinkError::empty();
+    }
+
+    /// Steers the motor for what is ordered now.
+    fn steer(&mut self) {
+        if !self.errors.is_empty() {
+            self.motor.freewheel();
+        } else if self.runs() {
+            self.motor.run(self.target(), self.ramps());
+        } else {
+            self.motor.ramp_to_rest(self.ramps().deceleration);
+        }
+    }
+
+    /// Whether a run command acts.
+    fn runs(&self) -> bool {
+        self.run_by_bus() && !self.locked && self.is_ready() && self.command().contains(Command::RUN)
+    }
+
+    fn run_by_bus(&self) -> bool {
+        self.set_up.run_by_bus && !self.local
+    }
+
+    /// The frequency that is ordered, in hundredths of a hertz, negative in reverse.
+    fn target(&self) -> i32 {
+        let frequency = i32::try_from(self.reference()).unwrap_or(0);
+        if self.command().contains(Command::REVERSE) { -frequency } else { frequency }
+    }
+
+    /// The reference in force, in hundredths of a hertz: tenths are all that the drive keeps (§2.1, note 1).
+    fn reference(&self) -> u32 {
+        if !self.set_up.reference_by_bus || self.local {
+            return 0;
+        }
+        self.set_up.frequency(self.bank.value(REFERENCE.address())) / 10 * 10
+    }
+
+    fn ramps(&self) -> Ramps {
+        let time = Duration::from_millis(u64::from(self.bank.value(N20.address())) * 100);
+        let ramp = Ramp { full_scale: MAX_FREQUENCY, time };
+        Ramps { acceleration: ramp, deceleration: ramp }
+    }
+
+    /// Whether the drive would take this word.
+    fn check(&self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+        if cast == Cast::Broadcast {
+            return if address <= REFERENCE.address() { Ok(()) } else { Err(Exception::ILLEGAL_ADDRESS) };
+        }
+        let constant = self.bank.row(address).is_some_and(|row| set_up::is_parameter(row.address));
+        if constant && self.errors.intersects(Errors::UV1 | Errors::UV2) {
+            return Err(NOT_WRITABLE_NOW);
+        }
+        self.bank.check(address, value, !self.motor.is_fed()).map_err(|refusal| match refusal {
+            Refusal::Unknown => Exception::ILLEGAL_ADDRESS,
+            Refusal::ReadOnly | Refusal::Running => NOT_WRITABLE_NOW,
+            Refusal::Range => OUT_OF_RANGE,
+        })?;
+        let too_fast = address == REFERENCE.address() && self.set_up.frequency(value) > MAX_FREQUENCY;
+        if too_fast { Err(OUT_OF_RANGE) } else { Ok(()) }
+    }
+
+    fn is_reserved(address: u16) -> bool {
+        RESERVED.iter().any(|range| range.contains(&address))
+    }
+}
+
+impl Default for Drive3g3ev {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Model for Drive3g3ev {
+    fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    fn read(&mut self, address: u16) -> Result<u16, Exception> {
+        if Self::is_reserved(address) {
+            return if self.refuses_reserved { Err(Exception::ILLEGAL_ADDRESS) } else { Ok(0) };
+        }
+        let kept = self.bank.read(address)?;
+        Ok(self.computed(address).unwrap_or(kept))
+    }
+
+    fn write(&mut self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+        let checked = self.check(address, value, cast);
+        self.limit_exceeded = checked == Err(OUT_OF_RANGE);
+        checked?;
+        let before = self.command();
+        match cast {
+            Cast::Broadcast if address == COMMAND.address() => self.obey_broadcast(value),
+            Cast::Broadcast if address == REFERENCE.address() => {
+                let frequency = u32::from(value) * MAX_FREQUENCY / BROADCAST_FULL;
+                self.bank.set(address, self.set_up.word(frequency.min(MAX_FREQUENCY)));
+            }
+            // 0000h is allowed to a broadcast (§4.4) and described nowhere.
+            Cast::Broadcast => {}
+            Cast::Unicast if address == ENTER.address() => self.bank.save(),
+            Cast::Unicast => {
+                self.bank.set(address, value);
+                if address == COMMAND.address() {
+                    self.obey_command(before);
+                }
+            }
+        }
+        self.steer();
+        Ok(())
+    }
+
+    fn check_write(&self, block: Block, values: &[u16], cast: Cast) -> Result<(), Exception> {
+        let mut words = (block.first..=u16::MAX).zip(values);
+        // A value outside its range is noted in 0022h by the write that fails.
+        words.try_for_each(|(address, &value)| match self.check(address, value, cast) {
+            Err(OUT_OF_RANGE) if block.quantity == 1 => Ok(()),
+            checked => checked,
+        })
+    }
+
+    fn advance(&mut self, elapsed: Duration) {
+        let mut left = elapsed;
+        while !left.is_zero() {
+            let piece = self.watchdog.remaining().map_or(left, |remaining| remaining.min(left));
+            self.motor.advance(piece);
+            if self.watchdog.advance(piece) {
+                self.link_errors |= LinkError::TIME_OVER;
+                self.fault(Errors::BUS);
+            }
+            left -= piece;
+        }
+    }
+
+    fn power_cycle(&mut self) {
+        self.bank.power_cycle();
+        self.set_up = SetUp::of(&self.bank);
+        self.rules = self.set_up.rules();
+        self.watchdog = Watchdog::new(self.set_up.detects_time_over.then_some(TIME_OVER));
+        self.errors = Errors::empty();
+        self.link_errors = LinkError::empty();
+        self.limit_exceeded = false;
+        self.locked = false;
+        self.motor.freewheel();
+    }
+
+    /// The code is the number of the bit of 0021h, 0 to 15.
+    fn trip(&mut self, code: u16) {
+        let bit = 1_u16.checked_shl(u32::from(code)).unwrap_or(0);
+        if bit != 0 {
+            self.fault(Errors::from_bits_retain(bit));
+        }
+    }
+
+    fn set_load(&mut self, percent: u16) {
+        self.motor.set_load(percent);
+    }
+
+    fn panel(&mut self, action: Panel) {
+        match action {
+            Panel::TakeControl => self.local = true,
+            Panel::ReleaseControl => {
+                self.local = false;
+                self.locked = self.command().contains(Command::RUN);
+            }
+            Panel::Stop => self.locked = self.command().contains(Command::RUN),
+        }
+        self.steer();
+    }
+
+    fn observe(&self) -> Observation {
+        let trip = (!self.errors.is_empty()).then(|| self.errors.bits().trailing_zeros() as u16);
+        Observation {
+            running: self.motor.is_fed(),
+            output_frequency: self.motor.output_frequency(),
+            shaft_frequency: self.motor.shaft_frequency(),
+            setpoint: if self.runs() { self.target() } else { 0 },
+            current: self.motor.current(),
+            trip,
+            local: self.local,
+            eeprom_writes: self.bank.eeprom_writes(),
+        }
+    }
+
+    fn frame_seen(&mut self, _: Cast) {
+        self.watchdog.feed();
+    }
+
+    fn peek(&self, address: u16) -> Option<u16> {
+        self.bank.peek(address).map(|kept| self.computed(address).unwrap_or(kept))
+    }
+
+    /// A parameter is set as on the keypad, for good. Those of §2.1 act at the next power-up.
+    fn poke(&mut self, address: u16, value: u16) -> bool {
+        if self.computed(address).is_some() {
+            return false;
+        }
+        let before = self.command();
+        let kept = if set_up::is_parameter(address) {
+            self.bank.set_for_good(address, value)
+        } else {
+            self.bank.set(address, value)
+        };
+        if kept && address == COMMAND.address() {
+            self.obey_command(before);
+        }
+        self.steer();
+        kept
+    }
+}
