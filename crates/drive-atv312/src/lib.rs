@@ -75,7 +75,7 @@ impl<P: Port> Atv312<P> {
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
-            registers: Registers::new(port, slave, &CAPABILITIES, meaning),
+            registers: Registers::new(port, slave, &CAPABILITIES, exception_meaning),
             known: Known::default(),
             command: None,
             unsaved: false,
@@ -192,7 +192,8 @@ impl<P: Port> Drive for Atv312<P> {
 
 /// What an exception means (BBV52816 p. 15; for function 43, p. 14). Which code answers a parameter that is refused while
 /// the motor runs is not printed.
-const fn meaning(function: u8, code: u8) -> ExceptionMeaning {
+#[must_use]
+pub const fn exception_meaning(function: u8, code: u8) -> ExceptionMeaning {
     match (function, code) {
         (_, 1) => ExceptionMeaning::NoSuchFunction,
         (_, 2) => ExceptionMeaning::NoSuchRegister,

@@ -430,7 +430,7 @@ async fn a_parameter_is_refused_before_it_is_sent_by_access_range_and_state() {
 async fn it_says_what_it_is() {
     let (mut drive, machine, _line) = rig();
     let identity = drive.identify().await.unwrap();
-    assert_eq!(identity.vendor.as_deref(), Some("Telemecanique"));
+    assert_eq!(identity.vendor.as_deref(), Some("TELEMECANIQUE"));
     assert_eq!(identity.model.as_deref(), Some("ATV312HU15N4"));
     let codes: Vec<_> = identity.codes.iter().map(|word| (word.code, word.value)).collect();
     let expected = [("ARE", 0), ("NCV", 6), ("VCAL", 3), ("INV", 41), ("UdP", 0x1204), ("TSP", 128)];

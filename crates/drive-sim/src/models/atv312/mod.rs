@@ -294,7 +294,7 @@ impl Model for Atv312 {
     fn other(&mut self, request: &[u8]) -> Result<Vec<u8>, Exception> {
         match *request {
             [0x2B, 0x0E, 0x01, 0x00] => {
-                Ok(identification(0x01, 0x02, &["Telemecanique", &self.reference, &self.version]))
+                Ok(identification(0x01, 0x02, &["TELEMECANIQUE", &self.reference, &self.version]))
             }
             [0x2B, 0x0E, 0x01, _] => Ok(vec![0xAB, 0x0E, 0x02]),
             [0x2B, ..] => Ok(vec![0xAB, 0x0E, 0x01]),
