@@ -8,6 +8,7 @@ use drive_core::{
     Class, Drive, Error, ExceptionMeaning, Fault, Registers, Row, SlaveAddress, State, StopMode,
     registers::Confidence, serial::CharacterFormat,
 };
+use drive_sim::models;
 use wire::Wire;
 
 fn slave(number: u8) -> SlaveAddress {
@@ -148,6 +149,29 @@ async fn function_06_is_laid_out_as_the_table_says() {
     ]);
     let mut drive = Atv28::new(wire, slave(5));
     assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().state, State::Disabled);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_simulated_drive_answers_as_the_frames_of_the_manual_say() {
+    let script = [
+        // "Lecture de N mots de sortie", the sample, its byte count in hexadecimal.
+        ("02 03 01C2 0007", "02 03 0E xxxx xxxx xxxx xxxx xxxx xxxx xxxx"),
+        // "Ecriture d'un mot de sortie", the layout.
+        ("02 06 0191 00C8", "02 06 0191 00C8"),
+        // "Ecriture de N mots de sortie", the sample.
+        ("02 10 0190 0002 04 000F 00C8", "02 10 0190 0002"),
+        ("02 03 0190 0002", "02 03 04 000F 00C8"),
+        // "Diffusion générale": never an answer.
+        ("00 06 0190 0000", ""),
+        ("02 03 0190 0001", "02 03 02 0000"),
+        // "Réponses d'exception": no such function, no such word, too many words, a value that is not permitted.
+        ("02 04 01C2 0001", "02 84 01"),
+        ("02 03 0064 0001", "02 83 02"),
+        ("02 03 01C2 0008", "02 83 03"),
+        ("02 10 01C2 0008 10 0000 0000 0000 0000 0000 0000 0000 0000", "02 90 03"),
+        ("02 06 000A 0020", "02 86 03"),
+    ];
+    wire::answers(CAPABILITIES.factory, 2, models::atv28::Atv28::new(), &script).await;
 }
 
 #[tokio::test]

@@ -56,13 +56,13 @@ impl<P: Port> Atv58<P> {
     /// Function 08/01: restarts the card's communication. It is the only request that a card in listen-only mode
     /// answers, and it ends that mode.
     ///
-    /// A line that has taken the silent slave for lost asks it again only after a while: repeat it as long as the
-    /// error says that nothing was sent.
+    /// It travels as urgently as a stop, also to a slave that the line has taken for lost: until it has arrived, no
+    /// stop reaches the drive.
     ///
     /// # Errors
     /// [`Error::Port`], [`Error::Exception`], and [`Error::Answer`] when the confirmation differs.
     pub async fn restart_communication(&mut self) -> Result<()> {
-        self.confirmed(RESTART_COMMUNICATION, 0).await
+        self.confirmed(Class::Stop, RESTART_COMMUNICATION, 0).await
     }
 
     /// Function 08/03: changes the character that ends a message in Modbus ASCII, line feed (0Ah) until then. The
@@ -71,24 +71,24 @@ impl<P: Port> Atv58<P> {
     /// # Errors
     /// [`Error::Port`], [`Error::Exception`], and [`Error::Answer`] when the confirmation differs.
     pub async fn change_ascii_delimiter(&mut self, delimiter: u8) -> Result<()> {
-        self.confirmed(CHANGE_DELIMITER, u16::from_be_bytes([delimiter, 0])).await
+        self.confirmed(Class::Background, CHANGE_DELIMITER, u16::from_be_bytes([delimiter, 0])).await
     }
 
     /// Function 08/04: enters listen-only mode. The card then carries out and answers nothing, **not even a stop**,
     /// until [`restart_communication`](Self::restart_communication). It does not answer this request either, so `Ok`
-    /// says that it was sent and that no answer came, which a dead line looks like too.
+    /// says that it was sent and not refused, and nothing more; a dead line looks the same. A line that knows the
+    /// request returns after its turnaround, another one after its timeout; a plain connection without a timeout waits
+    /// for ever.
     ///
     /// # Errors
-    /// [`Error::Port`] when it was not sent, [`Error::Exception`] when it is refused, and [`Error::Answer`] when it is
-    /// answered.
+    /// [`Error::Port`] when it was not sent, [`Error::Exception`] when it is refused, and [`Error::Answer`] when
+    /// something else comes back.
     pub async fn enter_listen_only(&mut self) -> Result<()> {
-        let mut calls = self.registers.at(Class::Background).edge();
-        match diagnose(&mut calls, ENTER_LISTEN_ONLY, 0).await {
+        match self.confirmed(Class::Background, ENTER_LISTEN_ONLY, 0).await {
             Err(Error::Port {
                 problem: PortError::Timeout { .. } | PortError::OutcomeUnknown(_), ..
             }) => Ok(()),
-            Err(error) => Err(error),
-            Ok(_) => Err(calls.answer(DIAGNOSTICS, "listen-only mode is entered without an answer")),
+            result => result,
         }
     }
 
@@ -97,7 +97,7 @@ impl<P: Port> Atv58<P> {
     /// # Errors
     /// [`Error::Port`], [`Error::Exception`], and [`Error::Answer`] when the confirmation differs.
     pub async fn clear_counters(&mut self) -> Result<()> {
-        self.confirmed(CLEAR_COUNTERS, 0).await
+        self.confirmed(Class::Background, CLEAR_COUNTERS, 0).await
     }
 
     /// Function 08/0B to 08/12: reads the counters, in eight exchanges.
@@ -154,8 +154,8 @@ impl<P: Port> Atv58<P> {
     }
 
     /// A sub-code whose answer repeats the request.
-    async fn confirmed(&mut self, code: u16, data: u16) -> Result<()> {
-        let mut calls = self.registers.at(Class::Background).edge();
+    async fn confirmed(&mut self, class: Class, code: u16, data: u16) -> Result<()> {
+        let mut calls = self.registers.at(class).edge();
         if diagnose(&mut calls, code, data).await? == data {
             Ok(())
         } else {

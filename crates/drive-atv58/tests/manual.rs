@@ -11,6 +11,7 @@ use drive_core::{
     registers::{Confidence, Form},
     serial::CharacterFormat,
 };
+use drive_sim::models;
 use wire::Wire;
 
 fn slave(number: u8) -> SlaveAddress {
@@ -195,11 +196,49 @@ async fn function_0b_reads_the_event_counter_behind_a_status_of_zero() {
 }
 
 #[tokio::test]
-async fn an_answer_of_another_sub_code_or_to_listen_only_is_refused() {
+async fn an_answer_of_another_sub_code_or_with_other_data_is_refused() {
     let other = drive(1, &[("01 08 000A 0000", "01 08 000B 0000")]).clear_counters().await;
     assert!(matches!(other, Err(Error::Answer { .. })));
-    let answered = drive(1, &[("01 08 0004 0000", "01 08 0004 0000")]).enter_listen_only().await;
+    let answered = drive(1, &[("01 08 0004 0000", "01 08 0004 0001")]).enter_listen_only().await;
     assert!(matches!(answered, Err(Error::Answer { .. })));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_simulated_drive_answers_as_the_frames_of_the_manual_say() {
+    let one = [
+        // p. 20/44.
+        ("01 03 01CF 0004 | 75CA", "01 03 08 xxxx xxxx xxxx xxxx"),
+        ("01 04 01CF 0004", "01 04 08 xxxx xxxx xxxx xxxx"),
+        ("01 06 00FC 0315 | 88C5", "01 06 00FC 0315 | 88C5"),
+        // p. 21/45, the table of sub-codes, and p. 19/43 for listen-only mode.
+        ("01 08 0000 A537", "01 08 0000 A537"),
+        ("01 08 000A 0000", "01 08 000A 0000"),
+        ("01 08 000B 0000", "01 08 000B xxxx"),
+        ("01 08 000C 0000", "01 08 000C 0000"),
+        ("01 08 000D 0000", "01 08 000D 0000"),
+        ("01 08 000E 0000", "01 08 000E xxxx"),
+        ("01 08 000F 0000", "01 08 000F 0000"),
+        ("01 08 0010 0000", "01 08 0010 0000"),
+        ("01 08 0011 0000", "01 08 0011 0000"),
+        ("01 08 0012 0000", "01 08 0012 0000"),
+        ("01 08 0003 2300", "01 08 0003 2300"),
+        ("01 08 0004 0000", ""),
+        ("01 03 01CF 0004 | 75CA", ""),
+        ("01 08 0001 FF00", "01 08 0001 FF00"),
+        ("01 08 0001 0000", "01 08 0001 0000"),
+        ("01 0B", "01 0B 0000 xxxx"),
+        // p. 22/46: no such function, no such word, too many words.
+        ("01 2B 0E 01 00", "01 AB 01"),
+        ("01 03 0064 0001", "01 83 02"),
+        ("01 03 01CF 0040", "01 83 03"),
+        // p. 18/42: a broadcast is never answered.
+        ("00 06 00FC 000A", ""),
+        ("01 03 00FC 0001", "01 03 02 000A"),
+    ];
+    wire::answers(CAPABILITIES.factory, 1, models::atv58::Atv58::new(), &one).await;
+    // p. 21/45.
+    let two = [("02 10 0190 0002 04 0006 01F4 | 1801", "02 10 0190 0002 | 402A")];
+    wire::answers(CAPABILITIES.factory, 2, models::atv58::Atv58::new(), &two).await;
 }
 
 #[tokio::test]

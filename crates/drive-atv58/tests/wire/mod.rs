@@ -1,10 +1,13 @@
-//! A port that speaks RTU bytes to a script: every request it must send, and the answer that it then gets.
+//! A port that speaks RTU bytes to a script: every request it must send, and the answer that it then gets; and the
+//! other side, a script that speaks RTU bytes to a simulated drive.
 
-use std::{collections::VecDeque, io};
+use std::{collections::VecDeque, io, time::Duration};
 
 use async_trait::async_trait;
 use bytes::Bytes;
-use drive_core::{Port, PortError};
+use drive_core::{Port, PortError, SerialSettings};
+use drive_sim::{Model, SimLine, Wiring};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio_modbus::{ExceptionCode, Request, Response, Slave, client::Client, slave::SlaveContext};
 
 /// The script: requests and answers as the manual prints them, without the CRC, which is computed as it says.
@@ -46,7 +49,7 @@ impl Client for Wire {
         let (expected, answer) = self.script.pop_front().expect("the script has ended");
         assert_eq!(sent, expected, "sent {sent:02X?} instead of {expected:02X?}");
         let Some(data) = answer.len().checked_sub(2).and_then(|end| answer.get(1..end)) else {
-            let silence = PortError::Timeout { after: std::time::Duration::from_millis(100) };
+            let silence = PortError::Timeout { after: Duration::from_millis(100) };
             return Err(tokio_modbus::Error::Transport(silence.into_io()));
         };
         if data[0] == function | 0x80 {
@@ -61,6 +64,37 @@ impl Client for Wire {
     async fn disconnect(&mut self) -> io::Result<()> {
         Ok(())
     }
+}
+
+/// Sends each request to a simulated drive and expects the answer, of which `xx` may be any byte, with its CRC; an empty
+/// one is none.
+pub(crate) async fn answers(
+    settings: SerialSettings,
+    slave: u8,
+    model: impl Model + 'static,
+    script: &[(&str, &str)],
+) {
+    let line = SimLine::new(Wiring::rtu(settings));
+    line.add(slave, model).unwrap();
+    let mut master = line.in_memory();
+    for (request, answer) in script {
+        master.write_all(&frame(request)).await.unwrap();
+        let expected = frame(&answer.replace("xx", "00"));
+        let mut got = vec![0; expected.len()];
+        master.read_exact(&mut got).await.unwrap();
+        if answer.contains("xx") {
+            let (printed, _) = answer.split_once("xx").unwrap();
+            assert!(got.starts_with(&hexadecimal(printed)), "{request}: {got:02X?}");
+            let mut sealed = got[..got.len() - 2].to_vec();
+            seal(&mut sealed);
+            assert_eq!(got, sealed, "{request}");
+        } else {
+            assert_eq!(got, expected, "{request}");
+        }
+        // The silence that ends a frame, and the time in which an answer would come that must not.
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    assert!(line.violations().is_empty(), "{:?}", line.violations());
 }
 
 /// A frame as printed, with its CRC: computed, and equal to the printed one where there is one.
