@@ -25,8 +25,8 @@ pub(crate) enum Content {
     Signal(Vec<u8>),
 }
 
-/// The slaves' side of a protocol. It has no clock: it is told when each character ended, and when the line has been
-/// silent for t3.5.
+/// The slaves' side of a protocol. It has no clock: it is told when each character ended, and when a
+/// silence has ended a frame.
 pub(crate) trait Framing: Send {
     /// Whether the next character begins a frame.
     fn is_between_frames(&self) -> bool;
@@ -34,14 +34,22 @@ pub(crate) trait Framing: Send {
     /// Whether the protocol asks for t3.5 between frames and t1.5 inside them.
     fn keeps_silences(&self) -> bool;
 
+    /// The silence after which a frame that has begun is over, on a line with this t3.5.
+    fn frame_timeout(&self, t3_5: Duration) -> Duration;
+
     /// A character whose last bit was on the wire at this moment.
     fn byte(&mut self, byte: u8, at: Instant, line: &mut State, speech: &mut Vec<Speech>);
 
-    /// Whether a frame has begun whose length is known and not yet reached.
+    /// Whether the end of the frame that has begun is still to come, as far as its characters tell.
     fn awaits_more(&self) -> bool;
 
-    /// t3.5 of silence inside a frame.
+    /// The silence that ends a frame.
     fn silence(&mut self, line: &mut State, speech: &mut Vec<Speech>);
+
+    /// An answer that was held back is released: said at once, or kept until its slave may speak.
+    fn release(&mut self, slave: u8, message: Vec<u8>, now: Instant) -> Option<Speech> {
+        Some(Speech { slave, content: Content::Message(message), heard: now, turnaround: Duration::ZERO })
+    }
 
     /// The frame of a message.
     fn encode(&self, slave: u8, message: &[u8], line: &State) -> Vec<u8>;

@@ -1,5 +1,6 @@
 //! Simulated variable-speed drives on a simulated line.
 
+mod ascii;
 mod bank;
 mod fault;
 mod framing;
@@ -13,13 +14,15 @@ mod rtu;
 mod serve;
 mod slave;
 mod state;
+mod unite;
+mod unitelway;
 mod watchdog;
 mod wire;
 
 pub use bank::{Bank, Refusal};
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
-pub use line::{AddressError, Protocol, SimLine, SimSlave, Wiring};
-pub use model::{Block, Cast, Exception, Model, Observation, Panel, Rules};
+pub use line::{AddressError, SimLine, SimSlave, Wiring};
+pub use model::{Block, Cast, Exception, Model, Observation, Panel, Protocol, Rules, UniTe};
 pub use motor::{Motor, Nameplate, Ramp, Ramps};
 pub use pdu::identification;
 pub use record::{Breach, LineStats, Violation};

@@ -10,13 +10,15 @@ use drive_core::SerialSettings;
 use tokio::{sync::watch, time::Instant};
 
 use crate::{
+    ascii::Ascii,
     fault::{Fault, Faults, PerMillion},
     framing::Framing,
-    model::{Exception, Model, Observation, Panel},
+    model::{Exception, Model, Observation, Panel, Protocol},
     record::{LineStats, Violation},
     rtu::Rtu,
     slave::{LineCounters, Received, Slave},
     state::{BROADCAST, State},
+    unitelway::UniTelway,
     wire::{Delivery, Pacing, Wire},
 };
 
@@ -24,14 +26,6 @@ use crate::{
 const LOOK: Duration = Duration::from_millis(1);
 /// The highest address of a slave (MODBUS over Serial Line V1.02 p. 8).
 const HIGHEST: u8 = 247;
-
-/// What the slaves of a line speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Protocol {
-    /// Modbus RTU.
-    #[default]
-    Rtu,
-}
 
 /// How a line is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -62,6 +56,8 @@ impl Wiring {
         };
         let framing: Box<dyn Framing> = match self.protocol {
             Protocol::Rtu => Box::new(Rtu::default()),
+            Protocol::Ascii => Box::new(Ascii::default()),
+            Protocol::UniTelway => Box::new(UniTelway::default()),
         };
         Wire::new(self.settings, pacing, self.delivery, framing)
     }
@@ -135,10 +131,11 @@ impl SimLine {
     ///
     /// # Errors
     /// As [`add`](Self::add).
-    pub fn add_boxed(&self, address: u8, model: Box<dyn Model>) -> Result<SimSlave, AddressError> {
+    pub fn add_boxed(&self, address: u8, mut model: Box<dyn Model>) -> Result<SimSlave, AddressError> {
         if address == BROADCAST || address > HIGHEST {
             return Err(AddressError::OutOfRange(address));
         }
+        model.join(self.wiring.protocol);
         let mut state = self.shared.lock();
         let slave = Slave::new(model, Instant::now(), state.counters());
         if !state.add(address, slave) {

@@ -61,6 +61,31 @@ pub struct Rules {
     pub turnaround: Duration,
 }
 
+/// What the slaves of a line speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Protocol {
+    /// Modbus RTU.
+    #[default]
+    Rtu,
+    /// Modbus ASCII.
+    Ascii,
+    /// UNI-TELWAY with UNI-TE requests.
+    UniTelway,
+}
+
+/// What a drive needs to answer UNI-TE requests (VVDED397054 p. 11–13); reads and writes of words go to its registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct UniTe {
+    /// Product type, sub-type and version of the identification.
+    pub product: [u8; 3],
+    /// The text of the identification.
+    pub name: &'static str,
+    /// The registers that request F2h writes, in its order: command, reference, acceleration, deceleration.
+    pub command: [u16; 4],
+    /// The registers that its answer reports, in its order: reference, status, fault, motor current.
+    pub report: [u16; 4],
+}
+
 /// What somebody at the machine does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Panel {
@@ -169,6 +194,16 @@ pub trait Model: Send {
     /// itself.
     fn frame_seen(&mut self, cast: Cast) {
         let _ = cast;
+    }
+
+    /// The drive is put on a line that speaks this. A drive whose times depend on the protocol learns it here.
+    fn join(&mut self, protocol: Protocol) {
+        let _ = protocol;
+    }
+
+    /// How the drive answers UNI-TE; `None`: it does not speak it.
+    fn unite(&self) -> Option<UniTe> {
+        None
     }
 
     /// Whether the drive hears the line at all; `false` while it starts up.

@@ -1,6 +1,8 @@
 //! Modbus RTU from the slaves' side: frames are cut by expected length and CRC, and by silence where the length of a
 //! function is not known.
 
+use std::time::Duration;
+
 use crc::{CRC_16_MODBUS, Crc};
 use tokio::time::Instant;
 
@@ -30,6 +32,10 @@ impl Framing for Rtu {
 
     fn keeps_silences(&self) -> bool {
         true
+    }
+
+    fn frame_timeout(&self, t3_5: Duration) -> Duration {
+        t3_5
     }
 
     fn byte(&mut self, byte: u8, at: Instant, line: &mut State, speech: &mut Vec<Speech>) {

@@ -11,12 +11,13 @@ use tokio::time::Instant;
 use crate::{
     model::{Cast, Exception, Model, Observation},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
+    unite::{self, LinkCounters},
 };
 
 /// Requests that a slave remembers.
 const REMEMBERED: usize = 256;
 /// Line feed, the last character of an ASCII frame until function 08/03 changes it.
-const LINE_FEED: u8 = b'\n';
+pub(crate) const LINE_FEED: u8 = b'\n';
 
 /// A request that a slave took.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -123,9 +124,9 @@ impl Slave {
             }
             _ => pdu::answer(&mut *self.model, request, cast).map(Some),
         };
-        let answer = match self.refuses.take() {
-            Some(exception) if cast == Cast::Unicast => Err(exception),
-            _ => answer,
+        let answer = match cast {
+            Cast::Unicast => self.refuses.take().map_or(answer, Err),
+            Cast::Broadcast => answer,
         };
         match &answer {
             Ok(_) if function != EVENT_COUNTER => self.counters.events = self.counters.events.wrapping_add(1),
@@ -139,10 +140,25 @@ impl Slave {
         self.unless_held(answer)
     }
 
+    /// Takes a UNI-TE request; the answer, if one is given. A drive without UNI-TE hears nothing.
+    pub(crate) fn unite(
+        &mut self,
+        now: Instant,
+        request: &[u8],
+        counters: &mut LinkCounters,
+    ) -> Option<Vec<u8>> {
+        self.model.unite()?;
+        if !self.hears(now, request, Cast::Unicast) {
+            return None;
+        }
+        let answer = unite::answer(&mut *self.model, request, counters);
+        let answer = if self.refuses.take().is_some() { unite::REFUSED.to_vec() } else { answer };
+        self.unless_held(answer)
+    }
+
     /// Notes that a frame for this slave came, unless it cannot hear it; the model is then at `now`.
     pub(crate) fn hears(&mut self, now: Instant, request: &[u8], cast: Cast) -> bool {
-        let model = self.at(now);
-        if !model.listens() || !self.connected {
+        if !self.is_connected(now) {
             return false;
         }
         self.model.frame_seen(cast);
@@ -159,6 +175,16 @@ impl Slave {
         }
         self.received.push_back(Received { at: now, cast, pdu: Bytes::copy_from_slice(request) });
         true
+    }
+
+    pub(crate) fn speaks_unite(&self) -> bool {
+        self.model.unite().is_some()
+    }
+
+    /// Whether it can be heard on the line at all.
+    pub(crate) fn is_connected(&mut self, now: Instant) -> bool {
+        let listens = self.at(now).listens();
+        self.connected && listens
     }
 
     /// The answer itself, or nothing while a test holds it.

@@ -51,15 +51,28 @@ impl State {
 
     /// An intact frame whose last bit was on the wire at `at`: carried out, and answered unless it is for all.
     pub(crate) fn request(&mut self, at: Instant, address: u8, request: &[u8]) -> Option<Speech> {
+        self.request_ended_by(at, address, request, None)
+    }
+
+    /// The same for a frame that a character ends: whoever waits for another character has not seen its end.
+    pub(crate) fn request_ended_by(
+        &mut self,
+        at: Instant,
+        address: u8,
+        request: &[u8],
+        delimiter: Option<u8>,
+    ) -> Option<Speech> {
         self.good_frame();
+        let sees_end = |slave: &Slave| delimiter.is_none_or(|delimiter| delimiter == slave.delimiter());
         if address == BROADCAST {
             self.stats.broadcasts += 1;
-            for slave in self.slaves.values_mut() {
+            for slave in self.slaves.values_mut().filter(|slave| sees_end(slave)) {
+                // Nobody answers.
                 let _ = slave.request(at, request, Cast::Broadcast, self.counters);
             }
             return None;
         }
-        let slave = self.slaves.get_mut(&address)?;
+        let slave = self.slaves.get_mut(&address).filter(|slave| sees_end(slave))?;
         let answer = slave.request(at, request, Cast::Unicast, self.counters)?;
         let turnaround = slave.turnaround();
         Some(Speech { slave: address, content: Content::Message(answer), heard: at, turnaround })
@@ -88,8 +101,9 @@ impl State {
         }
     }
 
-    pub(crate) fn take_released(&mut self) -> Vec<(u8, Vec<u8>)> {
-        std::mem::take(&mut self.released)
+    /// The released answers of these slaves. An endpoint takes what it was asked for itself.
+    pub(crate) fn take_released(&mut self, of: impl Fn(u8) -> bool) -> Vec<(u8, Vec<u8>)> {
+        self.released.extract_if(.., |(slave, _)| of(*slave)).collect()
     }
 
     /// Another slave than this one, for an answer in a wrong name: one that is there if there is one.

@@ -15,6 +15,9 @@ use crate::{
     state::State,
 };
 
+/// The silence that ends a frame where characters take no time: what a busy machine may pause between two pieces.
+const UNPACED_TIMEOUT: Duration = Duration::from_millis(50);
+
 /// How time passes on a wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pacing {
@@ -118,7 +121,8 @@ impl Wire {
         for byte in heard {
             self.hear(byte, line);
         }
-        if self.pacing == Pacing::None && self.framing.keeps_silences() && !self.framing.awaits_more() {
+        let is_open = !self.framing.is_between_frames();
+        if self.pacing == Pacing::None && is_open && !self.framing.awaits_more() {
             // Without time there is no silence to wait for: a frame of unknown length ends with what came at once.
             self.framing.silence(line, &mut self.speech);
             self.answer(line);
@@ -127,13 +131,8 @@ impl Wire {
 
     /// What is to be done at `now`.
     pub(crate) fn poll(&mut self, now: Instant, line: &mut State) -> Step {
-        for (slave, answer) in line.take_released() {
-            self.speech.push(Speech {
-                slave,
-                content: Content::Message(answer),
-                heard: now,
-                turnaround: Duration::ZERO,
-            });
+        for (slave, answer) in line.take_released(|_| true) {
+            self.speech.extend(self.framing.release(slave, answer, now));
         }
         let silence_due = self.silence_due();
         if silence_due.is_some_and(|due| due <= now) {
@@ -154,6 +153,11 @@ impl Wire {
         if self.pacing == Pacing::None { Duration::ZERO } else { self.settings.t3_5() }
     }
 
+    /// The silence after which a frame that has begun is over.
+    fn frame_timeout(&self) -> Duration {
+        if self.pacing == Pacing::None { UNPACED_TIMEOUT } else { self.framing.frame_timeout(self.t3_5()) }
+    }
+
     /// t1.5 of this wire: 1.5 characters, and a fixed 750 µs above 19200 bit/s (MODBUS over Serial Line V1.02 p. 13).
     fn t1_5(&self) -> Duration {
         if self.settings.baud() > 19_200 {
@@ -169,20 +173,19 @@ impl Wire {
 
     /// When a frame that is being received would be over by silence.
     fn silence_due(&self) -> Option<Instant> {
-        let waits = self.framing.keeps_silences() && !self.framing.is_between_frames();
-        let (start, count) = self.run.filter(|_| waits)?;
-        Some(start + self.time(count) + self.t3_5())
+        let (start, count) = self.run.filter(|_| !self.framing.is_between_frames())?;
+        Some(start + self.time(count) + self.frame_timeout())
     }
 
     /// A pause between two characters of the master.
     fn pause(&mut self, at: Instant, paused: Duration, line: &mut State) {
-        if self.framing.is_between_frames() || !self.framing.keeps_silences() || self.pacing == Pacing::None {
+        if self.framing.is_between_frames() {
             return;
         }
-        if paused >= self.t3_5() {
+        if paused >= self.frame_timeout() {
             self.framing.silence(line, &mut self.speech);
             self.answer(line);
-        } else if paused > self.t1_5() {
+        } else if self.framing.keeps_silences() && self.pacing != Pacing::None && paused > self.t1_5() {
             line.breach(at, Breach::Gap { paused, allowed: self.t1_5() });
         }
     }
@@ -202,7 +205,8 @@ impl Wire {
         let requests = line.stats.requests;
         self.framing.byte(byte, ends, line, &mut self.speech);
         if line.stats.requests > requests {
-            line.stats.ideal += self.time(self.frame_characters) + self.t3_5();
+            let silence = if self.framing.keeps_silences() { self.t3_5() } else { Duration::ZERO };
+            line.stats.ideal += self.time(self.frame_characters) + silence;
         }
         self.answer(line);
     }

@@ -84,7 +84,7 @@ async fn connection(line: SimLine, mut stream: TcpStream) -> io::Result<()> {
                 if woken.is_err() {
                     return Ok(());
                 }
-                let released = line.shared().lock().take_released();
+                let released = line.shared().lock().take_released(|unit| held.contains_key(&unit));
                 for (unit, answer) in released {
                     if let Some(transaction) = held.remove(&unit) {
                         stream.write_all(&frame(transaction, unit, &answer)).await?;

@@ -123,7 +123,7 @@ async fn modbus_tcp_answers_by_transaction_and_unit_and_several_clients_at_once(
     slave.wait_until_held().await;
     slave.release();
     let mut late = [0; 11];
-    one.read_exact(&mut late).await.unwrap();
+    tokio::time::timeout(PATIENCE, one.read_exact(&mut late)).await.unwrap().unwrap();
     assert_eq!(late, [9, 9, 0, 0, 0, 5, 1, 3, 2, 0, 9]);
 }
 
@@ -136,5 +136,6 @@ async fn a_client_that_does_not_speak_modbus_tcp_is_disconnected() {
     let _serving = line.serve_modbus_tcp(listener);
     let mut stream = TcpStream::connect(address).await.unwrap();
     stream.write_all(b"GET / HTTP/1.1\r\n\r\n").await.unwrap();
-    assert_eq!(stream.read(&mut [0; 16]).await.unwrap_or(0), 0);
+    let read = tokio::time::timeout(PATIENCE, stream.read(&mut [0; 16])).await;
+    assert_eq!(read.unwrap().unwrap_or(0), 0);
 }

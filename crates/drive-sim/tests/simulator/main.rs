@@ -1,6 +1,8 @@
 //! The simulator seen from a master and from a test, with a small drive and a master of its own.
 
+mod ascii;
 mod endpoints;
 mod faults;
 mod line;
 mod support;
+mod unitelway;

@@ -5,7 +5,8 @@ use std::time::Duration;
 use crc::{CRC_16_MODBUS, Crc};
 use drive_core::registers;
 use drive_sim::{
-    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules, Watchdog,
+    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules, UniTe,
+    Watchdog,
 };
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
@@ -26,6 +27,7 @@ registers! {
     REF: ReadWrite(2, "REF", "reference", Volatile, Unit::scaled("Hz", 2), Range::Within(0, 5_000), Factory::None, Manual, "test");
     OUT: Read(3, "OUT", "output frequency", Volatile, Unit::scaled("Hz", 2), Range::Any, Factory::None, Manual, "test");
     KEEP: ReadWrite(4, "EEP", "kept", Eeprom, Unit::COUNT, Range::Any, Factory::Value(7), Manual, "test");
+    ACC: ReadWrite(252, "ACC", "unused", Volatile, Unit::COUNT, Range::Within(0, 1_000), Factory::None, Manual, "test");
 }
 
 const RULES: Rules = Rules {
@@ -33,7 +35,7 @@ const RULES: Rules = Rules {
     read_input: 0,
     write_single: true,
     write_multiple: 4,
-    diagnostics: &[0x00, 0x01, 0x04, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F],
+    diagnostics: &[0x00, 0x01, 0x03, 0x04, 0x0A, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F],
     event_counter: true,
     broadcast: &[0x06, 0x10],
     turnaround: TURNAROUND,
@@ -97,6 +99,15 @@ impl Model for Small {
             [0x2B, 0x0E, code, 0] => Ok(drive_sim::identification(*code, 1, &["Maker", "Small"])),
             _ => Err(Exception::ILLEGAL_FUNCTION),
         }
+    }
+
+    fn unite(&self) -> Option<UniTe> {
+        Some(UniTe {
+            product: [0x18, 0x58, 0x21],
+            name: "Small",
+            command: [CMD.address(), REF.address(), ACC.address(), KEEP.address()],
+            report: [REF.address(), OUT.address(), KEEP.address(), ACC.address()],
+        })
     }
 
     fn frame_seen(&mut self, _: Cast) {
