@@ -156,7 +156,12 @@ impl<T> Schedule<T> {
         let replaced = terms.replaces.and_then(|_| {
             self.queued
                 .iter()
-                .position(|entry| entry.slave == slave && entry.terms.replaces == terms.replaces)
+                // Nothing less urgent takes the place of a Stop.
+                .position(|entry| {
+                    entry.slave == slave
+                        && entry.terms.replaces == terms.replaces
+                        && entry.terms.class <= terms.class
+                })
         });
         let limit =
             if terms.class == Class::Stop { self.rules.limit.saturating_mul(2) } else { self.rules.limit };
@@ -300,3 +305,6 @@ impl<T> Schedule<T> {
         self.since_background = count(background_waits, class == Class::Background, self.since_background);
     }
 }
+
+#[cfg(test)]
+mod tests;

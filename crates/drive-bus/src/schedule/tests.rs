@@ -1,0 +1,250 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const MS: Duration = Duration::from_millis(1);
+
+fn schedule() -> Schedule<u32> {
+    Schedule::new(Rules { limit: 1_000, aging: 1_000 * MS })
+}
+
+fn push(schedule: &mut Schedule<u32>, now: Instant, slave: u8, terms: Terms, work: u32) {
+    schedule.push(now, slave, terms, work).unwrap();
+}
+
+/// What is chosen, one after the other, when every slave is ready.
+fn order(schedule: &mut Schedule<u32>, now: Instant) -> Vec<u32> {
+    std::iter::from_fn(|| match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS }) {
+        Choice::Send(entry) => Some(entry.work),
+        Choice::Wait(_) | Choice::Idle => None,
+    })
+    .collect()
+}
+
+#[test]
+fn a_higher_class_goes_first() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    for (work, class) in Class::ALL.into_iter().rev().enumerate() {
+        push(&mut schedule, now, 1, Terms::of(class), work as u32);
+    }
+    assert_eq!(order(&mut schedule, now), [4, 3, 2, 1, 0]);
+}
+
+#[test]
+fn inside_a_class_the_earliest_deadline_goes_first() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    for (work, lifetime) in [(1, 300), (2, 100), (3, 200)] {
+        push(&mut schedule, now, work as u8, Terms::of(Class::Command).within(lifetime * MS), work);
+    }
+    assert_eq!(order(&mut schedule, now), [2, 3, 1]);
+}
+
+#[test]
+fn a_slave_with_many_requests_does_not_starve_the_others() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    for work in 0..5 {
+        push(&mut schedule, now, 1, Terms::of(Class::Status), work);
+    }
+    for slave in 2..5 {
+        push(&mut schedule, now, slave, Terms::of(Class::Status), u32::from(slave) * 10);
+    }
+    assert_eq!(order(&mut schedule, now), [0, 20, 30, 40, 1, 2, 3, 4]);
+}
+
+#[test]
+fn aging_never_lifts_a_poll_above_a_stop() {
+    let (mut schedule, start) = (schedule(), Instant::now());
+    for slave in 1..=30 {
+        push(&mut schedule, start, slave, Terms::of(Class::Status), 0);
+    }
+    let now = start + 3_600_000 * MS;
+    push(&mut schedule, now, 40, Terms::of(Class::Command), 1);
+    push(&mut schedule, now, 41, Terms::of(Class::Stop), 2);
+    let order = order(&mut schedule, now);
+    assert_eq!(order.iter().position(|work| *work == 2), Some(0));
+    assert_eq!(
+        order.iter().position(|work| *work == 1),
+        Some(1),
+        "a command waits for one aged poll at most"
+    );
+}
+
+#[test]
+fn what_has_aged_gets_every_fourth_turn_below_a_stream_of_commands() {
+    let (mut schedule, start) = (schedule(), Instant::now());
+    push(&mut schedule, start, 1, Terms::of(Class::Status), 7);
+    let now = start + 2_000 * MS;
+    for slave in 2..20 {
+        push(&mut schedule, now, slave, Terms::of(Class::Command), 0);
+    }
+    let place = order(&mut schedule, now).iter().position(|work| *work == 7);
+    assert_eq!(place, Some(3));
+}
+
+#[test]
+fn background_gets_every_twentieth_turn_and_no_more() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    for slave in 1..=100 {
+        push(&mut schedule, now, slave, Terms::of(Class::Status), 0);
+        push(&mut schedule, now, slave, Terms::of(Class::Background), 1);
+    }
+    let order = order(&mut schedule, now);
+    let share = order.iter().take(100).filter(|work| **work == 1).count();
+    assert_eq!(share, 5);
+}
+
+#[test]
+fn a_pause_of_one_slave_is_spent_on_another_unless_a_command_would_wait_for_it() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    let readiness = |entry: &Entry<u32>| match entry.slave {
+        1 => Readiness { at: now + 5 * MS, takes: 20 * MS },
+        _ => Readiness { at: now, takes: 20 * MS },
+    };
+    push(&mut schedule, now, 1, Terms::of(Class::Status), 1);
+    push(&mut schedule, now, 2, Terms::of(Class::Background), 2);
+    assert!(matches!(schedule.choose(now, readiness), Choice::Send(entry) if entry.work == 2));
+
+    push(&mut schedule, now, 1, Terms::of(Class::Command), 3);
+    push(&mut schedule, now, 2, Terms::of(Class::Background), 4);
+    assert!(matches!(schedule.choose(now, readiness), Choice::Wait(at) if at == now + 5 * MS));
+    // A pause that is longer than the other's exchange is not waited for.
+    let long = |entry: &Entry<u32>| Readiness {
+        at: if entry.slave == 1 { now + 50 * MS } else { now },
+        takes: 20 * MS,
+    };
+    assert!(matches!(schedule.choose(now, long), Choice::Send(entry) if entry.work == 4));
+}
+
+#[test]
+fn nothing_starts_while_a_stop_waits_for_its_slaves_pause() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    push(&mut schedule, now, 1, Terms::of(Class::Stop), 1);
+    push(&mut schedule, now, 2, Terms::of(Class::Command), 2);
+    let readiness =
+        |entry: &Entry<u32>| Readiness { at: if entry.slave == 1 { now + 500 * MS } else { now }, takes: MS };
+    assert!(matches!(schedule.choose(now, readiness), Choice::Wait(at) if at == now + 500 * MS));
+}
+
+#[test]
+fn a_stream_of_setpoints_keeps_the_place_of_the_first() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    let setpoint = Terms::of(Class::Command).replacing(8502);
+    push(&mut schedule, now, 1, setpoint, 1);
+    push(&mut schedule, now, 2, Terms::of(Class::Command), 2);
+    let (_, replaced) = schedule.push(now + 500 * MS, 1, setpoint, 3).unwrap();
+    assert_eq!(replaced.map(|entry| entry.work), Some(1));
+    assert_eq!(order(&mut schedule, now + 500 * MS), [3, 2]);
+}
+
+#[test]
+fn nothing_less_urgent_takes_the_place_of_a_stop() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    push(&mut schedule, now, 1, Terms::of(Class::Stop).replacing(8501), 1);
+    let (_, replaced) = schedule.push(now, 1, Terms::of(Class::Command).replacing(8501), 2).unwrap();
+    assert!(replaced.is_none());
+    assert_eq!(order(&mut schedule, now), [1, 2]);
+}
+
+#[test]
+fn a_full_queue_refuses_all_but_stops() {
+    let mut schedule = Schedule::new(Rules { limit: 2, aging: 1_000 * MS });
+    let now = Instant::now();
+    push(&mut schedule, now, 1, Terms::default(), 1);
+    push(&mut schedule, now, 2, Terms::default(), 2);
+    assert_eq!(schedule.push(now, 3, Terms::of(Class::Command), 3).unwrap_err(), 3);
+    assert!(schedule.push(now, 3, Terms::of(Class::Stop), 4).is_ok());
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Event {
+    Push { slave: u8, class: Class, lifetime: Option<u64>, key: Option<u16> },
+    Choose,
+    Withdraw(u64),
+    Pass(u64),
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    prop_oneof![
+        4 => (1_u8..8, 0_usize..5, prop::option::of(1_u64..3_000), prop::option::weighted(0.2, 0_u16..3))
+            .prop_map(|(slave, class, lifetime, key)| Event::Push {
+                slave,
+                class: Class::ALL[class],
+                lifetime,
+                key,
+            }),
+        4 => Just(Event::Choose),
+        1 => (0_u64..200).prop_map(Event::Withdraw),
+        2 => (1_u64..400).prop_map(Event::Pass),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn no_request_is_lost_or_chosen_twice_and_every_class_is_inside_its_bound(
+        events in prop::collection::vec(event(), 1..400),
+    ) {
+        let (mut schedule, mut now) = (schedule(), Instant::now());
+        let (mut pushed, mut ended) = (0_u32, Vec::new());
+        let mut turns_without_background = 0;
+        for event in events {
+            for entry in schedule.expired(now) {
+                prop_assert!(entry.expires().is_some_and(|expires| expires <= now));
+                ended.push(entry.work);
+            }
+            match event {
+                Event::Push { slave, class, lifetime, key } => {
+                    let lifetime = lifetime.map(Duration::from_millis);
+                    let terms = Terms { lifetime, replaces: key, ..Terms::of(class) };
+                    let (_, replaced) = schedule.push(now, slave, terms, pushed).unwrap();
+                    ended.extend(replaced.map(|entry| entry.work));
+                    pushed += 1;
+                }
+                Event::Choose => {
+                    let stops = schedule.has_stop();
+                    let background = schedule.any(|entry| entry.terms.class == Class::Background);
+                    let oldest_of = |schedule: &Schedule<u32>, slave, class| {
+                        let mut least = None;
+                        let _ = schedule.any(|entry| {
+                            if (entry.slave, entry.terms.class, entry.terms.replaces) == (slave, class, None) {
+                                least = Some(least.map_or(entry.ticket, |least: Ticket| least.min(entry.ticket)));
+                            }
+                            false
+                        });
+                        least
+                    };
+                    let before: Vec<_> = (1..8)
+                        .flat_map(|slave| Class::ALL.map(|class| (slave, class)))
+                        .map(|(slave, class)| (slave, class, oldest_of(&schedule, slave, class)))
+                        .collect();
+                    match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS }) {
+                        Choice::Send(entry) => {
+                            let class = entry.terms.class;
+                            prop_assert!(!stops || class == Class::Stop, "a stop is overtaken");
+                            prop_assert!(entry.expires().is_none_or(|expires| expires > now));
+                            if entry.terms.replaces.is_none() && entry.terms.lifetime.is_none() {
+                                let first = before
+                                    .iter()
+                                    .find(|(slave, of, _)| (*slave, *of) == (entry.slave, class))
+                                    .and_then(|(.., first)| *first);
+                                prop_assert_eq!(first, Some(entry.ticket), "one slave's calls keep their order");
+                            }
+                            let counts = background && class < Class::Stop && class != Class::Background;
+                            turns_without_background = if counts { turns_without_background + 1 } else { 0 };
+                            prop_assert!(turns_without_background < BACKGROUND_TURN);
+                            ended.push(entry.work);
+                        }
+                        Choice::Wait(_) => prop_assert!(false, "everything is ready"),
+                        Choice::Idle => prop_assert!(schedule.is_empty()),
+                    }
+                }
+                Event::Withdraw(ticket) => {
+                    ended.extend(schedule.withdraw(Ticket(ticket)).map(|entry| entry.work));
+                }
+                Event::Pass(millis) => now += Duration::from_millis(millis),
+            }
+        }
+        ended.extend(schedule.withdraw_all(|_| true).into_iter().map(|entry| entry.work));
+        ended.sort_unstable();
+        prop_assert_eq!(ended, (0..pushed).collect::<Vec<_>>());
+    }
+}
