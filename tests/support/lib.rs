@@ -1,1 +1,6 @@
 //! The rig that the behaviour tests share.
+
+pub mod cable;
+pub mod drives;
+pub mod peers;
+pub mod rig;

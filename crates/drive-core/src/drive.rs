@@ -117,6 +117,9 @@ pub trait Drive: Send {
     /// Stops the motor. Returns the status in which the drive shows that no run command is in force any more; the
     /// motor may still be coming down. It never refuses for the drive's state: a stop is sent whatever is known.
     ///
+    /// Some drives inject direct current for as long as they are told to: end a stop by [`StopMode::DcInjection`] with
+    /// one by [`StopMode::Ramp`] once the output has come to zero, or the motor is heated at rest.
+    ///
     /// # Errors
     /// [`Error::Unsupported`] for a mode that the family or its settings do not have: **nothing is stopped then**,
     /// choose among [`Capabilities::stop_modes`]; [`Error::NotConfirmed`] when the stop does not show: repeat it.
@@ -130,7 +133,8 @@ pub trait Drive: Send {
     /// of setpoint that the family does not take.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()>;
 
-    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start.
+    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start. Some
+    /// drives forget their setpoint by it; give it again before a start.
     ///
     /// # Errors
     /// [`Error::NotConfirmed`] when the drive still shows a fault: its cause is not gone.

@@ -1,0 +1,100 @@
+//! One simulated drive of any family on a simulated line, in virtual time, and the drive that talks to it.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, SlaveSettings};
+use drive_core::{Drive, Frequency, SlaveAddress, Status};
+use drive_families::Family;
+use drive_sim::{Observation, SimLine, SimSlave, Wiring};
+use tokio::time::{Instant, sleep, timeout_at};
+
+use crate::drives;
+
+/// Where the drive is.
+pub const ADDRESS: u8 = 5;
+
+/// How long anything may take here, in virtual time; a ramp takes seconds.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A drive, the line between, and the simulated machine.
+pub struct Rig {
+    /// The drive as a user holds it.
+    pub drive: Box<dyn Drive>,
+    /// The machine as somebody beside it sees it.
+    pub machine: SimSlave,
+    /// The simulated line.
+    pub simulated: SimLine,
+    /// The line that the drive is on.
+    pub line: Line,
+}
+
+impl Rig {
+    /// A drive of `family`, set up for control by the bus, with its factory line settings.
+    ///
+    /// # Panics
+    /// Only when the rig itself is wrong.
+    #[must_use]
+    pub fn new(family: Family) -> Self {
+        let capabilities = family.capabilities();
+        let settings = capabilities.factory;
+        let simulated = SimLine::new(Wiring::rtu(settings));
+        let machine = simulated.add_boxed(ADDRESS, drives::machine(family)).expect("the address is free");
+        let turnaround = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
+        let config = LineConfig::stream(settings).slave(ADDRESS, turnaround);
+        let line = Line::over(simulated.in_memory(), config);
+        let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
+        let drive = drives::drive(family, line.slave(ADDRESS), slave);
+        Self { drive, machine, simulated, line }
+    }
+
+    /// Polls the drive until its own status is so. A drive that is not polled would trip by its watchdog.
+    ///
+    /// # Panics
+    /// When that does not come in two minutes of virtual time.
+    pub async fn until(&mut self, what: &str, is_so: impl Fn(&Status) -> bool) -> Status {
+        self.until_both(what, |status, _| is_so(status)).await
+    }
+
+    /// Polls the drive until the machine itself is seen to be so.
+    ///
+    /// # Panics
+    /// As [`until`](Self::until).
+    pub async fn until_machine(&mut self, what: &str, is_so: impl Fn(&Observation) -> bool) -> Status {
+        self.until_both(what, |_, machine| is_so(machine)).await
+    }
+
+    /// Polls the drive for a while.
+    ///
+    /// # Panics
+    /// When it does not answer at the end of it.
+    pub async fn poll_for(&mut self, time: Duration) {
+        let end = Instant::now() + time;
+        self.until("time passes", |_| Instant::now() >= end).await;
+    }
+
+    async fn until_both(&mut self, what: &str, is_so: impl Fn(&Status, &Observation) -> bool) -> Status {
+        let end = Instant::now() + PATIENCE;
+        let mut last = None;
+        loop {
+            match timeout_at(end, self.drive.status()).await {
+                Ok(Ok(status)) if is_so(&status, &self.machine.observe()) => return status,
+                Ok(seen) => last = Some(seen),
+                Err(_) => panic!("{what}: not seen; the last was {last:?}"),
+            }
+            sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    /// Polls until the output has this frequency and the drive says that it is its reference.
+    pub async fn until_at(&mut self, frequency: Frequency) -> Status {
+        self.until("the reference is reached", |status| {
+            status.output_frequency == Some(frequency) && status.at_reference != Some(false)
+        })
+        .await
+    }
+
+    /// Polls until the drive shows standstill.
+    pub async fn until_standstill(&mut self) -> Status {
+        self.until("standstill", Status::is_standstill).await
+    }
+}
