@@ -1,2 +1,26 @@
-//! The program.
-fn main() {}
+//! Variable-speed drives over Modbus from the command line: see [`cli`] for the subcommands.
+
+mod cli;
+mod commands;
+mod drive_spec;
+mod duration;
+mod failure;
+mod line_spec;
+mod logging;
+mod one_drive;
+mod output;
+mod signals;
+mod simulated;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let cli = match cli::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return cli::refuse(&error),
+    };
+    logging::start(cli.command.log_level());
+    cli::run(cli.command)
+}

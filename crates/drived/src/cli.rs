@@ -1,0 +1,141 @@
+//! The command line: the subcommands, how bad input is answered, and the exit codes.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, error::ErrorKind};
+use tracing::Level;
+
+use crate::{
+    commands::{demo, faults, param, poll, reset, setpoint, sim, start, status, stop},
+    failure::Failure,
+};
+
+/// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones.
+///
+/// LINE is PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; speed and format are the
+/// drives' factory setting when they are not given. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as
+/// atv312@1-10,12.
+///
+/// Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input.
+#[derive(Debug, Parser)]
+#[command(name = "drived", version, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Demo(demo::Args),
+    Sim(sim::Args),
+    Poll(poll::Args),
+    Status(status::Args),
+    Start(start::Args),
+    Stop(stop::Args),
+    Setpoint(setpoint::Args),
+    Faults(faults::Args),
+    Reset(reset::Args),
+    #[command(subcommand)]
+    Param(param::Command),
+}
+
+impl Command {
+    /// What is logged unless the environment says otherwise. Those who talk to one drive say everything by their
+    /// result; the demo's table must not be written over.
+    pub(crate) fn log_level(&self) -> Option<Level> {
+        match self {
+            Self::Demo(args) => args.log_level(),
+            Self::Sim(_) | Self::Poll(_) => Some(Level::WARN),
+            _ => Some(Level::ERROR),
+        }
+    }
+
+    async fn run(self) -> Result<(), Failure> {
+        match self {
+            Self::Demo(args) => demo::run(args).await,
+            Self::Sim(args) => sim::run(args).await,
+            Self::Poll(args) => poll::run(args).await,
+            Self::Status(args) => status::run(args).await,
+            Self::Start(args) => start::run(args).await,
+            Self::Stop(args) => stop::run(args).await,
+            Self::Setpoint(args) => setpoint::run(args).await,
+            Self::Faults(args) => faults::run(args).await,
+            Self::Reset(args) => reset::run(args).await,
+            Self::Param(command) => param::run(command).await,
+        }
+    }
+}
+
+/// Carries out a subcommand and says why it failed, on one line.
+pub(crate) fn run(command: Command) -> ExitCode {
+    let runtime = match tokio::runtime::Runtime::new() {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            eprintln!("drived: the system gives no threads or timers: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    match runtime.block_on(command.run()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if failure != Failure::OutputClosed {
+                eprintln!("drived: {failure}");
+            }
+            failure.exit_code()
+        }
+    }
+}
+
+/// Help and version go to stdout; what clap refuses becomes one line.
+pub(crate) fn refuse(error: &clap::Error) -> ExitCode {
+    match error.kind() {
+        ErrorKind::DisplayHelp
+        | ErrorKind::DisplayVersion
+        | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            // A closed output is no reason to complain about help.
+            let _ = error.print();
+            ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+        }
+        _ => {
+            eprintln!("drived: {}", one_line(&error.to_string()));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The first paragraph of clap's message on one line, and where the rest is told.
+fn one_line(message: &str) -> String {
+    let paragraph = message.split("\n\n").next().unwrap_or(message);
+    let words = paragraph.strip_prefix("error: ").unwrap_or(paragraph).split_whitespace();
+    let text = words.collect::<Vec<_>>().join(" ");
+    let usage = message.lines().find_map(|line| line.strip_prefix("Usage: "));
+    match usage {
+        Some(usage) => format!("{text} (usage: {usage})"),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn what_is_refused_is_said_on_one_line_with_its_reason() {
+        for (arguments, reason) in [
+            (&["poll", "--line", "/dev/ttyUSB0", "--drive", "atv999@1"][..], "is not a family of drives"),
+            (&["poll", "--line", "/dev/ttyUSB0"], "--drive <FAMILY@ADDRESSES>"),
+            (&["fly"], "unrecognized subcommand 'fly'"),
+        ] {
+            let error = Cli::try_parse_from(["drived"].iter().chain(arguments)).unwrap_err();
+            let line = one_line(&error.to_string());
+            assert!(line.contains(reason) && !line.contains('\n'), "{line}");
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The demo where stdout is no terminal: one line for each event, and the line's numbers now and then.
+
+use std::time::{Duration, Instant};
+
+use tokio::time;
+
+use super::{
+    Act, Show, Why,
+    meter::{HEADS, Meter},
+};
+use crate::{failure::Failure, output};
+
+/// Between two looks at the plant.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Between two reports of the line's numbers.
+const REPORT: Duration = Duration::from_secs(5);
+
+pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
+    let Show { plant, mut incoming, until, ending } = show;
+    let began = Instant::now();
+    let seconds = |at: Instant| at.saturating_duration_since(began).as_millis();
+    let mut meters: Vec<Meter> = plant.lines.iter().map(|_| Meter::new()).collect();
+    let mut looks = time::interval(LOOK);
+    let mut reports = time::interval_at(time::Instant::now() + REPORT, REPORT);
+    let mut act = Act::Playing;
+    loop {
+        tokio::select! {
+            Some(event) = incoming.recv() => {
+                let at = seconds(event.at);
+                output::say(format_args!("{:>3}.{:03} {:<12} {}", at / 1_000, at % 1_000, event.name, event.text))?;
+            }
+            () = ending.asked() => match act {
+                Act::Playing => act = Act::stop(plant, Why::Asked),
+                Act::Stopping(why, _) => return Ok(why),
+            },
+            _ = looks.tick() => {
+                for (meter, line) in meters.iter_mut().zip(&plant.lines) {
+                    meter.look(plant, line, Instant::now());
+                }
+                if act == Act::Playing && until.is_some_and(|until| time::Instant::now() >= until) {
+                    act = Act::stop(plant, Why::TimeIsUp);
+                }
+                if let Some(why) = act.over(plant) {
+                    return Ok(why);
+                }
+            }
+            _ = reports.tick() => {
+                for (meter, line) in meters.iter().zip(&plant.lines) {
+                    let cells = HEADS.iter().zip(meter.cells(line)).map(|(head, cell)| format!("{head} {cell}"));
+                    output::say(format_args!("        {}", cells.collect::<Vec<_>>().join(", ")))?;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! What the demo's screen looks like.
+
+use std::{collections::VecDeque, time::Instant};
+
+use drive_core::{Control, Direction, Frequency, State, Status};
+use ratatui::{
+    Frame,
+    layout::{Constraint, Layout, Rect},
+    style::{Color, Modifier, Style, Stylize},
+    text::{Line, Span},
+    widgets::{Block, Borders, Cell, Paragraph, Row, Table, Wrap},
+};
+
+use super::{
+    meter::HEADS,
+    unit::{Done, Event, Order, View},
+};
+use crate::{drive_spec::DriveName, output};
+
+/// The right end of the frequency bars.
+const FULL_SCALE: Frequency = Frequency::from_hertz(50);
+
+/// From this width on there is room for whole sentences.
+const WIDE: u16 = 110;
+
+pub(super) struct Picture<'a> {
+    pub(super) began: Instant,
+    pub(super) stopping: bool,
+    pub(super) units: Vec<(DriveName, View)>,
+    /// The cells of each line, under [`HEADS`].
+    pub(super) lines: Vec<[String; 8]>,
+    /// The newest first.
+    pub(super) events: &'a VecDeque<Event>,
+}
+
+impl Picture<'_> {
+    pub(super) fn draw(&self, frame: &mut Frame<'_>) {
+        let height = |count: usize| u16::try_from(count).unwrap_or(u16::MAX);
+        let [title, drives, lines, events] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(height(self.units.len() + 2)),
+            Constraint::Length(height(self.lines.len() + 2)),
+            Constraint::Fill(1),
+        ])
+        .areas(frame.area());
+        frame.render_widget(self.title(title.width), title);
+        frame.render_widget(self.drives(drives.width), drives);
+        frame.render_widget(self.lines(), lines);
+        frame.render_widget(self.events(events), events);
+    }
+
+    fn title(&self, width: u16) -> Line<'_> {
+        let (left, right) = match self.stopping {
+            true => (" drived demo  stopping the motors ", "Ctrl-C again: leave now "),
+            false => (" drived demo  simulated drives, nothing real moves ", "Ctrl-C: stop the motors "),
+        };
+        let space = usize::from(width).saturating_sub(left.len() + right.len());
+        let colour = if self.stopping { Color::Yellow } else { Color::Cyan };
+        Line::styled(
+            format!("{left}{:space$}{right}", ""),
+            Style::new().fg(Color::Black).bg(colour).add_modifier(Modifier::BOLD),
+        )
+    }
+
+    fn drives(&self, width: u16) -> Table<'_> {
+        let wide = width >= WIDE;
+        let bar = if wide { 24 } else { 10 };
+        let rows = self.units.iter().map(|(name, view)| row(name, view, bar, wide));
+        let widths = [
+            Constraint::Length(9),
+            Constraint::Length(10),
+            Constraint::Length(3),
+            Constraint::Length(bar),
+            Constraint::Length(11),
+            Constraint::Length(7),
+            Constraint::Length(5),
+            Constraint::Length(5),
+            Constraint::Fill(1),
+        ];
+        let heads =
+            ["drive", "state", "dir", "frequency", "out/set Hz", "current", "ctrl", "fault", "last command"];
+        Table::new(rows, widths)
+            .header(Row::new(heads).style(Style::new().add_modifier(Modifier::DIM)))
+            .column_spacing(1)
+    }
+
+    fn lines(&self) -> Table<'_> {
+        let widths =
+            HEADS.map(|head| Constraint::Length(u16::try_from(head.len()).unwrap_or(u16::MAX).max(9)));
+        Table::new(self.lines.iter().map(|cells| Row::new(cells.iter().map(String::as_str))), widths)
+            .header(Row::new(HEADS).style(Style::new().add_modifier(Modifier::DIM)))
+            .column_spacing(1)
+    }
+
+    fn events(&self, area: Rect) -> Paragraph<'_> {
+        let lines = self.events.iter().take(usize::from(area.height)).map(|event| {
+            let at = event.at.saturating_duration_since(self.began).as_millis();
+            let style = if event.alarm { Style::new().fg(Color::Red) } else { Style::new() };
+            Line::from(vec![
+                Span::raw(format!(" {:>4}.{:01} s ", at / 1_000, at % 1_000 / 100)).dim(),
+                Span::styled(format!("{:<9} {}", event.name.to_string(), event.text), style),
+            ])
+        });
+        let block = Block::new().borders(Borders::TOP).title(" events ");
+        Paragraph::new(lines.collect::<Vec<_>>()).block(block).wrap(Wrap { trim: false })
+    }
+}
+
+fn row(name: &DriveName, view: &View, bar_width: u16, wide: bool) -> Row<'static> {
+    let Some(status) = &view.status else {
+        return Row::new([name.to_string(), "no answer".to_owned()]).style(Style::new().fg(Color::Red));
+    };
+    let colour = colour(status);
+    let output = status.output_frequency.unwrap_or_default();
+    let setpoint = view.setpoint.unwrap_or_default();
+    Row::new([
+        Cell::from(name.to_string()).bold(),
+        Cell::from(status.state.to_string()).fg(colour),
+        Cell::from(direction(status)),
+        Cell::from(bar(output, setpoint, usize::from(bar_width), colour)),
+        Cell::from(format!("{:>5}/{:<5}", hertz(output), hertz(setpoint))),
+        Cell::from(format!("{:>7}", output::current(status).unwrap_or_else(|| "-".to_owned()))),
+        Cell::from(control(status)),
+        Cell::from(view.fault.map_or("-", |fault| fault.mnemonic())).fg(if view.fault.is_some() {
+            Color::Red
+        } else {
+            Color::Reset
+        }),
+        last(view.last.as_ref(), wide),
+    ])
+}
+
+fn colour(status: &Status) -> Color {
+    match (status.state, status.at_reference) {
+        (State::Fault | State::FaultReaction | State::Unknown, _) => Color::Red,
+        (State::Running, Some(true)) => Color::Green,
+        (State::Running, _) => Color::Cyan,
+        (State::Stopping | State::QuickStop, _) => Color::Yellow,
+        (State::NotReady | State::Disabled | State::Ready, _) => Color::Gray,
+    }
+}
+
+fn direction(status: &Status) -> &'static str {
+    match status.direction {
+        Some(Direction::Forward) => "fwd",
+        Some(Direction::Reverse) => "rev",
+        None => "-",
+    }
+}
+
+fn control(status: &Status) -> &'static str {
+    match status.control {
+        Some(Control::Bus) => "bus",
+        Some(Control::Terminals) => "terms",
+        Some(Control::Panel) => "panel",
+        Some(Control::Local) => "local",
+        Some(Control::OtherBus) => "other",
+        None => "-",
+    }
+}
+
+fn hertz(frequency: Frequency) -> String {
+    let tenths = frequency.centihertz().div_ceil(10);
+    format!("{}.{}", tenths / 10, tenths % 10)
+}
+
+/// The output frequency as a bar in eighths of a character, with a mark where the setpoint is.
+fn bar(output: Frequency, setpoint: Frequency, width: usize, colour: Color) -> Line<'static> {
+    const EIGHTHS: [&str; 8] = [" ", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
+    let eighths = |frequency: Frequency| {
+        let share = u64::from(frequency.centihertz()) * width as u64 * 8 / u64::from(FULL_SCALE.centihertz());
+        usize::try_from(share).unwrap_or(usize::MAX).min(width * 8)
+    };
+    let filled = eighths(output);
+    let mark = (eighths(setpoint) / 8).min(width.saturating_sub(1));
+    let cells = (0..width).map(|cell| {
+        let here = filled.saturating_sub(cell * 8).min(8);
+        let text = EIGHTHS.get(here).copied().unwrap_or("█");
+        match (cell == mark && setpoint > Frequency::ZERO, here) {
+            (true, 8) => Span::styled("┃", Style::new().fg(Color::Black).bg(colour)),
+            (true, _) => Span::styled("┃", Style::new().fg(Color::White)),
+            (false, 0) => Span::styled("·", Style::new().fg(Color::DarkGray)),
+            (false, _) => Span::styled(text, Style::new().fg(colour)),
+        }
+    });
+    Line::from(cells.collect::<Vec<_>>())
+}
+
+/// The last command and how it ended: a word or two, or the whole sentence where there is room.
+fn last(done: Option<&Done>, wide: bool) -> Cell<'static> {
+    let Some(done) = done else { return Cell::from("-") };
+    let order = match (done.order, wide) {
+        (order, true) => order.to_string(),
+        (Order::Setpoint(frequency), false) => format!("{} Hz", hertz(frequency)),
+        (Order::Start(Direction::Forward), false) => "start fwd".to_owned(),
+        (Order::Start(Direction::Reverse), false) => "start rev".to_owned(),
+        (Order::Stop(_), false) => "stop".to_owned(),
+        (Order::Reset, false) => "reset".to_owned(),
+    };
+    match (&done.failure, wide) {
+        (None, true) => Cell::from(format!("{order}: confirmed, {} ms", done.took.as_millis())),
+        (None, false) => Cell::from(format!("✓ {order}")),
+        (Some(failure), true) => Cell::from(format!("{order}: {failure}")).fg(Color::Red),
+        (Some(_), false) => Cell::from(format!("✗ {order}")).fg(Color::Red),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use drive_core::Current;
+    use ratatui::{Terminal, backend::TestBackend};
+
+    use super::*;
+    use crate::drive_spec::DriveSpec;
+
+    fn drawn(width: u16, height: u16) -> String {
+        let name = |text: &str| text.parse::<DriveSpec>().unwrap().single().unwrap();
+        let status = Status {
+            state: State::Running,
+            direction: Some(Direction::Reverse),
+            output_frequency: Some(Frequency::from_hertz(25)),
+            current: Some(Current::from_deciamperes(23)),
+            control: Some(Control::Bus),
+            ..Status::default()
+        };
+        let view = View {
+            status: Some(status),
+            setpoint: Some(Frequency::from_hertz(40)),
+            last: Some(Done {
+                order: Order::Start(Direction::Reverse),
+                took: Duration::from_millis(48),
+                failure: None,
+            }),
+            ..View::default()
+        };
+        let events = VecDeque::from([Event {
+            at: Instant::now(),
+            name: name("atv312@1"),
+            text: "start reverse: confirmed".to_owned(),
+            alarm: false,
+        }]);
+        let picture = Picture {
+            began: Instant::now(),
+            stopping: false,
+            units: vec![(name("atv312@1"), view), (name("atv21@2"), View::default())],
+            lines: vec![
+                ["19200 8E1", "97.00 %", "7.1", "900", "2.01 ms", "2.00 ms", "0", "0"].map(str::to_owned),
+            ],
+            events: &events,
+        };
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| picture.draw(frame)).unwrap();
+        terminal.backend().to_string()
+    }
+
+    #[test]
+    fn a_small_screen_shows_each_drive_in_a_line() {
+        let screen = drawn(80, 24);
+        assert!(screen.contains("atv312@1  running    rev █████···┃·  25.0/40.0    2.3 A bus"), "{screen}");
+        assert!(screen.contains("✓ start rev"), "{screen}");
+        assert!(screen.contains("atv21@2   no answer"), "{screen}");
+        assert!(screen.contains("19200 8E1 97.00 %   7.1       900"), "{screen}");
+    }
+
+    #[test]
+    fn a_large_screen_says_how_the_last_command_ended() {
+        assert!(drawn(120, 40).contains("start reverse: confirmed, 48 ms"));
+    }
+
+    #[test]
+    fn a_screen_that_is_too_small_is_no_panic() {
+        for (width, height) in [(1, 1), (10, 3), (79, 5)] {
+            drawn(width, height);
+        }
+    }
+}

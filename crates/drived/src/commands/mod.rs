@@ -1,0 +1,12 @@
+//! The subcommands, one module each.
+
+pub(crate) mod demo;
+pub(crate) mod faults;
+pub(crate) mod param;
+pub(crate) mod poll;
+pub(crate) mod reset;
+pub(crate) mod setpoint;
+pub(crate) mod sim;
+pub(crate) mod start;
+pub(crate) mod status;
+pub(crate) mod stop;

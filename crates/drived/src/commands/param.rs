@@ -1,0 +1,237 @@
+//! `drived param`: the registers of a family, and their content in one drive.
+
+use drive_core::{
+    ErrorKind, Row,
+    registers::{Factory, Range, Storage},
+};
+use drive_families::Family;
+
+use crate::{
+    failure::Failure,
+    one_drive::OneDriveArgs,
+    output::{self, Table},
+};
+
+/// List, read and write the registers of a drive, by mnemonic or address
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// List every register of a family: access, where it is kept, range, factory setting, source
+    List {
+        /// The family, such as atv312
+        #[arg(value_name = "FAMILY")]
+        family: Family,
+    },
+    /// Read registers
+    Get {
+        #[command(flatten)]
+        one: OneDriveArgs,
+        /// Mnemonics or addresses, such as ACC, 9001 or 2329h
+        #[arg(value_name = "REGISTER", required = true)]
+        registers: Vec<String>,
+    },
+    /// Write one register and read it back
+    Set {
+        #[command(flatten)]
+        one: OneDriveArgs,
+        /// Mnemonic or address
+        #[arg(value_name = "REGISTER")]
+        register: String,
+        /// A number in the register's unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
+        #[arg(value_name = "VALUE", allow_hyphen_values = true)]
+        value: String,
+    },
+    /// Read every register that can be read
+    Dump {
+        #[command(flatten)]
+        one: OneDriveArgs,
+    },
+}
+
+pub(crate) async fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::List { family } => output::say(list(family)),
+        Command::Get { one, registers } => get(&one, &registers).await,
+        Command::Set { one, register, value } => set(&one, &register, &value).await,
+        Command::Dump { one } => dump(&one).await,
+    }
+}
+
+fn list(family: Family) -> Table {
+    let mut table =
+        Table::new(["register", "mnemonic", "access", "kept in", "factory", "range", "name", "source"]);
+    for row in family.rows() {
+        table.row([
+            row.address.to_string(),
+            row.code.to_owned(),
+            row.access.to_string(),
+            row.storage.to_string(),
+            factory(row),
+            range(row),
+            row.name.to_owned(),
+            row.source.to_owned(),
+        ]);
+    }
+    table
+}
+
+async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
+    let family = args.name()?.family;
+    let rows = registers.iter().map(|text| find(family, text)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(row) = rows.iter().find(|row| !row.access.is_readable()) {
+        return Err(Failure::Input(format!("{} ({}) can only be written", row.code, row.address)));
+    }
+    let mut one = args.open().await?;
+    let mut table = value_table();
+    for row in rows {
+        let word = one.drive.read_parameter(row).await.map_err(|error| one.failure(&error))?;
+        table.row(value_cells(row, row.show(word)));
+    }
+    output::say(table)?;
+    one.close().await;
+    Ok(())
+}
+
+async fn set(args: &OneDriveArgs, register: &str, value: &str) -> Result<(), Failure> {
+    let row = find(args.name()?.family, register)?;
+    let word = wanted(row, value)?;
+    let mut one = args.open().await?;
+    let written = one.drive.write_parameter(row, word).await.map_err(|error| one.failure(&error))?;
+    let what = if written.changed { "is now" } else { "was already" };
+    let kept = match written.storage {
+        Storage::Volatile => "kept in RAM, lost at power-off",
+        Storage::RamUntilSaved => {
+            "kept in RAM, lost at power-off unless the drive is told to save its parameters"
+        }
+        Storage::Eeprom => "kept in EEPROM",
+        Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
+    };
+    output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, row.show(word)))?;
+    one.close().await;
+    Ok(())
+}
+
+async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
+    let mut one = args.open().await?;
+    let mut table = value_table();
+    for row in one.drive.rows().iter().filter(|row| row.access.is_readable()) {
+        let shown = match one.drive.read_parameter(row).await {
+            Ok(word) => row.show(word),
+            // A drive refuses what its model or its settings do not have; the rest is still worth reading.
+            Err(error) if error.kind() == ErrorKind::Exception => "refused by the drive".to_owned(),
+            Err(error) => return Err(one.failure(&error)),
+        };
+        table.row(value_cells(row, shown));
+    }
+    output::say(table)?;
+    one.close().await;
+    Ok(())
+}
+
+/// The word for a person's text, refused here when access or range forbid it: nothing is sent then.
+fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
+    let refuse = |why: String| Failure::Input(format!("{} ({}): {why}", row.code, row.address));
+    if !row.access.is_writable() {
+        return Err(refuse("the register can only be read".to_owned()));
+    }
+    let expected = || match range(row) {
+        range if range.is_empty() => "a number in its unit or a hexadecimal word such as 0627h".to_owned(),
+        range => range,
+    };
+    let word =
+        row.read(text).ok_or_else(|| refuse(format!("{text:?} is no value, expected: {}", expected())))?;
+    if !row.range.allows(row.unit.number(word)) {
+        return Err(refuse(format!("{} is not allowed, expected: {}", row.show(word), expected())));
+    }
+    Ok(word)
+}
+
+fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
+    Row::find(family.rows(), text).ok_or_else(|| {
+        Failure::Input(format!("a {family} has no register {text:?}: see drived param list {family}"))
+    })
+}
+
+fn value_table() -> Table {
+    Table::new(["register", "mnemonic", "value", "access", "factory", "range", "name"])
+}
+
+fn value_cells(row: &Row, value: String) -> [String; 7] {
+    [
+        row.address.to_string(),
+        row.code.to_owned(),
+        value,
+        row.access.to_string(),
+        factory(row),
+        range(row),
+        row.name.to_owned(),
+    ]
+}
+
+fn factory(row: &Row) -> String {
+    match row.factory {
+        Factory::None => String::new(),
+        Factory::Value(word) => {
+            row.choice(word).map_or_else(|| row.unit.show(word), |choice| choice.code.to_owned())
+        }
+        Factory::Described(rule) => rule.to_owned(),
+    }
+}
+
+fn range(row: &Row) -> String {
+    let span =
+        |low, high| format!("{} to {}", output::in_unit(row.unit, low), output::in_unit(row.unit, high));
+    let listed = || {
+        let codes = row.range.choices().iter().map(|choice| choice.code);
+        codes.collect::<Vec<_>>().join("|")
+    };
+    match row.range {
+        Range::Any => String::new(),
+        Range::Within(low, high) => span(low, high),
+        Range::OneOf(_) => listed(),
+        Range::OneOfOr(_, low, high) => format!("{}, or {}", listed(), span(low, high)),
+        Range::Described(_, _, rule) => rule.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::registers::{Access, Choice, Confidence, Unit};
+
+    use super::*;
+
+    const YES_NO: &[Choice] = &[Choice::new(0, "nO", "no"), Choice::new(1, "YES", "yes")];
+
+    const RAMP: Row = Row {
+        address: 9001,
+        code: "ACC",
+        name: "acceleration",
+        access: Access::ReadWrite,
+        storage: Storage::RamUntilSaved,
+        unit: Unit::scaled("s", 1),
+        range: Range::Within(1, 9_999),
+        factory: Factory::Value(30),
+        confidence: Confidence::Manual,
+        source: "p. 1",
+    };
+
+    #[test]
+    fn what_range_and_access_forbid_is_refused_before_anything_is_sent() {
+        assert_eq!(wanted(&RAMP, "3.5 s"), Ok(35));
+        for (row, text, reason) in [
+            (RAMP, "0", "0.0 s is not allowed, expected: 0.1 s to 999.9 s"),
+            (RAMP, "fast", "\"fast\" is no value, expected: 0.1 s to 999.9 s"),
+            (Row { access: Access::Read, ..RAMP }, "3", "can only be read"),
+            (Row { range: Range::OneOf(YES_NO), unit: Unit::CODE, ..RAMP }, "7", "expected: nO|YES"),
+        ] {
+            let Err(Failure::Input(message)) = wanted(&row, text) else { panic!("{text} was taken") };
+            assert!(message.contains(reason), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_row_shows_its_factory_setting_and_its_range() {
+        assert_eq!((factory(&RAMP), range(&RAMP)), ("3.0 s".to_owned(), "0.1 s to 999.9 s".to_owned()));
+        let list = Row { range: Range::OneOf(YES_NO), factory: Factory::Value(1), ..RAMP };
+        assert_eq!((factory(&list), range(&list)), ("YES".to_owned(), "nO|YES".to_owned()));
+    }
+}

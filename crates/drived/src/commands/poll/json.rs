@@ -1,0 +1,183 @@
+//! The same for programs: one JSON object a line. Numbers are integers with their unit in their name.
+
+use std::time::{Duration, SystemTime};
+
+use drive_core::Status;
+use serde::Serialize;
+
+use super::{Reading, summary::Summary};
+
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum Object {
+    Status(StatusObject),
+    Error { time_unix_ms: u64, drive: String, error: String },
+    Summary(SummaryObject),
+}
+
+#[derive(Serialize)]
+struct StatusObject {
+    time_unix_ms: u64,
+    drive: String,
+    state: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    direction: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    output_frequency_centihertz: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    current_deciamperes: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    current_hundredths_of_percent: Option<i32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_reference: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warning: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault_code: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control: Option<String>,
+    words: Vec<WordObject>,
+}
+
+#[derive(Serialize)]
+struct WordObject {
+    register: u16,
+    code: &'static str,
+    value: u16,
+}
+
+#[derive(Serialize)]
+struct SummaryObject {
+    drives: Vec<DriveObject>,
+    line: LineObject,
+}
+
+#[derive(Serialize)]
+struct DriveObject {
+    drive: String,
+    good: u64,
+    timeouts: u64,
+    crc_errors: u64,
+    exceptions: u64,
+    response_p50_us: u64,
+    response_p99_us: u64,
+}
+
+#[derive(Serialize)]
+struct LineObject {
+    elapsed_ms: u64,
+    sweeps: u64,
+    sweeps_per_1000_s: u64,
+    utilisation_ppm: u32,
+    silences: u64,
+    shortest_silence_us: u64,
+    t3_5_us: u64,
+}
+
+pub(super) fn reading(reading: &Reading) -> String {
+    let time_unix_ms = milliseconds(reading.at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default());
+    let drive = reading.name.to_string();
+    text(&match &reading.outcome {
+        Ok(status) => Object::Status(of_status(time_unix_ms, drive, status)),
+        Err(error) => Object::Error { time_unix_ms, drive, error: error.to_string() },
+    })
+}
+
+pub(super) fn summary(summary: &Summary) -> String {
+    let drives = summary.drives.iter().map(|(name, stats)| DriveObject {
+        drive: name.to_string(),
+        good: stats.outcomes.answered,
+        timeouts: stats.outcomes.timeouts,
+        crc_errors: stats.outcomes.damaged,
+        exceptions: stats.outcomes.exceptions,
+        response_p50_us: microseconds(stats.response.quantile(500)),
+        response_p99_us: microseconds(stats.response.quantile(990)),
+    });
+    let line = LineObject {
+        elapsed_ms: milliseconds(summary.elapsed),
+        sweeps: summary.sweeps,
+        sweeps_per_1000_s: summary.sweeps_per_1000_s(),
+        utilisation_ppm: summary.utilisation_ppm,
+        silences: summary.silences,
+        shortest_silence_us: microseconds(summary.shortest_silence),
+        t3_5_us: microseconds(summary.t3_5),
+    };
+    text(&Object::Summary(SummaryObject { drives: drives.collect(), line }))
+}
+
+fn of_status(time_unix_ms: u64, drive: String, status: &Status) -> StatusObject {
+    let word = |word: &drive_core::RawWord| WordObject {
+        register: word.address,
+        code: word.code,
+        value: word.value,
+    };
+    StatusObject {
+        time_unix_ms,
+        drive,
+        state: status.state.to_string(),
+        direction: status.direction.map(|direction| direction.to_string()),
+        output_frequency_centihertz: status.output_frequency.map(drive_core::Frequency::centihertz),
+        current_deciamperes: status.current.map(drive_core::Current::deciamperes),
+        current_hundredths_of_percent: status.current_share.map(drive_core::Percent::hundredths),
+        at_reference: status.at_reference,
+        warning: status.warning,
+        fault_code: status.fault_code,
+        control: status.control.map(|control| control.to_string()),
+        words: status.raw.iter().map(word).collect(),
+    }
+}
+
+fn text(object: &Object) -> String {
+    // Strings, integers and lists always have a JSON form.
+    serde_json::to_string(object).unwrap_or_default()
+}
+
+fn milliseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
+}
+
+fn microseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{Control, Error, Exchange, Frequency, PortError, RawWord, State};
+
+    use super::*;
+    use crate::drive_spec::DriveSpec;
+
+    fn of(outcome: Result<Status, Error>) -> String {
+        let name = "atv312@7".parse::<DriveSpec>().unwrap().single().unwrap();
+        reading(&Reading { name, at: SystemTime::UNIX_EPOCH + Duration::from_millis(5), outcome })
+    }
+
+    #[test]
+    fn a_status_is_one_object_without_what_the_drive_does_not_tell() {
+        let status = Status {
+            state: State::Running,
+            output_frequency: Some(Frequency::from_hertz(30)),
+            control: Some(Control::Bus),
+            raw: vec![RawWord { address: 3201, code: "ETA", value: 0x0627 }],
+            ..Status::default()
+        };
+        assert_eq!(
+            of(Ok(status)),
+            r#"{"kind":"status","time_unix_ms":5,"drive":"atv312@7","state":"running","output_frequency_centihertz":3000,"control":"bus","words":[{"register":3201,"code":"ETA","value":1575}]}"#
+        );
+    }
+
+    #[test]
+    fn a_poll_without_an_answer_is_an_object_with_its_reason() {
+        let slave = "atv312@7".parse::<DriveSpec>().unwrap().single().unwrap().slave;
+        let error = Error::Port {
+            slave,
+            exchange: Exchange { function: 3, register: Some(3201) },
+            problem: PortError::Timeout { after: Duration::from_millis(500) },
+        };
+        assert_eq!(
+            of(Err(error)),
+            r#"{"kind":"error","time_unix_ms":5,"drive":"atv312@7","error":"slave 7, reading register 3201 (0C81h): no answer within 500ms"}"#
+        );
+    }
+}

@@ -1,0 +1,169 @@
+//! `drived poll`: reads the status of many drives on one line again and again.
+
+mod json;
+mod summary;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::{Duration, SystemTime},
+};
+
+use drive_core::{Drive, Error, ErrorKind, PortError, Status};
+use tokio::{sync::mpsc, task::JoinSet, time};
+
+use self::summary::Summary;
+use crate::{
+    drive_spec::{self, DriveName, DriveSpec},
+    duration::Time,
+    failure::Failure,
+    line_spec::LineSpec,
+    one_drive, output,
+    signals::Ending,
+};
+
+/// Readings that may wait for a slow reader of our output; then the polls wait too.
+const WAITING: usize = 1_024;
+
+/// How long a drive is left alone when the line did not even send its poll.
+const NOT_SENT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Poll the status of many drives on one line, and say how well it went; nothing is written
+///
+/// A drive's line is printed when what it says has changed. The summary counts the exchanges of the line, repeated ones
+/// included. Exit code 1 when a drive has not answered once.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT
+    #[arg(long, value_name = "LINE")]
+    line: LineSpec,
+    /// Drives, such as atv312@1-10,12; may be given several times
+    #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", required = true)]
+    drives: Vec<DriveSpec>,
+    /// Time between two polls of one drive; 0: as fast as the line allows
+    #[arg(long, value_name = "TIME", default_value = "1s")]
+    period: Time,
+    /// End after so many seconds instead of at Ctrl-C
+    #[arg(long, value_name = "N")]
+    seconds: Option<u32>,
+    /// Print one JSON object per status and one for the summary
+    #[arg(long)]
+    json: bool,
+}
+
+/// What one poll of one drive brought.
+struct Reading {
+    name: DriveName,
+    at: SystemTime,
+    outcome: Result<Status, Error>,
+}
+
+pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let names = drive_spec::on_one_line(&args.drives).map_err(|error| Failure::Input(error.to_string()))?;
+    let config = args.line.config(&names).map_err(|error| Failure::Input(error.to_string()))?;
+    let settings = config.serial;
+    let mut ending = Ending::listen()?;
+    let line = one_drive::open_line(config).await?;
+
+    let (readings, mut incoming) = mpsc::channel(WAITING);
+    let mut polls = JoinSet::new();
+    for &name in &names {
+        let drive = name.family.open(line.slave(name.slave.number()), name.slave);
+        polls.spawn(poll(name, drive, args.period.0, readings.clone()));
+    }
+    let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
+    let mut book = Book::default();
+    loop {
+        tokio::select! {
+            () = ending.asked() => break,
+            () = reached(until) => break,
+            Some(reading) = incoming.recv() => {
+                if args.json {
+                    output::say(json::reading(&reading))?;
+                } else if let Some(text) = book.news(&reading) {
+                    output::say(format_args!("{:<12} {text}", reading.name))?;
+                }
+                book.note(&reading);
+            }
+        }
+    }
+    polls.shutdown().await;
+    let stats = line.stats();
+    line.close().await;
+    let summary = Summary::new(&names, &book.answered, &stats, settings.t3_5());
+    output::say(if args.json { json::summary(&summary) } else { summary.to_string() })?;
+    book.verdict(&names)
+}
+
+async fn reached(until: Option<time::Instant>) {
+    match until {
+        Some(until) => time::sleep_until(until).await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Polls one drive until nobody listens any more. Each drive has its own loop, so that a mute one delays only itself.
+async fn poll(name: DriveName, mut drive: Box<dyn Drive>, period: Duration, readings: mpsc::Sender<Reading>) {
+    let mut due = time::Instant::now();
+    loop {
+        let outcome = drive.status().await;
+        let pause = match &outcome {
+            Err(Error::Port { problem: PortError::Offline { retry_in }, .. }) => *retry_in,
+            Err(error) if error.kind() == ErrorKind::NotSent => NOT_SENT_PAUSE,
+            _ => Duration::ZERO,
+        };
+        if readings.send(Reading { name, at: SystemTime::now(), outcome }).await.is_err() {
+            return;
+        }
+        // A poll that took longer than the period is followed by the next at once, and none is made up for.
+        due = (due + period).max(time::Instant::now() + pause);
+        time::sleep_until(due).await;
+    }
+}
+
+/// What the readings have told so far.
+#[derive(Default)]
+struct Book {
+    last: BTreeMap<DriveName, String>,
+    answered: BTreeMap<DriveName, u64>,
+    failed: BTreeSet<DriveName>,
+}
+
+impl Book {
+    /// What a person wants to know of a reading: nothing, when it says what the last one said.
+    fn news(&mut self, reading: &Reading) -> Option<String> {
+        let text = match &reading.outcome {
+            Ok(status) => status.to_string(),
+            Err(error) if error.kind() == ErrorKind::NotSent && self.failed.contains(&reading.name) => {
+                return None;
+            }
+            Err(error) => error.to_string(),
+        };
+        let last = self.last.insert(reading.name, text.clone());
+        (last.as_ref() != Some(&text)).then_some(text)
+    }
+
+    fn note(&mut self, reading: &Reading) {
+        match reading.outcome {
+            Ok(_) => {
+                *self.answered.entry(reading.name).or_default() += 1;
+                self.failed.remove(&reading.name);
+            }
+            Err(_) => {
+                self.failed.insert(reading.name);
+            }
+        }
+    }
+
+    fn verdict(&self, names: &[DriveName]) -> Result<(), Failure> {
+        let silent =
+            names.iter().filter(|name| !self.answered.contains_key(name) && self.failed.contains(name));
+        let silent: Vec<String> = silent.map(ToString::to_string).collect();
+        if silent.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::Drive(format!(
+            "no status from {}: see that it is switched on, wired, and set to this address, speed and format",
+            silent.join(", ")
+        )))
+    }
+}

@@ -1,0 +1,82 @@
+//! How well a poll went: per drive, and for the line.
+
+use std::{collections::BTreeMap, fmt, time::Duration};
+
+use drive_bus::stats::{SlaveStats, Stats};
+
+use crate::{
+    drive_spec::DriveName,
+    output::{self, Table},
+};
+
+pub(super) struct Summary {
+    pub(super) drives: Vec<(DriveName, SlaveStats)>,
+    pub(super) elapsed: Duration,
+    /// Full rounds: how often every drive that answers at all was read.
+    pub(super) sweeps: u64,
+    pub(super) utilisation_ppm: u32,
+    pub(super) silences: u64,
+    pub(super) shortest_silence: Duration,
+    pub(super) t3_5: Duration,
+}
+
+impl Summary {
+    pub(super) fn new(
+        names: &[DriveName],
+        answered: &BTreeMap<DriveName, u64>,
+        stats: &Stats,
+        t3_5: Duration,
+    ) -> Self {
+        let of = |name: &DriveName| stats.slaves.get(&name.slave.number()).cloned().unwrap_or_default();
+        Self {
+            drives: names.iter().map(|name| (*name, of(name))).collect(),
+            elapsed: stats.elapsed,
+            sweeps: answered.values().copied().min().unwrap_or_default(),
+            utilisation_ppm: stats.utilisation_ppm(),
+            silences: stats.silence.count(),
+            shortest_silence: stats.silence.min(),
+            t3_5,
+        }
+    }
+
+    /// Full rounds in 1000 s.
+    pub(super) fn sweeps_per_1000_s(&self) -> u64 {
+        let sweeps = u128::from(self.sweeps) * 1_000_000_000;
+        let per_1000_s = sweeps.checked_div(self.elapsed.as_micros()).unwrap_or_default();
+        u64::try_from(per_1000_s).unwrap_or(u64::MAX)
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let heads = ["drive", "good", "timeouts", "CRC errors", "exceptions", "p50", "p99"];
+        let mut table = Table::new(heads).with_numbers_from(1);
+        for (name, stats) in &self.drives {
+            let response = |per_mille| {
+                let answered = stats.response.count() > 0;
+                output::or_dash(answered.then(|| output::milliseconds(stats.response.quantile(per_mille))))
+            };
+            table.row([
+                name.to_string(),
+                stats.outcomes.answered.to_string(),
+                stats.outcomes.timeouts.to_string(),
+                stats.outcomes.damaged.to_string(),
+                stats.outcomes.exceptions.to_string(),
+                response(500),
+                response(990),
+            ]);
+        }
+        let rate = self.sweeps_per_1000_s();
+        writeln!(f, "{table}")?;
+        write!(
+            f,
+            "line: {}.{:03} sweeps/s, utilisation {}, {} silences kept, the shortest {} (t3.5 is {})",
+            rate / 1_000,
+            rate % 1_000,
+            output::percent(self.utilisation_ppm.into()),
+            self.silences,
+            output::milliseconds(self.shortest_silence),
+            output::milliseconds(self.t3_5)
+        )
+    }
+}

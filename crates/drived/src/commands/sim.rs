@@ -1,0 +1,65 @@
+//! `drived sim`: serves simulated drives on a pty.
+
+use std::path::PathBuf;
+
+use drive_core::serial::CharacterFormat;
+use drive_sim::{SimLine, Wiring};
+
+use crate::{
+    drive_spec::{self, DriveName, DriveSpec},
+    failure::Failure,
+    line_spec::{self, SerialSpec},
+    output,
+    signals::Ending,
+    simulated,
+};
+
+/// Serve simulated drives on a pty, with the line's character times, until Ctrl-C
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Where the symbolic link to the pty is made; other programs open it as their serial port
+    #[arg(long, value_name = "LINK")]
+    pty: PathBuf,
+    /// Drives, such as atv312@1-10,12; may be given several times
+    #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", required = true)]
+    drives: Vec<DriveSpec>,
+    /// Speed in bit/s; the drives' factory setting when it is not given
+    #[arg(long, value_name = "N", value_parser = line_spec::speed)]
+    baud: Option<u32>,
+    /// Character format, such as 8E1; the drives' factory setting when it is not given
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<CharacterFormat>,
+}
+
+pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+    let drives = drive_spec::on_one_line(&args.drives).map_err(|error| input(&error))?;
+    let settings = SerialSpec { baud: args.baud, format: args.format }.settings(&drives);
+    let settings = settings.map_err(|error| input(&error))?;
+    let mut ending = Ending::listen()?;
+    let line = SimLine::new(Wiring::rtu(settings));
+    for name in &drives {
+        let model = simulated::model(name.family);
+        line.add_boxed(name.slave.number(), model).map_err(|error| input(&error))?;
+    }
+    let served = line.serve_pty(&args.pty);
+    let mut serving = served.map_err(|error| Failure::Input(format!("--pty: {error}")))?;
+
+    output::say(format_args!("serving {settings} on {} (Ctrl-C ends it)", args.pty.display()))?;
+    for name in &drives {
+        output::say(describe(name))?;
+    }
+    tokio::select! {
+        () = ending.asked() => {}
+        ended = serving.ended() => ended.map_err(|error| Failure::Drive(format!("the pty is gone: {error}")))?,
+    }
+    let stats = line.stats();
+    output::say(format_args!(
+        "served {} requests, {} answers; {} damaged frames, {} breaches of the line's rules",
+        stats.requests, stats.answers, stats.bad_frames, stats.violations
+    ))
+}
+
+fn describe(name: &DriveName) -> String {
+    format!("  {name:<12} {}", name.family.capabilities().name)
+}

@@ -1,0 +1,43 @@
+//! `drived start`: starts the motor of one drive.
+
+use clap::ValueEnum;
+use drive_core::Direction;
+
+use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+
+/// Start the motor of one drive at the setpoint that the drive holds
+///
+/// Refused when the drive has tripped, is not ready or is commanded by somebody else. The motor goes on when this
+/// program has ended, unless the drive's own communication watchdog stops it: keep the line alive with `drived poll`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    one: OneDriveArgs,
+    /// Which way
+    #[arg(long, value_enum, default_value_t = Turn::Forward)]
+    direction: Turn,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Turn {
+    Forward,
+    Reverse,
+}
+
+impl From<Turn> for Direction {
+    fn from(turn: Turn) -> Self {
+        match turn {
+            Turn::Forward => Self::Forward,
+            Turn::Reverse => Self::Reverse,
+        }
+    }
+}
+
+pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let mut one = args.one.open().await?;
+    let direction = Direction::from(args.direction);
+    let status = one.drive.start(direction).await.map_err(|error| one.failure(&error))?;
+    output::say(format_args!("{} started {direction}: the drive shows {status}", one.name))?;
+    one.close().await;
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! `drived status`: what one drive says of itself.
+
+use drive_core::{Measurements, Status};
+
+use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+
+/// Read the state of one drive; nothing is written
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    one: OneDriveArgs,
+    /// Also read the slow values: voltages, torque, thermal states, hours, inputs and outputs
+    #[arg(long)]
+    all: bool,
+}
+
+pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let mut one = args.one.open().await?;
+    let status = one.drive.status().await.map_err(|error| one.failure(&error))?;
+    let measurements = match args.all {
+        true => Some(one.drive.measurements().await.map_err(|error| one.failure(&error))?),
+        false => None,
+    };
+    output::say(format_args!("{} {}", one.name, one.drive.capabilities().name))?;
+    for (label, value) in lines(&status).into_iter().chain(measurements.iter().flat_map(slow_lines)) {
+        output::say(format_args!("  {label:<17} {value}"))?;
+    }
+    one.close().await;
+    Ok(())
+}
+
+/// The values that the drive gave, each with its label.
+fn lines(status: &Status) -> Vec<(&'static str, String)> {
+    let state = match (status.direction, status.at_reference) {
+        (Some(direction), Some(true)) => format!("{}, {direction}, at reference", status.state),
+        (Some(direction), _) => format!("{}, {direction}", status.state),
+        (None, _) => status.state.to_string(),
+    };
+    let yes_no = |value: bool| if value { "present" } else { "none" }.to_owned();
+    let words = status.raw.iter().map(|word| format!("{} {:04X}h", word.code, word.value));
+    let mut lines = vec![("state", state)];
+    let mut line = |label, value: Option<String>| lines.extend(value.map(|value| (label, value)));
+    line("output frequency", status.output_frequency.map(|value| value.to_string()));
+    line("motor current", output::current(status));
+    line("control", status.control.map(|value| value.to_string()));
+    line("fault code", status.fault_code.filter(|&code| code != 0).map(|code| code.to_string()));
+    line("warning", status.warning.map(yes_no));
+    line("words", Some(words.collect::<Vec<_>>().join(", ")));
+    lines
+}
+
+fn slow_lines(values: &Measurements) -> Vec<(&'static str, String)> {
+    let hours = |time: std::time::Duration| format!("{} h", time.as_secs() / 3_600);
+    let bits = |word: u16| format!("{word:016b}");
+    let mut lines = Vec::new();
+    let mut line = |label, value: Option<String>| lines.extend(value.map(|value| (label, value)));
+    line("reference", values.reference.map(|value| value.to_string()));
+    line("speed", values.speed.map(|value| value.to_string()));
+    line("output voltage", values.output_voltage.map(|value| value.to_string()));
+    line("output voltage", values.output_voltage_share.map(|value| value.to_string()));
+    line("line voltage", values.line_voltage.map(|value| value.to_string()));
+    line("DC bus voltage", values.dc_bus_voltage.map(|value| value.to_string()));
+    line("DC bus voltage", values.dc_bus_voltage_share.map(|value| value.to_string()));
+    line("torque", values.torque.map(|value| value.to_string()));
+    line("power", values.power_share.map(|value| value.to_string()));
+    line("input power", values.input_power.map(|value| value.to_string()));
+    line("output power", values.output_power.map(|value| value.to_string()));
+    line("drive thermal", values.drive_thermal.map(|value| value.to_string()));
+    line("motor thermal", values.motor_thermal.map(|value| value.to_string()));
+    line("drive load", values.drive_load.map(|value| value.to_string()));
+    line("motor load", values.motor_load.map(|value| value.to_string()));
+    line("input energy", values.input_energy.map(|value| value.to_string()));
+    line("output energy", values.output_energy.map(|value| value.to_string()));
+    line("running time", values.running_time.map(hours));
+    line("powered time", values.powered_time.map(hours));
+    line("inputs", values.inputs.map(bits));
+    line("outputs", values.outputs.map(bits));
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{Direction, Frequency, State};
+
+    use super::*;
+
+    #[test]
+    fn what_a_drive_does_not_tell_is_left_out() {
+        let status = Status {
+            state: State::Running,
+            direction: Some(Direction::Reverse),
+            at_reference: Some(true),
+            output_frequency: Some(Frequency::from_hertz(30)),
+            fault_code: Some(0),
+            ..Status::default()
+        };
+        let lines = lines(&status);
+        assert_eq!(lines[0], ("state", "running, reverse, at reference".to_owned()));
+        assert_eq!(lines[1], ("output frequency", "30.00 Hz".to_owned()));
+        assert!(lines.iter().all(|(label, _)| !["fault code", "motor current", "warning"].contains(label)));
+    }
+}

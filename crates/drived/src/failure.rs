@@ -1,0 +1,34 @@
+//! Why the program ends without success, and its exit code.
+
+use std::{io, process::ExitCode};
+
+/// Why the program ends without success: one line for a person, which says what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Failure {
+    /// What was asked for cannot be: a family, an address, a port. Exit code 2.
+    #[error("{0}")]
+    Input(String),
+    /// A drive did not answer, refused, or did not do it. Exit code 1.
+    #[error("{0}")]
+    Drive(String),
+    /// Whoever read our output has gone. Nothing is said then. Exit code 1.
+    #[error("nobody reads the output any more")]
+    OutputClosed,
+}
+
+impl Failure {
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Drive(_) | Self::OutputClosed => ExitCode::FAILURE,
+            Self::Input(_) => ExitCode::from(2),
+        }
+    }
+
+    /// Writing to our output failed.
+    pub(crate) fn output(error: &io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::OutputClosed,
+            _ => Self::Input(format!("cannot write the output: {error}")),
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! What `--line` says: `PATH[,BAUD[,FORMAT]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`, and the
+//! settings that the drives on it share.
+
+use std::{fmt, str::FromStr};
+
+use drive_bus::{LineConfig, SlaveSettings};
+use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings};
+
+use crate::drive_spec::DriveName;
+
+/// A line as a person names it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LineSpec {
+    target: Target,
+    serial: SerialSpec,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Target {
+    Serial(String),
+    RtuOverTcp(String),
+    ModbusTcp(String),
+}
+
+/// Speed and format as far as they were said; the rest is the drives' factory setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct SerialSpec {
+    pub(crate) baud: Option<u32>,
+    pub(crate) format: Option<CharacterFormat>,
+}
+
+impl LineSpec {
+    /// The configuration of this line for these drives, checked against what each family can be set to.
+    pub(crate) fn config(&self, drives: &[DriveName]) -> Result<LineConfig, LineSpecError> {
+        let config = match &self.target {
+            Target::Serial(path) => LineConfig::serial(path, self.serial.settings(drives)?),
+            Target::RtuOverTcp(address) => {
+                LineConfig::rtu_over_tcp(address.as_str(), self.serial.settings(drives)?)
+            }
+            Target::ModbusTcp(address) => LineConfig::modbus_tcp(address.as_str()),
+        };
+        Ok(with_turnarounds(config, drives))
+    }
+}
+
+/// The configuration with the pause that each drive needs after its answers.
+pub(crate) fn with_turnarounds(config: LineConfig, drives: &[DriveName]) -> LineConfig {
+    drives.iter().fold(config, |config, name| {
+        let turnaround = name.family.capabilities().turnaround;
+        config.slave(name.slave.number(), SlaveSettings { turnaround, ..SlaveSettings::default() })
+    })
+}
+
+impl SerialSpec {
+    /// Speed and format for these drives: what was said, else what all of them have from the factory, if every drive
+    /// can be set to it.
+    pub(crate) fn settings(self, drives: &[DriveName]) -> Result<SerialSettings, LineSpecError> {
+        let factory = |name: &DriveName| name.family.capabilities().factory;
+        let baud = match self.baud {
+            Some(baud) => baud,
+            None => agreed(drives, |name| factory(name).baud())?,
+        };
+        let format = match self.format {
+            Some(format) => format,
+            None => agreed(drives, |name| factory(name).format())?,
+        };
+        let settings = SerialSettings::new(baud, format)?;
+        for name in drives {
+            let checked = name.family.capabilities().check_line(name.slave, settings);
+            checked.map_err(|mismatch| LineSpecError::Drive(*name, mismatch.to_string()))?;
+        }
+        Ok(settings)
+    }
+}
+
+/// The value that all drives have from the factory.
+fn agreed<T: PartialEq + fmt::Display>(
+    drives: &[DriveName],
+    of: impl Fn(&DriveName) -> T,
+) -> Result<T, LineSpecError> {
+    let (first, rest) = drives.split_first().ok_or(LineSpecError::NoDrive)?;
+    match rest.iter().find(|name| of(name) != of(first)) {
+        Some(other) => Err(LineSpecError::FactorySettings(format!(
+            "{first} has {} from the factory and {other} has {}",
+            of(first),
+            of(other)
+        ))),
+        None => Ok(of(first)),
+    }
+}
+
+/// A text that is no line, or a line that the drives cannot share.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum LineSpecError {
+    #[error("expected PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT")]
+    Form,
+    #[error("{0:?} is not HOST:PORT, such as gateway.local:502 or [::1]:502")]
+    Address(String),
+    #[error("{0:?} is not a speed: expected such as 9600, 19200 or 38400")]
+    Speed(String),
+    #[error(transparent)]
+    Baud(#[from] BaudError),
+    #[error(transparent)]
+    Format(#[from] CharacterFormatError),
+    #[error("Modbus TCP has no speed and no format: expected tcp://HOST:PORT")]
+    TcpSettings,
+    #[error("no drive is named")]
+    NoDrive,
+    #[error("{0}: say which speed and format the line has, such as 19200,8E1")]
+    FactorySettings(String),
+    #[error("{0}: {1}")]
+    Drive(DriveName, String),
+}
+
+impl FromStr for LineSpec {
+    type Err = LineSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LineSpecError> {
+        if let Some(address) = text.strip_prefix("tcp://") {
+            let (address, settings) = split_settings(address);
+            return match settings {
+                Some(_) => Err(LineSpecError::TcpSettings),
+                None => Ok(Self {
+                    target: Target::ModbusTcp(host_and_port(address)?),
+                    serial: SerialSpec::default(),
+                }),
+            };
+        }
+        let (target, settings) = if let Some(rest) = text.strip_prefix("rtu+tcp://") {
+            let (address, settings) = split_settings(rest);
+            (Target::RtuOverTcp(host_and_port(address)?), settings)
+        } else {
+            let (path, settings) = split_settings(text);
+            if path.is_empty() || path.contains("://") {
+                return Err(LineSpecError::Form);
+            }
+            (Target::Serial(path.to_owned()), settings)
+        };
+        let serial = settings.map(str::parse).transpose()?.unwrap_or_default();
+        Ok(Self { target, serial })
+    }
+}
+
+/// It is written `BAUD[,FORMAT]`.
+impl FromStr for SerialSpec {
+    type Err = LineSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LineSpecError> {
+        let (baud, format) = match text.split_once(',') {
+            Some((baud, format)) => (baud, Some(format)),
+            None => (text, None),
+        };
+        Ok(Self { baud: Some(speed(baud)?), format: format.map(str::parse).transpose()? })
+    }
+}
+
+/// A speed that a serial line can have.
+pub(crate) fn speed(text: &str) -> Result<u32, LineSpecError> {
+    let baud = text.parse().map_err(|_| LineSpecError::Speed(text.to_owned()))?;
+    SerialSettings::new(baud, CharacterFormat::F8E1)?;
+    Ok(baud)
+}
+
+fn split_settings(text: &str) -> (&str, Option<&str>) {
+    match text.split_once(',') {
+        Some((target, settings)) => (target, Some(settings)),
+        None => (text, None),
+    }
+}
+
+fn host_and_port(text: &str) -> Result<String, LineSpecError> {
+    let well_formed =
+        text.rsplit_once(':').is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
+    if well_formed { Ok(text.to_owned()) } else { Err(LineSpecError::Address(text.to_owned())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_bus::Endpoint;
+
+    use super::*;
+    use crate::drive_spec::{self, DriveSpec};
+
+    fn drives(texts: &[&str]) -> Vec<DriveName> {
+        let specs: Vec<DriveSpec> = texts.iter().map(|text| text.parse().unwrap()).collect();
+        drive_spec::on_one_line(&specs).unwrap()
+    }
+
+    fn config(line: &str, texts: &[&str]) -> Result<LineConfig, LineSpecError> {
+        line.parse::<LineSpec>()?.config(&drives(texts))
+    }
+
+    #[test]
+    fn a_path_alone_has_the_factory_setting_of_its_drives() {
+        let config = config("/dev/ttyUSB0", &["atv312@1"]).unwrap();
+        assert_eq!(config.endpoint, Endpoint::Serial("/dev/ttyUSB0".into()));
+        assert_eq!(config.serial.to_string(), "19200 8E1");
+    }
+
+    #[test]
+    fn speed_and_format_stand_behind_the_path() {
+        assert_eq!(config("COM3,9600", &["atv312@1"]).unwrap().serial.to_string(), "9600 8E1");
+        assert_eq!(config("COM3,9600,8N1", &["atv312@1"]).unwrap().serial.to_string(), "9600 8N1");
+        let far = config("rtu+tcp://plant:4001,9600,8N1", &["atv312@1"]).unwrap();
+        assert_eq!(far.endpoint, Endpoint::RtuOverTcp("plant:4001".into()));
+        assert_eq!(far.serial.to_string(), "9600 8N1");
+        assert_eq!(
+            config("tcp://plant:502", &["atv312@1"]).unwrap().endpoint,
+            Endpoint::ModbusTcp("plant:502".into())
+        );
+    }
+
+    #[test]
+    fn what_is_no_line_is_refused_with_the_reason() {
+        for (line, reason) in [
+            ("", "expected PATH"),
+            (",9600", "expected PATH"),
+            ("udp://plant:502", "expected PATH"),
+            ("/dev/ttyUSB0,", "is not a speed"),
+            ("/dev/ttyUSB0,fast", "is not a speed"),
+            ("/dev/ttyUSB0,0", "0 bit/s is not a serial speed"),
+            ("/dev/ttyUSB0,19200,8X1", "is not a character format"),
+            ("tcp://plant", "is not HOST:PORT"),
+            ("tcp://:502", "is not HOST:PORT"),
+            ("tcp://plant:99999", "is not HOST:PORT"),
+            ("tcp://plant:502,9600", "Modbus TCP has no speed"),
+        ] {
+            let error = line.parse::<LineSpec>().unwrap_err().to_string();
+            assert!(error.contains(reason), "{line}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_a_drive_cannot_have_is_refused_with_its_name() {
+        let error = config("/dev/ttyUSB0,12345,8E1", &["atv312@1"]).unwrap_err().to_string();
+        assert!(error.starts_with("atv312@1: 12345 bit/s"), "{error}");
+        let error = config("/dev/ttyUSB0,19200,8E1", &["atv312@1", "atv28@2"]).unwrap_err().to_string();
+        assert!(error.starts_with("atv28@2: format 8E1"), "{error}");
+    }
+
+    #[test]
+    fn drives_with_two_factory_settings_need_to_be_told_which_the_line_has() {
+        let error = config("/dev/ttyUSB0", &["atv312@1", "atv28@2"]).unwrap_err().to_string();
+        assert!(error.contains("say which speed and format"), "{error}");
+        assert!(config("/dev/ttyUSB0,19200,8N1", &["atv312@1", "atv28@2"]).is_ok());
+    }
+}

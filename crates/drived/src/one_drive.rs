@@ -1,0 +1,74 @@
+//! The one drive on which a subcommand acts.
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{Drive, Error, ErrorKind};
+
+use crate::{
+    drive_spec::{DriveName, DriveSpec},
+    failure::Failure,
+    line_spec::LineSpec,
+};
+
+/// `--line` and `--drive` of the subcommands that act on one drive.
+#[derive(Debug, clap::Args)]
+pub(crate) struct OneDriveArgs {
+    /// The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT
+    #[arg(long, value_name = "LINE")]
+    line: LineSpec,
+    /// The drive, such as atv312@1
+    #[arg(long, value_name = "FAMILY@ADDRESS")]
+    drive: DriveSpec,
+}
+
+impl OneDriveArgs {
+    /// The name of the one drive.
+    pub(crate) fn name(&self) -> Result<DriveName, Failure> {
+        self.drive.single().ok_or_else(|| {
+            Failure::Input("--drive names several drives: this acts on one, such as atv312@1".to_owned())
+        })
+    }
+
+    /// Opens the line. Nothing is sent by it.
+    pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
+        let name = self.name()?;
+        let config = self.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+        let line = open_line(config.clone()).await?;
+        let drive = name.family.open(line.slave(name.slave.number()), name.slave);
+        Ok(OneDrive { name, drive, config, line })
+    }
+}
+
+/// Opens a line; a port that is missing or in use is the caller's input.
+pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
+    Line::open(config).await.map_err(|error| Failure::Input(error.to_string()))
+}
+
+/// A drive and its open line.
+pub(crate) struct OneDrive {
+    pub(crate) name: DriveName,
+    pub(crate) drive: Box<dyn Drive>,
+    config: LineConfig,
+    line: Line,
+}
+
+impl OneDrive {
+    /// What a person reads when the drive did not do it.
+    pub(crate) fn failure(&self, error: &Error) -> Failure {
+        let name = self.name;
+        Failure::Drive(match error.kind() {
+            ErrorKind::NoAnswer => format!(
+                "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}",
+                name.slave, self.config.serial
+            ),
+            ErrorKind::OutcomeUnknown => {
+                format!("{name}: {error}: nobody knows whether it was carried out, read the status")
+            }
+            _ => format!("{name}: {error}"),
+        })
+    }
+
+    /// Closes the port.
+    pub(crate) async fn close(self) {
+        self.line.close().await;
+    }
+}

@@ -1,0 +1,126 @@
+//! `sim`, and the other subcommands against it over a pty.
+#![cfg(unix)]
+
+mod support;
+
+use support::{Running, Sim, run};
+
+#[test]
+fn a_drive_is_started_watched_and_stopped_by_the_words_that_it_confirms() {
+    let sim = Sim::serve("start-stop", &["atv312@7"]);
+
+    sim.on("atv312@7", &["setpoint", "30Hz"]);
+    let held = sim.on("atv312@7", &["setpoint", "30Hz"]);
+    assert!(held.assert_done().starts_with("atv312@7 holds the setpoint 30.00 Hz"), "{held:?}");
+    let started = sim.on("atv312@7", &["start", "--direction", "reverse"]);
+    assert!(started.assert_done().starts_with("atv312@7 started reverse: the drive shows running, reverse"));
+    let status = sim.on("atv312@7", &["status", "--all"]);
+    let out = status.assert_done();
+    assert!(out.contains("state             running, reverse") && out.contains("line voltage"), "{out}");
+    let stopped = sim.on("atv312@7", &["stop", "--mode", "freewheel"]);
+    assert!(stopped.assert_done().contains("(freewheel stop): the drive shows"), "{stopped:?}");
+}
+
+#[test]
+fn a_drive_without_a_fault_says_so() {
+    let sim = Sim::serve("faults", &["atv312@1"]);
+    let faults = sim.on("atv312@1", &["faults"]);
+    assert!(faults.assert_done().starts_with("atv312@1 has no fault\n"), "{faults:?}");
+    let reset = sim.on("atv312@1", &["reset"]);
+    assert!(reset.assert_done().starts_with("atv312@1 has no fault any more"), "{reset:?}");
+}
+
+#[test]
+fn a_drive_that_does_not_answer_is_named_and_the_exit_code_is_1() {
+    let sim = Sim::serve("mute", &["atv312@1"]);
+    for subcommand in [&["status"][..], &["start"], &["reset"]] {
+        sim.on("atv312@2", subcommand).assert_refused(1, "atv312@2 does not answer");
+    }
+    sim.on("atv312@2", &["stop"]).assert_refused(1, "STOP NOT CONFIRMED");
+    let poll =
+        run(&["poll", "--line", sim.link(), "--drive", "atv312@1-2", "--period", "0", "--seconds", "3"]);
+    assert_eq!(poll.code, Some(1), "{poll:?}");
+    assert!(poll.err.lines().last().is_some_and(|line| line.contains("no status from atv312@2")), "{poll:?}");
+}
+
+#[test]
+fn a_port_that_another_program_uses_is_refused() {
+    let sim = Sim::serve("in-use", &["atv312@1"]);
+    let mut poll = Running::start(&["poll", "--line", sim.link(), "--drive", "atv312@1"]);
+    poll.wait_for("atv312@1");
+    sim.on("atv312@1", &["status"]).assert_refused(2, sim.link());
+}
+
+#[test]
+fn polling_ends_with_a_summary_of_each_drive_and_of_the_line() {
+    let sim = Sim::serve("summary", &["atv312@1-3", "atv21@4"]);
+    let line = format!("{},19200,8E1", sim.link());
+    let poll = ["poll", "--line", &line, "--drive", "atv312@1-3", "--drive", "atv21@4", "--period", "0"];
+    let mut running = Running::start(&poll);
+    for _ in 0..4 {
+        running.wait_for("@");
+    }
+    let (code, rest) = running.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains("CRC errors") && rest.contains("atv21@4") && rest.contains("sweeps/s"), "{rest}");
+}
+
+#[test]
+fn polling_for_programs_prints_objects() {
+    let sim = Sim::serve("json", &["atv312@1"]);
+    let arguments =
+        ["poll", "--line", sim.link(), "--drive", "atv312@1", "--period", "0", "--seconds", "1", "--json"];
+    let poll = run(&arguments);
+    let objects: Vec<serde_json::Value> =
+        poll.assert_done().lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
+    let (summary, statuses) = objects.split_last().expect("at least the summary");
+    assert!(!statuses.is_empty() && statuses.iter().all(|object| object["kind"] == "status"), "{objects:?}");
+    assert_eq!(summary["kind"], "summary");
+    assert_eq!(summary["drives"][0]["timeouts"], 0);
+    assert!(
+        summary["line"]["shortest_silence_us"].as_u64() >= summary["line"]["t3_5_us"].as_u64(),
+        "{summary}"
+    );
+}
+
+#[test]
+fn a_parameter_is_read_written_and_read_back_and_it_is_said_where_it_is_kept() {
+    let sim = Sim::serve("param", &["atv312@1"]);
+    let read = sim.on("atv312@1", &["param", "get", "ACC"]);
+    assert!(read.assert_done().contains("3.0 s"), "{read:?}");
+    let written = sim.on("atv312@1", &["param", "set", "ACC", "4.5"]);
+    assert!(written.assert_done().starts_with("atv312@1 ACC is now 4.5 s (kept in RAM"), "{written:?}");
+    let again = sim.on("atv312@1", &["param", "set", "ACC", "4.5"]);
+    assert!(again.assert_done().contains("was already 4.5 s"), "{again:?}");
+    sim.on("atv312@1", &["param", "set", "ACC", "5000"]).assert_refused(2, "ACC (9001)");
+}
+
+#[test]
+fn the_simulator_removes_its_link_when_it_is_asked_to_end() {
+    let sim = Sim::serve("link", &["atv21@1"]);
+    let link = std::path::PathBuf::from(sim.link());
+    assert!(link.symlink_metadata().is_ok());
+    let (code, rest) = sim.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(link.symlink_metadata().is_err());
+}
+
+#[test]
+fn the_simulator_does_not_replace_a_file() {
+    let path = support::path("a-file");
+    std::fs::write(&path, "mine").expect("the file can be written");
+    let text = path.to_str().expect("the path is text");
+    run(&["sim", "--pty", text, "--drive", "atv312@1"]).assert_refused(2, "is no symbolic link");
+    assert_eq!(std::fs::read_to_string(&path).expect("the file is still there"), "mine");
+    std::fs::remove_file(path).expect("the file can be removed");
+}
+
+#[test]
+fn the_demo_drives_its_motors_and_stops_them_when_it_is_asked_to_end() {
+    let mut demo = Running::start(&["demo"]);
+    demo.wait_for("running");
+    let (code, rest) = demo.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains("Ctrl-C: the motors were asked to stop"), "{rest}");
+    assert!(rest.contains("stands still") && !rest.contains("NOT CONFIRMED"), "{rest}");
+}

@@ -1,0 +1,151 @@
+//! Runs the built program.
+
+// Not every test program uses everything here.
+#![allow(dead_code)]
+
+use std::{
+    io::{BufRead, BufReader},
+    path::PathBuf,
+    process::{Child, ChildStdout, Command, Output, Stdio},
+};
+
+/// The program with arguments, not yet started.
+pub(crate) fn drived(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_drived"));
+    command.args(arguments).env_remove("DRIVED_LOG").env("RUST_BACKTRACE", "1");
+    command
+}
+
+/// What a run of the program left behind.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+impl Ended {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code(),
+            out: String::from_utf8(output.stdout).expect("stdout is text"),
+            err: String::from_utf8(output.stderr).expect("stderr is text"),
+        }
+    }
+
+    /// It ended with this code and one line on stderr that says this.
+    #[track_caller]
+    pub(crate) fn assert_refused(&self, code: i32, reason: &str) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert_eq!(self.err.lines().count(), 1, "{self:?}");
+        assert!(self.err.starts_with("drived: ") && self.err.contains(reason), "{self:?}");
+        assert!(!self.err.contains("panicked"), "{self:?}");
+    }
+
+    /// It ended well, and said nothing on stderr.
+    #[track_caller]
+    pub(crate) fn assert_done(&self) -> &str {
+        assert_eq!((self.code, self.err.as_str()), (Some(0), ""), "{self:?}");
+        &self.out
+    }
+}
+
+/// Runs the program to its end.
+pub(crate) fn run(arguments: &[&str]) -> Ended {
+    Ended::from(drived(arguments).stdin(Stdio::null()).output().expect("the program starts"))
+}
+
+/// A path of this test alone.
+pub(crate) fn path(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("drived-test-{}-{name}", std::process::id()))
+}
+
+/// The program running beside the test; killed when dropped.
+pub(crate) struct Running {
+    child: Child,
+    lines: BufReader<ChildStdout>,
+}
+
+impl Running {
+    pub(crate) fn start(arguments: &[&str]) -> Self {
+        let mut child = drived(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let lines = BufReader::new(child.stdout.take().expect("stdout is piped"));
+        Self { child, lines }
+    }
+
+    /// Its next line that contains this.
+    pub(crate) fn wait_for(&mut self, text: &str) -> String {
+        let mut line = String::new();
+        while self.lines.read_line(&mut line).expect("stdout is text") > 0 {
+            if line.contains(text) {
+                return line;
+            }
+            line.clear();
+        }
+        panic!("the program ended without saying {text:?}");
+    }
+
+    /// Asks it to end as Ctrl-C does, and waits for it: its exit code and its last lines.
+    pub(crate) fn interrupt(mut self) -> (Option<i32>, String) {
+        let pid = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &pid]).status().expect("kill runs");
+        assert!(sent.success());
+        let mut rest = String::new();
+        std::io::Read::read_to_string(&mut self.lines, &mut rest).expect("stdout is text");
+        (self.child.wait().expect("it can be waited for").code(), rest)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Simulated drives on a pty of this test alone.
+pub(crate) struct Sim {
+    running: Option<Running>,
+    link: PathBuf,
+}
+
+impl Sim {
+    pub(crate) fn serve(name: &str, drives: &[&str]) -> Self {
+        let link = path(name);
+        let mut arguments = vec!["sim", "--pty", link.to_str().expect("the path is text")];
+        for drive in drives {
+            arguments.extend(["--drive", drive]);
+        }
+        let mut running = Running::start(&arguments);
+        running.wait_for("serving");
+        Self { running: Some(running), link }
+    }
+
+    pub(crate) fn link(&self) -> &str {
+        self.link.to_str().expect("the path is text")
+    }
+
+    /// Runs a subcommand on one of the drives.
+    pub(crate) fn on(&self, drive: &str, subcommand: &[&str]) -> Ended {
+        let arguments = [subcommand, &["--line", self.link(), "--drive", drive]].concat();
+        run(&arguments)
+    }
+
+    /// Ends it as Ctrl-C does.
+    pub(crate) fn interrupt(mut self) -> (Option<i32>, String) {
+        self.running.take().expect("it runs").interrupt()
+    }
+}
+
+impl Drop for Sim {
+    fn drop(&mut self) {
+        if self.running.take().is_some() {
+            let _ = std::fs::remove_file(&self.link);
+        }
+    }
+}
