@@ -24,7 +24,12 @@ impl<P: Port> Atv312<P> {
         let word = self.stop_word(mode).await?;
         let keeps_enabled = word.contains(ControlWord::ENABLE_OPERATION);
         let shows = |status: &Status| FastWords::in_status(status).shows_stop(keeps_enabled);
-        drivecom::stop(self, mode, word.bits(), shows).await
+        let stopped = drivecom::stop(self, mode, word.bits(), shows).await;
+        if matches!(stopped, Err(Error::NotConfirmed { .. })) {
+            // The settings may have been changed at the drive: the next attempt reads them, or does without them.
+            self.known.control = None;
+        }
+        stopped
     }
 
     async fn stop_word(&mut self, mode: StopMode) -> Result<ControlWord> {
@@ -60,8 +65,9 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
         let resolution = self.resolution(class).await?;
         let words = self.fast_words(class).await?;
-        // A chart that has left operation enabled holds no run command, whatever was written before.
-        if words.chart() != Some(ChartState::OperationEnabled) {
+        // A chart that has left operation enabled holds no run command, whatever was written before; nor is one in force
+        // again by itself when somebody else gives control back.
+        if words.chart() != Some(ChartState::OperationEnabled) || words.control() != Control::Bus {
             self.command = self.command.filter(|command| !command.is_run());
         }
         Ok(words.status(resolution, self.command))

@@ -48,6 +48,7 @@ impl<P: Port> Atv312<P> {
     pub(crate) fn note(&mut self, written: Written) {
         if written.changed {
             self.known = Known::default();
+            self.command = None;
             self.unsaved |= matches!(written.storage, Storage::RamUntilSaved | Storage::Unknown);
         }
     }
@@ -116,7 +117,6 @@ impl<P: Port> Atv312<P> {
             return Ok(current);
         }
         self.check_standing(Command::ArmWatchdog).await?;
-        // The longer time is never in force with the new reaction unasked: time first, reaction second, watch last.
         self.change(TTO, tto).await?;
         self.change(SLL, sll).await?;
         let mut calls = self.registers.at(Class::Background);

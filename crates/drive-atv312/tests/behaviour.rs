@@ -456,6 +456,28 @@ async fn status_is_one_exchange_and_measurements_are_as_many_as_the_capabilities
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_run_command_does_not_count_as_given_after_somebody_else_had_control() {
+    let (mut drive, machine, _line) = running().await;
+    machine.panel(Panel::TakeControl);
+    machine.wait_until(|seen| !seen.running).await;
+    assert_eq!(drive.status().await.unwrap().control, Some(Control::Local));
+    machine.panel(Panel::ReleaseControl);
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.state, status.control), (State::Ready, Some(Control::Bus)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_does_not_show_is_tried_without_the_old_settings_the_next_time() {
+    let (mut drive, machine, _line) = running().await;
+    // Somebody at the panel takes bit 14 away.
+    assert!(machine.poke(11204, 0));
+    let error = drive.stop(StopMode::Fast).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    drive.stop(StopMode::Fast).await.unwrap();
+    assert_eq!(commands(&machine)[3..], [0x400F, 0x0002]);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stop_whose_confirmation_is_lost_is_read_back() {
     let (mut drive, machine, _line) = running().await;
     machine.hold_next_answer();
