@@ -1,5 +1,5 @@
 //! The families of drives, chosen by name: what a configuration or a command line says becomes a
-//! [`Drive`](drive_core::Drive).
+//! [`Drive`].
 //!
 //! ```
 //! use drive_families::Family;
