@@ -9,7 +9,7 @@ use drive_core::{
 
 use crate::{
     Atv28,
-    registers::{CMD, ETA},
+    registers::{CMD, ETA, LFR, LFRD},
     status::{FastWords, raw_command},
     words::{ControlWord, ExtendedStatus, StatusWord},
 };
@@ -34,6 +34,10 @@ impl<P: Port> Drivecom for Atv28<P> {
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let words = self.fast_words(class).await?;
+        // A chart that has left operation enabled holds no run command, whatever was written before.
+        if words.chart() != Some(ChartState::OperationEnabled) {
+            self.command = self.command.filter(|command| !command.is_run());
+        }
         Ok(words.status(self.command))
     }
 
@@ -58,8 +62,15 @@ impl<P: Port> Drivecom for Atv28<P> {
             return Ok(Some(Refusal::NotInControl(words.control())));
         }
         // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
-        let braking = turning && words.chart() == Some(ChartState::QuickStopActive);
-        Ok(braking.then_some(Refusal::State(State::QuickStop)))
+        if turning && words.chart() == Some(ChartState::QuickStopActive) {
+            return Ok(Some(Refusal::State(State::QuickStop)));
+        }
+        // A sign that somebody else left would turn the direction round.
+        let mut calls = self.registers.at(Class::Command);
+        let negative = calls.read(LFR).await?.cast_signed() < 0 || calls.read(LFRD).await?.cast_signed() < 0;
+        Ok(negative.then_some(Refusal::Settings(
+            "a reference on the bus (LFr or LFRD) is negative: give a setpoint in its unit first",
+        )))
     }
 
     /// "Operation enabled" is also the state of a drive that its terminals have just powered up in, so the drive must
@@ -73,9 +84,15 @@ impl<P: Port> Drivecom for Atv28<P> {
     }
 }
 
-/// The write that stops all drives on a line.
-pub(crate) const fn broadcast(mode: StopMode) -> BroadcastWrite {
-    BroadcastWrite { function: 0x06, register: CMD.address(), value: stop_word(mode).bits() }
+/// The write that stops all drives on a line, by the words of the chart: the others would enable a drive that is merely
+/// ready.
+pub(crate) const fn broadcast(mode: StopMode) -> Option<BroadcastWrite> {
+    let value = match mode {
+        StopMode::Fast => drivecom::QUICK_STOP,
+        StopMode::Freewheel => drivecom::DISABLE_VOLTAGE,
+        StopMode::Ramp | StopMode::DcInjection => return None,
+    };
+    Some(BroadcastWrite { function: 0x06, register: CMD.address(), value })
 }
 
 /// The stops by bits 12 to 14 keep operation enabled; without voltage the motor coasts (BBV51701 p. 11, 12, 19).

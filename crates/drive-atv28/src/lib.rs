@@ -49,7 +49,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     identification: Some("nominal current INV (W555)"),
     release: false,
     persist: None,
-    broadcast_stops: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
+    broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,
     turnaround: Duration::ZERO,
     status_exchanges: 2,
@@ -228,8 +228,7 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     fn broadcast_stop(&self, mode: StopMode) -> Option<BroadcastWrite> {
-        let known = CAPABILITIES.broadcast_stops.contains(&mode);
-        known.then(|| command::broadcast(mode))
+        command::broadcast(mode)
     }
 }
 

@@ -154,6 +154,17 @@ async fn nobody_starts_a_drive_that_is_in_forced_local_control() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_negative_reference_that_somebody_left_refuses_the_start() {
+    let (mut drive, machine, _line) = rig();
+    drive.write_parameter(row("LFr"), (-200_i16).cast_unsigned()).await.unwrap();
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
+    assert!(commands(&machine).is_empty());
+    drive.set_setpoint(FIFTY).await.unwrap();
+    drive.start(Direction::Forward).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
 async fn after_the_stop_key_a_start_climbs_the_chart() {
     let (mut drive, machine, _line) = running().await;
     machine.panel(Panel::Stop);
@@ -292,7 +303,7 @@ async fn what_the_family_cannot_do_is_unsupported() {
 
 #[tokio::test(start_paused = true)]
 async fn a_broadcast_stop_stops_every_drive() {
-    for mode in [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel] {
+    for mode in [StopMode::Fast, StopMode::Freewheel] {
         let (drive, machine, line) = running().await;
         let write = drive.broadcast_stop(mode).unwrap();
         assert_eq!(write.function, 0x06);
@@ -302,7 +313,9 @@ async fn a_broadcast_stop_stops_every_drive() {
         machine.wait_until(|seen| seen.shaft_frequency == 0 && !seen.running).await;
     }
     let (drive, ..) = rig();
-    assert_eq!(drive.broadcast_stop(StopMode::DcInjection), None, "it would brake motors that stand");
+    for mode in [StopMode::Ramp, StopMode::DcInjection] {
+        assert_eq!(drive.broadcast_stop(mode), None, "{mode}: it would enable drives that are merely ready");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -131,8 +131,12 @@ impl<P: Port> Drivecom for Atv58<P> {
         }
         // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
         let turning = status.output_frequency.is_some_and(|frequency| frequency > Frequency::ZERO);
-        let braking = turning && status.state == State::QuickStop;
-        Ok(braking.then_some(Refusal::State(State::QuickStop)))
+        if turning && status.state == State::QuickStop {
+            return Ok(Some(Refusal::State(State::QuickStop)));
+        }
+        // A sign that somebody else left would turn the direction round.
+        let negative = self.registers.at(Class::Command).read(W401).await?.cast_signed() < 0;
+        Ok(negative.then_some(Refusal::Settings("the reference W401 is negative: give a setpoint first")))
     }
 
     /// The drive shows a run command by holding it in the state "operation enabled".

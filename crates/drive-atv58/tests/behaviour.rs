@@ -161,6 +161,15 @@ async fn nobody_starts_a_drive_that_is_in_forced_local_control() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_negative_reference_that_somebody_left_refuses_the_start() {
+    let (mut drive, machine, _line) = rig();
+    drive.write_parameter(row("W401"), (-200_i16).cast_unsigned()).await.unwrap();
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
+    assert!(commands(&machine).is_empty());
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_setpoint_that_the_drive_cannot_hold_is_refused_and_not_sent() {
     let (mut drive, machine, _line) = rig();
     let high = Frequency::from_hertz(50);
