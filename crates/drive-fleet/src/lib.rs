@@ -1,1 +1,72 @@
-//! Not yet written.
+//! Many drives on many lines, supervised as a plant needs it.
+//!
+//! A [`Fleet`] is built from lines and from drives of any family, which it knows only as
+//! [`dyn Drive`](drive_core::Drive). It asks each drive at its own periods, judges how old its values are, tells what
+//! happens ([`Events`]), carries out commands to a known [`Outcome`], keeps the drives' communication watchdogs armed
+//! and fed, and acts by each drive's policies when a drive is lost, trips, or the program ends.
+//!
+//! ```no_run
+//! use drive_bus::{Line, LineConfig};
+//! use drive_core::{Direction, Drive, Frequency, SerialSettings, StopMode};
+//! use drive_fleet::{DriveSettings, Fleet, LineBudget};
+//!
+//! # fn some_drive(port: drive_bus::Slave) -> Box<dyn Drive> { unimplemented!() }
+//! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
+//! let config = LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT);
+//! let budget = LineBudget::of(&config);
+//! let line = Line::open(config).await?;
+//! let pump = some_drive(line.slave(1));
+//! let fleet = Fleet::builder()
+//!     .line("north", line, budget)
+//!     .drive("north", DriveSettings::controlled("pump 1"), pump)
+//!     .start()?;
+//!
+//! let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+//! let outcome = pump.run(Direction::Forward, Frequency::from_hertz(40)).await;
+//! println!("{outcome}");
+//! println!("{}", fleet.stop_all(StopMode::Ramp).await);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Rules
+//! What moves a motor goes by rules, each enforced here or below and each with a test of its name: a stop outranks
+//! everything and is repeated until it is confirmed; a command expires; an ambiguous write is read back; motion needs a
+//! fresh status, a checked identity, no fault and control here; nothing restarts by itself; edges are written once; the
+//! running state is adopted and nothing is written before; each drive's policy acts at the exit; a watchdog is armed,
+//! verified and fed, or the configuration is refused; EEPROM is written only when asked; a drive that is not under
+//! control is only read.
+//!
+//! # Inside
+//! One task for each drive owns the conversation with it. What it does next is decided by a supervisor that is a pure
+//! machine: no clock, no port.
+
+mod builder;
+mod event;
+mod fleet;
+mod group;
+mod handle;
+mod limits;
+mod outcome;
+mod plan;
+mod settings;
+mod snapshot;
+mod supervisor;
+mod task;
+#[cfg(test)]
+mod testing;
+
+pub use builder::{FleetBuilder, FleetError, check_settings};
+pub use event::{Event, EventKind, ExitAction, Limit};
+pub use fleet::{Events, Fleet, Received};
+pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
+pub use handle::DriveHandle;
+pub use limits::{Band, FrequencyLimits, LimitProblem};
+pub use outcome::{Order, Outcome, Refused, Unconfirmed, Until};
+pub use plan::{Demand, LineBudget, LinePlan, PlanProblem, plan};
+pub use settings::{
+    Alarms, Commanders, DriveSettings, OnExit, OnFault, OnLoss, Periods, Times, WatchdogContract,
+};
+pub use snapshot::{
+    Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,
+};

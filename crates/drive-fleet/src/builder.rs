@@ -1,0 +1,259 @@
+//! [`FleetBuilder`]: lines and drives become a fleet, after everything that can be checked beforehand is.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use drive_bus::Line;
+use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode};
+use tokio::{
+    sync::{broadcast, mpsc, watch},
+    time::Instant,
+};
+
+use crate::{
+    event::Event,
+    fleet::{Fleet, LineEntry},
+    handle::Entry,
+    plan::{Demand, LineBudget, PlanProblem, plan},
+    settings::{DriveSettings, WatchdogContract},
+    supervisor::Supervisor,
+    task::{Desk, Task},
+};
+
+/// How many orders of one drive may be on their way to its task.
+const MAILBOX: usize = 32;
+/// How many events are kept for a slow reader.
+const EVENTS: usize = 4_096;
+
+/// Why a fleet cannot be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum FleetError {
+    /// Two drives or two lines have one name.
+    #[error("{0:?}: the name is taken")]
+    NameTaken(String),
+    /// A drive names a line that is not there.
+    #[error("{drive}: there is no line {line:?}")]
+    NoSuchLine {
+        /// The drive.
+        drive: String,
+        /// The line that it names.
+        line: String,
+    },
+    /// Two drives of one line have one address.
+    #[error("{drive}: address {slave} of line {line:?} is taken")]
+    AddressTaken {
+        /// The second drive.
+        drive: String,
+        /// The line.
+        line: String,
+        /// The address.
+        slave: SlaveAddress,
+    },
+    /// The drive cannot live on its line.
+    #[error("{drive}: {problem}")]
+    Mismatch {
+        /// The drive.
+        drive: String,
+        /// Why.
+        problem: LineMismatch,
+    },
+    /// A setting of the drive contradicts another one or its family.
+    #[error("{drive}: {problem}")]
+    Setting {
+        /// The drive.
+        drive: String,
+        /// Which and why.
+        problem: String,
+    },
+    /// The drives of a line want more than it gives.
+    #[error("line {line:?}: {problem}")]
+    Plan {
+        /// The line.
+        line: String,
+        /// The arithmetic.
+        problem: PlanProblem,
+    },
+}
+
+/// What a drive is before the fleet starts.
+struct Member {
+    line: usize,
+    settings: DriveSettings,
+    drive: Box<dyn Drive>,
+}
+
+/// Lines and drives that become a [`Fleet`].
+#[must_use]
+pub struct FleetBuilder {
+    lines: Vec<(String, Line, LineBudget)>,
+    members: Vec<(String, DriveSettings, Box<dyn Drive>)>,
+    events: usize,
+}
+
+impl FleetBuilder {
+    pub(crate) const fn new() -> Self {
+        Self { lines: Vec::new(), members: Vec::new(), events: EVENTS }
+    }
+
+    /// Adds a line. The budget says what it gives, see [`LineBudget::of`].
+    pub fn line(mut self, name: impl Into<String>, line: Line, budget: LineBudget) -> Self {
+        self.lines.push((name.into(), line, budget));
+        self
+    }
+
+    /// Adds a drive that talks over a line named so.
+    pub fn drive(mut self, line: impl Into<String>, settings: DriveSettings, drive: Box<dyn Drive>) -> Self {
+        self.members.push((line.into(), settings, drive));
+        self
+    }
+
+    /// How many events are kept for a reader that is slow; 4096 unless said.
+    pub const fn event_capacity(mut self, events: usize) -> Self {
+        self.events = events;
+        self
+    }
+
+    /// Checks everything that can be checked beforehand and starts one task for each drive on the current tokio runtime.
+    /// Nothing is written to any drive until somebody commands it, except its watchdog at standstill.
+    ///
+    /// # Errors
+    /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
+    pub fn start(self) -> Result<Fleet, FleetError> {
+        let (events, first) = broadcast::channel(self.events.max(1));
+        let (lines, members) = self.check()?;
+        let entries = members.into_iter().map(|member| spawn(member, &events)).collect();
+        Ok(Fleet::new(lines, entries, &events, first))
+    }
+
+    fn check(self) -> Result<(Vec<LineEntry>, Vec<Member>), FleetError> {
+        let mut numbers = BTreeMap::new();
+        for (number, (name, ..)) in self.lines.iter().enumerate() {
+            if numbers.insert(name.clone(), number).is_some() {
+                return Err(FleetError::NameTaken(name.clone()));
+            }
+        }
+        let mut demands: Vec<Vec<Demand>> = self.lines.iter().map(|_| Vec::new()).collect();
+        let mut names = BTreeSet::new();
+        let mut addresses = BTreeSet::new();
+        let mut members = Vec::with_capacity(self.members.len());
+        for (line_name, settings, drive) in self.members {
+            let name = settings.name.clone();
+            if !names.insert(name.clone()) {
+                return Err(FleetError::NameTaken(name));
+            }
+            let found = numbers.get(&line_name).and_then(|&number| Some((number, self.lines.get(number)?)));
+            let Some((line, (_, _, budget))) = found else {
+                return Err(FleetError::NoSuchLine { drive: name, line: line_name });
+            };
+            let slave = drive.slave();
+            if !addresses.insert((line, slave)) {
+                return Err(FleetError::AddressTaken { drive: name, line: line_name, slave });
+            }
+            let capabilities = drive.capabilities();
+            if let Some(serial) = budget.serial {
+                let fits = capabilities.check_line(slave, serial);
+                fits.map_err(|problem| FleetError::Mismatch { drive: name.clone(), problem })?;
+            }
+            check_settings(&settings, capabilities)
+                .map_err(|problem| FleetError::Setting { drive: name.clone(), problem })?;
+            if let Some(demands) = demands.get_mut(line) {
+                let (periods, watchdog) = (settings.periods, settings.watchdog);
+                demands.push(Demand { drive: name, capabilities, periods, watchdog });
+            }
+            members.push(Member { line, settings, drive });
+        }
+        let mut lines = Vec::with_capacity(self.lines.len());
+        for ((name, line, budget), demands) in self.lines.into_iter().zip(demands) {
+            let plan =
+                plan(budget, &demands).map_err(|problem| FleetError::Plan { line: name.clone(), problem })?;
+            lines.push(LineEntry { name: Arc::from(name), line, plan });
+        }
+        Ok((lines, members))
+    }
+}
+
+/// Checks what the settings of a drive say against each other and against its family.
+///
+/// # Errors
+/// One sentence: which setting, and what was expected.
+pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> Result<(), String> {
+    if settings.name.trim().is_empty() {
+        return Err("a drive needs a name".to_owned());
+    }
+    let periods = settings.periods;
+    for (name, period) in [("running", periods.running), ("rest", periods.rest)] {
+        if period.is_zero() {
+            return Err(format!("the period {name:?} is zero: expected the time between two statuses"));
+        }
+        if period >= periods.max_age {
+            return Err(format!(
+                "a status every {period:?} ({name}) is never fresh with a max_age of {:?}: expected a longer max_age",
+                periods.max_age
+            ));
+        }
+    }
+    settings.limits.check()?;
+    match settings.watchdog {
+        Some(contract) => check_watchdog(contract, capabilities),
+        None => Ok(()),
+    }
+}
+
+fn check_watchdog(contract: WatchdogContract, capabilities: &Capabilities) -> Result<(), String> {
+    let name = capabilities.name;
+    let Some(watchdog) = capabilities.watchdog else {
+        return Err(format!("the bus can neither read nor set a communication watchdog of a {name}"));
+    };
+    let timeout = contract.timeout;
+    let in_steps = timeout
+        .checked_sub(watchdog.min)
+        .is_some_and(|above| above.as_nanos().checked_rem(watchdog.step.as_nanos()).unwrap_or_default() == 0);
+    if timeout > watchdog.max || !in_steps {
+        return Err(format!(
+            "a watchdog of {timeout:?}: a {name} has {:?} to {:?} in steps of {:?}",
+            watchdog.min, watchdog.max, watchdog.step
+        ));
+    }
+    if watchdog.settable && !watchdog.reactions.contains(&contract.reaction) {
+        let has: Vec<_> = watchdog.reactions.iter().map(ToString::to_string).collect();
+        return Err(format!(
+            "the watchdog of a {name} has no {}: it has {}",
+            contract.reaction,
+            has.join(", ")
+        ));
+    }
+    Ok(())
+}
+
+fn spawn(member: Member, events: &broadcast::Sender<Event>) -> Arc<Entry> {
+    let Member { line, settings, drive } = member;
+    let (slave, capabilities, control) = (drive.slave(), drive.capabilities(), settings.control);
+    let broadcasts = StopMode::ALL
+        .into_iter()
+        .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
+        .collect();
+    let supervisor = Supervisor::new(Instant::now(), settings, capabilities);
+    let name = supervisor.name();
+    let (messages, message_box) = mpsc::channel(MAILBOX);
+    // Unbounded, because a stop must never be refused for want of room: each entry is a caller that waits.
+    let (urgent, urgent_box) = mpsc::unbounded_channel();
+    let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot()));
+    let (exit, exited) = watch::channel(None);
+    let desk =
+        Desk { supervisor, events: events.clone(), snapshots, exit, callers: BTreeMap::new(), next_call: 0 };
+    tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box }.run());
+    Arc::new(Entry {
+        name,
+        line,
+        slave,
+        capabilities,
+        control,
+        broadcasts,
+        messages,
+        urgent,
+        snapshots: snapshot,
+        exit: exited,
+    })
+}

@@ -1,0 +1,281 @@
+//! What happens to the drives of a fleet, as it happens.
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use drive_core::{Command, Control, Current, Error, Identity, Percent, State, Status, StopMode, Watchdog};
+use tokio::time::Instant;
+
+use crate::{outcome::Outcome, snapshot::Trip};
+
+/// Something that happened to a drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// The drive.
+    pub drive: Arc<str>,
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EventKind {
+    /// It answers, for the first time or again; its state is adopted.
+    Connected(Arc<Status>),
+    /// It does not answer any more.
+    Lost {
+        /// How long ago its last valid status is.
+        silent_for: Duration,
+        /// The last error; `None` when its statuses only came too late.
+        error: Option<Error>,
+    },
+    /// Its state changed.
+    StateChanged {
+        /// Before.
+        from: State,
+        /// Now.
+        to: State,
+    },
+    /// It tripped.
+    Tripped(Box<Trip>),
+    /// What the drive says about its last trip was read.
+    TripExplained(Box<Trip>),
+    /// It shows no fault any more.
+    FaultCleared,
+    /// An alarm that does not trip came or went.
+    Warning {
+        /// Whether it is present.
+        present: bool,
+    },
+    /// A measured value went above its limit or came back.
+    Limit {
+        /// The value and its limit.
+        limit: Limit,
+        /// Whether it is above.
+        exceeded: bool,
+    },
+    /// Panel, terminals or another bus took control.
+    ControlTaken(Control),
+    /// This bus has control again.
+    ControlReturned,
+    /// It said what it is for the first time, or again what is remembered.
+    Identified(Arc<Identity>),
+    /// It says that it is another drive than before. Motion is refused.
+    IdentityChanged {
+        /// What is remembered.
+        remembered: Arc<Identity>,
+        /// What it says now.
+        found: Arc<Identity>,
+    },
+    /// Its communication watchdog is as the contract says; whether it had to be written for that.
+    WatchdogVerified {
+        /// As it is.
+        watchdog: Watchdog,
+        /// Whether it was written.
+        written: bool,
+    },
+    /// Its communication watchdog is not as the contract says.
+    WatchdogBroken(String),
+    /// A command ended.
+    Command {
+        /// Which.
+        command: Command,
+        /// By whom.
+        commander: Arc<str>,
+        /// How.
+        outcome: Outcome,
+    },
+    /// It cannot stop by the mode that was asked for and is stopped by another.
+    StopModeReplaced {
+        /// What was asked for.
+        asked: StopMode,
+        /// What is done.
+        used: StopMode,
+    },
+    /// **Alarm**: a stop cannot be confirmed. It is repeated.
+    StopUnconfirmed {
+        /// Since when, as a duration.
+        since: Duration,
+        /// How often it was sent.
+        attempts: u32,
+        /// The last error; `None` when the drive took the stop and does not stand.
+        error: Option<Error>,
+    },
+    /// A stop is confirmed: the drive shows standstill.
+    StopConfirmed,
+    /// What was done to it when the fleet shut down.
+    Exit(ExitAction),
+}
+
+impl EventKind {
+    /// Its name, as logs and JSON lines have it.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Connected(_) => "connected",
+            Self::Lost { .. } => "lost",
+            Self::StateChanged { .. } => "state changed",
+            Self::Tripped(_) => "tripped",
+            Self::TripExplained(_) => "trip explained",
+            Self::FaultCleared => "fault cleared",
+            Self::Warning { .. } => "warning",
+            Self::Limit { .. } => "limit",
+            Self::ControlTaken(_) => "control taken",
+            Self::ControlReturned => "control returned",
+            Self::Identified(_) => "identified",
+            Self::IdentityChanged { .. } => "identity changed",
+            Self::WatchdogVerified { .. } => "watchdog verified",
+            Self::WatchdogBroken(_) => "watchdog broken",
+            Self::Command { .. } => "command",
+            Self::StopModeReplaced { .. } => "stop mode replaced",
+            Self::StopUnconfirmed { .. } => "stop unconfirmed",
+            Self::StopConfirmed => "stop confirmed",
+            Self::Exit(_) => "exit",
+        }
+    }
+
+    /// Whether somebody should look at it now.
+    #[must_use]
+    pub const fn is_alarm(&self) -> bool {
+        matches!(
+            self,
+            Self::Lost { .. }
+                | Self::Tripped(_)
+                | Self::IdentityChanged { .. }
+                | Self::WatchdogBroken(_)
+                | Self::StopUnconfirmed { .. }
+                | Self::Limit { exceeded: true, .. }
+                | Self::Warning { present: true }
+        )
+    }
+}
+
+impl fmt::Display for EventKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        match self {
+            Self::Connected(status) => write!(f, ": {status}"),
+            Self::Lost { silent_for, error: Some(error) } => write!(f, " for {silent_for:?}: {error}"),
+            Self::Lost { silent_for, error: None } => write!(f, " for {silent_for:?}"),
+            Self::StateChanged { from, to } => write!(f, ": {from} to {to}"),
+            Self::Tripped(trip) | Self::TripExplained(trip) => trip_details(f, trip),
+            Self::Warning { present } => write!(f, ": {}", if *present { "present" } else { "gone" }),
+            Self::Limit { limit, exceeded } => {
+                write!(f, ": {limit}, {}", if *exceeded { "exceeded" } else { "kept again" })
+            }
+            Self::ControlTaken(control) => write!(f, " by {control}"),
+            Self::Identified(identity) => write!(f, ": {}", describe(identity)),
+            Self::IdentityChanged { remembered, found } => {
+                write!(f, ": {} instead of {}", describe(found), describe(remembered))
+            }
+            Self::WatchdogVerified { watchdog, written } => {
+                let how = if *written { "written and read back" } else { "found so" };
+                match watchdog.timeout {
+                    Some(timeout) => write!(f, ": {timeout:?}, {how}"),
+                    None => write!(f, ": off, {how}"),
+                }
+            }
+            Self::WatchdogBroken(why) => write!(f, ": {why}"),
+            Self::Command { command, commander, outcome } => {
+                write!(f, ": {command} by {commander}: {outcome}")
+            }
+            Self::StopModeReplaced { asked, used } => write!(f, ": {used} instead of {asked}"),
+            Self::StopUnconfirmed { since, attempts, error } => {
+                write!(f, " since {since:?} after {attempts} attempts")?;
+                match error {
+                    Some(error) => write!(f, ": {error}"),
+                    None => f.write_str(": the motor does not stand"),
+                }
+            }
+            Self::Exit(action) => write!(f, ": {action}"),
+            Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed => Ok(()),
+        }
+    }
+}
+
+fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
+    if let Some(silence) = trip.watchdog_after {
+        write!(f, " by its communication watchdog after {silence:?} without a message")?;
+    }
+    match trip.faults.as_deref().and_then(|faults| faults.present.first()) {
+        Some(fault) => write!(f, ": {fault}"),
+        None => match trip.status.value.fault_code {
+            Some(code) => write!(f, ": fault {code}"),
+            None => Ok(()),
+        },
+    }
+}
+
+/// An identity in one line.
+fn describe(identity: &Identity) -> String {
+    let mut parts: Vec<String> =
+        [&identity.vendor, &identity.model, &identity.version].into_iter().flatten().cloned().collect();
+    parts.extend(identity.codes.iter().map(|word| format!("{} {}", word.code, word.value)));
+    parts.join(" ")
+}
+
+/// A measured value that has a limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Limit {
+    /// The motor current.
+    Current {
+        /// Measured.
+        measured: Current,
+        /// Its limit.
+        limit: Current,
+    },
+    /// The thermal state of the drive.
+    DriveThermal {
+        /// Measured.
+        measured: Percent,
+        /// Its limit.
+        limit: Percent,
+    },
+    /// The thermal state of the motor.
+    MotorThermal {
+        /// Measured.
+        measured: Percent,
+        /// Its limit.
+        limit: Percent,
+    },
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Current { measured, limit } => write!(f, "current {measured} of {limit}"),
+            Self::DriveThermal { measured, limit } => {
+                write!(f, "thermal state of the drive {measured} of {limit}")
+            }
+            Self::MotorThermal { measured, limit } => {
+                write!(f, "thermal state of the motor {measured} of {limit}")
+            }
+        }
+    }
+}
+
+/// What was done to a drive when the fleet shut down.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ExitAction {
+    /// It was left as it was, because its policy says so or because this fleet had not started it.
+    Left,
+    /// It was stopped, with this outcome.
+    Stopped(Outcome),
+    /// Control was given back, with this outcome.
+    Released(Outcome),
+    /// The time for shutting down was over first.
+    TimeOver,
+}
+
+impl fmt::Display for ExitAction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Left => f.write_str("left as it is"),
+            Self::Stopped(outcome) => write!(f, "stop {outcome}"),
+            Self::Released(outcome) => write!(f, "release {outcome}"),
+            Self::TimeOver => f.write_str("time over before it was done"),
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! [`Fleet`]: the handle of it all.
+
+use std::{
+    fmt,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use drive_bus::Line;
+use drive_core::StopMode;
+use futures_util::future::join_all;
+use tokio::sync::broadcast::{self, error::RecvError};
+
+use crate::{
+    builder::FleetBuilder,
+    event::{Event, ExitAction},
+    group::{Group, NoSuchDrive, StopReport},
+    handle::{DriveHandle, Entry},
+    plan::LinePlan,
+    task::Urgent,
+};
+
+/// A line of the fleet.
+pub(crate) struct LineEntry {
+    pub(crate) name: Arc<str>,
+    pub(crate) line: Line,
+    pub(crate) plan: LinePlan,
+}
+
+/// Many drives on many lines, each watched by a task of its own. Cheap to clone.
+///
+/// [`shutdown`](Self::shutdown) is the end that acts by each drive's policy. When the last handle is dropped without it
+/// the tasks end and nothing is written: the drives go on until their own watchdogs act.
+#[derive(Clone)]
+pub struct Fleet {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    lines: Vec<LineEntry>,
+    entries: Vec<Arc<Entry>>,
+    /// The tasks hold the senders, so that readers see the end of the fleet.
+    events: broadcast::WeakSender<Event>,
+    /// For the first reader, which misses nothing of the start.
+    first: Mutex<Option<broadcast::Receiver<Event>>>,
+}
+
+impl fmt::Debug for Fleet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let drives: Vec<_> = self.inner.entries.iter().map(|entry| &entry.name).collect();
+        f.debug_struct("Fleet").field("drives", &drives).finish_non_exhaustive()
+    }
+}
+
+impl Fleet {
+    /// Begins a fleet.
+    pub const fn builder() -> FleetBuilder {
+        FleetBuilder::new()
+    }
+
+    pub(crate) fn new(
+        lines: Vec<LineEntry>,
+        entries: Vec<Arc<Entry>>,
+        events: &broadcast::Sender<Event>,
+        first: broadcast::Receiver<Event>,
+    ) -> Self {
+        let (events, first) = (events.downgrade(), Mutex::new(Some(first)));
+        Self { inner: Arc::new(Inner { lines, entries, events, first }) }
+    }
+
+    /// The drive with a name.
+    #[must_use]
+    pub fn drive(&self, name: &str) -> Option<DriveHandle> {
+        let entry = self.inner.entries.iter().find(|entry| &*entry.name == name)?;
+        Some(DriveHandle::new(Arc::clone(entry)))
+    }
+
+    /// All drives, in the order in which they were added.
+    #[must_use]
+    pub fn drives(&self) -> Vec<DriveHandle> {
+        self.inner.entries.iter().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
+    }
+
+    /// What happens to the drives, from now on; the first reader gets it from the start of the fleet.
+    #[must_use]
+    pub fn events(&self) -> Events {
+        let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).take();
+        Events(first.or_else(|| self.inner.events.upgrade().map(|events| events.subscribe())))
+    }
+
+    /// The reckoning of a line.
+    #[must_use]
+    pub fn plan(&self, line: &str) -> Option<LinePlan> {
+        self.inner.lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan)
+    }
+
+    /// All drives as one group.
+    #[must_use]
+    pub fn all(&self) -> Group {
+        Group::new(self.clone(), self.drives())
+    }
+
+    /// Some drives as one group.
+    ///
+    /// # Errors
+    /// [`NoSuchDrive`] for a name that no drive has.
+    pub fn group<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Group, NoSuchDrive> {
+        let members =
+            names.into_iter().map(|name| self.drive(name).ok_or_else(|| NoSuchDrive(name.to_owned())));
+        Ok(Group::new(self.clone(), members.collect::<Result<_, _>>()?))
+    }
+
+    /// Stops every drive: see [`Group::stop`].
+    pub async fn stop_all(&self, mode: StopMode) -> StopReport {
+        self.all().stop(mode).await
+    }
+
+    /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
+    /// a drive that is still stopping then has [`ExitAction::TimeOver`].
+    pub async fn shutdown(&self, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
+        let entries = &self.inner.entries;
+        let tell = |message: fn() -> Urgent| {
+            for entry in entries {
+                // A task that is gone has its action in the watch.
+                let _ = entry.urgent.send(message());
+            }
+        };
+        let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
+        tell(|| Urgent::Exit);
+        let actions = match tokio::time::timeout(limit, all_done()).await {
+            Ok(actions) => actions,
+            Err(_) => {
+                tell(|| Urgent::ExitTimeOver);
+                all_done().await
+            }
+        };
+        entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
+    }
+
+    pub(crate) fn lines(&self) -> &[LineEntry] {
+        &self.inner.lines
+    }
+
+    pub(crate) fn entries(&self) -> &[Arc<Entry>] {
+        &self.inner.entries
+    }
+}
+
+async fn exit_action(entry: &Entry) -> ExitAction {
+    let mut exit = entry.exit.clone();
+    match exit.wait_for(Option::is_some).await {
+        Ok(action) => action.clone().unwrap_or(ExitAction::TimeOver),
+        Err(_) => ExitAction::TimeOver,
+    }
+}
+
+/// A reader of the fleet's events.
+#[derive(Debug)]
+pub struct Events(Option<broadcast::Receiver<Event>>);
+
+/// What a reader of events gets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Received {
+    /// An event.
+    Event(Event),
+    /// The reader was slow: so many events are gone. The next is the oldest that is left.
+    Missed(u64),
+    /// The fleet has ended.
+    End,
+}
+
+impl Events {
+    /// The next event, or how many were missed.
+    ///
+    /// # Cancellation
+    /// Safe to drop: nothing is lost.
+    pub async fn recv(&mut self) -> Received {
+        let Some(receiver) = &mut self.0 else { return Received::End };
+        match receiver.recv().await {
+            Ok(event) => Received::Event(event),
+            Err(RecvError::Lagged(missed)) => Received::Missed(missed),
+            Err(RecvError::Closed) => Received::End,
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! [`Group`]: several drives commanded together.
+
+use std::{borrow::Cow, collections::BTreeSet, fmt, sync::Arc, time::Duration};
+
+use drive_core::{BroadcastWrite, Class, Direction, Setpoint, StopMode, Terms};
+use futures_util::future::{join, join_all};
+use tokio_modbus::{Request, client::Client};
+
+use crate::{
+    fleet::{Fleet, LineEntry},
+    handle::{DriveHandle, Entry},
+    outcome::{Order, Outcome, Refused, Until},
+    snapshot::Link,
+};
+
+/// Mute drives that a stop of a line is reckoned with at least.
+const MUTE: u32 = 3;
+
+/// A name that no drive of the fleet has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the fleet has no drive {0:?}")]
+pub struct NoSuchDrive(pub String);
+
+/// What became of a stop of several drives.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StopReport {
+    /// Drives that show standstill.
+    pub confirmed: Vec<Arc<str>>,
+    /// Drives that do not, and why. Their stops go on being repeated.
+    pub unconfirmed: Vec<(Arc<str>, Outcome)>,
+    /// Drives that are only read: nothing was sent to them.
+    pub read_only: Vec<Arc<str>>,
+    /// Lines on which one broadcast went out first.
+    pub broadcasts: Vec<Arc<str>>,
+}
+
+impl StopReport {
+    /// Whether every drive that may be commanded shows standstill.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.unconfirmed.is_empty()
+    }
+}
+
+impl fmt::Display for StopReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} confirmed", self.confirmed.len())?;
+        for (name, outcome) in &self.unconfirmed {
+            write!(f, "; {name}: {outcome}")?;
+        }
+        Ok(())
+    }
+}
+
+/// How a group starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GroupStart {
+    /// The direction.
+    pub direction: Direction,
+    /// The setpoint for each; `None`: what each holds.
+    pub setpoint: Option<Setpoint>,
+    /// From one start to the next; zero: as close together as the line allows, all setpoints first.
+    pub spacing: Duration,
+    /// When a start counts as done. With a spacing it counts from the start, not from the last drive's reference.
+    pub until: Until,
+}
+
+/// Why a group did not start, or did not stay started.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum GroupFailure {
+    /// These were not ready. Nobody was started.
+    NotReady(Vec<(Arc<str>, Refused)>),
+    /// All were ready, and these did not start; those that did were stopped again.
+    Failed {
+        /// The outcomes that are not confirmed.
+        outcomes: Vec<(Arc<str>, Outcome)>,
+        /// What became of the stop.
+        stopped: StopReport,
+    },
+}
+
+impl fmt::Display for GroupFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotReady(reasons) => {
+                f.write_str("nobody was started, not ready:")?;
+                reasons.iter().try_for_each(|(name, refused)| write!(f, " {name} ({refused})"))
+            }
+            Self::Failed { outcomes, stopped } => {
+                f.write_str("stopped again, because not all started:")?;
+                outcomes.iter().try_for_each(|(name, outcome)| write!(f, " {name} ({outcome})"))?;
+                write!(f, "; stop: {stopped}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for GroupFailure {}
+
+/// Several drives of a fleet, commanded together.
+#[derive(Debug, Clone)]
+pub struct Group {
+    fleet: Fleet,
+    members: Vec<DriveHandle>,
+}
+
+impl Group {
+    pub(crate) const fn new(fleet: Fleet, members: Vec<DriveHandle>) -> Self {
+        Self { fleet, members }
+    }
+
+    /// This group, commanded under a name.
+    #[must_use]
+    pub fn commanded_by(&self, commander: &str) -> Self {
+        let members = self.members.iter().map(|member| member.commanded_by(commander)).collect();
+        Self { fleet: self.fleet.clone(), members }
+    }
+
+    /// Its drives.
+    #[must_use]
+    pub fn members(&self) -> &[DriveHandle] {
+        &self.members
+    }
+
+    /// Stops every drive of the group.
+    ///
+    /// On a line whose drives all belong to the group, may all be commanded and all take the same write for this mode,
+    /// one broadcast goes out first. Nobody confirms it, so each drive is then stopped by itself, which also verifies it.
+    /// The report comes when every drive stands or its time is over; a drive that does not answer is named after the time
+    /// that its line's plan gives. Stops that are not confirmed go on being repeated.
+    pub async fn stop(&self, mode: StopMode) -> StopReport {
+        let mut report = StopReport::default();
+        let (members, read_only): (Vec<_>, Vec<_>) =
+            self.members.iter().partition(|member| member.entry.control);
+        report.read_only = read_only.into_iter().map(|member| Arc::clone(member.name())).collect();
+        let lines = self.fleet.lines().iter().enumerate();
+        let stops = lines.map(|(number, line)| self.stop_line(number, line, &members, mode));
+        for (broadcast, outcomes) in join_all(stops).await {
+            report.broadcasts.extend(broadcast);
+            for (name, outcome) in outcomes {
+                if outcome.is_confirmed() {
+                    report.confirmed.push(name);
+                } else {
+                    report.unconfirmed.push((name, outcome));
+                }
+            }
+        }
+        report
+    }
+
+    async fn stop_line(
+        &self,
+        number: usize,
+        line: &LineEntry,
+        members: &[&DriveHandle],
+        mode: StopMode,
+    ) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
+        let members: Vec<_> = members.iter().filter(|member| member.entry.line == number).collect();
+        let write = self.common_write(number, mode);
+        let broadcast = async {
+            match write {
+                Some(write) if send(line, write).await => Some(Arc::clone(&line.name)),
+                _ => None,
+            }
+        };
+        let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
+        let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
+        let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
+        let stops = members
+            .into_iter()
+            .map(async |member| (Arc::clone(member.name()), member.stop_within(mode, Some(patience)).await));
+        // Both at once: the broadcast is first on the line, and no start of before can come behind it.
+        join(broadcast, join_all(stops)).await
+    }
+
+    /// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
+    fn common_write(&self, line: usize, mode: StopMode) -> Option<BroadcastWrite> {
+        let group: BTreeSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
+        let mut on_line = self.fleet.entries().iter().filter(|entry| entry.line == line);
+        let write = |entry: &Arc<Entry>| {
+            let allowed = entry.control && group.contains(&entry.name);
+            let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
+            write.filter(|_| allowed)
+        };
+        let first = write(on_line.next()?)?;
+        on_line.all(|entry| write(entry) == Some(first)).then_some(first)
+    }
+
+    /// Starts every drive of the group, or none: first all are asked whether they would start, then they start, as close
+    /// together as the line allows or one after the other. When one of them does not, those that did are stopped again
+    /// along their ramps.
+    ///
+    /// # Errors
+    /// [`GroupFailure`] names who was not ready, or did not start.
+    pub async fn start(&self, start: GroupStart) -> Result<(), GroupFailure> {
+        let GroupStart { direction, setpoint, spacing, until } = start;
+        let asked = self.members.iter().map(async |member| {
+            member.unready(setpoint).await.map(|refused| (Arc::clone(member.name()), refused))
+        });
+        let unready: Vec<_> = join_all(asked).await.into_iter().flatten().collect();
+        if !unready.is_empty() {
+            return Err(GroupFailure::NotReady(unready));
+        }
+        let together = spacing.is_zero();
+        if let (Some(setpoint), true) = (setpoint, together) {
+            let given = self.each(async |member| member.set_setpoint(setpoint).await).await;
+            self.keep_or_stop(given).await?;
+        }
+        let order = Order::Start { direction, setpoint: setpoint.filter(|_| !together), until };
+        let begin = tokio::time::Instant::now();
+        let starts = self.members.iter().zip(0_u32..).map(async |(member, number)| {
+            tokio::time::sleep_until(begin + spacing.saturating_mul(number)).await;
+            (Arc::clone(member.name()), member.order(order).await)
+        });
+        let started = join_all(starts).await;
+        self.keep_or_stop(started).await
+    }
+
+    /// Gives every drive of the group a setpoint.
+    pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Vec<(Arc<str>, Outcome)> {
+        let setpoint = setpoint.into();
+        self.each(async |member| member.set_setpoint(setpoint).await).await
+    }
+
+    async fn each(&self, command: impl AsyncFn(&DriveHandle) -> Outcome) -> Vec<(Arc<str>, Outcome)> {
+        let command = &command;
+        join_all(self.members.iter().map(async |member| (Arc::clone(member.name()), command(member).await)))
+            .await
+    }
+
+    async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> Result<(), GroupFailure> {
+        let outcomes: Vec<_> = outcomes.into_iter().filter(|(_, outcome)| !outcome.is_confirmed()).collect();
+        if outcomes.is_empty() {
+            return Ok(());
+        }
+        // A drive whose start is uncertain is among those that are stopped.
+        let stopped = Box::pin(self.stop(StopMode::Ramp)).await;
+        Err(GroupFailure::Failed { outcomes, stopped })
+    }
+}
+
+/// Sends a broadcast; whether it went out.
+async fn send(line: &LineEntry, write: BroadcastWrite) -> bool {
+    let request = match write.function {
+        0x10 => Request::WriteMultipleRegisters(write.register, Cow::Owned(vec![write.value])),
+        _ => Request::WriteSingleRegister(write.register, write.value),
+    };
+    let mut all = line.line.broadcast().with_terms(Terms::of(Class::Stop));
+    all.call(request).await.is_ok_and(|answer| answer.is_ok())
+}

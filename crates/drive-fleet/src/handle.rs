@@ -1,0 +1,206 @@
+//! [`DriveHandle`]: one drive of a fleet, as its users hold it.
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use drive_core::{BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode};
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    time::Instant,
+};
+
+use crate::{
+    event::ExitAction,
+    outcome::{Order, Outcome, Refused, Until},
+    snapshot::Snapshot,
+    task::{Message, Urgent},
+};
+
+/// What the handles of a drive share.
+pub(crate) struct Entry {
+    pub(crate) name: Arc<str>,
+    pub(crate) line: usize,
+    pub(crate) slave: SlaveAddress,
+    pub(crate) capabilities: &'static Capabilities,
+    pub(crate) control: bool,
+    /// The writes that stop every drive of its family on a line, by mode.
+    pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
+    pub(crate) messages: mpsc::Sender<Message>,
+    pub(crate) urgent: mpsc::UnboundedSender<Urgent>,
+    pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
+    pub(crate) exit: watch::Receiver<Option<ExitAction>>,
+}
+
+/// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives.
+///
+/// # Cancellation
+/// Dropping the future of a command does not take the command back: what is sent is sent, what is not yet sent expires
+/// by its lifetime, and a stop is repeated until it is confirmed.
+#[derive(Clone)]
+pub struct DriveHandle {
+    pub(crate) entry: Arc<Entry>,
+    commander: Arc<str>,
+}
+
+impl fmt::Debug for DriveHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DriveHandle")
+            .field("name", &self.entry.name)
+            .field("commander", &self.commander)
+            .finish_non_exhaustive()
+    }
+}
+
+impl DriveHandle {
+    pub(crate) fn new(entry: Arc<Entry>) -> Self {
+        Self { entry, commander: Arc::from("program") }
+    }
+
+    /// This drive, commanded under a name: for the settings that say who may command it, and for the events.
+    #[must_use]
+    pub fn commanded_by(&self, commander: &str) -> Self {
+        Self { entry: Arc::clone(&self.entry), commander: Arc::from(commander) }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &Arc<str> {
+        &self.entry.name
+    }
+
+    /// Its address on its line.
+    #[must_use]
+    pub fn slave(&self) -> SlaveAddress {
+        self.entry.slave
+    }
+
+    /// What its family can do.
+    #[must_use]
+    pub fn capabilities(&self) -> &'static Capabilities {
+        self.entry.capabilities
+    }
+
+    /// What is known of it now.
+    #[must_use]
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        Arc::clone(&self.entry.snapshots.borrow())
+    }
+
+    /// What is known of it, and a notice of every change. A reader that is slow sees the latest.
+    #[must_use]
+    pub fn watch(&self) -> watch::Receiver<Arc<Snapshot>> {
+        self.entry.snapshots.clone()
+    }
+
+    /// Waits until a snapshot is so, and gives it. After the end of the fleet it gives the last snapshot there is.
+    ///
+    /// # Cancellation
+    /// Safe to drop.
+    pub async fn wait_until(&self, mut is_so: impl FnMut(&Snapshot) -> bool) -> Arc<Snapshot> {
+        let mut watch = self.watch();
+        match watch.wait_for(|snapshot| is_so(snapshot)).await {
+            Ok(snapshot) => Arc::clone(&snapshot),
+            Err(_) => self.snapshot(),
+        }
+    }
+
+    /// Waits until a start would be sent: the drive answers, was identified, its watchdog verified, and nothing stands in
+    /// the way. Gives the reason that it still has when `patience` is over.
+    ///
+    /// # Errors
+    /// Why a start would be refused.
+    pub async fn ready(&self, patience: Duration) -> Result<(), Refused> {
+        let deadline = Instant::now() + patience;
+        let mut watch = self.watch();
+        loop {
+            watch.mark_unchanged();
+            let Some(refused) = self.unready(None).await else { return Ok(()) };
+            match tokio::time::timeout_at(deadline, watch.changed()).await {
+                Ok(Ok(())) => {}
+                Ok(Err(_)) | Err(_) => return Err(refused),
+            }
+        }
+    }
+
+    /// Why a start, with this setpoint, would be refused now; `None` when it would be sent.
+    pub async fn unready(&self, setpoint: Option<Setpoint>) -> Option<Refused> {
+        let (reply, answer) = oneshot::channel();
+        let name = Arc::clone(&self.commander);
+        if let Err(refused) = self.post(Message::Unready { name, setpoint, reply }) {
+            return Some(refused);
+        }
+        answer.await.unwrap_or(Some(Refused::ShutDown))
+    }
+
+    /// Starts the motor at the setpoint that the drive holds. Confirmed when the run command shows in its words.
+    pub async fn start(&self, direction: Direction) -> Outcome {
+        self.order(Order::Start { direction, setpoint: None, until: Until::InForce }).await
+    }
+
+    /// Gives a setpoint, starts the motor, and waits until it has reached it.
+    pub async fn run(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Outcome {
+        let setpoint = Some(setpoint.into());
+        self.order(Order::Start { direction, setpoint, until: Until::AtReference }).await
+    }
+
+    /// Changes the setpoint. Confirmed when the drive holds it. A setpoint that is not yet sent gives its place to a
+    /// later one.
+    pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Outcome {
+        self.order(Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce }).await
+    }
+
+    /// Stops the motor. It goes ahead of everything, interrupts what is asked of this drive, and is repeated until the
+    /// drive shows standstill. A mode that the drive does not have is replaced by its ramp; an event says so.
+    ///
+    /// The outcome comes at standstill, or when the time of the settings is over: the stop goes on being repeated then.
+    pub async fn stop(&self, mode: StopMode) -> Outcome {
+        self.stop_within(mode, None).await
+    }
+
+    pub(crate) async fn stop_within(&self, mode: StopMode, patience: Option<Duration>) -> Outcome {
+        let (reply, outcome) = oneshot::channel();
+        let name = Arc::clone(&self.commander);
+        if self.entry.urgent.send(Urgent::Stop { mode, name, patience, reply }).is_err() {
+            return Outcome::Refused(Refused::ShutDown);
+        }
+        outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown))
+    }
+
+    /// Resets the present fault, once. The motor does not start.
+    pub async fn reset_faults(&self) -> Outcome {
+        self.order(Order::ResetFaults).await
+    }
+
+    /// Gives control back to the panel or the terminals; the motor must stand.
+    pub async fn release(&self) -> Outcome {
+        self.order(Order::Release).await
+    }
+
+    /// Takes what the drive says it is for right from now on, after
+    /// [`IdentityChanged`](crate::EventKind::IdentityChanged).
+    pub async fn accept_identity(&self) -> Outcome {
+        self.order(Order::AcceptIdentity).await
+    }
+
+    /// Saves the drive's parameters to EEPROM: refused when nothing changed, and counted
+    /// ([`Counters::saves`](crate::Counters::saves)).
+    pub async fn persist(&self) -> Outcome {
+        self.order(Order::Persist).await
+    }
+
+    /// Gives an order and waits for its outcome.
+    pub async fn order(&self, order: Order) -> Outcome {
+        let (reply, outcome) = oneshot::channel();
+        let name = Arc::clone(&self.commander);
+        match self.post(Message::Order { order, name, reply }) {
+            Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
+            Err(refused) => Outcome::Refused(refused),
+        }
+    }
+
+    fn post(&self, message: Message) -> Result<(), Refused> {
+        self.entry.messages.try_send(message).map_err(|error| match error {
+            mpsc::error::TrySendError::Full(_) => Refused::QueueFull,
+            mpsc::error::TrySendError::Closed(_) => Refused::ShutDown,
+        })
+    }
+}

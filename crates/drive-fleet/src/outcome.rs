@@ -1,0 +1,218 @@
+//! What is asked of a drive of a fleet, and what became of it.
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use drive_core::{Command, Control, Direction, Error, Setpoint, State, Status};
+
+use crate::limits::LimitProblem;
+
+/// When a start or a setpoint counts as done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Until {
+    /// The drive's words show that it is in force.
+    #[default]
+    InForce,
+    /// The drive's words show that the output has reached the setpoint.
+    AtReference,
+}
+
+/// What is asked of a drive, besides a stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Start in a direction, at a setpoint that is given first, or at the one that the drive holds.
+    Start {
+        /// The direction.
+        direction: Direction,
+        /// The setpoint.
+        setpoint: Option<Setpoint>,
+        /// When it counts as done.
+        until: Until,
+    },
+    /// Change the setpoint.
+    Setpoint {
+        /// The setpoint.
+        setpoint: Setpoint,
+        /// When it counts as done.
+        until: Until,
+    },
+    /// Reset the present fault.
+    ResetFaults,
+    /// Give control back to the panel or the terminals.
+    Release,
+    /// Take what the drive says it is for right from now on.
+    AcceptIdentity,
+    /// Save the drive's parameters to EEPROM.
+    Persist,
+}
+
+impl Order {
+    /// Whether it can move a motor.
+    pub(crate) const fn is_motion(&self) -> bool {
+        matches!(self, Self::Start { .. } | Self::Setpoint { .. })
+    }
+
+    /// How events and logs name it.
+    #[must_use]
+    pub const fn command(&self) -> Command {
+        match *self {
+            Self::Start { direction, .. } => Command::Start(direction),
+            Self::Setpoint { setpoint, .. } => Command::Setpoint(setpoint),
+            Self::ResetFaults => Command::ResetFaults,
+            Self::Release => Command::Release,
+            Self::AcceptIdentity => Command::Configure("accepting the identity"),
+            Self::Persist => Command::Persist,
+        }
+    }
+}
+
+/// What became of a command.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// The drive's own words show it.
+    Confirmed,
+    /// It was sent and the drive's own words do not show it.
+    NotConfirmed(Unconfirmed),
+    /// Its lifetime ran out before it was sent. It never will be.
+    Expired,
+    /// It was sent, an answer was lost, and the drive could not be asked in time what became of it.
+    OutcomeUnknown(Error),
+    /// It was refused; nothing moved because of it.
+    Refused(Refused),
+}
+
+impl Outcome {
+    /// Whether the drive's own words show it.
+    #[must_use]
+    pub const fn is_confirmed(&self) -> bool {
+        matches!(self, Self::Confirmed)
+    }
+
+    /// Its kind in one word, for logs and counters.
+    #[must_use]
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Confirmed => "confirmed",
+            Self::NotConfirmed(_) => "not confirmed",
+            Self::Expired => "expired",
+            Self::OutcomeUnknown(_) => "outcome unknown",
+            Self::Refused(_) => "refused",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.kind())?;
+        match self {
+            Self::Confirmed | Self::Expired => Ok(()),
+            Self::NotConfirmed(why) => write!(f, ": {why}"),
+            Self::OutcomeUnknown(error) => write!(f, ": {error}"),
+            Self::Refused(why) => write!(f, ": {why}"),
+        }
+    }
+}
+
+/// Why a command that was sent is not confirmed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unconfirmed {
+    /// The time for it is over and the drive says something else, or nothing.
+    TimeOver {
+        /// The time it had.
+        after: Duration,
+        /// The last status, if there was one.
+        status: Option<Arc<Status>>,
+    },
+    /// The drive's words deny it.
+    Denied(Error),
+    /// A later command took its place.
+    Superseded,
+    /// A stop came.
+    Stopped,
+    /// The drive tripped.
+    Tripped,
+    /// The drive was lost.
+    Lost,
+}
+
+impl fmt::Display for Unconfirmed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TimeOver { after, status: Some(status) } => {
+                write!(f, "after {after:?} the drive says {status}")
+            }
+            Self::TimeOver { after, status: None } => write!(f, "the drive has said nothing for {after:?}"),
+            Self::Denied(error) => error.fmt(f),
+            Self::Superseded => f.write_str("a later command took its place"),
+            Self::Stopped => f.write_str("a stop came"),
+            Self::Tripped => f.write_str("the drive tripped"),
+            Self::Lost => f.write_str("the drive was lost"),
+        }
+    }
+}
+
+/// Why a command is refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Refused {
+    /// The drive is configured to be only read.
+    ReadOnly,
+    /// The commander is not among those who may command this drive.
+    Commander(String),
+    /// The drive has not been seen yet, or is lost.
+    NotConnected,
+    /// Its last status is too old, and no fresh one came in time.
+    Stale,
+    /// Its status is none that its manual explains, or one that does not start.
+    State(State),
+    /// It has tripped; the code where it is known.
+    Tripped(Option<u16>),
+    /// Somebody else controls it.
+    NotInControl(Control),
+    /// It says that it is another drive than before; accept that first.
+    IdentityChanged,
+    /// What it is could not be checked in time since it was connected.
+    IdentityUnchecked,
+    /// Its communication watchdog is not as the contract says.
+    WatchdogUnverified,
+    /// A stop of it is not confirmed yet.
+    StopPending,
+    /// A stop came before it was sent.
+    Stopped,
+    /// A later command took its place before it was sent.
+    Superseded,
+    /// The limits of this fleet forbid the setpoint.
+    Limit(LimitProblem),
+    /// The drive or its driver refused it.
+    Drive(Error),
+    /// Too many commands for this drive wait.
+    QueueFull,
+    /// The fleet has shut down.
+    ShutDown,
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ReadOnly => f.write_str("the drive is only read: its settings say control = false"),
+            Self::Commander(name) => write!(f, "{name:?} may not command this drive"),
+            Self::NotConnected => f.write_str("the drive does not answer"),
+            Self::Stale => f.write_str("its status is too old"),
+            Self::State(state) => write!(f, "the drive is in state {state}"),
+            Self::Tripped(Some(code)) => write!(f, "the drive has tripped (fault {code}); reset it first"),
+            Self::Tripped(None) => f.write_str("the drive has tripped; reset it first"),
+            Self::NotInControl(control) => write!(f, "the drive is controlled by {control}"),
+            Self::IdentityChanged => {
+                f.write_str("it is another drive than before: accept its identity first")
+            }
+            Self::IdentityUnchecked => f.write_str("it has not been possible to check which drive it is"),
+            Self::WatchdogUnverified => f.write_str("its communication watchdog is not verified"),
+            Self::StopPending => f.write_str("a stop of it is not confirmed yet"),
+            Self::Stopped => f.write_str("a stop came before it was sent"),
+            Self::Superseded => f.write_str("a later command took its place before it was sent"),
+            Self::Limit(problem) => problem.fmt(f),
+            Self::Drive(error) => error.fmt(f),
+            Self::QueueFull => f.write_str("too many commands for this drive wait"),
+            Self::ShutDown => f.write_str("the fleet has shut down"),
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! What a drive of a fleet is told: its name, how often it is asked, how long its commands may take, its policies.
+
+use std::time::Duration;
+
+use drive_core::{Current, Identity, Percent, Reaction, StopMode};
+
+use crate::limits::FrequencyLimits;
+
+/// Settings of one drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DriveSettings {
+    /// Its name, unique in the fleet.
+    pub name: String,
+    /// Whether anything is ever written to it. `false`: it is only read, and every command is refused, stops included
+    /// (rule 11).
+    pub control: bool,
+    /// Who may command it. Anybody may stop it.
+    pub commanders: Commanders,
+    /// How often it is asked.
+    pub periods: Periods,
+    /// How long its commands may take.
+    pub times: Times,
+    /// Which setpoints it may be given.
+    pub limits: FrequencyLimits,
+    /// Measured values that are worth an event.
+    pub alarms: Alarms,
+    /// Its communication watchdog; `None`: the fleet leaves it alone.
+    pub watchdog: Option<WatchdogContract>,
+    /// What happens to it when the fleet shuts down.
+    pub on_exit: OnExit,
+    /// What happens to it when it is lost.
+    pub on_loss: OnLoss,
+    /// What happens to it after a trip.
+    pub on_fault: OnFault,
+    /// What it said it was, from an earlier run; `None`: what it says first is remembered.
+    pub identity: Option<Identity>,
+}
+
+impl DriveSettings {
+    /// Settings of a drive that is only read.
+    #[must_use]
+    pub fn watched(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            control: false,
+            commanders: Commanders::Anyone,
+            periods: Periods::default(),
+            times: Times::default(),
+            limits: FrequencyLimits::default(),
+            alarms: Alarms::default(),
+            watchdog: None,
+            on_exit: OnExit::default(),
+            on_loss: OnLoss::default(),
+            on_fault: OnFault::default(),
+            identity: None,
+        }
+    }
+
+    /// Settings of a drive that is also commanded.
+    #[must_use]
+    pub fn controlled(name: impl Into<String>) -> Self {
+        Self { control: true, ..Self::watched(name) }
+    }
+}
+
+/// Who may command a drive. Commands carry the name that
+/// [`DriveHandle::commanded_by`](crate::DriveHandle::commanded_by) gave them.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Commanders {
+    /// Whoever holds a handle.
+    #[default]
+    Anyone,
+    /// Those who are named here.
+    Only(Vec<String>),
+}
+
+impl Commanders {
+    /// Whether a commander may command.
+    #[must_use]
+    pub fn allow(&self, commander: &str) -> bool {
+        match self {
+            Self::Anyone => true,
+            Self::Only(names) => names.iter().any(|name| name == commander),
+        }
+    }
+}
+
+/// How often a drive is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Periods {
+    /// The fast set while it runs or has to confirm something.
+    pub running: Duration,
+    /// The fast set while it stands.
+    pub rest: Duration,
+    /// The slow set; zero: never.
+    pub slow: Duration,
+    /// The oldest status that still counts as fresh. A drive without a valid status for longer is lost.
+    pub max_age: Duration,
+}
+
+impl Default for Periods {
+    /// 0.5 s running, 1 s at rest, 10 s for the slow set, stale after 3 s.
+    fn default() -> Self {
+        Self {
+            running: Duration::from_millis(500),
+            rest: Duration::from_secs(1),
+            slow: Duration::from_secs(10),
+            max_age: Duration::from_secs(3),
+        }
+    }
+}
+
+/// How long the commands of a drive may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Times {
+    /// From the call until it is sent; what is not sent by then never is (rule 2).
+    pub lifetime: Duration,
+    /// From sending until the drive's words show that it took effect: run command in force, fault gone, and where an
+    /// answer was lost the time to find out.
+    pub effect: Duration,
+    /// From then until the reference is reached.
+    pub reference: Duration,
+    /// From a stop until standstill.
+    pub standstill: Duration,
+    /// How long a stop may go without a confirmation before it raises an alarm.
+    pub stop_alarm: Duration,
+}
+
+impl Default for Times {
+    /// 1 s until sent, 2 s until in effect, 60 s to reach the reference and to stand still, an alarm after 2 s.
+    fn default() -> Self {
+        Self {
+            lifetime: Duration::from_secs(1),
+            effect: Duration::from_secs(2),
+            reference: Duration::from_secs(60),
+            standstill: Duration::from_secs(60),
+            stop_alarm: Duration::from_secs(2),
+        }
+    }
+}
+
+/// Measured values above which an event is raised. None of them stops anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Alarms {
+    /// The motor current.
+    pub current: Option<Current>,
+    /// The thermal state of the drive.
+    pub drive_thermal: Option<Percent>,
+    /// The thermal state of the motor.
+    pub motor_thermal: Option<Percent>,
+}
+
+/// The drive's own communication watchdog, as it has to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WatchdogContract {
+    /// The time without a message after which it acts.
+    pub timeout: Duration,
+    /// What it does then.
+    pub reaction: Reaction,
+}
+
+/// What happens to a drive when the fleet shuts down (rule 8).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum OnExit {
+    /// It is stopped if this fleet started it, and left as it is otherwise.
+    Stop(StopMode),
+    /// As [`Stop`](Self::Stop), and at standstill control is given back to the panel or the terminals.
+    Release(StopMode),
+    /// It is left as it is. Its own watchdog acts, if it is armed.
+    Leave,
+}
+
+impl Default for OnExit {
+    fn default() -> Self {
+        Self::Stop(StopMode::Ramp)
+    }
+}
+
+/// What happens to a drive that was lost. While it is lost nothing reaches it; this is for its return.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum OnLoss {
+    /// An event; its state is adopted when it returns.
+    #[default]
+    Report,
+    /// It is stopped as soon as it can be reached, whatever it does then.
+    Stop(StopMode),
+}
+
+/// What happens to a drive after a trip. It never starts again by itself (rule 5).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum OnFault {
+    /// An event; somebody resets it.
+    #[default]
+    Report,
+    /// The trip of its communication watchdog after a lost line is reset, once, when the line is back. Every other
+    /// trip waits for somebody.
+    ResetWatchdogTrip,
+}

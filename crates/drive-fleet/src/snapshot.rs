@@ -1,0 +1,192 @@
+//! What a fleet knows of a drive: [`Snapshot`], with the time of each value and a verdict on its age.
+
+use std::{collections::VecDeque, sync::Arc, time::Duration};
+
+use drive_core::{Faults, Identity, Measurements, Setpoint, Status, StopMode, Watchdog};
+use tokio::time::Instant;
+
+/// A value and when it was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Timed<T> {
+    /// The value.
+    pub value: Arc<T>,
+    /// When its answer came.
+    pub at: Instant,
+}
+
+impl<T> Timed<T> {
+    pub(crate) fn new(value: T, at: Instant) -> Self {
+        Self { value: Arc::new(value), at }
+    }
+
+    /// How old it is at `now`.
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.at)
+    }
+}
+
+/// Whether a drive answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Link {
+    /// It has not answered yet.
+    #[default]
+    Connecting,
+    /// It answers.
+    Connected,
+    /// It has answered and does not any more.
+    Lost,
+}
+
+/// The verdict on a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Freshness {
+    /// The drive answers and the status is young enough.
+    Fresh,
+    /// The status is older than the settings allow, or the drive does not answer.
+    Stale,
+    /// There has been no status yet.
+    Never,
+}
+
+/// What is known of which drive it is.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum IdentityCheck {
+    /// Not asked since it was connected.
+    #[default]
+    Unchecked,
+    /// It is the one that is remembered.
+    Same(Arc<Identity>),
+    /// The family cannot say what it is.
+    CannotSay,
+    /// It is another one. Motion is refused until somebody accepts that.
+    Changed {
+        /// What is remembered.
+        remembered: Arc<Identity>,
+        /// What it says now.
+        found: Arc<Identity>,
+    },
+}
+
+/// What is known of the drive's communication watchdog.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum WatchdogCheck {
+    /// The settings have no contract for it.
+    #[default]
+    NoContract,
+    /// Not read since the drive was connected.
+    Unchecked,
+    /// It is set otherwise and the motor turns, so it is set up at the next standstill.
+    WaitsForStandstill(Watchdog),
+    /// It is as the contract says.
+    Verified(Watchdog),
+    /// It cannot be brought to what the contract says.
+    Broken(String),
+}
+
+impl WatchdogCheck {
+    /// Whether motion may be asked for.
+    pub(crate) const fn allows_motion(&self) -> bool {
+        matches!(self, Self::NoContract | Self::Verified(_))
+    }
+}
+
+/// A stop that is not confirmed yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PendingStop {
+    /// By which mode.
+    pub mode: StopMode,
+    /// Since when.
+    pub since: Instant,
+    /// How often it was sent.
+    pub attempts: u32,
+    /// Whether the drive has shown that no run command is in force; what is missing then is standstill.
+    pub taken: bool,
+}
+
+/// A trip, with the statuses around it: the freeze-frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Trip {
+    /// When it was seen.
+    pub at: Instant,
+    /// The last status before it; `None` when the drive was already tripped when it was first seen.
+    pub before: Option<Timed<Status>>,
+    /// The first status that shows it.
+    pub status: Timed<Status>,
+    /// What the drive said about its faults, as soon as that has been read.
+    pub faults: Option<Arc<Faults>>,
+    /// For how long the drive had not been heard, when it must have tripped by its communication watchdog.
+    pub watchdog_after: Option<Duration>,
+}
+
+/// What was counted for a drive since the fleet started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub struct Counters {
+    /// Statuses that were due.
+    pub polls: u64,
+    /// Statuses that came.
+    pub answered: u64,
+    /// Statuses that did not come before the next was due.
+    pub missed: u64,
+    /// Answers that did not come, and those that were no good.
+    pub failures: u64,
+    /// How often it was lost.
+    pub lost: u64,
+    /// Trips.
+    pub trips: u64,
+    /// Saves to EEPROM that were asked for here.
+    pub saves: u64,
+}
+
+/// What a fleet knows of a drive at one moment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Snapshot {
+    /// The drive's name.
+    pub name: Arc<str>,
+    /// Whether it answers.
+    pub link: Link,
+    /// The fast set.
+    pub status: Option<Timed<Status>>,
+    /// The slow set.
+    pub measurements: Option<Timed<Measurements>>,
+    /// The setpoint that this fleet gave it last and it confirmed, as long as nothing else is known.
+    pub setpoint: Option<Setpoint>,
+    /// Which drive it is.
+    pub identity: IdentityCheck,
+    /// Its communication watchdog.
+    pub watchdog: WatchdogCheck,
+    /// A stop that is not confirmed yet.
+    pub stop: Option<PendingStop>,
+    /// Whether this fleet started the motor and has not seen it stand since.
+    pub started_here: bool,
+    /// The last trips, the newest last.
+    pub trips: Arc<VecDeque<Trip>>,
+    /// Counters.
+    pub counters: Counters,
+    /// The age beyond which a status is stale.
+    pub max_age: Duration,
+}
+
+impl Snapshot {
+    /// The verdict on the status at `now`.
+    #[must_use]
+    pub fn freshness(&self, now: Instant) -> Freshness {
+        match &self.status {
+            None => Freshness::Never,
+            Some(status) if self.link == Link::Connected && status.age(now) <= self.max_age => {
+                Freshness::Fresh
+            }
+            Some(_) => Freshness::Stale,
+        }
+    }
+
+    /// The status, if it is fresh at `now`.
+    #[must_use]
+    pub fn fresh_status(&self, now: Instant) -> Option<&Status> {
+        match self.freshness(now) {
+            Freshness::Fresh => self.status.as_ref().map(|status| &*status.value),
+            Freshness::Stale | Freshness::Never => None,
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! What is checked at each connect: which drive it is, and its communication watchdog.
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::{Capabilities, Error, ErrorKind, ExceptionMeaning, Identity, Result, Watchdog};
+use tokio::time::Instant;
+
+use crate::{
+    event::EventKind,
+    settings::{DriveSettings, WatchdogContract},
+    snapshot::{IdentityCheck, WatchdogCheck},
+    supervisor::Job,
+};
+
+/// Until a check that failed is tried again.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// The part of a watchdog's time after which it is fed by a frame of its own, if no poll has fed it: a half. The
+/// plan reckons with the same part.
+pub(crate) const FEED_PART: u32 = 2;
+
+#[derive(Debug)]
+pub(crate) struct Checks {
+    identity: IdentityCheck,
+    remembered: Option<Arc<Identity>>,
+    identity_at: Option<Instant>,
+    contract: Option<WatchdogContract>,
+    /// Whether the bus can set it.
+    settable: bool,
+    watchdog: WatchdogCheck,
+    watchdog_at: Option<Instant>,
+    /// The watchdog was verified at some time since the program started, so it acts while the drive is lost.
+    armed: bool,
+    heard: Option<Instant>,
+    feed_again: Option<Instant>,
+}
+
+impl Checks {
+    pub(crate) fn new(settings: &DriveSettings, capabilities: &Capabilities) -> Self {
+        let watchdog = match settings.watchdog {
+            Some(_) => WatchdogCheck::Unchecked,
+            None => WatchdogCheck::NoContract,
+        };
+        Self {
+            identity: IdentityCheck::Unchecked,
+            remembered: settings.identity.clone().map(Arc::new),
+            identity_at: None,
+            contract: settings.watchdog,
+            settable: capabilities.watchdog.is_some_and(|watchdog| watchdog.settable),
+            watchdog,
+            watchdog_at: None,
+            armed: false,
+            heard: None,
+            feed_again: None,
+        }
+    }
+
+    pub(crate) const fn identity(&self) -> &IdentityCheck {
+        &self.identity
+    }
+
+    pub(crate) const fn watchdog(&self) -> &WatchdogCheck {
+        &self.watchdog
+    }
+
+    /// The time of a watchdog that was seen armed.
+    pub(crate) fn armed_for(&self) -> Option<Duration> {
+        self.contract.filter(|_| self.armed).map(|contract| contract.timeout)
+    }
+
+    /// A connection begins: everything is checked anew.
+    pub(crate) fn connected(&mut self, now: Instant) {
+        self.identity = IdentityCheck::Unchecked;
+        self.identity_at = Some(now);
+        self.watchdog_at = Some(now);
+        if self.contract.is_some() {
+            self.watchdog = WatchdogCheck::Unchecked;
+        }
+    }
+
+    /// The drive received a frame and answered.
+    pub(crate) const fn heard(&mut self, now: Instant) {
+        self.heard = Some(now);
+        self.feed_again = None;
+    }
+
+    /// When the watchdog wants a frame of its own.
+    pub(crate) fn feed_at(&self) -> Option<Instant> {
+        let WatchdogCheck::Verified(Watchdog { timeout: Some(timeout), .. }) = self.watchdog else {
+            return None;
+        };
+        let at = self.heard? + timeout / FEED_PART;
+        Some(self.feed_again.map_or(at, |again| at.max(again)))
+    }
+
+    /// When a check is due.
+    pub(crate) fn wake_at(&self) -> Option<Instant> {
+        let identity = self.identity_at.filter(|_| self.identity == IdentityCheck::Unchecked);
+        let watchdog = self.watchdog_at.filter(|_| self.wants_watchdog());
+        [identity, watchdog, self.feed_at()].into_iter().flatten().min()
+    }
+
+    fn wants_watchdog(&self) -> bool {
+        matches!(self.watchdog, WatchdogCheck::Unchecked | WatchdogCheck::Broken(_))
+    }
+
+    /// The check that is due. The watchdog is written at standstill, and only to the drive that the settings are for.
+    pub(crate) fn job(&self, now: Instant, control: bool, stands: bool) -> Option<Job> {
+        self.identity_job(now).or_else(|| self.watchdog_job(now)).or_else(|| {
+            let waits = matches!(self.watchdog, WatchdogCheck::WaitsForStandstill(_));
+            let known = matches!(self.identity, IdentityCheck::Same(_) | IdentityCheck::CannotSay);
+            let due = self.watchdog_at.is_none_or(|at| at <= now);
+            self.arm().filter(|_| waits && known && due && control && stands)
+        })
+    }
+
+    /// The question which drive it is, if it is due.
+    pub(crate) fn identity_job(&self, now: Instant) -> Option<Job> {
+        let due = self.identity == IdentityCheck::Unchecked && self.identity_at.is_some_and(|at| at <= now);
+        due.then_some(Job::Identify)
+    }
+
+    /// The question how the watchdog is set, if it is due.
+    pub(crate) fn watchdog_job(&self, now: Instant) -> Option<Job> {
+        let due = self.wants_watchdog() && self.watchdog_at.is_some_and(|at| at <= now);
+        due.then_some(Job::Watchdog)
+    }
+
+    /// The job that sets the watchdog up.
+    pub(crate) fn arm(&self) -> Option<Job> {
+        self.contract.map(|contract| Job::ArmWatchdog(contract.timeout, contract.reaction))
+    }
+
+    pub(crate) fn handle_identity(&mut self, now: Instant, result: Result<Identity>) -> Option<EventKind> {
+        let found = match result {
+            Ok(identity) => Arc::new(identity),
+            Err(error) if cannot_say(&error) => {
+                self.identity = IdentityCheck::CannotSay;
+                return None;
+            }
+            Err(_) => {
+                self.identity_at = Some(now + AGAIN);
+                return None;
+            }
+        };
+        match &self.remembered {
+            Some(remembered) if *remembered != found => {
+                let remembered = Arc::clone(remembered);
+                self.identity =
+                    IdentityCheck::Changed { remembered: Arc::clone(&remembered), found: Arc::clone(&found) };
+                Some(EventKind::IdentityChanged { remembered, found })
+            }
+            _ => {
+                self.remembered = Some(Arc::clone(&found));
+                self.identity = IdentityCheck::Same(Arc::clone(&found));
+                Some(EventKind::Identified(found))
+            }
+        }
+    }
+
+    /// Takes what the drive says it is for right.
+    pub(crate) fn accept_identity(&mut self) {
+        if let IdentityCheck::Changed { found, .. } = &self.identity {
+            let found = Arc::clone(found);
+            self.remembered = Some(Arc::clone(&found));
+            self.identity = IdentityCheck::Same(found);
+        }
+    }
+
+    pub(crate) fn handle_watchdog(
+        &mut self,
+        now: Instant,
+        written: bool,
+        control: bool,
+        result: Result<Watchdog>,
+    ) -> Option<EventKind> {
+        let contract = self.contract?;
+        match result {
+            Ok(watchdog) if self.keeps(watchdog, contract) => {
+                self.armed = true;
+                self.watchdog = WatchdogCheck::Verified(watchdog);
+                Some(EventKind::WatchdogVerified { watchdog, written })
+            }
+            Ok(watchdog) if control && self.settable && !written => {
+                self.watchdog = WatchdogCheck::WaitsForStandstill(watchdog);
+                None
+            }
+            Ok(watchdog) => {
+                let reason = match (written, self.settable) {
+                    (true, _) => "it was written and reads back so",
+                    (false, true) => "the drive is only read",
+                    (false, false) => "the bus cannot set it, set it at the drive",
+                };
+                self.broken(now, format!("{}; {reason}", describe(watchdog, contract)))
+            }
+            // A read or a write that found no answer says nothing of the watchdog.
+            Err(Error::Port { .. }) => {
+                self.watchdog_at = Some(now + AGAIN);
+                self.watchdog = WatchdogCheck::Unchecked;
+                None
+            }
+            // While the motor turns the drive may refuse; it is tried again at standstill.
+            Err(Error::Exception { meaning: ExceptionMeaning::NotNow, .. } | Error::Refused { .. })
+                if written =>
+            {
+                self.watchdog_at = Some(now + AGAIN);
+                None
+            }
+            Err(error) => self.broken(now, error.to_string()),
+        }
+    }
+
+    /// Whether a watchdog is as the contract says. What the bus cannot set has the drive's own reaction.
+    fn keeps(&self, watchdog: Watchdog, contract: WatchdogContract) -> bool {
+        watchdog.timeout == Some(contract.timeout)
+            && (!self.settable || watchdog.reaction.is_none_or(|reaction| reaction == contract.reaction))
+    }
+
+    fn broken(&mut self, now: Instant, why: String) -> Option<EventKind> {
+        self.watchdog_at = Some(now + 10 * AGAIN);
+        let known = matches!(&self.watchdog, WatchdogCheck::Broken(before) if *before == why);
+        self.watchdog = WatchdogCheck::Broken(why.clone());
+        (!known).then_some(EventKind::WatchdogBroken(why))
+    }
+
+    pub(crate) fn handle_kept_alive(&mut self, now: Instant, answered: bool) {
+        if let (false, Some(contract)) = (answered, self.contract) {
+            self.feed_again = Some(now + contract.timeout / (2 * FEED_PART));
+        }
+    }
+}
+
+/// Whether a family or a drive has nothing to say of what it is.
+fn cannot_say(error: &Error) -> bool {
+    error.kind() == ErrorKind::Unsupported
+        || matches!(error, Error::Exception { meaning: ExceptionMeaning::NoSuchFunction, .. })
+}
+
+fn describe(watchdog: Watchdog, contract: WatchdogContract) -> String {
+    let is = watchdog.timeout.map_or_else(|| "off".to_owned(), |timeout| format!("{timeout:?}"));
+    let then = watchdog.reaction.map_or_else(String::new, |reaction| format!(", then {reaction}"));
+    format!(
+        "the watchdog is {is}{then}; the contract says {:?}, then {}",
+        contract.timeout, contract.reaction
+    )
+}

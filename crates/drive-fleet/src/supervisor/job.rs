@@ -1,0 +1,100 @@
+//! What the machine has done and what comes back.
+
+use std::time::Duration;
+
+use drive_core::{
+    Direction, Error, Faults, Identity, Measurements, Reaction, Result, Setpoint, Status, StopMode, Watchdog,
+};
+use tokio::time::Instant;
+
+/// What to do now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Talk to the drive.
+    Do {
+        job: Job,
+        /// How long its calls may wait until they are sent.
+        lifetime: Option<Duration>,
+        /// When to drop it, because something else must not wait for it.
+        until: Option<Instant>,
+    },
+    /// Wait for an order or this time.
+    Wait(Instant),
+    /// The exit is done.
+    Finished,
+}
+
+/// One call of the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Job {
+    Stop(StopMode),
+    Start(Direction),
+    SetSetpoint(Setpoint),
+    ResetFaults,
+    Release,
+    Persist,
+    ArmWatchdog(Duration, Reaction),
+    KeepAlive,
+    Status {
+        /// Whether what was read once is to be forgotten first.
+        anew: bool,
+    },
+    Identify,
+    Watchdog,
+    Faults,
+    Measurements,
+}
+
+impl Job {
+    /// Whether it only reads, and gives way to an order.
+    pub(crate) const fn is_poll(self) -> bool {
+        matches!(
+            self,
+            Self::KeepAlive
+                | Self::Status { .. }
+                | Self::Identify
+                | Self::Watchdog
+                | Self::Faults
+                | Self::Measurements
+        )
+    }
+}
+
+/// What a call of the drive gave.
+#[derive(Debug)]
+pub(crate) enum Reply {
+    Stopped(Result<Status>),
+    Started(Result<Status>),
+    Setpoint(Result<()>),
+    Reset(Result<Status>),
+    Released(Result<Status>),
+    Saved(Result<u32>),
+    KeptAlive(Result<()>),
+    Status(Result<Status>),
+    Identity(Result<Identity>),
+    Watchdog(Result<Watchdog>),
+    Faults(Result<Faults>),
+    Measurements(Result<Measurements>),
+}
+
+impl Reply {
+    /// The error, if it is one that tells of the line or the drive, and not of what the family has.
+    pub(crate) fn error(&self) -> Option<&Error> {
+        let error = match self {
+            Self::Stopped(result)
+            | Self::Started(result)
+            | Self::Reset(result)
+            | Self::Released(result)
+            | Self::Status(result) => result.as_ref().err(),
+            Self::Setpoint(result) | Self::KeptAlive(result) => result.as_ref().err(),
+            Self::Saved(result) => result.as_ref().err(),
+            Self::Identity(result) => result.as_ref().err(),
+            Self::Watchdog(result) => result.as_ref().err(),
+            Self::Faults(result) => result.as_ref().err(),
+            Self::Measurements(result) => result.as_ref().err(),
+        };
+        error.filter(|error| {
+            matches!(error, Error::Port { .. } | Error::Exception { .. } | Error::Answer { .. })
+        })
+    }
+}

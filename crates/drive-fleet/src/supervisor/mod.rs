@@ -1,0 +1,356 @@
+//! The supervisor of one drive: a pure machine. Time is an argument, it does no input or output.
+//!
+//! In: [`handle_order`](Supervisor::handle_order), [`handle_stop`](Supervisor::handle_stop),
+//! [`handle_exit`](Supervisor::handle_exit), [`handle_reply`](Supervisor::handle_reply). Out:
+//! [`next`](Supervisor::next) says what to do now, [`poll_output`](Supervisor::poll_output) what to tell whom,
+//! [`snapshot`](Supervisor::snapshot) what is known.
+
+pub(crate) mod checks;
+mod exit;
+mod job;
+mod observe;
+mod orders;
+mod pace;
+mod permission;
+mod stopping;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+use std::{
+    collections::{BTreeSet, VecDeque},
+    sync::Arc,
+    time::Duration,
+};
+
+use drive_core::{Capabilities, Error, ErrorKind, Measurements, PortError, Status};
+use tokio::time::Instant;
+
+pub(crate) use self::job::{Job, Reply, Step};
+use self::{
+    checks::Checks,
+    exit::Exit,
+    orders::{Active, Queued},
+    pace::Pace,
+    stopping::Stopping,
+};
+use crate::{
+    event::{EventKind, ExitAction},
+    limits::Given,
+    outcome::Outcome,
+    settings::DriveSettings,
+    snapshot::{Counters, IdentityCheck, Link, Snapshot, Timed, Trip, WatchdogCheck},
+};
+
+/// Names a caller that waits for an outcome.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct CallId(pub(crate) u64);
+
+/// Who asked for something.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Asker {
+    /// Somebody who waits for the outcome.
+    Caller { id: CallId, name: Arc<str> },
+    /// A policy of the settings.
+    Policy(&'static str),
+    /// The exit of the fleet.
+    Exit,
+}
+
+impl Asker {
+    fn name(&self) -> Arc<str> {
+        match self {
+            Self::Caller { name, .. } => Arc::clone(name),
+            Self::Policy(name) => Arc::from(*name),
+            Self::Exit => Arc::from("exit"),
+        }
+    }
+}
+
+/// What the machine wants told.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Output {
+    /// To everybody.
+    Event(EventKind),
+    /// To one caller.
+    Answer(CallId, Outcome),
+}
+
+/// The supervisor of one drive.
+#[derive(Debug)]
+pub(crate) struct Supervisor {
+    name: Arc<str>,
+    settings: DriveSettings,
+    capabilities: &'static Capabilities,
+    link: Link,
+    status: Option<Timed<Status>>,
+    measurements: Option<Timed<Measurements>>,
+    /// The setpoint that the drive confirmed last.
+    given: Option<Given>,
+    checks: Checks,
+    pace: Pace,
+    active: Option<Active>,
+    queue: VecDeque<Queued>,
+    stopping: Option<Stopping>,
+    exit: Exit,
+    started_here: bool,
+    exceeded: BTreeSet<&'static str>,
+    trips: Arc<VecDeque<Trip>>,
+    /// How often the last trip's explanation may still be asked for.
+    explanations: u8,
+    counters: Counters,
+    /// Since when there has been no valid status.
+    silent_since: Instant,
+    last_error: Option<Error>,
+    in_flight: Option<Job>,
+    /// A poll has given way to an order since the last status.
+    yielded: bool,
+    outputs: VecDeque<Output>,
+    changed: bool,
+}
+
+impl Supervisor {
+    pub(crate) fn new(now: Instant, settings: DriveSettings, capabilities: &'static Capabilities) -> Self {
+        Self {
+            name: Arc::from(settings.name.as_str()),
+            capabilities,
+            link: Link::Connecting,
+            status: None,
+            measurements: None,
+            given: None,
+            checks: Checks::new(&settings, capabilities),
+            pace: Pace::new(now, settings.periods),
+            active: None,
+            queue: VecDeque::new(),
+            stopping: None,
+            exit: Exit::No,
+            started_here: false,
+            exceeded: BTreeSet::new(),
+            trips: Arc::default(),
+            explanations: 0,
+            counters: Counters::default(),
+            silent_since: now,
+            last_error: None,
+            in_flight: None,
+            yielded: false,
+            outputs: VecDeque::new(),
+            changed: true,
+            settings,
+        }
+    }
+
+    /// The drive's name.
+    pub(crate) fn name(&self) -> Arc<str> {
+        Arc::clone(&self.name)
+    }
+
+    /// What to do now. A job that it gives is in flight until its reply or [`handle_dropped`](Self::handle_dropped).
+    pub(crate) fn next(&mut self, now: Instant) -> Step {
+        self.handle_time(now);
+        if let Exit::Done(_) = self.exit {
+            return Step::Finished;
+        }
+        let Some((job, until)) = self.choose(now) else {
+            return Step::Wait(self.wake_at(now));
+        };
+        let lifetime = self.lifetime(now, job);
+        self.in_flight = Some(job);
+        self.changed = true;
+        Step::Do { job, lifetime, until }
+    }
+
+    /// What is most urgent, and how long it may hold up the rest.
+    fn choose(&mut self, now: Instant) -> Option<(Job, Option<Instant>)> {
+        if let Some(job) = self.stop_job(now) {
+            return Some((job, None));
+        }
+        let feed_at = self.checks.feed_at();
+        // A stream of orders must not blind the fleet for the drive that it commands.
+        if self.pace.status_due() + self.settings.periods.rest <= now {
+            return Some((Job::Status { anew: self.link != Link::Connected }, feed_at));
+        }
+        if let Some(order) = self.order_job(now) {
+            return Some(order);
+        }
+        if self.link == Link::Connected && feed_at.is_some_and(|at| at <= now) {
+            return Some((Job::KeepAlive, None));
+        }
+        if self.pace.status_due() <= now {
+            return Some((Job::Status { anew: self.link != Link::Connected }, feed_at));
+        }
+        if self.link != Link::Connected {
+            return None;
+        }
+        let job = self.background_job(now)?;
+        let holds = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
+        Some((job, Some(feed_at.map_or(holds, |at| at.min(holds)))))
+    }
+
+    fn background_job(&self, now: Instant) -> Option<Job> {
+        if self.explanations > 0 {
+            return Some(Job::Faults);
+        }
+        if let Some(job) = self.checks.job(now, self.settings.control, self.stands()) {
+            return Some(job);
+        }
+        (self.pace.slow_due() <= now).then_some(Job::Measurements)
+    }
+
+    fn lifetime(&self, now: Instant, job: Job) -> Option<Duration> {
+        match job {
+            Job::Status { .. } => Some(self.pace.until_next(now, self.is_busy())),
+            Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+                Some(self.order_lifetime(now))
+            }
+            _ => None,
+        }
+    }
+
+    /// When something is to be done at the latest.
+    fn wake_at(&self, now: Instant) -> Instant {
+        let mut at = self.pace.status_due();
+        if self.link == Link::Connected {
+            at = at.min(self.pace.slow_due()).min(self.lost_at());
+            at = self.checks.wake_at().into_iter().fold(at, Instant::min);
+        }
+        let stop = self.stopping.as_ref().and_then(Stopping::wake_at);
+        let order = self.active.as_ref().and_then(Active::wake_at);
+        stop.into_iter().chain(order).fold(at, Instant::min).max(now)
+    }
+
+    fn handle_time(&mut self, now: Instant) {
+        if self.link != Link::Lost && now >= self.lost_at() {
+            self.lose(now);
+        }
+        self.check_stop_times(now);
+        self.check_order_times(now);
+        self.advance_exit(now);
+    }
+
+    fn lost_at(&self) -> Instant {
+        self.silent_since + self.settings.periods.max_age
+    }
+
+    /// The reply to the job in flight.
+    pub(crate) fn handle_reply(&mut self, now: Instant, reply: Reply) {
+        let job = self.in_flight.take();
+        self.changed = true;
+        if reply.error().is_none_or(|error| error.kind() == ErrorKind::Exception) {
+            self.checks.heard(now);
+        }
+        if let Some(error) = reply.error() {
+            self.counters.failures += 1;
+            self.last_error = Some(error.clone());
+            if is_gone(error) && self.link == Link::Connected {
+                self.lose(now);
+            }
+        }
+        match reply {
+            Reply::Status(result) => self.handle_status(now, result),
+            Reply::Measurements(result) => self.handle_measurements(now, result),
+            Reply::Faults(result) => self.handle_faults(result),
+            Reply::Identity(result) => {
+                if let Some(event) = self.checks.handle_identity(now, result) {
+                    self.emit(event);
+                }
+            }
+            Reply::Watchdog(result) => {
+                let armed = matches!(job, Some(Job::ArmWatchdog(..)));
+                let control = self.settings.control;
+                if let Some(event) = self.checks.handle_watchdog(now, armed, control, result) {
+                    self.emit(event);
+                }
+            }
+            Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
+            Reply::Stopped(result) => self.handle_stopped(now, result),
+            Reply::Setpoint(result) => self.handle_setpoint_reply(now, result),
+            Reply::Started(result) => self.handle_order_reply(now, result.map(Some)),
+            Reply::Reset(result) => self.handle_order_reply(now, result.map(Some)),
+            Reply::Released(result) => self.handle_order_reply(now, result.map(Some)),
+            Reply::Saved(result) => {
+                if let Ok(saves) = result {
+                    self.counters.saves = u64::from(saves);
+                }
+                self.handle_order_reply(now, result.map(|_| None));
+            }
+        }
+    }
+
+    /// The job in flight was dropped: because the machine asked for it, or because its time was over.
+    pub(crate) fn handle_dropped(&mut self) {
+        self.in_flight = None;
+    }
+
+    /// What is to be told, in order.
+    pub(crate) fn poll_output(&mut self) -> Option<Output> {
+        self.outputs.pop_front()
+    }
+
+    /// The snapshot, if anything changed since this was last asked.
+    pub(crate) fn take_snapshot(&mut self) -> Option<Snapshot> {
+        std::mem::take(&mut self.changed).then(|| self.snapshot())
+    }
+
+    /// What is known now.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            name: self.name(),
+            link: self.link,
+            status: self.status.clone(),
+            measurements: self.measurements.clone(),
+            setpoint: self.given.map(|given| given.setpoint),
+            identity: self.checks.identity().clone(),
+            watchdog: self.checks.watchdog().clone(),
+            stop: self.stopping.as_ref().map(Stopping::pending),
+            started_here: self.started_here,
+            trips: Arc::clone(&self.trips),
+            counters: self.counters,
+            max_age: self.settings.periods.max_age,
+        }
+    }
+
+    /// What was done at the exit, once it is.
+    pub(crate) fn exit_action(&self) -> Option<&ExitAction> {
+        match &self.exit {
+            Exit::Done(action) => Some(action),
+            _ => None,
+        }
+    }
+
+    fn emit(&mut self, kind: EventKind) {
+        self.changed = true;
+        self.outputs.push_back(Output::Event(kind));
+    }
+
+    /// Whether the drive's words show that the motor is not driven.
+    fn stands(&self) -> bool {
+        self.link == Link::Connected
+            && self.status.as_ref().is_some_and(|status| status.value.is_standstill())
+    }
+
+    /// Whether the drive is asked at the faster period.
+    fn is_busy(&self) -> bool {
+        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        self.link == Link::Connected && (moving || self.active.is_some() || self.stopping.is_some())
+    }
+
+    fn watchdog_allows_motion(&self) -> bool {
+        self.checks.watchdog().allows_motion()
+    }
+
+    fn identity_check(&self) -> &IdentityCheck {
+        self.checks.identity()
+    }
+
+    fn watchdog_check(&self) -> &WatchdogCheck {
+        self.checks.watchdog()
+    }
+}
+
+/// Whether an error says that the drive cannot be reached at all now.
+const fn is_gone(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::Port { problem: PortError::Offline { .. } | PortError::LineDown(_) | PortError::Closed, .. }
+    )
+}

@@ -1,0 +1,181 @@
+//! What a status tells: events, trips with their freeze-frame, loss and return.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use drive_core::{Control, Faults, Measurements, Result, Status};
+use tokio::time::Instant;
+
+use super::{Asker, Supervisor};
+use crate::{
+    event::{EventKind, Limit},
+    settings::{OnFault, OnLoss},
+    snapshot::{Link, Timed, Trip},
+};
+
+/// How many trips are kept for each drive.
+const TRIPS: usize = 16;
+/// How often the explanation of a trip is asked for.
+const EXPLANATIONS: u8 = 3;
+
+impl Supervisor {
+    pub(super) fn handle_status(&mut self, now: Instant, result: Result<Status>) {
+        let in_time = self.pace.status_ended(now, self.is_busy());
+        self.yielded = false;
+        self.counters.polls += 1;
+        match result {
+            Ok(status) => {
+                self.counters.answered += 1;
+                self.counters.missed += u64::from(!in_time);
+                self.accept_status(now, status);
+            }
+            Err(_) => self.counters.missed += 1,
+        }
+    }
+
+    /// Takes what the drive says now for true, whatever was thought of it before.
+    pub(super) fn accept_status(&mut self, now: Instant, status: Status) {
+        let was = self.link;
+        let before = self.status.take();
+        let status = Timed::new(status, now);
+        let silent_for = now.saturating_duration_since(self.silent_since);
+        self.silent_since = now;
+        self.status = Some(status.clone());
+        self.changed = true;
+        if was != Link::Connected {
+            self.link = Link::Connected;
+            self.given = None;
+            self.checks.connected(now);
+            self.pace.reconnected(now);
+            self.emit(EventKind::Connected(Arc::clone(&status.value)));
+        }
+        self.compare(before.as_ref().map(|before| &*before.value), &status.value);
+        if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
+            let armed_for = self.checks.armed_for().filter(|_| before.is_some());
+            let watchdog_after = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
+            self.record_trip(
+                now,
+                Trip { at: now, before, status: status.clone(), faults: None, watchdog_after },
+            );
+        }
+        if status.value.is_standstill() && !self.is_starting() {
+            self.started_here = false;
+        }
+        if status.value.control.is_some_and(|control| control != Control::Bus) {
+            // Whoever has control may give another reference.
+            self.given = None;
+        }
+        self.check_limit("current", {
+            let limit = self.settings.alarms.current;
+            status
+                .value
+                .current
+                .zip(limit)
+                .map(|(measured, limit)| (Limit::Current { measured, limit }, measured > limit))
+        });
+        if was == Link::Lost
+            && self.settings.control
+            && let OnLoss::Stop(mode) = self.settings.on_loss
+        {
+            self.begin_stop(now, Asker::Policy("on loss"), mode, self.settings.times.stop_alarm);
+        }
+        self.judge_stop(now);
+        self.judge_order(now);
+        if self.is_busy() {
+            self.pace.quicken(now);
+        }
+    }
+
+    fn compare(&mut self, before: Option<&Status>, status: &Status) {
+        if let Some(before) = before {
+            if before.state != status.state {
+                self.emit(EventKind::StateChanged { from: before.state, to: status.state });
+            }
+            if before.is_fault() && !status.is_fault() {
+                self.emit(EventKind::FaultCleared);
+            }
+        }
+        let warned = before.and_then(|before| before.warning).unwrap_or(false);
+        if let Some(present) = status.warning
+            && present != warned
+        {
+            self.emit(EventKind::Warning { present });
+        }
+        let controlled = before.and_then(|before| before.control).unwrap_or(Control::Bus);
+        match status.control {
+            Some(Control::Bus) if controlled != Control::Bus => self.emit(EventKind::ControlReturned),
+            Some(control) if control != Control::Bus && control != controlled => {
+                self.emit(EventKind::ControlTaken(control));
+            }
+            _ => {}
+        }
+    }
+
+    fn record_trip(&mut self, now: Instant, trip: Trip) {
+        self.counters.trips += 1;
+        self.explanations = EXPLANATIONS;
+        self.emit(EventKind::Tripped(Box::new(trip.clone())));
+        let by_watchdog = trip.watchdog_after.is_some();
+        let trips: &mut VecDeque<Trip> = Arc::make_mut(&mut self.trips);
+        if trips.len() == TRIPS {
+            trips.pop_front();
+        }
+        trips.push_back(trip);
+        self.end_order_by_trip();
+        if by_watchdog && self.settings.control && self.settings.on_fault == OnFault::ResetWatchdogTrip {
+            self.enqueue_reset(now);
+        }
+    }
+
+    pub(super) fn handle_faults(&mut self, result: Result<Faults>) {
+        let Ok(faults) = result else {
+            self.explanations = self.explanations.saturating_sub(1);
+            return;
+        };
+        self.explanations = 0;
+        let trips = Arc::make_mut(&mut self.trips);
+        let Some(trip) = trips.back_mut() else { return };
+        trip.faults = Some(Arc::new(faults));
+        let explained = trip.clone();
+        self.emit(EventKind::TripExplained(Box::new(explained)));
+    }
+
+    pub(super) fn handle_measurements(&mut self, now: Instant, result: Result<Measurements>) {
+        self.pace.slow_ended(now);
+        let result = self.judge_reference(now, result);
+        let Ok(measurements) = result else { return };
+        let alarms = self.settings.alarms;
+        self.check_limit("drive thermal", {
+            measurements
+                .drive_thermal
+                .zip(alarms.drive_thermal)
+                .map(|(measured, limit)| (Limit::DriveThermal { measured, limit }, measured > limit))
+        });
+        self.check_limit("motor thermal", {
+            measurements
+                .motor_thermal
+                .zip(alarms.motor_thermal)
+                .map(|(measured, limit)| (Limit::MotorThermal { measured, limit }, measured > limit))
+        });
+        self.measurements = Some(Timed::new(measurements, now));
+        self.changed = true;
+    }
+
+    fn check_limit(&mut self, name: &'static str, measured: Option<(Limit, bool)>) {
+        let Some((limit, exceeded)) = measured else { return };
+        let changed = if exceeded { self.exceeded.insert(name) } else { self.exceeded.remove(name) };
+        if changed {
+            self.emit(EventKind::Limit { limit, exceeded });
+        }
+    }
+
+    /// There is no valid status any more.
+    pub(super) fn lose(&mut self, now: Instant) {
+        self.link = Link::Lost;
+        self.counters.lost += 1;
+        let silent_for = now.saturating_duration_since(self.silent_since);
+        self.emit(EventKind::Lost { silent_for, error: self.last_error.clone() });
+        self.given = None;
+        self.explanations = 0;
+        self.end_orders_by_loss();
+    }
+}

@@ -1,0 +1,246 @@
+//! Orders: checked, sent once within their lifetime, and followed until the drive's own words show what became of them.
+
+use std::{collections::VecDeque, time::Duration};
+
+use drive_core::Error;
+use tokio::time::Instant;
+
+use super::{Asker, Job, Supervisor, permission::Blocked};
+use crate::outcome::{Order, Outcome, Refused, Unconfirmed};
+
+/// How many orders of one drive may wait.
+pub(super) const QUEUE: usize = 16;
+/// An order that waits.
+#[derive(Debug)]
+pub(super) struct Queued {
+    pub(super) asker: Asker,
+    pub(super) order: Order,
+    pub(super) issued: Instant,
+}
+
+/// The order that is being carried out.
+#[derive(Debug)]
+pub(super) struct Active {
+    asker: Asker,
+    pub(super) order: Order,
+    /// When its lifetime is over.
+    expires: Instant,
+    /// The setpoint of a start has been given.
+    pub(super) setpoint_given: bool,
+    /// A fresh status was asked for on its behalf.
+    pub(super) hurried: bool,
+    /// The watchdog was written on its behalf.
+    pub(super) armed: bool,
+    /// Why it could not be sent yet.
+    blocked: Option<Refused>,
+    pub(super) phase: Phase,
+}
+
+#[derive(Debug)]
+pub(super) enum Phase {
+    /// Nothing was sent yet, or not all.
+    Prepare,
+    /// A job of it is in flight.
+    Sending(Job),
+    /// An answer of this job was lost or denied it: the drive is asked.
+    Verifying { job: Job, error: Error, until: Instant, again: Instant, seen: bool },
+    /// In force; on its way to the reference.
+    Awaiting { since: Instant, until: Instant },
+}
+
+impl Active {
+    pub(super) fn wake_at(&self) -> Option<Instant> {
+        match self.phase {
+            Phase::Prepare => Some(self.expires),
+            Phase::Sending(_) => None,
+            Phase::Verifying { job: Job::SetSetpoint(_), until, again, .. } => Some(until.min(again)),
+            Phase::Verifying { until, .. } | Phase::Awaiting { until, .. } => Some(until),
+        }
+    }
+
+    /// How it ends when something comes in between.
+    fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
+        match &self.phase {
+            Phase::Prepare if !self.setpoint_given => Outcome::Refused(unsent),
+            _ => Outcome::NotConfirmed(sent),
+        }
+    }
+}
+
+impl Supervisor {
+    /// Somebody commands the drive. Gives whether the job in flight has to be dropped for it.
+    pub(crate) fn handle_order(&mut self, now: Instant, asker: Asker, order: Order) -> bool {
+        self.changed = true;
+        if let Some(refused) = self.refuse_at_once(&asker, &order) {
+            self.conclude(asker, order.command(), Outcome::Refused(refused));
+            return false;
+        }
+        if matches!(order, Order::Setpoint { .. }) {
+            self.supersede_setpoints();
+        }
+        self.enqueue(Queued { asker, order, issued: now });
+        // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
+        let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
+        self.yielded |= gives_way;
+        gives_way
+    }
+
+    /// Only the latest setpoint counts; what is not yet sent gives its place away.
+    fn supersede_setpoints(&mut self) {
+        let is_setpoint = |order: &Order| matches!(order, Order::Setpoint { .. });
+        let (older, rest): (VecDeque<_>, VecDeque<_>) =
+            std::mem::take(&mut self.queue).into_iter().partition(|queued| is_setpoint(&queued.order));
+        self.queue = rest;
+        for queued in older {
+            self.conclude(queued.asker, queued.order.command(), Outcome::Refused(Refused::Superseded));
+        }
+        let replaced = self.active.take_if(|active| {
+            is_setpoint(&active.order) && matches!(active.phase, Phase::Prepare | Phase::Verifying { .. })
+        });
+        if let Some(active) = replaced {
+            let outcome = active.ended_by(Refused::Superseded, Unconfirmed::Superseded);
+            self.conclude(active.asker, active.order.command(), outcome);
+        }
+    }
+
+    pub(super) fn enqueue(&mut self, queued: Queued) {
+        self.queue.push_back(queued);
+    }
+
+    pub(super) fn enqueue_reset(&mut self, now: Instant) {
+        self.enqueue(Queued { asker: Asker::Policy("on fault"), order: Order::ResetFaults, issued: now });
+    }
+
+    /// Whether a start is being carried out.
+    pub(super) fn is_starting(&self) -> bool {
+        self.active.as_ref().is_some_and(|active| {
+            matches!(active.order, Order::Start { .. }) && !matches!(active.phase, Phase::Prepare)
+        })
+    }
+
+    /// How long the calls of the order in flight may wait.
+    pub(super) fn order_lifetime(&self, now: Instant) -> Duration {
+        let expires = self.active.as_ref().map_or(now, |active| active.expires);
+        expires.saturating_duration_since(now)
+    }
+
+    /// The job that the orders want next, and how long it may take.
+    pub(super) fn order_job(&mut self, now: Instant) -> Option<(Job, Option<Instant>)> {
+        loop {
+            let next_waits = !self.queue.is_empty();
+            if let Some(active) =
+                self.active.take_if(|active| next_waits && matches!(active.phase, Phase::Awaiting { .. }))
+            {
+                let outcome = Outcome::NotConfirmed(Unconfirmed::Superseded);
+                self.conclude(active.asker, active.order.command(), outcome);
+            }
+            if self.active.is_none() {
+                let Queued { asker, order, issued } = self.queue.pop_front()?;
+                self.active = Some(Active {
+                    asker,
+                    order,
+                    expires: issued + self.settings.times.lifetime,
+                    setpoint_given: false,
+                    hurried: false,
+                    armed: false,
+                    blocked: None,
+                    phase: Phase::Prepare,
+                });
+            }
+            let active = self.active.as_ref()?;
+            match &active.phase {
+                Phase::Prepare => {}
+                Phase::Verifying { job: Job::SetSetpoint(_), until, again, .. } if *again <= now => {
+                    return Some((Job::Measurements, Some(*until)));
+                }
+                Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => return None,
+            }
+            let (order, expires) = (active.order, active.expires);
+            if expires <= now {
+                let blocked = active.blocked.clone();
+                self.end_order(blocked.map_or(Outcome::Expired, Outcome::Refused));
+                continue;
+            }
+            match self.allow(now, order) {
+                Ok(Some(job)) => {
+                    self.started_here |= matches!(job, Job::Start(_));
+                    self.set_phase(Phase::Sending(job));
+                    return Some((job, None));
+                }
+                Ok(None) => self.end_order(Outcome::Confirmed),
+                Err(Blocked::Refused(refused)) => self.end_order(Outcome::Refused(refused)),
+                Err(Blocked::Needs(job, refused)) => {
+                    self.block(refused);
+                    return Some((job, Some(expires)));
+                }
+                Err(Blocked::Waits(refused)) => {
+                    self.block(refused);
+                    return None;
+                }
+            }
+        }
+    }
+
+    pub(super) fn set_phase(&mut self, phase: Phase) {
+        if let Some(active) = &mut self.active {
+            active.phase = phase;
+        }
+    }
+
+    fn block(&mut self, refused: Refused) {
+        if let Some(active) = &mut self.active {
+            active.blocked = Some(refused);
+        }
+    }
+
+    pub(super) fn end_order(&mut self, outcome: Outcome) {
+        if let Some(active) = self.active.take() {
+            self.conclude(active.asker, active.order.command(), outcome);
+        }
+    }
+
+    pub(super) fn end_orders_by_stop(&mut self) {
+        self.end_active(Refused::Stopped, Unconfirmed::Stopped);
+        self.end_queue(&Refused::Stopped);
+    }
+
+    pub(super) fn end_orders_by_loss(&mut self) {
+        if let Some(Active { phase: Phase::Verifying { error, .. }, .. }) = &self.active {
+            let outcome = Outcome::OutcomeUnknown(error.clone());
+            self.end_order(outcome);
+        }
+        // The reply to what is in flight is still to come, and may tell more.
+        if !self.active.as_ref().is_some_and(|active| matches!(active.phase, Phase::Sending(_))) {
+            self.end_active(Refused::NotConnected, Unconfirmed::Lost);
+        }
+        self.end_queue(&Refused::NotConnected);
+    }
+
+    /// The drive has tripped: a motion order that was sent is over.
+    pub(super) fn end_order_by_trip(&mut self) {
+        let ends = self.active.as_ref().is_some_and(|active| {
+            active.order.is_motion()
+                && matches!(active.phase, Phase::Verifying { .. } | Phase::Awaiting { .. })
+        });
+        if ends {
+            self.end_order(Outcome::NotConfirmed(Unconfirmed::Tripped));
+        }
+    }
+
+    pub(super) fn refuse_queue(&mut self) {
+        self.end_queue(&Refused::ShutDown);
+    }
+
+    fn end_active(&mut self, unsent: Refused, sent: Unconfirmed) {
+        if let Some(active) = &self.active {
+            let outcome = active.ended_by(unsent, sent);
+            self.end_order(outcome);
+        }
+    }
+
+    fn end_queue(&mut self, refused: &Refused) {
+        for queued in std::mem::take(&mut self.queue) {
+            self.conclude(queued.asker, queued.order.command(), Outcome::Refused(refused.clone()));
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Connecting, losing, tripping, feeding.
+
+use super::*;
+
+#[test]
+fn a_connect_reads_the_state_then_the_identity_then_the_watchdog_and_only_then_arms_it() {
+    let mut rig = Rig::controlled();
+    rig.pass(200 * MS);
+    let arm = Job::ArmWatchdog(CONTRACT.timeout, CONTRACT.reaction);
+    assert_eq!(rig.drive.log[..4], [Job::Status { anew: true }, Job::Identify, Job::Watchdog, arm]);
+    assert_eq!(rig.events(), ["connected", "identified", "watchdog verified"]);
+}
+
+#[test]
+fn a_running_drive_is_adopted_without_a_write() {
+    let mut rig = Rig::controlled();
+    rig.drive.run();
+    rig.pass(60_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+    assert!(!rig.machine.snapshot().started_here);
+    assert!(matches!(rig.machine.snapshot().watchdog, WatchdogCheck::WaitsForStandstill(_)));
+}
+
+#[test]
+fn a_drive_that_is_only_read_is_never_written() {
+    let mut rig = Rig::new(DriveSettings { control: false, ..settings() });
+    rig.drive.run();
+    rig.pass(2_000 * MS);
+    let start = rig.order(START);
+    let stop = rig.stop(StopMode::Ramp);
+    rig.machine.handle_exit(rig.now);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::ReadOnly)));
+    assert_eq!(rig.outcome(stop), Some(&Outcome::Refused(Refused::ReadOnly)));
+    assert_eq!(rig.machine.exit_action(), Some(&ExitAction::Left));
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn another_drive_at_the_address_is_not_moved_until_it_is_accepted() {
+    let mut rig = Rig::ready();
+    rig.drive.failing = Some(PortError::Offline { retry_in: 500 * MS });
+    rig.pass(2_000 * MS);
+    rig.drive =
+        Paper { identity: Identity { model: Some("two".to_owned()), ..Identity::default() }, ..Paper::new() };
+    rig.pass(3_000 * MS);
+    assert!(rig.events().contains(&"identity changed"));
+    let start = rig.order(START);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::IdentityChanged)));
+    assert_eq!(rig.drive.writes(), []);
+    let accept = rig.order(Order::AcceptIdentity);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(accept), Some(&Outcome::Confirmed));
+    let start = rig.order(START);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Confirmed));
+}
+
+#[test]
+fn nothing_restarts_after_a_loss_a_trip_or_a_reset() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+    rig.pass(10_000 * MS);
+    rig.drive.failing = None;
+    rig.drive.trip(18);
+    rig.pass(10_000 * MS);
+    let reset = rig.order(Order::ResetFaults);
+    rig.pass(10_000 * MS);
+    assert_eq!(rig.outcome(reset), Some(&Outcome::Confirmed));
+    assert_eq!(rig.drive.writes(), [Job::ResetFaults]);
+    assert_eq!(rig.drive.status.state, State::Ready);
+}
+
+#[test]
+fn a_trip_after_a_lost_line_is_told_as_the_watchdogs_and_reset_once_by_policy() {
+    for (policy, resets) in [(OnFault::Report, 0), (OnFault::ResetWatchdogTrip, 1)] {
+        let mut rig = Rig::ready();
+        rig.machine.settings.on_fault = policy;
+        rig.order(START);
+        rig.pass(1_000 * MS);
+        rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+        rig.pass(10_000 * MS);
+        rig.drive.failing = None;
+        rig.drive.trip(18);
+        rig.pass(10_000 * MS);
+        let snapshot = rig.machine.snapshot();
+        let trip = snapshot.trips.back().unwrap();
+        assert!(trip.watchdog_after.unwrap() >= CONTRACT.timeout);
+        assert_eq!(trip.before.as_ref().unwrap().value.state, State::Running, "the frame before the trip");
+        assert_eq!(trip.status.value.fault_code, Some(18));
+        assert_eq!(rig.drive.writes().iter().filter(|job| **job == Job::ResetFaults).count(), resets);
+    }
+}
+
+#[test]
+fn a_trip_without_a_lost_line_is_not_the_watchdogs() {
+    let mut rig = Rig::ready();
+    rig.machine.settings.on_fault = OnFault::ResetWatchdogTrip;
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.trip(4);
+    rig.pass(5_000 * MS);
+    let snapshot = rig.machine.snapshot();
+    assert_eq!(snapshot.trips.back().unwrap().watchdog_after, None);
+    assert_eq!(rig.drive.status.state, State::Fault);
+    assert!(rig.drive.log.contains(&Job::Faults), "its explanation is read");
+    assert!(rig.events().contains(&"trip explained"));
+}
+
+#[test]
+fn the_last_trips_are_kept_and_their_number_is_bounded() {
+    let mut rig = Rig::ready();
+    for code in 0..40 {
+        rig.drive.trip(code);
+        rig.pass(1_500 * MS);
+        rig.drive.stand();
+        rig.pass(1_500 * MS);
+    }
+    let snapshot = rig.machine.snapshot();
+    assert_eq!(snapshot.trips.len(), 16);
+    assert_eq!(snapshot.trips.back().unwrap().status.value.fault_code, Some(39));
+    assert_eq!(snapshot.counters.trips, 40);
+}
+
+#[test]
+fn a_drive_that_is_lost_is_told_once_and_stopped_on_return_where_the_policy_says_so() {
+    for (policy, stops) in [(OnLoss::Report, 0), (OnLoss::Stop(StopMode::Ramp), 1)] {
+        let mut rig = Rig::ready();
+        rig.machine.settings.on_loss = policy;
+        rig.order(START);
+        rig.pass(1_000 * MS);
+        rig.drive.log.clear();
+        rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+        rig.pass(30_000 * MS);
+        assert_eq!(rig.events().iter().filter(|name| **name == "lost").count(), 1);
+        rig.drive.failing = None;
+        rig.pass(5_000 * MS);
+        assert_eq!(rig.drive.writes().len(), stops);
+    }
+}
+
+#[test]
+fn a_watchdog_is_fed_by_a_frame_of_its_own_when_no_poll_does() {
+    let mut rig = Rig::new(DriveSettings {
+        periods: crate::settings::Periods { rest: 2_500 * MS, slow: Duration::ZERO, ..Default::default() },
+        ..settings()
+    });
+    rig.pass(500 * MS);
+    rig.drive.log.clear();
+    rig.pass(20_000 * MS);
+    assert!(rig.drive.log.iter().filter(|job| **job == Job::KeepAlive).count() >= 8, "{:?}", rig.drive.log);
+}
+
+#[test]
+fn a_stream_of_orders_does_not_blind_the_fleet() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(200 * MS);
+    rig.drive.log.clear();
+    for hertz in 0..500 {
+        rig.order(setpoint(hertz % 50));
+        rig.pass(20 * MS);
+    }
+    let statuses = rig.drive.log.iter().filter(|job| matches!(job, Job::Status { .. })).count();
+    assert!(statuses >= 6, "{statuses} statuses in 10 s");
+}
+
+#[test]
+fn control_that_panel_or_terminals_take_is_told_and_told_when_it_is_back() {
+    let mut rig = Rig::ready();
+    rig.drive.status.control = Some(Control::Panel);
+    rig.pass(2_000 * MS);
+    rig.drive.status.control = Some(Control::Bus);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.events(), ["control taken", "control returned"]);
+}
+
+#[test]
+fn a_watchdog_that_reads_back_otherwise_forbids_motion() {
+    let mut rig = Rig::controlled();
+    rig.pass(60 * MS);
+    rig.machine
+        .handle_reply(rig.now, Reply::Watchdog(Err(Error::Unsupported { what: "watchdog", reason: "none" })));
+    let id = rig.order(START);
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::WatchdogUnverified)));
+}

@@ -1,0 +1,277 @@
+//! The machine alone: a made-up drive answers what it is asked, time is a number.
+
+mod connection;
+mod orders;
+mod stops;
+
+use drive_core::{
+    Command, Control, Direction, Exchange, Frequency, Identity, Measurements, PortError, Reaction, Refusal,
+    Result, SlaveAddress, State, StopMode, Watchdog,
+};
+
+use super::*;
+use crate::{
+    limits::{Band, FrequencyLimits},
+    outcome::{Order, Refused, Unconfirmed, Until},
+    settings::{Commanders, OnExit, OnFault, OnLoss, WatchdogContract},
+    testing::CAPABILITIES,
+};
+
+const MS: Duration = Duration::from_millis(1);
+const CONTRACT: WatchdogContract =
+    WatchdogContract { timeout: Duration::from_secs(2), reaction: Reaction::Ramp };
+
+/// A drive of paper: what it is, and whether it answers.
+struct Paper {
+    status: Status,
+    identity: Identity,
+    watchdog: Watchdog,
+    reference: Option<drive_core::Setpoint>,
+    /// The error of every job while it lasts.
+    failing: Option<PortError>,
+    /// A command is carried out and its answer is lost, once.
+    loses_answer: bool,
+    /// What a run command does; `false`: nothing.
+    obeys: bool,
+    log: Vec<Job>,
+}
+
+fn slave() -> SlaveAddress {
+    SlaveAddress::try_from(1).unwrap()
+}
+
+fn port_error(problem: PortError) -> Error {
+    Error::Port { slave: slave(), exchange: Exchange { function: 3, register: Some(3201) }, problem }
+}
+
+impl Paper {
+    fn new() -> Self {
+        Self {
+            status: Status {
+                state: State::Ready,
+                output_frequency: Some(Frequency::ZERO),
+                control: Some(Control::Bus),
+                at_reference: Some(false),
+                ..Status::default()
+            },
+            identity: Identity { model: Some("one".to_owned()), ..Identity::default() },
+            watchdog: Watchdog { timeout: None, reaction: None },
+            reference: None,
+            failing: None,
+            loses_answer: false,
+            obeys: true,
+            log: Vec::new(),
+        }
+    }
+
+    fn run(&mut self) {
+        let reference = self.reference;
+        self.status.state = State::Running;
+        self.status.at_reference = Some(true);
+        self.status.output_frequency = match reference {
+            Some(drive_core::Setpoint::Frequency(frequency)) => Some(frequency),
+            _ => Some(Frequency::from_hertz(10)),
+        };
+    }
+
+    fn stand(&mut self) {
+        self.status.state = State::Ready;
+        self.status.at_reference = Some(false);
+        self.status.output_frequency = Some(Frequency::ZERO);
+    }
+
+    fn trip(&mut self, code: u16) {
+        self.stand();
+        self.status.state = State::Fault;
+        self.status.fault_code = Some(code);
+    }
+
+    fn result<T>(&mut self, value: T) -> Result<T> {
+        if std::mem::take(&mut self.loses_answer) {
+            return Err(port_error(PortError::OutcomeUnknown("no answer")));
+        }
+        match &self.failing {
+            Some(problem) => Err(port_error(problem.clone())),
+            None => Ok(value),
+        }
+    }
+
+    fn status(&mut self) -> Result<Status> {
+        let status = self.status.clone();
+        self.result(status)
+    }
+
+    fn answer(&mut self, job: Job) -> Reply {
+        self.log.push(job);
+        let reached = self.failing.is_none();
+        match job {
+            Job::Stop(_) => {
+                if reached && self.obeys {
+                    self.stand();
+                }
+                Reply::Stopped(self.status())
+            }
+            Job::Start(direction) => {
+                if self.status.is_fault() {
+                    let reason = Refusal::Tripped;
+                    let command = Command::Start(direction);
+                    return Reply::Started(Err(Error::Refused { slave: slave(), command, reason }));
+                }
+                if reached && self.obeys {
+                    self.run();
+                    self.status.direction = Some(direction);
+                }
+                Reply::Started(self.status())
+            }
+            Job::SetSetpoint(setpoint) => {
+                if reached && self.obeys {
+                    self.reference = Some(setpoint);
+                    if self.status.state == State::Running {
+                        self.run();
+                    }
+                }
+                Reply::Setpoint(self.result(()))
+            }
+            Job::ResetFaults => {
+                if reached && self.obeys {
+                    self.stand();
+                    self.status.fault_code = None;
+                }
+                Reply::Reset(self.status())
+            }
+            Job::Release => {
+                self.status.control = Some(Control::Terminals);
+                Reply::Released(self.status())
+            }
+            Job::Persist => Reply::Saved(self.result(1)),
+            Job::ArmWatchdog(timeout, reaction) => {
+                if reached {
+                    self.watchdog = Watchdog { timeout: Some(timeout), reaction: Some(reaction) };
+                }
+                let watchdog = self.watchdog;
+                Reply::Watchdog(self.result(watchdog))
+            }
+            Job::KeepAlive => Reply::KeptAlive(self.result(())),
+            Job::Status { .. } => Reply::Status(self.status()),
+            Job::Identify => {
+                let identity = self.identity.clone();
+                Reply::Identity(self.result(identity))
+            }
+            Job::Watchdog => {
+                let watchdog = self.watchdog;
+                Reply::Watchdog(self.result(watchdog))
+            }
+            Job::Faults => Reply::Faults(self.result(drive_core::Faults::default())),
+            Job::Measurements => {
+                let measurements = Measurements { reference: self.reference, ..Measurements::default() };
+                Reply::Measurements(self.result(measurements))
+            }
+        }
+    }
+
+    /// Jobs that write.
+    fn writes(&self) -> Vec<Job> {
+        self.log.iter().copied().filter(|job| !job.is_poll()).collect()
+    }
+}
+
+/// The machine, the drive and the time.
+struct Rig {
+    machine: Supervisor,
+    drive: Paper,
+    now: Instant,
+    outputs: Vec<Output>,
+    next_call: u64,
+}
+
+impl Rig {
+    fn new(settings: DriveSettings) -> Self {
+        let now = Instant::now();
+        let machine = Supervisor::new(now, settings, &CAPABILITIES);
+        Self { machine, drive: Paper::new(), now, outputs: Vec::new(), next_call: 0 }
+    }
+
+    fn controlled() -> Self {
+        Self::new(settings())
+    }
+
+    /// A drive that has been connected, identified and whose watchdog is verified.
+    fn ready() -> Self {
+        let mut rig = Self::controlled();
+        rig.pass(1_500 * MS);
+        rig.outputs.clear();
+        rig.drive.log.clear();
+        rig
+    }
+
+    /// Lets the machine work for a time; each job takes 20 ms.
+    fn pass(&mut self, time: Duration) {
+        let until = self.now + time;
+        let mut turns = 0;
+        while self.now < until {
+            turns += 1;
+            assert!(turns < 10_000, "the machine spins at {:?}", self.machine);
+            match self.machine.next(self.now) {
+                Step::Do { job, .. } => {
+                    self.now += 20 * MS;
+                    let reply = self.drive.answer(job);
+                    self.machine.handle_reply(self.now, reply);
+                }
+                Step::Wait(at) => self.now = at.clamp(self.now + Duration::from_micros(1), until),
+                Step::Finished => self.now = until,
+            }
+            while let Some(output) = self.machine.poll_output() {
+                self.outputs.push(output);
+            }
+        }
+    }
+
+    fn asker(&mut self) -> Asker {
+        self.next_call += 1;
+        Asker::Caller { id: CallId(self.next_call), name: Arc::from("tester") }
+    }
+
+    fn order(&mut self, order: Order) -> CallId {
+        let asker = self.asker();
+        self.machine.handle_order(self.now, asker, order);
+        CallId(self.next_call)
+    }
+
+    fn stop(&mut self, mode: StopMode) -> CallId {
+        let asker = self.asker();
+        if self.machine.handle_stop(self.now, asker, mode, None) {
+            self.machine.handle_dropped();
+        }
+        CallId(self.next_call)
+    }
+
+    fn outcome(&self, id: CallId) -> Option<&Outcome> {
+        self.outputs.iter().find_map(|output| match output {
+            Output::Answer(answered, outcome) if *answered == id => Some(outcome),
+            _ => None,
+        })
+    }
+
+    fn events(&self) -> Vec<&'static str> {
+        let names = self.outputs.iter().filter_map(|output| match output {
+            Output::Event(kind) => Some(kind.name()),
+            Output::Answer(..) => None,
+        });
+        names.collect()
+    }
+}
+
+fn settings() -> DriveSettings {
+    DriveSettings { watchdog: Some(CONTRACT), ..DriveSettings::controlled("pump") }
+}
+
+const START: Order = Order::Start { direction: Direction::Forward, setpoint: None, until: Until::InForce };
+
+fn run_at(hertz: u16) -> Order {
+    let setpoint = Some(Frequency::from_hertz(hertz).into());
+    Order::Start { direction: Direction::Forward, setpoint, until: Until::AtReference }
+}
+
+fn setpoint(hertz: u16) -> Order {
+    Order::Setpoint { setpoint: Frequency::from_hertz(hertz).into(), until: Until::InForce }
+}

@@ -1,0 +1,142 @@
+//! Orders and their outcomes.
+
+use super::*;
+
+#[test]
+fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
+    let mut rig = Rig::ready();
+    let id = rig.order(run_at(40));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    let setpoint = Frequency::from_hertz(40).into();
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint), Job::Start(Direction::Forward)]);
+    assert!(rig.machine.snapshot().started_here);
+    assert_eq!(rig.machine.snapshot().setpoint, Some(setpoint));
+}
+
+#[test]
+fn an_order_that_was_not_sent_in_its_lifetime_expires_and_is_never_sent() {
+    let mut rig = Rig::ready();
+    let id = rig.order(START);
+    rig.now += 1_001 * MS;
+    rig.pass(20_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Expired));
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn a_start_whose_answer_was_lost_is_read_back_and_confirmed() {
+    let mut rig = Rig::ready();
+    rig.drive.loses_answer = true;
+    let id = rig.order(START);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)], "it is not written twice");
+}
+
+#[test]
+fn a_start_that_the_drive_denies_is_not_confirmed_and_not_repeated() {
+    let mut rig = Rig::ready();
+    rig.drive.loses_answer = true;
+    rig.drive.obeys = false;
+    let id = rig.order(START);
+    rig.pass(5_000 * MS);
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(Unconfirmed::Denied(_)))));
+    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)]);
+}
+
+#[test]
+fn a_start_whose_drive_goes_mute_has_an_unknown_outcome() {
+    let mut rig = Rig::ready();
+    let id = rig.order(START);
+    rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+    rig.pass(5_000 * MS);
+    assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(id));
+    rig.drive.failing = None;
+    rig.pass(20_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)], "nothing is replayed");
+}
+
+#[test]
+fn a_setpoint_whose_answer_was_lost_is_read_back() {
+    for (obeys, confirmed) in [(true, true), (false, false)] {
+        let mut rig = Rig::ready();
+        rig.drive.reference = Some(Frequency::from_hertz(10).into());
+        rig.drive.loses_answer = true;
+        rig.drive.obeys = obeys;
+        let id = rig.order(setpoint(30));
+        rig.pass(1_000 * MS);
+        assert_eq!(rig.outcome(id).map(Outcome::is_confirmed), Some(confirmed));
+        assert!(rig.drive.log.contains(&Job::Measurements));
+    }
+}
+
+#[test]
+fn only_the_latest_setpoint_that_was_not_sent_is_sent() {
+    let mut rig = Rig::ready();
+    let ids = [20, 30, 40].map(|hertz| rig.order(setpoint(hertz)));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(ids[0]), Some(&Outcome::Refused(Refused::Superseded)));
+    assert_eq!(rig.outcome(ids[1]), Some(&Outcome::Refused(Refused::Superseded)));
+    assert_eq!(rig.outcome(ids[2]), Some(&Outcome::Confirmed));
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(Frequency::from_hertz(40).into())]);
+}
+
+#[test]
+fn motion_is_refused_without_connection_fault_free_state_control_or_permission() {
+    let refused_after = |prepare: fn(&mut Rig), expected: Refused| {
+        let mut rig = Rig::ready();
+        prepare(&mut rig);
+        rig.pass(2_000 * MS);
+        rig.drive.log.clear();
+        let id = rig.order(START);
+        rig.pass(1_500 * MS);
+        assert_eq!(rig.drive.writes(), []);
+        assert_eq!(rig.outcome(id), Some(&Outcome::Refused(expected)));
+    };
+    refused_after(
+        |rig| rig.drive.failing = Some(PortError::Offline { retry_in: 500 * MS }),
+        Refused::NotConnected,
+    );
+    refused_after(|rig| rig.drive.trip(7), Refused::Tripped(Some(7)));
+    refused_after(
+        |rig| rig.drive.status.control = Some(Control::Panel),
+        Refused::NotInControl(Control::Panel),
+    );
+    refused_after(|rig| rig.drive.status.state = State::Unknown, Refused::State(State::Unknown));
+    refused_after(
+        |rig| rig.machine.settings.commanders = Commanders::Only(vec!["operator".to_owned()]),
+        Refused::Commander("tester".to_owned()),
+    );
+}
+
+#[test]
+fn limits_and_bands_refuse_a_setpoint_before_anything_is_sent() {
+    let limits = FrequencyLimits {
+        high: Some(Frequency::from_hertz(45)),
+        forbidden: vec![Band { low: Frequency::from_hertz(20), high: Frequency::from_hertz(25) }],
+        ..FrequencyLimits::default()
+    };
+    let mut rig = Rig::new(DriveSettings { limits, ..settings() });
+    rig.pass(1_500 * MS);
+    rig.drive.log.clear();
+    let ids = [run_at(50), run_at(22), START].map(|order| rig.order(order));
+    rig.pass(500 * MS);
+    for id in ids {
+        assert!(
+            matches!(rig.outcome(id), Some(Outcome::Refused(Refused::Limit(_)))),
+            "{:?}",
+            rig.outcome(id)
+        );
+    }
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn an_overloaded_queue_says_so() {
+    let mut rig = Rig::ready();
+    let ids: Vec<_> = (0..20).map(|_| rig.order(Order::ResetFaults)).collect();
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(ids[19]), Some(&Outcome::Refused(Refused::QueueFull)));
+    assert_eq!(rig.outcome(ids[0]), Some(&Outcome::Confirmed));
+}

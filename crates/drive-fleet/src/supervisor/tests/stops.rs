@@ -1,0 +1,100 @@
+//! Stops and the exit.
+
+use super::*;
+
+#[test]
+fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
+    let mut rig = Rig::ready();
+    let start = rig.order(START);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
+    let waiting = rig.order(Order::Persist);
+    let asker = rig.asker();
+    assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, None));
+    rig.machine.handle_dropped();
+    let stop = CallId(rig.next_call);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
+    let reply = rig.drive.answer(Job::Stop(StopMode::Ramp));
+    rig.machine.handle_reply(rig.now, reply);
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::NotConfirmed(Unconfirmed::Stopped)));
+    assert_eq!(rig.outcome(waiting), Some(&Outcome::Refused(Refused::Stopped)));
+    assert_eq!(rig.outcome(stop), Some(&Outcome::Confirmed));
+}
+
+#[test]
+fn a_stop_is_repeated_until_the_drive_shows_standstill() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    let id = rig.stop(StopMode::Ramp);
+    rig.pass(10_000 * MS);
+    assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))));
+    assert!(rig.events().contains(&"stop unconfirmed"));
+    assert_eq!(rig.events().iter().filter(|name| **name == "stop unconfirmed").count(), 1);
+    let attempts = rig.drive.writes().len();
+    assert!(attempts >= 10, "{attempts}");
+    let start = rig.order(START);
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::StopPending)));
+    rig.drive.failing = None;
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"));
+    assert_eq!(rig.drive.status.state, State::Ready);
+    assert_eq!(rig.machine.snapshot().stop, None);
+}
+
+#[test]
+fn a_stop_that_the_drive_takes_back_is_sent_again() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    let id = rig.stop(StopMode::Ramp);
+    // The drive takes the stop, comes down, and is started by somebody else before it stands.
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    let stopping = Status { state: State::Stopping, ..rig.drive.status.clone() };
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopping)));
+    assert_eq!(rig.outcome(id), None);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+}
+
+#[test]
+fn a_stop_mode_that_the_family_lacks_is_replaced_by_the_ramp() {
+    let mut rig = Rig::ready();
+    let id = rig.stop(StopMode::DcInjection);
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+    assert!(rig.events().contains(&"stop mode replaced"));
+}
+
+#[test]
+fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
+    for (started, policy, expected) in [
+        (true, OnExit::Stop(StopMode::Ramp), ExitAction::Stopped(Outcome::Confirmed)),
+        (false, OnExit::Stop(StopMode::Ramp), ExitAction::Left),
+        (true, OnExit::Leave, ExitAction::Left),
+        (true, OnExit::Release(StopMode::Ramp), ExitAction::Released(Outcome::Confirmed)),
+        (false, OnExit::Release(StopMode::Ramp), ExitAction::Left),
+    ] {
+        let mut rig = Rig::ready();
+        rig.machine.settings.on_exit = policy;
+        if started {
+            rig.order(START);
+        } else {
+            rig.drive.run();
+        }
+        rig.pass(2_000 * MS);
+        rig.drive.log.clear();
+        rig.machine.handle_exit(rig.now);
+        rig.machine.handle_dropped();
+        rig.pass(5_000 * MS);
+        assert_eq!(rig.machine.exit_action(), Some(&expected), "{started} {policy:?}");
+        if expected == ExitAction::Left {
+            assert_eq!(rig.drive.writes(), []);
+        }
+    }
+}

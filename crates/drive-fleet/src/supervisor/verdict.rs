@@ -1,0 +1,220 @@
+//! What became of an order: the drive's own words decide (rule 3).
+
+use std::time::Duration;
+
+use drive_core::{
+    Control, Direction, Error, ErrorKind, Frequency, Measurements, PortError, Result, Setpoint, State, Status,
+};
+use tokio::time::Instant;
+
+use super::{
+    Job, Supervisor,
+    orders::{Active, Phase},
+};
+use crate::{
+    limits::Given,
+    outcome::{Order, Outcome, Refused, Unconfirmed, Until},
+};
+
+/// Until a reference is read back again after that has failed.
+const READ_AGAIN: Duration = Duration::from_millis(100);
+/// How far the output may be from a setpoint that it has reached by its frequency alone.
+const NEAR: Frequency = Frequency::from_centihertz(50);
+/// The same where the drive itself says that it is at its reference: its slip compensation moves the output.
+const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
+
+impl Supervisor {
+    pub(super) fn handle_setpoint_reply(&mut self, now: Instant, result: Result<()>) {
+        let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint)), .. }) = self.active else {
+            return;
+        };
+        match result {
+            Ok(()) => self.setpoint_given(now, setpoint),
+            Err(error) => {
+                self.given = None;
+                match error.kind() {
+                    ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::Exception => {
+                        self.end_order(Outcome::Refused(Refused::Drive(error)));
+                    }
+                    _ => self.verify(now, Job::SetSetpoint(setpoint), error),
+                }
+            }
+        }
+    }
+
+    /// The drive holds the setpoint.
+    fn setpoint_given(&mut self, now: Instant, setpoint: Setpoint) {
+        self.given = Some(Given { setpoint, at: now });
+        let Some(active) = &mut self.active else { return };
+        active.setpoint_given = true;
+        match active.order {
+            Order::Setpoint { until: Until::InForce, .. } => self.end_order(Outcome::Confirmed),
+            Order::Setpoint { .. } => self.await_reference(now),
+            _ => active.phase = Phase::Prepare,
+        }
+    }
+
+    fn await_reference(&mut self, now: Instant) {
+        let until = now + self.settings.times.reference;
+        self.set_phase(Phase::Awaiting { since: now, until });
+        self.pace.quicken(now);
+    }
+
+    fn verify(&mut self, now: Instant, job: Job, error: Error) {
+        let until = now + self.settings.times.effect;
+        self.set_phase(Phase::Verifying { job, error, until, again: now, seen: false });
+        if !matches!(job, Job::SetSetpoint(_)) {
+            self.pace.hurry(now);
+        }
+    }
+
+    /// The reply to a start, a reset, a release or a save.
+    pub(super) fn handle_order_reply(&mut self, now: Instant, result: Result<Option<Status>>) {
+        let Some(Active { phase: Phase::Sending(job), order, .. }) = self.active else {
+            if let Ok(Some(status)) = result {
+                self.accept_status(now, status);
+            }
+            return;
+        };
+        match result {
+            Ok(status) => {
+                match order {
+                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
+                    _ => self.end_order(Outcome::Confirmed),
+                }
+                if let Some(status) = status {
+                    self.accept_status(now, status);
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
+                self.end_order(Outcome::Refused(Refused::Drive(error)));
+            }
+            Err(error) if job == Job::Persist => self.end_order(match error.kind() {
+                ErrorKind::Exception => Outcome::Refused(Refused::Drive(error)),
+                ErrorKind::NotConfirmed => Outcome::NotConfirmed(Unconfirmed::Denied(error)),
+                // A save is an edge and cannot be read back.
+                _ => Outcome::OutcomeUnknown(error),
+            }),
+            Err(error) => {
+                let status = match &error {
+                    Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
+                    _ => None,
+                };
+                self.verify(now, job, error);
+                if let Some(status) = status {
+                    self.accept_status(now, status);
+                }
+            }
+        }
+    }
+
+    /// What a new status says of the order under way.
+    pub(super) fn judge_order(&mut self, now: Instant) {
+        let Some(status) = self.status.as_ref().map(|status| status.value.clone()) else { return };
+        let given = self.given.map(|given| given.setpoint);
+        let Some(active) = &mut self.active else { return };
+        match &mut active.phase {
+            Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(_), .. } => {}
+            Phase::Awaiting { .. } => {
+                if has_reached(given, &status) {
+                    self.end_order(Outcome::Confirmed);
+                }
+            }
+            Phase::Verifying { job, error, seen, .. } => {
+                *seen = true;
+                if shows(*job, &status) {
+                    match active.order {
+                        Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
+                        _ => self.end_order(Outcome::Confirmed),
+                    }
+                } else if let Some(outcome) = denied(error) {
+                    self.end_order(outcome);
+                }
+            }
+        }
+    }
+
+    /// What the reference that was read back says of a setpoint whose answer was lost.
+    pub(super) fn judge_reference(
+        &mut self,
+        now: Instant,
+        result: Result<Measurements>,
+    ) -> Result<Measurements> {
+        let Some(Active {
+            phase: Phase::Verifying { job: Job::SetSetpoint(asked), error, again, .. }, ..
+        }) = &mut self.active
+        else {
+            return result;
+        };
+        let (asked, error) = (*asked, error.clone());
+        match &result {
+            Err(_) => *again = now + READ_AGAIN,
+            Ok(Measurements { reference: Some(reference), .. }) if *reference == asked => {
+                self.setpoint_given(now, asked);
+            }
+            Ok(Measurements { reference: Some(_), .. }) => {
+                let unconfirmed = Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()));
+                self.end_order(denied(&error).unwrap_or(unconfirmed));
+            }
+            Ok(_) => self.end_order(Outcome::OutcomeUnknown(error)),
+        }
+        result
+    }
+
+    pub(super) fn check_order_times(&mut self, now: Instant) {
+        let Some(active) = &self.active else { return };
+        let outcome = match &active.phase {
+            Phase::Verifying { error, until, seen, .. } if *until <= now => {
+                if *seen {
+                    Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()))
+                } else {
+                    Outcome::OutcomeUnknown(error.clone())
+                }
+            }
+            Phase::Awaiting { since, until } if *until <= now => {
+                let after = now.saturating_duration_since(*since);
+                let status = self.status.as_ref().map(|status| status.value.clone());
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, status })
+            }
+            _ => return,
+        };
+        self.end_order(outcome);
+    }
+}
+
+/// Whether a status shows what a job was to bring about.
+fn shows(job: Job, status: &Status) -> bool {
+    match job {
+        Job::Start(direction) => {
+            status.state == State::Running
+                && status.direction.is_none_or(|shown: Direction| shown == direction)
+        }
+        Job::ResetFaults => !status.is_fault(),
+        Job::Release => status.control.is_some_and(|control| control != Control::Bus),
+        _ => false,
+    }
+}
+
+/// How an order ends at once that the drive denies, by why its answer was missing.
+fn denied(error: &Error) -> Option<Outcome> {
+    match error {
+        Error::Port { problem: PortError::Expired, .. } => Some(Outcome::Expired),
+        error if matches!(error.kind(), ErrorKind::NotSent | ErrorKind::Exception) => {
+            Some(Outcome::Refused(Refused::Drive(error.clone())))
+        }
+        _ => None,
+    }
+}
+
+fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
+    if status.state != State::Running || status.at_reference == Some(false) {
+        return false;
+    }
+    let near = if status.at_reference.is_some() { NEAR_WITH_SLIP } else { NEAR };
+    match (setpoint, status.output_frequency) {
+        (Some(Setpoint::Frequency(setpoint)), Some(output)) => {
+            output.centihertz().abs_diff(setpoint.centihertz()) <= near.centihertz()
+        }
+        _ => status.at_reference == Some(true),
+    }
+}

@@ -1,0 +1,219 @@
+//! The task of one drive: it owns the conversation and does what the supervisor says.
+
+use std::{collections::BTreeMap, pin::pin, sync::Arc, time::Duration};
+
+use drive_core::{Drive, Setpoint, StopMode};
+use tokio::{
+    sync::{broadcast, mpsc, oneshot, watch},
+    time::{Instant, sleep_until},
+};
+
+use crate::{
+    event::{Event, ExitAction},
+    outcome::{Order, Outcome, Refused},
+    snapshot::Snapshot,
+    supervisor::{Asker, CallId, Job, Output, Reply, Step, Supervisor},
+};
+
+/// What waits its turn.
+#[derive(Debug)]
+pub(crate) enum Message {
+    /// An order.
+    Order { order: Order, name: Arc<str>, reply: oneshot::Sender<Outcome> },
+    /// The question whether a start would be sent now.
+    Unready { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Option<Refused>> },
+}
+
+/// What waits for nothing.
+#[derive(Debug)]
+pub(crate) enum Urgent {
+    /// A stop.
+    Stop {
+        mode: StopMode,
+        name: Arc<str>,
+        /// Until its lack of confirmation is an alarm; `None`: as the settings say.
+        patience: Option<Duration>,
+        reply: oneshot::Sender<Outcome>,
+    },
+    /// The fleet shuts down.
+    Exit,
+    /// The time for shutting down is over.
+    ExitTimeOver,
+}
+
+/// The task of one drive.
+pub(crate) struct Task {
+    pub(crate) drive: Box<dyn Drive>,
+    pub(crate) desk: Desk,
+    pub(crate) messages: mpsc::Receiver<Message>,
+    pub(crate) urgent: mpsc::UnboundedReceiver<Urgent>,
+}
+
+impl Task {
+    /// Runs until the fleet has shut down, or nobody holds it any more.
+    pub(crate) async fn run(self) {
+        let Self { mut drive, mut desk, mut messages, mut urgent } = self;
+        let mut open = true;
+        loop {
+            let step = desk.supervisor.next(Instant::now());
+            desk.publish();
+            let (call, until) = match step {
+                Step::Finished => break,
+                Step::Wait(until) => (None, Some(until)),
+                Step::Do { job, lifetime, until } => (Some(carry_out(&mut *drive, job, lifetime)), until),
+            };
+            let talking = call.is_some();
+            let mut call = pin!(async {
+                match call {
+                    Some(call) => call.await,
+                    None => std::future::pending().await,
+                }
+            });
+            let mut timer = pin!(async {
+                match until {
+                    Some(until) => sleep_until(until).await,
+                    None => std::future::pending().await,
+                }
+            });
+            // A stop is looked at before everything else, an order before the answer of a poll.
+            loop {
+                let drops = tokio::select! {
+                    biased;
+                    message = urgent.recv() => match message {
+                        Some(message) => desk.handle_urgent(message),
+                        None => return,
+                    },
+                    message = messages.recv(), if open => match message {
+                        Some(message) => desk.handle_message(message),
+                        None => {
+                            open = false;
+                            continue;
+                        }
+                    },
+                    reply = &mut call => {
+                        desk.supervisor.handle_reply(Instant::now(), reply);
+                        break;
+                    }
+                    () = &mut timer => true,
+                };
+                if drops || !talking {
+                    desk.supervisor.handle_dropped();
+                    break;
+                }
+                desk.publish();
+            }
+        }
+    }
+}
+
+/// The supervisor and those who wait for its words.
+pub(crate) struct Desk {
+    pub(crate) supervisor: Supervisor,
+    pub(crate) events: broadcast::Sender<Event>,
+    pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
+    pub(crate) exit: watch::Sender<Option<ExitAction>>,
+    pub(crate) callers: BTreeMap<CallId, oneshot::Sender<Outcome>>,
+    pub(crate) next_call: u64,
+}
+
+impl Desk {
+    fn handle_message(&mut self, message: Message) -> bool {
+        let now = Instant::now();
+        match message {
+            Message::Order { order, name, reply } => {
+                let asker = self.caller(name, reply);
+                self.supervisor.handle_order(now, asker, order)
+            }
+            Message::Unready { name, setpoint, reply } => {
+                let _ = reply.send(self.supervisor.unready(now, &name, setpoint));
+                false
+            }
+        }
+    }
+
+    fn handle_urgent(&mut self, message: Urgent) -> bool {
+        let now = Instant::now();
+        match message {
+            Urgent::Stop { mode, name, patience, reply } => {
+                // A stop may be pending for hours; only those who still wait for it are kept.
+                self.callers.retain(|_, caller| !caller.is_closed());
+                let callers = &self.callers;
+                self.supervisor.forget_callers(|id| !callers.contains_key(&id));
+                let asker = self.caller(name, reply);
+                self.supervisor.handle_stop(now, asker, mode, patience)
+            }
+            Urgent::Exit => self.supervisor.handle_exit(now),
+            Urgent::ExitTimeOver => {
+                self.supervisor.handle_exit_time_over();
+                true
+            }
+        }
+    }
+
+    fn caller(&mut self, name: Arc<str>, reply: oneshot::Sender<Outcome>) -> Asker {
+        let id = CallId(self.next_call);
+        self.next_call += 1;
+        self.callers.insert(id, reply);
+        Asker::Caller { id, name }
+    }
+
+    /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.
+    fn publish(&mut self) {
+        if let Some(snapshot) = self.supervisor.take_snapshot() {
+            self.snapshots.send_replace(Arc::new(snapshot));
+        }
+        while let Some(output) = self.supervisor.poll_output() {
+            match output {
+                Output::Event(kind) => {
+                    let drive = self.supervisor.name();
+                    if kind.is_alarm() {
+                        tracing::warn!(%drive, "{kind}");
+                    } else {
+                        tracing::info!(%drive, "{kind}");
+                    }
+                    // Without a reader there is nobody to tell.
+                    let _ = self.events.send(Event { drive, at: Instant::now(), kind });
+                }
+                Output::Answer(id, outcome) => {
+                    if let Some(caller) = self.callers.remove(&id) {
+                        let _ = caller.send(outcome);
+                    }
+                }
+            }
+        }
+        if let Some(action) = self.supervisor.exit_action() {
+            self.exit.send_replace(Some(action.clone()));
+        }
+    }
+}
+
+async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
+    let lifetimes = drive.lifetimes_mut();
+    match job {
+        Job::Status { .. } => lifetimes.status = lifetime,
+        Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+            lifetimes.command = lifetime;
+        }
+        _ => {}
+    }
+    match job {
+        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
+        Job::Start(direction) => Reply::Started(drive.start(direction).await),
+        Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
+        Job::ResetFaults => Reply::Reset(drive.reset_faults().await),
+        Job::Release => Reply::Released(drive.release().await),
+        Job::Persist => Reply::Saved(drive.persist().await),
+        Job::ArmWatchdog(timeout, reaction) => Reply::Watchdog(drive.arm_watchdog(timeout, reaction).await),
+        Job::KeepAlive => Reply::KeptAlive(drive.keep_alive().await),
+        Job::Status { anew } => {
+            if anew {
+                drive.forget();
+            }
+            Reply::Status(drive.status().await)
+        }
+        Job::Identify => Reply::Identity(drive.identify().await),
+        Job::Watchdog => Reply::Watchdog(drive.watchdog().await),
+        Job::Faults => Reply::Faults(drive.faults().await),
+        Job::Measurements => Reply::Measurements(drive.measurements().await),
+    }
+}
