@@ -79,7 +79,7 @@ registers! {
     LFT: Read(457, "LFt", "last fault", Unknown, Unit::CODE, Range::OneOf(lists::LFT), Factory::None, Elsewhere, "BBV51701 p. 57; twin W7121, p. 24");
     ETA: Read(458, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3201, p. 21");
     ETI: Read(459, "ETI", "extended status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3206, p. 22");
-    ETI2: Read(460, "ETI2", "second extended status word; its bits are in no document we have", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57, which refers to the ATV28 variables manual");
+    ETI2: Read(460, "ETI2", "second extended status word; its bits are not public", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57, which refers to the ATV28 variables manual");
     DP1: Read(462, "DP1", "past fault 1", Unknown, Unit::CODE, Range::OneOf(lists::LFT), Factory::None, Elsewhere, "BBV51701 p. 57; twin W7201, p. 24");
     DP2: Read(464, "DP2", "past fault 2", Unknown, Unit::CODE, Range::OneOf(lists::LFT), Factory::None, Elsewhere, "BBV51701 p. 57; twin W7202, p. 24");
     DP3: Read(466, "DP3", "past fault 3", Unknown, Unit::CODE, Range::OneOf(lists::LFT), Factory::None, Elsewhere, "BBV51701 p. 57; twin W7203, p. 24");
