@@ -10,15 +10,17 @@ use crate::{
     failure::Failure,
 };
 
-/// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones.
-///
-/// LINE is PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; speed and format are the
-/// drives' factory setting when they are not given. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as
-/// atv312@1-10,12.
-///
-/// Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input.
+/// What holds for all subcommands.
+const NOTES: &str = "\
+A line is PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; speed and format are the
+drives' factory setting when they are not given. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as
+atv312@1-10,12.
+
+Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input.";
+
+/// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones
 #[derive(Debug, Parser)]
-#[command(name = "drived", version, max_term_width = 100)]
+#[command(name = "drived", version, max_term_width = 100, after_help = NOTES)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

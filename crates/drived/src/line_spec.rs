@@ -8,6 +8,10 @@ use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, Seria
 
 use crate::drive_spec::DriveName;
 
+/// What a line is, for the help of `--line`.
+pub(crate) const HELP: &str =
+    "The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT";
+
 /// A line as a person names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LineSpec {

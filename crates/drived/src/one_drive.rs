@@ -6,14 +6,14 @@ use drive_core::{Drive, Error, ErrorKind};
 use crate::{
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
-    line_spec::LineSpec,
+    line_spec::{self, LineSpec},
 };
 
 /// `--line` and `--drive` of the subcommands that act on one drive.
 #[derive(Debug, clap::Args)]
 pub(crate) struct OneDriveArgs {
-    /// The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT
-    #[arg(long, value_name = "LINE")]
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "LINE", help = line_spec::HELP)]
     line: LineSpec,
     /// The drive, such as atv312@1
     #[arg(long, value_name = "FAMILY@ADDRESS")]

@@ -58,17 +58,17 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
 
 fn list(family: Family) -> Table {
     let mut table =
-        Table::new(["register", "mnemonic", "access", "kept in", "factory", "range", "name", "source"]);
+        Table::new(["register", "mnemonic", "name", "access", "kept in", "factory", "source", "range"]);
     for row in family.rows() {
         table.row([
             row.address.to_string(),
             row.code.to_owned(),
+            row.name.to_owned(),
             row.access.to_string(),
             row.storage.to_string(),
             factory(row),
-            range(row),
-            row.name.to_owned(),
             row.source.to_owned(),
+            range(row),
         ]);
     }
     table
@@ -152,7 +152,7 @@ fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
 }
 
 fn value_table() -> Table {
-    Table::new(["register", "mnemonic", "value", "access", "factory", "range", "name"])
+    Table::new(["register", "mnemonic", "value", "name", "access", "factory", "range"])
 }
 
 fn value_cells(row: &Row, value: String) -> [String; 7] {
@@ -160,10 +160,10 @@ fn value_cells(row: &Row, value: String) -> [String; 7] {
         row.address.to_string(),
         row.code.to_owned(),
         value,
+        row.name.to_owned(),
         row.access.to_string(),
         factory(row),
         range(row),
-        row.name.to_owned(),
     ]
 }
 

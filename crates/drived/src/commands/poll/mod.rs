@@ -16,7 +16,7 @@ use crate::{
     drive_spec::{self, DriveName, DriveSpec},
     duration::Time,
     failure::Failure,
-    line_spec::LineSpec,
+    line_spec::{self, LineSpec},
     one_drive, output,
     signals::Ending,
 };
@@ -33,8 +33,8 @@ const NOT_SENT_PAUSE: Duration = Duration::from_millis(100);
 /// included. Exit code 1 when a drive has not answered once.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT
-    #[arg(long, value_name = "LINE")]
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "LINE", help = line_spec::HELP)]
     line: LineSpec,
     /// Drives, such as atv312@1-10,12; may be given several times
     #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", required = true)]
