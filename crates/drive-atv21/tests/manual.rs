@@ -17,8 +17,8 @@ use drive_atv21::{
 };
 use drive_bus::{Line, LineConfig};
 use drive_core::{
-    Class, Direction, Drive, Error, ExceptionMeaning, Fault, Frequency, Percent, Registers, SerialSettings,
-    SlaveAddress, State, StopMode,
+    Class, Direction, Drive, Error, ExceptionMeaning, Fault, Frequency, Percent, Power, Registers,
+    SerialSettings, SlaveAddress, State, StopMode,
     registers::{Confidence, Factory, Storage},
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
@@ -262,7 +262,7 @@ fn the_models_are_those_of_8_9() {
             assert_eq!(model.reference, expected.as_deref());
             let powers: Vec<_> =
                 power.split('/').map(|kw| (kw.parse::<f64>().unwrap() * 100.0) as i32).collect();
-            assert_eq!(model.powers().map(|power| power.decawatts()).collect::<Vec<_>>(), powers);
+            assert_eq!(model.powers().map(Power::decawatts).collect::<Vec<_>>(), powers);
             let two_hundred = reference.ends_with("M3X") || code == "2";
             assert_eq!(model.voltage == drive_atv21::VoltageClass::V200, two_hundred);
             known += 1;

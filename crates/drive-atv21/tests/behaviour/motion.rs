@@ -1,0 +1,216 @@
+//! Starts, stops, resets, setpoints, and who may.
+
+use std::time::Duration;
+
+use drive_atv21::{Alarms, Authority, CommandWord};
+use drive_core::{
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, SetpointProblem, Speed, State, StopMode,
+};
+use drive_sim::{Panel, models::atv21::Atv21 as Model};
+
+use crate::support::{HALF_SPEED, Rig, SECOND, refusal, state};
+
+#[tokio::test(start_paused = true)]
+async fn it_starts_reverses_and_stops_along_the_ramp() {
+    let (rig, mut drive) = Rig::factory();
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.state, status.control), (State::Ready, Some(Control::Terminals)));
+    rig.at_speed(&mut drive).await;
+    let status = drive.status().await.unwrap();
+    assert_eq!(state(&status), (State::Running, Some(Direction::Forward)));
+    assert_eq!((status.output_frequency, status.control), (Some(HALF_SPEED), Some(Control::Bus)));
+    drive.start(Direction::Reverse).await.unwrap();
+    rig.until(|seen| seen.output_frequency == -2_500).await;
+    let status = drive.status().await.unwrap();
+    assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    rig.until(|seen| !seen.running).await;
+    let status = drive.status().await.unwrap();
+    assert!(status.is_standstill(), "{status}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_confirmed_by_its_order_where_run_shows_until_standstill() {
+    let (rig, mut drive) = Rig::new(Model::new().running_until_standstill());
+    rig.at_speed(&mut drive).await;
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    drive.start(Direction::Reverse).await.unwrap();
+    rig.until(|seen| seen.output_frequency < 0).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn freewheel_and_dc_injection_hold_until_the_next_command() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().state, State::Disabled);
+    assert!(!rig.machine.observe().running);
+    rig.at_speed(&mut drive).await;
+    assert_eq!(drive.stop(StopMode::DcInjection).await.unwrap().state, State::Stopping);
+    rig.until(|seen| seen.shaft_frequency == 0).await;
+    assert!(rig.machine.observe().running, "the injection goes on at rest");
+    drive.stop(StopMode::Ramp).await.unwrap();
+    assert!(drive.status().await.unwrap().is_standstill());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_fast_stop_is_unsupported_and_sends_nothing() {
+    let (rig, mut drive) = Rig::factory();
+    assert_eq!(drive.stop(StopMode::Fast).await.unwrap_err().kind(), ErrorKind::Unsupported);
+    assert_eq!(rig.count(), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_emergency_stop_trips_once_and_leaves_no_edge() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    assert!(drive.emergency_stop().await.unwrap().is_fault());
+    assert_eq!((rig.machine.observe().trip, rig.machine.peek(0xFA00)), (Some(17), Some(0xC000)));
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::Fault(17));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_mute_after_a_reset_is_reported_as_unknown_and_found_reset_later() {
+    let (rig, mut drive) = Rig::factory();
+    rig.machine.trip(10);
+    assert_eq!(drive.status().await.unwrap().state, State::Fault);
+    let error = drive.reset_faults().await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    tokio::time::sleep(15 * SECOND).await;
+    assert_eq!(drive.status().await.unwrap().state, State::Ready);
+    assert_eq!(rig.machine.observe().trip, None);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_answers_at_once_is_seen_reset_and_does_not_start() {
+    let (rig, mut drive) = Rig::new(Model::new().restarting_in(Duration::ZERO));
+    rig.at_speed(&mut drive).await;
+    rig.machine.trip(14);
+    assert_eq!(drive.reset_faults().await.unwrap().state, State::Ready);
+    assert!(!rig.machine.observe().running);
+    assert_eq!(rig.machine.peek(0xFA00), Some(0xC000));
+    let resets =
+        rig.machine.received().iter().filter(|request| request.pdu[..] == [6, 0xFA, 0, 0xE0, 0]).count();
+    assert_eq!(resets, 1);
+    // Nothing to reset: nothing is written.
+    let writes = rig.machine.requests(6);
+    drive.reset_faults().await.unwrap();
+    assert_eq!(rig.machine.requests(6), writes);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_is_refused_while_somebody_else_has_the_drive() {
+    let (rig, mut drive) = Rig::factory();
+    rig.machine.panel(Panel::TakeControl);
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Panel));
+    rig.machine.panel(Panel::ReleaseControl);
+    // The terminals run the motor.
+    rig.machine.poke(0xFD06, 1);
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Terminals));
+    rig.machine.poke(0xFD06, 0);
+    rig.until(|seen| !seen.running).await;
+    // Without the priorities a drive that listens to its terminals is not ours.
+    let mut drive = drive.with_authority(Authority::Settings);
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Terminals));
+    assert_eq!(rig.machine.requests(6), 0);
+    rig.machine.poke(0x0003, 2);
+    drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(rig.machine.peek(0xFA00), Some(0x0400));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_is_refused_in_undervoltage() {
+    let (rig, mut drive) = Rig::factory();
+    rig.machine.poke(0xFC91, Alarms::UNDERVOLTAGE_RELAY.bits());
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::State(State::NotReady));
+}
+
+#[tokio::test(start_paused = true)]
+async fn release_gives_the_command_back_to_the_terminals_at_rest() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    assert_eq!(refusal(drive.release().await), Refusal::MotorRunning);
+    drive.stop(StopMode::Ramp).await.unwrap();
+    rig.until(|seen| !seen.running).await;
+    assert_eq!(drive.release().await.unwrap().control, Some(Control::Terminals));
+    assert_eq!(rig.machine.peek(0xFA00), Some(0));
+    rig.machine.poke(0x0003, 2);
+    assert!(matches!(refusal(drive.release().await), Refusal::Settings(_)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_outside_the_limits_is_refused_before_it_is_sent() {
+    let (rig, mut drive) = Rig::factory();
+    let error = drive.set_setpoint(Frequency::from_centihertz(5_001).into()).await.unwrap_err();
+    let Error::Setpoint { problem, .. } = error else { panic!("{error}") };
+    let high = Frequency::from_hertz(50);
+    assert_eq!(problem, SetpointProblem::OutsideFrequencyLimits { low: Frequency::ZERO, high });
+    assert!(drive.set_setpoint(Speed::from_rpm(24_001).into()).await.is_err());
+    assert_eq!(rig.machine.requests(6), 0);
+    // Another UL is found after forget, not before.
+    rig.machine.poke(0x0012, 6_000);
+    assert!(drive.set_setpoint(Frequency::from_hertz(60).into()).await.is_err());
+    drive.forget();
+    drive.set_setpoint(Frequency::from_hertz(60).into()).await.unwrap();
+    drive.set_setpoint(Speed::from_rpm(1_500).into()).await.unwrap();
+    assert_eq!((rig.machine.peek(0xFA01), rig.machine.peek(0xFA13)), (Some(6_000), Some(1_500)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_preset_speed_that_overrides_the_setpoint_is_noticed() {
+    let (rig, mut drive) = Rig::factory();
+    drive.select(CommandWord::PRESET_SPEED_2 | CommandWord::RUN);
+    drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(rig.machine.peek(0xFA00), Some(0xC402), "only selections are kept");
+    assert!(matches!(refusal(drive.set_setpoint(HALF_SPEED.into()).await), Refusal::Settings(_)));
+    // A start without a preset of our own overwrites that of FA00.
+    drive.select(CommandWord::RAMP_2);
+    drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(rig.machine.peek(0xFA00), Some(0xC440));
+    // One that does not come from FA00 stays: no start then.
+    drive.select(CommandWord::empty());
+    rig.machine.poke(0xFE46, 255);
+    assert!(matches!(refusal(drive.start(Direction::Forward).await), Refusal::Settings(_)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_allows_it() {
+    let (rig, mut drive) = Rig::with_blocks().await;
+    let set_up = rig.machine.requests(6);
+    let status = drive.start_at(Direction::Reverse, HALF_SPEED).await.unwrap();
+    assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
+    assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6) - set_up), (1, 0));
+    rig.until(|seen| seen.output_frequency == -2_500).await;
+
+    let (rig, mut drive) = Rig::factory();
+    drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
+    assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6)), (0, 2));
+    rig.until(|seen| seen.output_frequency == 2_500).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_lost_confirmation_of_a_stop_is_read_back() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    rig.machine.hold_next_answer();
+    let (status, ()) = tokio::join!(drive.stop(StopMode::Ramp), async {
+        rig.machine.wait_until_held().await;
+        assert_eq!(rig.machine.peek(0xFA00), Some(0xC000));
+        tokio::time::sleep(SECOND).await;
+        rig.machine.release();
+    });
+    assert!(matches!(status.unwrap().state, State::Stopping | State::Ready));
+    rig.line.close().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_stop_reaches_the_drive() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    let write = drive.broadcast_stop(StopMode::Freewheel).unwrap();
+    let mut all: tokio_modbus::client::Context = rig.line.broadcast().into();
+    tokio_modbus::prelude::Writer::write_single_register(&mut all, write.register, write.value)
+        .await
+        .unwrap()
+        .unwrap();
+    assert!(!rig.machine.observe().running);
+}

@@ -1,0 +1,76 @@
+//! A drive on a simulated line.
+
+use std::time::Duration;
+
+use drive_atv21::{Atv21, blocks::Blocks};
+use drive_bus::{Line, LineConfig, Slave};
+use drive_core::{
+    Direction, Drive, Error, Frequency, Refusal, Result, SerialSettings, SlaveAddress, State, Status,
+};
+use drive_sim::{Observation, SimLine, SimSlave, Wiring, models::atv21::Atv21 as Model};
+
+pub(crate) const SECOND: Duration = Duration::from_secs(1);
+pub(crate) const HALF_SPEED: Frequency = Frequency::from_hertz(25);
+
+/// A simulated drive, and the line to it.
+pub(crate) struct Rig {
+    pub(crate) machine: SimSlave,
+    pub(crate) line: Line,
+}
+
+impl Rig {
+    pub(crate) fn new(model: Model) -> (Self, Atv21<Slave>) {
+        let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+        let machine = simulated.add(1, model).unwrap();
+        let line = Line::over(simulated.in_memory(), LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+        // The time-out would trip a drive that a test leaves alone.
+        machine.poke(0x0803, 0);
+        let drive = Atv21::new(line.slave(1), SlaveAddress::try_from(1).unwrap());
+        (Self { machine, line }, drive)
+    }
+
+    pub(crate) fn factory() -> (Self, Atv21<Slave>) {
+        Self::new(Model::new())
+    }
+
+    /// With the standard blocks in effect.
+    pub(crate) async fn with_blocks() -> (Self, Atv21<Slave>) {
+        let (rig, mut drive) = Self::factory();
+        let _ = drive.set_up_blocks(Blocks::STANDARD).await.unwrap();
+        rig.power_cycle().await;
+        drive.forget();
+        (rig, drive)
+    }
+
+    pub(crate) async fn power_cycle(&self) {
+        self.machine.power_cycle();
+        tokio::time::sleep(2 * SECOND).await;
+    }
+
+    pub(crate) async fn at_speed(&self, drive: &mut Atv21<Slave>) {
+        drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
+        drive.start(Direction::Forward).await.unwrap();
+        self.until(|seen| seen.output_frequency == 2_500).await;
+    }
+
+    /// Waits until the machine is seen to be so, and fails when it never is.
+    pub(crate) async fn until(&self, is_so: impl Fn(&Observation) -> bool) {
+        let seen = tokio::time::timeout(100 * SECOND, self.machine.wait_until(is_so)).await;
+        seen.unwrap_or_else(|_| panic!("{:?}", self.machine.observe()));
+    }
+
+    pub(crate) fn count(&self) -> u64 {
+        self.machine.all_requests()
+    }
+}
+
+pub(crate) fn refusal<T: std::fmt::Debug>(result: Result<T>) -> Refusal {
+    match result.unwrap_err() {
+        Error::Refused { reason, .. } => reason,
+        other => panic!("{other}"),
+    }
+}
+
+pub(crate) fn state(status: &Status) -> (State, Option<Direction>) {
+    (status.state, status.direction)
+}
