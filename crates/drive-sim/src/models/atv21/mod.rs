@@ -141,7 +141,7 @@ impl Atv21 {
     #[must_use]
     pub fn with_blocks(mut self) -> Self {
         for (address, slot) in (0x0875..).zip(1..=5).chain([(0x0870, 1), (0x0871, 3)]) {
-            self.bank.set(address, slot);
+            self.bank.set_factory(address, slot);
         }
         self.start_up(Duration::ZERO);
         self

@@ -49,12 +49,9 @@ fn hexadecimal(text: &str) -> Vec<u8> {
     digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }
 
-/// A drive with the blocks of the manual's examples in effect.
+/// A drive that the bus commands, with the blocks of the manual's examples in effect; they outlive a power cycle.
 fn with_blocks() -> Atv21 {
-    let mut drive = Atv21::new();
-    for (address, slot) in (0x0875..).zip(1..=5).chain([(0x0870, 1), (0x0871, 3)]) {
-        assert!(drive.poke(address, slot));
-    }
+    let mut drive = Atv21::new().with_blocks();
     drive.poke(0x0003, 2);
     drive.poke(0x0004, 4);
     drive.power_cycle();
