@@ -15,7 +15,9 @@ use drive_atv58::{
 };
 
 use super::drivecom::{CommandBits, Drivecom, LinkWatch, Reaction, Settings, Stop};
-use crate::{Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Ramp, Ramps, Rules};
+use crate::{
+    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Protocol, Ramp, Ramps, Rules, UniTe,
+};
 
 const RULES: Rules = Rules {
     read_holding: 63,
@@ -30,6 +32,16 @@ const RULES: Rules = Rules {
 
 /// The card's watch for messages on the bus (p. 24/48).
 const MESSAGE_WATCH: Duration = Duration::from_secs(10);
+/// The same in Modbus ASCII (note on the lamps, p. 24/48).
+const MESSAGE_WATCH_ASCII: Duration = Duration::from_secs(1);
+/// The card's answers to UNI-TE (p. 11–13). That the reference FRH of request F2h is W401, and that its report shows the
+/// status and current words of the Altivar 28, nobody has confirmed.
+const UNITE: UniTe = UniTe {
+    product: [0x18, 0x58, 0x21],
+    name: "ATV58U18N4",
+    command: [CMD.address(), W401.address(), ACC.address(), W253.address()],
+    report: [W401.address(), W458.address(), W483.address(), W453.address()],
+};
 /// The fault bit of the link. Which one it is on a real drive is not public.
 const LINK_FAULT: u16 = 5;
 /// Nominal current in tenths of an ampere: an ATV58HU18N4's order of size.
@@ -47,6 +59,7 @@ const FACTORY: &[(u16, u16)] =
 pub struct Atv58 {
     bank: Bank,
     drive: Drivecom,
+    protocol: Protocol,
 }
 
 impl Atv58 {
@@ -57,8 +70,9 @@ impl Atv58 {
         for &(address, value) in FACTORY {
             bank.set_factory(address, value);
         }
-        let drive = Drivecom::new(Nameplate::light(u32::from(NOMINAL_CURRENT)), settings(&bank));
-        Self { bank, drive }
+        let protocol = Protocol::default();
+        let drive = Drivecom::new(Nameplate::light(u32::from(NOMINAL_CURRENT)), settings(&bank, protocol));
+        Self { bank, drive, protocol }
     }
 
     /// A register that the drive computes; `None` for one that is kept.
@@ -86,7 +100,7 @@ impl Atv58 {
         } else if address == W401.address() {
             self.drive.reference(i32::from(value.cast_signed()) * 10);
         } else {
-            self.drive.set_settings(settings(&self.bank));
+            self.drive.set_settings(settings(&self.bank, self.protocol));
         }
     }
 }
@@ -120,7 +134,7 @@ impl Model for Atv58 {
 
     fn power_cycle(&mut self) {
         self.bank.power_cycle();
-        self.drive.set_settings(settings(&self.bank));
+        self.drive.set_settings(settings(&self.bank, self.protocol));
         self.drive.power_cycle();
     }
 
@@ -149,6 +163,15 @@ impl Model for Atv58 {
         self.drive.frame_seen();
     }
 
+    fn join(&mut self, protocol: Protocol) {
+        self.protocol = protocol;
+        self.drive.set_settings(settings(&self.bank, protocol));
+    }
+
+    fn unite(&self) -> Option<UniTe> {
+        Some(UNITE)
+    }
+
     fn peek(&self, address: u16) -> Option<u16> {
         self.bank.peek(address).map(|kept| self.computed(address).unwrap_or(kept))
     }
@@ -156,19 +179,23 @@ impl Model for Atv58 {
     fn poke(&mut self, address: u16, value: u16) -> bool {
         let kept = self.computed(address).is_none() && self.bank.set(address, value);
         if kept {
-            self.drive.set_settings(settings(&self.bank));
+            self.drive.set_settings(settings(&self.bank, self.protocol));
         }
         kept
     }
 }
 
 /// Ramps in tenths of a second (A for W252, p. 20/44), speeds in tenths of a hertz.
-fn settings(bank: &Bank) -> Settings {
+fn settings(bank: &Bank, protocol: Protocol) -> Settings {
     let ramp = |address| Ramp {
         full_scale: NOMINAL_FREQUENCY,
         time: Duration::from_millis(u64::from(bank.value(address)) * 100),
     };
     let deceleration = ramp(W253.address());
+    let watch = match protocol {
+        Protocol::Ascii => MESSAGE_WATCH_ASCII,
+        Protocol::Rtu | Protocol::UniTelway => MESSAGE_WATCH,
+    };
     Settings {
         starts_enabled: false,
         bus_commands: true,
@@ -181,7 +208,7 @@ fn settings(bank: &Bank) -> Settings {
         injection_time: Duration::ZERO,
         low_speed: u32::from(bank.value(W251.address())) * 10,
         high_speed: u32::from(bank.value(W250.address())) * 10,
-        link: LinkWatch { timeout: Some(MESSAGE_WATCH), reaction: Reaction::Freewheel, code: LINK_FAULT },
+        link: LinkWatch { timeout: Some(watch), reaction: Reaction::Freewheel, code: LINK_FAULT },
     }
 }
 
@@ -250,6 +277,17 @@ mod tests {
         let mut drive = running();
         drive.frame_seen(Cast::Unicast);
         drive.advance(10 * SECOND - Duration::from_nanos(1));
+        assert_eq!(drive.observe().trip, None);
+        drive.advance(Duration::from_nanos(1));
+        assert_eq!(drive.observe().trip, Some(LINK_FAULT));
+    }
+
+    #[test]
+    fn in_ascii_one_second_without_a_message_is_a_fault() {
+        let mut drive = Atv58::new();
+        drive.join(Protocol::Ascii);
+        drive.frame_seen(Cast::Unicast);
+        drive.advance(SECOND - Duration::from_nanos(1));
         assert_eq!(drive.observe().trip, None);
         drive.advance(Duration::from_nanos(1));
         assert_eq!(drive.observe().trip, Some(LINK_FAULT));

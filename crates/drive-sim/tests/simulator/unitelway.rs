@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{SerialSettings, serial::CharacterFormat};
-use drive_sim::{ALWAYS, Exception, Fault, Protocol, SimLine, SimSlave, Wiring};
+use drive_sim::{ALWAYS, Exception, Fault, Protocol, SimLine, SimSlave, Wiring, models::atv58::Atv58};
 use tokio::io::{AsyncWriteExt, DuplexStream};
 
 use crate::support::{ACC, CMD, KEEP, OUT, REF, Small, ask};
@@ -192,6 +192,24 @@ async fn the_specific_request_orders_and_reports_in_one_exchange() {
     assert_eq!((slave.peek(ACC.address()), slave.peek(KEEP.address())), (Some(30), Some(40)));
     let read = master.exchange(1, &[0x04, 0, OUT.address().to_le_bytes()[0], 0]).await;
     assert_eq!(read, [0x34, 0x88, 0x13]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_altivar_58_climbs_its_chart_and_says_who_it_is() {
+    let mut master = Master::new([]);
+    let slave = master.line.add(5, Atv58::new()).unwrap();
+    assert_eq!(master.exchange(5, &[0x0F, 7]).await, b"\x3F\x18\x58\x21\x0AATV58U18N4");
+    // Reference 500 (50.0 Hz), ACC and DEC 10 (1 s): shut down, switch on, enable operation.
+    for (word, eta) in [(0x06, [0x21, 0x02]), (0x07, [0x23, 0x02]), (0x0F, [0x27, 0x02])] {
+        let answer = master.exchange(5, &[0xF2, 0, 0, 0, word, 0, 0xF4, 1, 10, 0, 10, 0]).await;
+        assert_eq!(answer[..7], [&[0xF2, 0x30, 0, 0xF4, 1][..], &eta].concat());
+    }
+    slave.wait_until(|seen| seen.output_frequency == 5_000).await;
+    // The manual's example reads W250 to W253 (p. 12): nine bytes, the words one byte further on.
+    let read = master.exchange(5, &[0x36, 7, 0x68, 7, 0xFA, 0, 4, 0]).await;
+    assert_eq!(read, [0x66, 7, 0xF4, 1, 0, 0, 10, 0, 10, 0]);
+    // The status word is the drive's own.
+    assert_eq!(master.exchange(5, &[0x14, 7, 0xCA, 1, 0, 0]).await, [0xFD]);
 }
 
 #[tokio::test(start_paused = true)]
