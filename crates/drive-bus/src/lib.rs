@@ -57,6 +57,7 @@
 //! [`exchange`], [`schedule`] and [`master`] are pure: no clock, no port. One task per line reads, writes and waits.
 
 pub mod answer;
+pub mod capture;
 pub mod config;
 pub mod exchange;
 mod line;

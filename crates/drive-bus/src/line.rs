@@ -13,6 +13,7 @@ use tokio::{
 };
 
 use crate::{
+    capture::{self, Dissector, Tap, Writing},
     config::{LineConfig, SlaveSettings},
     master::Master,
     pdu::MAX_PDU,
@@ -76,8 +77,11 @@ impl Line {
 
     fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>) -> Self {
         let (finished, when_finished) = watch::channel(false);
-        let shared =
-            Arc::new(Shared { master: Mutex::new(Master::new(config.clone())), wake: Notify::new() });
+        let shared = Arc::new(Shared {
+            master: Mutex::new(Master::new(config.clone())),
+            tap: Mutex::new(None),
+            wake: Notify::new(),
+        });
         let task = Task::new(&config, Arc::clone(&shared), connector, stream);
         tokio::spawn(async move {
             task.run().await;
@@ -118,6 +122,19 @@ impl Line {
         self.handle.shared.master().config().worst_case_stop(MAX_PDU, MAX_PDU)
     }
 
+    /// Writes every frame to `sink` as a pcapng file from now on, until the line is closed or another capture begins. The
+    /// writing happens on a thread of its own; frames that it cannot take in time are left out. What is returned
+    /// says when it has ended, and gives the sink's error, if it had one.
+    ///
+    /// # Errors
+    /// The sink's, when it does not take the head of the file.
+    pub fn capture(&self, sink: impl io::Write + Send + 'static) -> io::Result<Writing> {
+        let paced = self.handle.shared.master().config().is_paced();
+        let (tap, writing) = capture::start(sink, if paced { Dissector::Rtu } else { Dissector::Tcp })?;
+        *self.handle.shared.tap() = Some(tap);
+        Ok(writing)
+    }
+
     /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is
     /// under way finishes, the port is closed. Returns when it is.
     pub async fn close(&self) {
@@ -149,6 +166,7 @@ impl Drop for Handle {
 /// What the handles and the task share.
 pub(crate) struct Shared {
     master: Mutex<Master<Caller>>,
+    tap: Mutex<Option<Tap>>,
     /// Tells the task that the master has something new to do.
     pub(crate) wake: Notify,
 }
@@ -158,6 +176,11 @@ impl Shared {
     pub(crate) fn master(&self) -> MutexGuard<'_, Master<Caller>> {
         // A panic elsewhere must not keep a stop from being sent.
         self.master.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The capture, if there is one.
+    pub(crate) fn tap(&self) -> MutexGuard<'_, Option<Tap>> {
+        self.tap.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn close(&self) {

@@ -81,7 +81,11 @@ impl Task {
                 Event::Received(Ok(len)) => {
                     self.backoff = REOPEN_BACKOFF.0;
                     let bytes = self.received.get(..len).unwrap_or_default();
-                    self.shared.master().handle_bytes(Instant::now(), bytes);
+                    let (now, mut master) = (Instant::now(), self.shared.master());
+                    master.handle_bytes(now, bytes);
+                    let complete = !master.is_busy();
+                    drop(master);
+                    self.shared.tap().take_if(|tap| !tap.received(now, bytes, complete));
                 }
                 Event::Received(Err(error)) => self.lose(&error.to_string()),
                 Event::Opened(Ok(stream)) => {
@@ -95,6 +99,8 @@ impl Task {
                 Event::Woken => {}
             }
         }
+        // With the tap the capture ends: its writer finishes the file.
+        *self.shared.tap() = None;
     }
 
     /// Lets the master decide and writes what it wants written, until there is nothing to do but wait. `None`: the end.
@@ -114,7 +120,11 @@ impl Task {
             let Some(frame) = frame else { return (!finished).then_some(deadline) };
             let Port::Open(stream) = &mut self.port else { return Some(deadline) };
             match timeout(WRITE_LIMIT, stream.write_all(&frame)).await {
-                Ok(Ok(())) => self.shared.master().handle_sent(Instant::now()),
+                Ok(Ok(())) => {
+                    let now = Instant::now();
+                    self.shared.master().handle_sent(now);
+                    self.shared.tap().take_if(|tap| !tap.sent(now, &frame));
+                }
                 Ok(Err(error)) => self.lose(&error.to_string()),
                 Err(_) => self.lose("the port takes no bytes"),
             }

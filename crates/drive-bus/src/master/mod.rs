@@ -401,6 +401,12 @@ impl<C> Master<C> {
         }
     }
 
+    /// Whether an exchange is under way.
+    #[must_use]
+    pub const fn is_busy(&self) -> bool {
+        self.flight.is_some()
+    }
+
     /// When [`handle_timeout`](Self::handle_timeout) and [`poll_transmit`](Self::poll_transmit) are to be called, unless
     /// something else happens before.
     #[must_use]
