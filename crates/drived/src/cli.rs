@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
 use crate::{
-    commands::{demo, faults, param, poll, reset, setpoint, sim, start, status, stop},
+    commands::{demo, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
     failure::Failure,
 };
 
@@ -30,6 +30,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Demo(demo::Args),
     Sim(sim::Args),
+    Plan(plan::Args),
     Poll(poll::Args),
     Status(status::Args),
     Start(start::Args),
@@ -56,6 +57,7 @@ impl Command {
         match self {
             Self::Demo(args) => demo::run(args).await,
             Self::Sim(args) => sim::run(args).await,
+            Self::Plan(args) => plan::run(&args),
             Self::Poll(args) => poll::run(args).await,
             Self::Status(args) => status::run(args).await,
             Self::Start(args) => start::run(args).await,

@@ -47,6 +47,14 @@ impl LineSpec {
     }
 }
 
+impl LineSpec {
+    /// The same line at another speed; `None` for one without a speed.
+    pub(crate) fn at(&self, baud: u32) -> Option<Self> {
+        let target = self.target.clone();
+        (!matches!(target, Target::ModbusTcp(_))).then(|| Self { target, serial: self.serial.at(baud) })
+    }
+}
+
 /// The configuration with the pause that each drive needs after its answers.
 pub(crate) fn with_turnarounds(config: LineConfig, drives: &[DriveName]) -> LineConfig {
     drives.iter().fold(config, |config, name| {
@@ -56,6 +64,11 @@ pub(crate) fn with_turnarounds(config: LineConfig, drives: &[DriveName]) -> Line
 }
 
 impl SerialSpec {
+    /// What was said of the format, at another speed.
+    pub(crate) const fn at(self, baud: u32) -> Self {
+        Self { baud: Some(baud), ..self }
+    }
+
     /// Speed and format for these drives: what was said, else what all of them have from the factory, if every drive
     /// can be set to it.
     pub(crate) fn settings(self, drives: &[DriveName]) -> Result<SerialSettings, LineSpecError> {

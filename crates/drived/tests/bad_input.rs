@@ -117,3 +117,14 @@ fn what_is_missing_or_misspelt_is_said() {
         run(arguments).assert_refused(2, reason);
     }
 }
+
+#[test]
+fn a_plan_that_cannot_work_is_refused_with_the_arithmetic() {
+    let plan = ["plan", "--line", PORT, "--drive", "atv312@1-31"];
+    let ended = run(&[&plan[..], &["--period", "500ms"]].concat());
+    ended.assert_refused(2, "one status of 31 drives takes");
+    let ended = run(&[&plan[..], &["--watchdog", "1s"]].concat());
+    ended.assert_refused(2, "the watchdog of atv312@1 is 1s, and it might hear nothing for");
+    let works = run(&[&plan[..], &["--watchdog", "10s"]].concat());
+    assert!(works.assert_done().contains("with 3 dead"), "{works:?}");
+}

@@ -3,6 +3,7 @@
 pub(crate) mod demo;
 pub(crate) mod faults;
 pub(crate) mod param;
+pub(crate) mod plan;
 pub(crate) mod poll;
 pub(crate) mod reset;
 pub(crate) mod setpoint;
