@@ -1,4 +1,4 @@
-//! Simulated variable-speed drives on a simulated line.
+#![doc = include_str!("../README.md")]
 
 mod ascii;
 mod bank;

@@ -3,6 +3,7 @@
 mod ascii;
 mod endpoints;
 mod faults;
+mod fuzz;
 mod line;
 mod support;
 mod unitelway;
