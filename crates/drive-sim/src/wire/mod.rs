@@ -1,12 +1,15 @@
 //! The wire: which character is on it when, who speaks, and what rule is broken. No clock and no I/O: `now` is an
 //! argument.
 
+mod transmission;
+
 use std::{collections::VecDeque, time::Duration};
 
 use drive_core::SerialSettings;
 use fastrand::Rng;
 use tokio::time::Instant;
 
+use self::transmission::{Overlap, Transmission};
 use crate::{
     fault::{Fault, flip},
     framing::{Content, Framing, Speech},
@@ -63,18 +66,6 @@ pub(crate) struct Wire {
     speech: Vec<Speech>,
     /// Characters of the frame that is being received, for the ideal time of its exchange.
     frame_characters: usize,
-}
-
-/// What is or will be on the wire towards the master.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Transmission {
-    slave: u8,
-    start: Instant,
-    bytes: Vec<u8>,
-    delivered: usize,
-    late: bool,
-    /// The adapter's echo of the master's own characters: it is no use of the line.
-    echo: bool,
 }
 
 impl Wire {
@@ -395,42 +386,9 @@ impl Wire {
     }
 }
 
-impl Transmission {
-    /// Inverts the characters that fall into a span and are not yet delivered.
-    fn damage(&mut self, overlap: Overlap, settings: SerialSettings) {
-        for (index, byte) in self.bytes.iter_mut().enumerate().skip(self.delivered) {
-            if overlap.touches(self.start + settings.characters(index), settings) {
-                *byte = !*byte;
-            }
-        }
-    }
-}
-
-/// A span of time in which two parties send.
-#[derive(Debug, Clone, Copy)]
-struct Overlap {
-    begins: Instant,
-    ends: Instant,
-}
-
-impl Overlap {
-    fn of(
-        transmission: &Transmission,
-        begins: Instant,
-        ends: Instant,
-        settings: SerialSettings,
-    ) -> Option<Self> {
-        let over = transmission.start + settings.characters(transmission.bytes.len());
-        let span = Self { begins: begins.max(transmission.start), ends: ends.min(over) };
-        (span.begins < span.ends).then_some(span)
-    }
-
-    /// Whether a character that begins at this moment falls into it.
-    fn touches(self, character: Instant, settings: SerialSettings) -> bool {
-        character < self.ends && character + settings.characters(1) > self.begins
-    }
-}
-
 fn count_of(length: usize) -> u64 {
     u64::try_from(length).unwrap_or(u64::MAX)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,7 @@
 //! The line as a test or a program holds it: [`SimLine`], and [`SimSlave`] for one of its drives.
 
+mod slave;
+
 use std::{
     fmt,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -9,21 +11,21 @@ use std::{
 use drive_core::SerialSettings;
 use tokio::{sync::watch, time::Instant};
 
+pub use slave::SimSlave;
+
 use crate::{
     ascii::Ascii,
     fault::{Fault, Faults, PerMillion},
     framing::Framing,
-    model::{Exception, Model, Observation, Panel, Protocol},
+    model::{Model, Protocol},
     record::{LineStats, Violation},
     rtu::Rtu,
-    slave::{LineCounters, Received, Slave},
+    slave::Slave,
     state::{BROADCAST, State},
     unitelway::UniTelway,
     wire::{Delivery, Pacing, Wire},
 };
 
-/// How often a waiting observer looks. The time of a model passes only while somebody looks at it.
-const LOOK: Duration = Duration::from_millis(1);
 /// The highest address of a slave (MODBUS over Serial Line V1.02 p. 8).
 const HIGHEST: u8 = 247;
 
@@ -221,158 +223,5 @@ impl fmt::Debug for SimLine {
             .field("wiring", &self.wiring)
             .field("slaves", &addresses)
             .finish_non_exhaustive()
-    }
-}
-
-/// One drive of a [`SimLine`], as somebody beside the machine reaches it: a handle that is cheap to clone.
-#[derive(Debug, Clone)]
-pub struct SimSlave {
-    line: SimLine,
-    address: u8,
-}
-
-impl SimSlave {
-    /// Its address.
-    #[must_use]
-    pub const fn address(&self) -> u8 {
-        self.address
-    }
-
-    /// What an observer of the machine sees now.
-    #[must_use]
-    pub fn observe(&self) -> Observation {
-        self.with(|slave, _| slave.observe(Instant::now()))
-    }
-
-    /// Waits until the machine is seen to be so; what was seen.
-    ///
-    /// # Cancellation
-    /// Safe to drop.
-    pub async fn wait_until(&self, is_so: impl Fn(&Observation) -> bool) -> Observation {
-        self.wait_for(|slave| slave.observe(Instant::now()), is_so).await
-    }
-
-    /// Cuts the drive's cable: it hears nothing and says nothing, and goes on doing what it does.
-    pub fn mute(&self) {
-        self.order(|slave, _| slave.connect(false));
-    }
-
-    /// Connects the cable again.
-    pub fn unmute(&self) {
-        self.order(|slave, _| slave.connect(true));
-    }
-
-    /// Holds back the next answer until [`release`](Self::release).
-    pub fn hold_next_answer(&self) {
-        self.order(|slave, _| slave.hold_next());
-    }
-
-    /// Waits until an answer is held back: its request has been carried out.
-    ///
-    /// # Cancellation
-    /// Safe to drop.
-    pub async fn wait_until_held(&self) {
-        self.wait_for(|slave| slave.is_holding(), |held| *held).await;
-    }
-
-    /// Sends the answer that is held back, at once; without one, ends the holding.
-    pub fn release(&self) {
-        self.line.shared.lock().release(self.address);
-        self.line.shared.wake.send_replace(());
-        self.line.shared.has_changed();
-    }
-
-    /// Answers the next request for this slave alone with an exception, whatever it asks. The request is carried out
-    /// nevertheless.
-    pub fn refuse_next(&self, exception: Exception) {
-        self.order(|slave, _| slave.refuse_next(exception));
-    }
-
-    /// Changes the time from the end of a request to the start of its answer; `None`: the family's own.
-    pub fn set_turnaround(&self, turnaround: Option<Duration>) {
-        self.order(|slave, _| slave.set_turnaround(turnaround));
-    }
-
-    /// Trips the drive with a code of its family.
-    pub fn trip(&self, code: u16) {
-        self.order(|slave, _| slave.at(Instant::now()).trip(code));
-    }
-
-    /// Switches the supply off and on.
-    pub fn power_cycle(&self) {
-        self.order(|slave, state| slave.power_cycle(Instant::now(), state));
-    }
-
-    /// Somebody at the machine acts.
-    pub fn panel(&self, action: Panel) {
-        self.order(|slave, _| slave.at(Instant::now()).panel(action));
-    }
-
-    /// Sets the load at the shaft in percent of the motor's nominal torque.
-    pub fn set_load(&self, percent: u16) {
-        self.order(|slave, _| slave.at(Instant::now()).set_load(percent));
-    }
-
-    /// The content of a register, without the rules of the line.
-    #[must_use]
-    pub fn peek(&self, address: u16) -> Option<u16> {
-        self.with(|slave, _| slave.at(Instant::now()).peek(address))
-    }
-
-    /// Changes a register, without the rules of the line; `false` when there is none.
-    pub fn poke(&self, address: u16, value: u16) -> bool {
-        self.order(|slave, _| slave.at(Instant::now()).poke(address, value))
-    }
-
-    /// How many requests of a function it took, broadcasts included.
-    #[must_use]
-    pub fn requests(&self, function: u8) -> u64 {
-        self.with(|slave, _| slave.requests(function))
-    }
-
-    /// How many requests it took in all, broadcasts included.
-    #[must_use]
-    pub fn all_requests(&self) -> u64 {
-        self.with(|slave, _| slave.all_requests())
-    }
-
-    /// Waits until it has taken so many requests in all.
-    ///
-    /// # Cancellation
-    /// Safe to drop.
-    pub async fn wait_for_requests(&self, count: u64) {
-        self.wait_for(|slave| slave.all_requests(), |taken| *taken >= count).await;
-    }
-
-    /// The last 256 requests it took, the oldest first.
-    #[must_use]
-    pub fn received(&self) -> Vec<Received> {
-        self.with(|slave, _| slave.received())
-    }
-
-    async fn wait_for<T: Default>(&self, look: impl Fn(&mut Slave) -> T, is_so: impl Fn(&T) -> bool) -> T {
-        let mut changed = self.line.shared.changed.subscribe();
-        loop {
-            let seen = self.with(|slave, _| look(slave));
-            if is_so(&seen) {
-                return seen;
-            }
-            // An error would mean that the line is gone, and this handle keeps it.
-            let _ = tokio::time::timeout(LOOK, changed.changed()).await;
-        }
-    }
-
-    /// Looks at the slave. It never leaves its line, so the default is never taken.
-    fn with<R: Default>(&self, look: impl FnOnce(&mut Slave, LineCounters) -> R) -> R {
-        let mut state = self.line.shared.lock();
-        let counters = state.counters();
-        state.slave(self.address).map(|slave| look(slave, counters)).unwrap_or_default()
-    }
-
-    /// Acts on the slave and tells observers.
-    fn order<R: Default>(&self, act: impl FnOnce(&mut Slave, LineCounters) -> R) -> R {
-        let result = self.with(act);
-        self.line.shared.has_changed();
-        result
     }
 }

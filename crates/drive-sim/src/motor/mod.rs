@@ -1,49 +1,23 @@
 //! A motor with its load: ramps, coasting, braking, current, heat. Integers only, so every run is the same.
 
+mod heat;
+mod ramp;
+
 use std::time::Duration;
 
-/// Micro-hertz in a hundredth of a hertz. The shaft is kept finer than any register shows it, so that many short
-/// steps of time and one long step end at the same place.
-const MICRO: i64 = 10_000;
+pub use ramp::{Ramp, Ramps};
+
+use self::{
+    heat::Heat,
+    ramp::{MICRO, nanos, steered},
+};
+
 /// Torque that bearings and fan take, in percent of nominal.
 const FRICTION: i64 = 5;
 /// Magnetising current, in percent of nominal.
 const MAGNETISING: i64 = 30;
 /// Share of the nominal current that makes torque: with [`MAGNETISING`] it adds up to 100 % at nominal torque.
 const ACTIVE: i64 = 95;
-
-/// How fast a ramp is: the time from standstill to a frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Ramp {
-    /// The frequency that the time is measured to, in hundredths of a hertz.
-    pub full_scale: u32,
-    /// From 0 to `full_scale`, or back. 0: at once.
-    pub time: Duration,
-}
-
-impl Ramp {
-    /// The change of frequency in this time.
-    fn change(self, time: Duration) -> i64 {
-        let scale = i128::from(self.full_scale) * i128::from(MICRO);
-        let change = (scale * nanos(time)).checked_div(nanos(self.time)).unwrap_or(i128::from(i64::MAX));
-        i64::try_from(change).unwrap_or(i64::MAX)
-    }
-
-    /// The time that a change of frequency takes, rounded up.
-    fn duration(self, change: i64) -> Duration {
-        let scale = i128::from(self.full_scale.max(1)) * i128::from(MICRO);
-        from_nanos((i128::from(change.unsigned_abs()) * nanos(self.time) + scale - 1) / scale)
-    }
-}
-
-/// Acceleration and deceleration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Ramps {
-    /// Away from standstill.
-    pub acceleration: Ramp,
-    /// Towards standstill.
-    pub deceleration: Ramp,
-}
 
 /// What is on the motor's plate, and how heavy the machine is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,14 +85,13 @@ impl Motor {
     /// A motor at rest, cold, without a load.
     #[must_use]
     pub const fn new(plate: Nameplate) -> Self {
-        let heat = Heat { state: 0, squares: 0, part: Duration::ZERO };
         Self {
             plate,
             stage: Stage::Off,
             load: 0,
             anchor: 0,
             since: Duration::ZERO,
-            heat,
+            heat: Heat::COLD,
             fed: Duration::ZERO,
         }
     }
@@ -247,7 +220,7 @@ impl Motor {
     /// Thermal state in percent: 100 is what nominal current ends at.
     #[must_use]
     pub fn thermal_state(&self) -> u16 {
-        u16::try_from(self.heat.state / Heat::PERCENT).unwrap_or(u16::MAX)
+        self.heat.percent()
     }
 
     /// How long the motor has been fed in all.
@@ -370,211 +343,5 @@ enum Slope {
     Down,
 }
 
-/// Where a shaft is that is steered from `from` to `target`, after a time.
-fn steered(from: i64, target: i64, ramps: Ramps, time: Duration) -> i64 {
-    let reverses = from.signum() * target.signum() < 0;
-    if reverses || target.abs() < from.abs() {
-        let knee = if reverses { 0 } else { target };
-        let span = (from - knee).abs();
-        let change = ramps.deceleration.change(time);
-        if change < span {
-            return from - change * from.signum();
-        }
-        if !reverses {
-            return target;
-        }
-        return steered(0, target, ramps, time.saturating_sub(ramps.deceleration.duration(span)));
-    }
-    let change = ramps.acceleration.change(time).min((target - from).abs());
-    from + change * (target - from).signum()
-}
-
-/// A first-order picture of the windings' heat, in steps of one second.
-#[derive(Debug, Clone, Copy)]
-struct Heat {
-    /// Thermal state in [`Heat::PERCENT`] of a percent.
-    state: i64,
-    /// Current squared times nanoseconds in the second that is not yet over, and how much of it is.
-    squares: i128,
-    part: Duration,
-}
-
-impl Heat {
-    const PERCENT: i64 = 1_000_000;
-    const STEP: Duration = Duration::from_secs(1);
-
-    fn take(&mut self, current: i64, mut time: Duration, constant: Duration) {
-        let square = current * current;
-        let steps = i64::try_from(constant.as_secs()).unwrap_or(i64::MAX).max(1);
-        let rest = Self::STEP - self.part;
-        if time < rest {
-            self.squares += i128::from(square) * nanos(time);
-            self.part += time;
-            return;
-        }
-        let mean = (self.squares + i128::from(square) * nanos(rest)) / nanos(Self::STEP);
-        self.step(i64::try_from(mean).unwrap_or(0), steps);
-        time -= rest;
-        // After ten time constants the heat is where it ends.
-        for _ in 0..time.as_secs().min(steps.unsigned_abs().saturating_mul(10).min(100_000)) {
-            self.step(square, steps);
-        }
-        self.part = Duration::from_nanos(u64::from(time.subsec_nanos()));
-        self.squares = i128::from(square) * nanos(self.part);
-    }
-
-    fn step(&mut self, square: i64, steps: i64) {
-        let end = square.saturating_mul(Self::PERCENT) / 100;
-        self.state += (end - self.state) / steps;
-    }
-}
-
-fn nanos(time: Duration) -> i128 {
-    i128::try_from(time.as_nanos()).unwrap_or(i128::MAX >> 64)
-}
-
-fn from_nanos(nanos: i128) -> Duration {
-    Duration::from_nanos(u64::try_from(nanos.max(0)).unwrap_or(u64::MAX))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RAMPS: Ramps = Ramps {
-        acceleration: Ramp { full_scale: 5_000, time: Duration::from_secs(3) },
-        deceleration: Ramp { full_scale: 5_000, time: Duration::from_secs(6) },
-    };
-
-    fn motor() -> Motor {
-        Motor::new(Nameplate::light(20))
-    }
-
-    fn running_at(frequency: i32) -> Motor {
-        let mut motor = motor();
-        motor.run(frequency, RAMPS);
-        motor.advance(Duration::from_secs(60));
-        motor
-    }
-
-    #[test]
-    fn the_motor_ramps_in_the_time_its_ramp_says() {
-        let mut motor = motor();
-        motor.run(4_000, RAMPS);
-        motor.advance(Duration::from_millis(2_399));
-        assert_eq!(motor.output_frequency(), 3_998);
-        assert!(motor.is_accelerating() && !motor.is_at_target());
-        motor.advance(Duration::from_millis(1));
-        assert_eq!(motor.output_frequency(), 4_000);
-        assert!(!motor.is_accelerating() && motor.is_at_target());
-    }
-
-    #[test]
-    fn a_reversal_goes_through_standstill_on_both_ramps() {
-        let mut motor = running_at(5_000);
-        motor.run(-5_000, RAMPS);
-        motor.advance(Duration::from_secs(6));
-        assert_eq!(motor.output_frequency(), 0);
-        motor.advance(Duration::from_millis(1_500));
-        assert_eq!(motor.output_frequency(), -2_500);
-        motor.advance(Duration::from_millis(1_500));
-        assert!(motor.is_at_target());
-    }
-
-    #[test]
-    fn one_long_step_ends_where_many_short_ones_end() {
-        let mut once = running_at(5_000);
-        let mut often = once;
-        for motor in [&mut once, &mut often] {
-            motor.set_load(40);
-            motor.run(-3_000, RAMPS);
-        }
-        once.advance(Duration::from_millis(9_500));
-        for _ in 0..19_000 {
-            often.advance(Duration::from_micros(500));
-        }
-        assert_eq!(once.output_frequency(), often.output_frequency());
-        assert_eq!(once.current(), often.current());
-        assert_eq!(once.thermal_state(), often.thermal_state());
-        assert_eq!(once.fed_for(), often.fed_for());
-    }
-
-    #[test]
-    fn a_stop_along_the_ramp_blocks_the_output_at_standstill() {
-        let mut motor = running_at(5_000);
-        motor.ramp_to_rest(RAMPS.deceleration);
-        motor.advance(Duration::from_millis(5_999));
-        assert!(motor.is_fed() && motor.is_stopping() && motor.is_decelerating());
-        motor.advance(Duration::from_millis(1));
-        assert!(!motor.is_fed());
-        assert_eq!(motor.shaft_frequency(), 0);
-    }
-
-    #[test]
-    fn a_freewheel_stop_coasts_and_a_load_shortens_it() {
-        let coasts_for = |load: u16| {
-            let mut motor = running_at(5_000);
-            motor.set_load(load);
-            motor.freewheel();
-            assert_eq!((motor.output_frequency(), motor.shaft_frequency()), (0, 5_000));
-            let mut time = Duration::ZERO;
-            while motor.shaft_frequency() > 0 {
-                motor.advance(Duration::from_millis(10));
-                time += Duration::from_millis(10);
-            }
-            time
-        };
-        assert_eq!(coasts_for(0), Duration::from_secs(10));
-        assert_eq!(coasts_for(95), Duration::from_millis(500));
-    }
-
-    #[test]
-    fn direct_current_brakes_faster_than_coasting_and_ends_after_its_time() {
-        let mut motor = running_at(5_000);
-        motor.brake(70, Some(Duration::from_secs(2)));
-        assert!(motor.is_braking() && motor.is_fed());
-        assert_eq!(motor.current(), 14);
-        motor.advance(Duration::from_millis(500));
-        assert_eq!(motor.shaft_frequency(), 0);
-        motor.advance(Duration::from_millis(1_499));
-        assert!(motor.is_braking());
-        motor.advance(Duration::from_millis(1));
-        assert!(!motor.is_fed());
-    }
-
-    #[test]
-    fn a_coasting_motor_is_caught_at_its_speed() {
-        let mut motor = running_at(5_000);
-        motor.freewheel();
-        motor.advance(Duration::from_secs(5));
-        motor.run(5_000, RAMPS);
-        assert_eq!(motor.output_frequency(), 2_500);
-    }
-
-    #[test]
-    fn current_torque_and_heat_follow_the_load() {
-        let mut motor = running_at(5_000);
-        assert_eq!(motor.torque(), 5);
-        let idle = motor.current();
-        motor.set_load(95);
-        assert_eq!((motor.torque(), motor.current()), (100, 19));
-        assert!(idle < motor.current());
-        motor.advance(Duration::from_secs(36_000));
-        assert!((98..=100).contains(&motor.thermal_state()), "{}", motor.thermal_state());
-        motor.freewheel();
-        motor.advance(Duration::from_secs(600));
-        assert!((34..=38).contains(&motor.thermal_state()), "{}", motor.thermal_state());
-    }
-
-    #[test]
-    fn a_ramp_of_no_time_is_taken_at_once() {
-        let at_once = Ramp { full_scale: 5_000, time: Duration::ZERO };
-        let mut motor = motor();
-        motor.run(5_000, Ramps { acceleration: at_once, deceleration: at_once });
-        motor.advance(Duration::from_millis(1));
-        assert_eq!(motor.output_frequency(), 5_000);
-        motor.ramp_to_rest(at_once);
-        motor.advance(Duration::from_millis(1));
-        assert!(!motor.is_fed());
-    }
-}
+mod tests;
