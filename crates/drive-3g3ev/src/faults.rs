@@ -116,7 +116,7 @@ pub const WARNINGS: &[FaultEntry] = &[
         code(STATE.address(), DriveState::LINK_FAULT.bits()),
         "002Ch.F",
         "communication fault",
-        "see 003Dh",
+        "the bits of 003Dh say what was wrong with the received frames",
     ),
     FaultEntry::new(
         code(LINK_ERROR.address(), LinkError::CRC.bits()),

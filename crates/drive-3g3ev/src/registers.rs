@@ -21,48 +21,50 @@ const WORD: i32 = 0xFFFF;
 /// The first parameter's address less one (§5.4).
 const PARAMETERS: u16 = 0x0100;
 
-/// `n02`. The manual prints row 3 like row 0.
+/// `n02`: who gives the run command, and who the reference. The manual prints row 3 like row 0.
 const MODE: &[Choice] = &[
-    Choice::new(0, "", "run by the panel, reference by the panel"),
-    Choice::new(1, "", "run by the terminals, reference by the panel"),
-    Choice::new(2, "", "run by the bus, reference by the panel"),
-    Choice::new(3, "", "run by the panel, reference by the panel"),
-    Choice::new(4, "", "run by the terminals, reference by the bus"),
-    Choice::new(5, "", "run by the bus, reference by the bus"),
+    Choice::new(0, "panel/panel", "run by the panel, reference by the panel"),
+    Choice::new(1, "terminals/panel", "run by the terminals, reference by the panel"),
+    Choice::new(2, "bus/panel", "run by the bus, reference by the panel"),
+    Choice::new(3, "panel/panel", "run by the panel, reference by the panel"),
+    Choice::new(4, "terminals/bus", "run by the terminals, reference by the bus"),
+    Choice::new(5, "bus/bus", "run by the bus, reference by the bus"),
 ];
 
 /// `n05`.
-const REVERSE: &[Choice] = &[Choice::new(1, "", "reverse forbidden")];
+const REVERSE: &[Choice] = &[Choice::new(1, "forbidden", "no run in reverse")];
 
 /// `n09`, `n10`.
-const BY_BUS: &[Choice] = &[Choice::new(15, "", "commanded by 0009h")];
+const BY_BUS: &[Choice] = &[Choice::new(15, "bus", "commanded by 0009h")];
 
 /// `n39`.
 const FREQUENCY_UNIT: &[Choice] = &[
-    Choice::new(0, "", "0.1 Hz"),
-    Choice::new(1, "", "0.01 Hz"),
-    Choice::new(2, "", "30000 = 100 %"),
-    Choice::new(3, "", "0.1 %"),
+    Choice::new(0, "0.1 Hz", ""),
+    Choice::new(1, "0.01 Hz", ""),
+    Choice::new(2, "30000 = 100 %", ""),
+    Choice::new(3, "0.1 %", ""),
 ];
 
 /// `n40`.
-const TIME_OVER: &[Choice] = &[Choice::new(0, "", "detection"), Choice::new(1, "", "no detection")];
+const TIME_OVER: &[Choice] = &[Choice::new(0, "on", "detection"), Choice::new(1, "off", "no detection")];
 
 /// `n63`.
 const BAUD: &[Choice] = &[
-    Choice::new(0, "", "2400 bit/s"),
-    Choice::new(1, "", "4800 bit/s"),
-    Choice::new(2, "", "9600 bit/s"),
-    Choice::new(3, "", "19200 bit/s"),
+    Choice::new(0, "2400", "bit/s"),
+    Choice::new(1, "4800", "bit/s"),
+    Choice::new(2, "9600", "bit/s"),
+    Choice::new(3, "19200", "bit/s"),
 ];
 
 /// `n64`.
 const PARITY: &[Choice] =
-    &[Choice::new(0, "", "even"), Choice::new(1, "", "odd"), Choice::new(2, "", "none")];
+    &[Choice::new(0, "even", ""), Choice::new(1, "odd", ""), Choice::new(2, "none", "")];
 
 /// `n66`.
-const RTS: &[Choice] =
-    &[Choice::new(0, "", "RTS control: RS-485 and RS-422"), Choice::new(1, "", "no RTS: RS-232C")];
+const RTS: &[Choice] = &[
+    Choice::new(0, "RTS", "RTS control: RS-485 and RS-422"),
+    Choice::new(1, "no RTS", "without RTS: RS-232C"),
+];
 
 registers! {
     /// Every register of the family.
