@@ -8,8 +8,8 @@ use drive_sim::{Serving, SimLine, SimSlave, Wiring, models};
 use support::peers;
 use tokio::process::Command;
 
-/// ETA of an Altivar 312 that stands under bus control, as BBV51701 p. 10 gives it for "switch on disabled".
-const SWITCH_ON_DISABLED: u16 = 0x0040;
+/// ETA of an Altivar 312 that stands under bus control: "switch on disabled" (BBV51701 p. 10), not forced local (p. 21).
+const SWITCH_ON_DISABLED: u16 = 0x0240;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn mbpoll_reads_and_writes_a_simulated_altivar_312() {

@@ -25,8 +25,6 @@ async def main() -> None:
         identity=identity,
         port=port,
         baudrate=19200,
-        ignore_missing_devices=True,
-        broadcast_enable=False,
     )
     await server.serve_forever(background=True)
     print("serving", flush=True)

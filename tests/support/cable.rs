@@ -1,6 +1,10 @@
 //! Two ptys and a cable between them, so that two programs can each open a serial port by its path.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::{File, OpenOptions},
+    os::unix::fs::OpenOptionsExt,
+    path::{Path, PathBuf},
+};
 
 use tokio::{io::copy_bidirectional, task::JoinHandle};
 use tokio_serial::{SerialPort, SerialStream};
@@ -11,7 +15,7 @@ pub struct Cable {
     near: PathBuf,
     far: PathBuf,
     /// Kept open, so that a port that nobody has opened yet does not hang up.
-    _ends: [SerialStream; 2],
+    _ends: [File; 2],
     carrier: JoinHandle<()>,
 }
 
@@ -25,11 +29,12 @@ impl Cable {
         let (mut near, near_end) = pair();
         let (mut far, far_end) = pair();
         let (near_path, far_path) = (path(&near_end), path(&far_end));
+        let ends = [keep_open(&near_path), keep_open(&far_path)];
         let carrier = tokio::spawn(async move {
             // It ends with the test.
             let _ = copy_bidirectional(&mut near, &mut far).await;
         });
-        Self { near: near_path, far: far_path, _ends: [near_end, far_end], carrier }
+        Self { near: near_path, far: far_path, _ends: ends, carrier }
     }
 
     /// The port at this end.
@@ -58,11 +63,15 @@ impl Drop for Cable {
 }
 
 fn pair() -> (SerialStream, SerialStream) {
-    let (carrier, mut end) = SerialStream::pair().expect("the system gives a pty");
-    end.set_exclusive(false).expect("a pty can be shared");
-    (carrier, end)
+    SerialStream::pair().expect("the system gives a pty")
 }
 
 fn path(end: &SerialStream) -> PathBuf {
     PathBuf::from(end.name().expect("a pty has a name"))
+}
+
+/// Opens a port without the lock that a serial library puts on it, and without making it this program's terminal.
+fn keep_open(path: &Path) -> File {
+    let flags = rustix::fs::OFlags::NOCTTY.bits().cast_signed();
+    OpenOptions::new().read(true).write(true).custom_flags(flags).open(path).expect("a pty can be opened")
 }
