@@ -80,6 +80,9 @@ pub struct LineConfig {
     pub offline_after: u32,
     /// First and longest time between two probes of an off-line slave.
     pub probe_backoff: (Duration, Duration),
+    /// Keep no silences and count no character times: for a stream that is no line, and for measurements of everything
+    /// but the line.
+    pub unpaced: bool,
     /// Use the precise timer also on a stream that the caller brings. Not under a paused clock.
     pub precise_timer: bool,
     /// Settings of single slaves; the others have [`SlaveSettings::default`].
@@ -126,6 +129,7 @@ impl LineConfig {
             retries: 2,
             offline_after: 3,
             probe_backoff: (Duration::from_millis(500), Duration::from_secs(10)),
+            unpaced: false,
             precise_timer: false,
             slaves: BTreeMap::new(),
         }
@@ -166,7 +170,12 @@ impl LineConfig {
 
     /// Whether frames need silences between them.
     pub(crate) const fn is_paced(&self) -> bool {
-        !matches!(self.endpoint, Endpoint::ModbusTcp(_))
+        !self.unpaced && !self.is_mbap()
+    }
+
+    /// Whether the line speaks Modbus TCP.
+    pub(crate) const fn is_mbap(&self) -> bool {
+        matches!(self.endpoint, Endpoint::ModbusTcp(_))
     }
 }
 

@@ -129,8 +129,8 @@ impl Line {
     /// # Errors
     /// The sink's, when it does not take the head of the file.
     pub fn capture(&self, sink: impl io::Write + Send + 'static) -> io::Result<Writing> {
-        let paced = self.handle.shared.master().config().is_paced();
-        let (tap, writing) = capture::start(sink, if paced { Dissector::Rtu } else { Dissector::Tcp })?;
+        let mbap = self.handle.shared.master().config().is_mbap();
+        let (tap, writing) = capture::start(sink, if mbap { Dissector::Tcp } else { Dissector::Rtu })?;
         *self.handle.shared.tap() = Some(tap);
         Ok(writing)
     }

@@ -56,8 +56,7 @@ async fn record() -> Vec<u8> {
     line.close().await;
     drop(line);
     writing.finished().await.unwrap();
-    let file = sink.0.lock().unwrap().clone();
-    file
+    std::mem::take(&mut sink.0.lock().unwrap())
 }
 
 /// Feeds a capture to a new master: the requests are asked, what was received is received, each at its time.
@@ -106,7 +105,7 @@ async fn a_capture_replayed_through_the_machines_gives_the_same_answers() {
     assert!(frames.windows(2).all(|pair| pair[0].at <= pair[1].at));
     let expected =
         [Ok(vec![10]), Ok(vec![20]), Err("CRC".to_owned()), Err("Err(IllegalDataAddress)".to_owned())];
-    assert_eq!(replay(&frames, |master, now, bytes| master.handle_bytes(now, bytes)), expected);
+    assert_eq!(replay(&frames, Master::handle_bytes), expected);
     let byte_by_byte = |master: &mut Master<usize>, now, bytes: &[u8]| {
         for byte in bytes {
             master.handle_bytes(now, &[*byte]);

@@ -113,10 +113,10 @@ impl<C> Master<C> {
     /// A line whose port is not open yet.
     #[must_use]
     pub fn new(config: LineConfig) -> Self {
-        let exchange: Box<dyn Exchange> = if config.is_paced() {
-            Box::new(Rtu::new(config.serial, config.chunk_gap, config.echo))
-        } else {
+        let exchange: Box<dyn Exchange> = if config.is_mbap() {
             Box::new(Mbap::new())
+        } else {
+            Box::new(Rtu::new(config.serial, config.chunk_gap, config.echo))
         };
         Self {
             exchange,
