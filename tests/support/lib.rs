@@ -3,4 +3,5 @@
 pub mod cable;
 pub mod drives;
 pub mod peers;
+pub mod plant;
 pub mod rig;

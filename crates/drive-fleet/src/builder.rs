@@ -8,7 +8,7 @@ use std::{
 use drive_bus::Line;
 use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode};
 use tokio::{
-    sync::{broadcast, mpsc, watch},
+    sync::{Semaphore, broadcast, mpsc, watch},
     time::Instant,
 };
 
@@ -123,7 +123,15 @@ impl FleetBuilder {
     pub fn start(self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(self.events.max(1));
         let (lines, members) = self.check()?;
-        let entries = members.into_iter().map(|member| spawn(member, &events)).collect();
+        let turns: Vec<_> = lines.iter().map(|_| Arc::new(Semaphore::new(1))).collect();
+        let entries = members
+            .into_iter()
+            .map(|member| {
+                let turns =
+                    turns.get(member.line).map(Arc::clone).unwrap_or_else(|| Arc::new(Semaphore::new(1)));
+                spawn(member, &events, turns)
+            })
+            .collect();
         Ok(Fleet::new(lines, entries, &events, first))
     }
 
@@ -227,7 +235,7 @@ fn check_watchdog(contract: WatchdogContract, capabilities: &Capabilities) -> Re
     Ok(())
 }
 
-fn spawn(member: Member, events: &broadcast::Sender<Event>) -> Arc<Entry> {
+fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore>) -> Arc<Entry> {
     let Member { line, settings, drive } = member;
     let (slave, capabilities, control) = (drive.slave(), drive.capabilities(), settings.control);
     let broadcasts = StopMode::ALL
@@ -243,7 +251,7 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>) -> Arc<Entry> {
     let (exit, exited) = watch::channel(None);
     let desk =
         Desk { supervisor, events: events.clone(), snapshots, exit, callers: BTreeMap::new(), next_call: 0 };
-    tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box }.run());
+    tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box, turns }.run());
     Arc::new(Entry {
         name,
         line,

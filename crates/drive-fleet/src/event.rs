@@ -56,7 +56,7 @@ pub enum EventKind {
         /// Whether it is above.
         exceeded: bool,
     },
-    /// Panel, terminals or another bus took control.
+    /// Panel, terminals or another bus have control now.
     ControlTaken(Control),
     /// This bus has control again.
     ControlReturned,

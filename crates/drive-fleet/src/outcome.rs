@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Control, Direction, Error, Setpoint, State, Status};
+use drive_core::{Command, Direction, Error, Setpoint, State, Status};
 
 use crate::limits::LimitProblem;
 
@@ -166,8 +166,6 @@ pub enum Refused {
     State(State),
     /// It has tripped; the code where it is known.
     Tripped(Option<u16>),
-    /// Somebody else controls it.
-    NotInControl(Control),
     /// It says that it is another drive than before; accept that first.
     IdentityChanged,
     /// What it is could not be checked in time since it was connected.
@@ -200,7 +198,6 @@ impl fmt::Display for Refused {
             Self::State(state) => write!(f, "the drive is in state {state}"),
             Self::Tripped(Some(code)) => write!(f, "the drive has tripped (fault {code}); reset it first"),
             Self::Tripped(None) => f.write_str("the drive has tripped; reset it first"),
-            Self::NotInControl(control) => write!(f, "the drive is controlled by {control}"),
             Self::IdentityChanged => {
                 f.write_str("it is another drive than before: accept its identity first")
             }

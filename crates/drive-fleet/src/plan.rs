@@ -8,7 +8,7 @@ use drive_core::{Capabilities, SerialSettings};
 
 use crate::{
     settings::{Periods, WatchdogContract},
-    supervisor::checks::FEED_PART,
+    supervisor::checks::{FEED_PART, fixed_watchdog},
 };
 
 /// Words that an exchange of a status or of measurements is reckoned with.
@@ -78,8 +78,16 @@ pub struct Demand {
     pub capabilities: &'static Capabilities,
     /// How often it is asked.
     pub periods: Periods,
-    /// Its watchdog.
+    /// Its watchdog, where the settings have a contract for it. A watchdog that the bus cannot set has to be fed in any
+    /// case.
     pub watchdog: Option<WatchdogContract>,
+}
+
+impl Demand {
+    /// The time within which it has to hear something.
+    fn feed_within(&self) -> Option<Duration> {
+        self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.capabilities))
+    }
 }
 
 /// What a line will be like.
@@ -183,12 +191,12 @@ pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProbl
     if utilisation_ppm > 1_000_000 {
         return Err(PlanProblem::Overloaded { sweep, drives: drives.len(), utilisation_ppm });
     }
-    let watched = drives.iter().filter(|demand| demand.watchdog.is_some()).count();
+    let watched = drives.iter().filter(|demand| demand.feed_within().is_some()).count();
     let frames = read.saturating_mul(u32::try_from(watched).unwrap_or(u32::MAX));
     let lost = budget.lost_slot();
     let shortest = drives
         .iter()
-        .filter_map(|demand| demand.watchdog.map(|watchdog| (watchdog.timeout, demand)))
+        .filter_map(|demand| demand.feed_within().map(|timeout| (timeout, demand)))
         .min_by_key(|(timeout, _)| *timeout);
     let feed_gap = shortest.map(|(timeout, _)| timeout / FEED_PART + lost + frames);
     if let (Some((timeout, demand)), Some(gap)) = (shortest, feed_gap)

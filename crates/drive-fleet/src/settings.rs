@@ -127,11 +127,11 @@ pub struct Times {
 }
 
 impl Default for Times {
-    /// 1 s until sent, 2 s until in effect, 60 s to reach the reference and to stand still, an alarm after 2 s.
+    /// 1 s until sent, 5 s until in effect (an Altivar 21 is deaf for 2 s after a reset), 60 s to reach the reference and to stand still, an alarm after 2 s.
     fn default() -> Self {
         Self {
             lifetime: Duration::from_secs(1),
-            effect: Duration::from_secs(2),
+            effect: Duration::from_secs(5),
             reference: Duration::from_secs(60),
             standstill: Duration::from_secs(60),
             stop_alarm: Duration::from_secs(2),

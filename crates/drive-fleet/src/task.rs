@@ -1,10 +1,15 @@
 //! The task of one drive: it owns the conversation and does what the supervisor says.
 
-use std::{collections::BTreeMap, pin::pin, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    pin::{Pin, pin},
+    sync::Arc,
+    time::Duration,
+};
 
 use drive_core::{Drive, Setpoint, StopMode};
 use tokio::{
-    sync::{broadcast, mpsc, oneshot, watch},
+    sync::{AcquireError, OwnedSemaphorePermit, Semaphore, broadcast, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
 };
 
@@ -12,7 +17,7 @@ use crate::{
     event::{Event, ExitAction},
     outcome::{Order, Outcome, Refused},
     snapshot::Snapshot,
-    supervisor::{Asker, CallId, Job, Output, Reply, Step, Supervisor},
+    supervisor::{Asker, CallId, Job, Output, Reply, Step, Supervisor, Turn},
 };
 
 /// What waits its turn.
@@ -47,21 +52,37 @@ pub(crate) struct Task {
     pub(crate) desk: Desk,
     pub(crate) messages: mpsc::Receiver<Message>,
     pub(crate) urgent: mpsc::UnboundedReceiver<Urgent>,
+    /// The turn that the drives of a line take one after the other.
+    pub(crate) turns: Arc<Semaphore>,
 }
 
 impl Task {
     /// Runs until the fleet has shut down, or nobody holds it any more.
     pub(crate) async fn run(self) {
-        let Self { mut drive, mut desk, mut messages, mut urgent } = self;
+        let Self { mut drive, mut desk, mut messages, mut urgent, turns } = self;
         let mut open = true;
+        // Kept across the steps, so that a drive does not lose its place in the row.
+        let mut waits_for_turn = None;
+        let mut turn: Option<OwnedSemaphorePermit> = None;
         loop {
             let step = desk.supervisor.next(Instant::now());
             desk.publish();
             let (call, until) = match step {
                 Step::Finished => break,
                 Step::Wait(until) => (None, Some(until)),
-                Step::Do { job, lifetime, until } => (Some(carry_out(&mut *drive, job, lifetime)), until),
+                Step::Do { job, lifetime, until, .. } => (Some(carry_out(&mut *drive, job, lifetime)), until),
             };
+            let on_turn = matches!(step, Step::Do { on_turn: true, .. });
+            match desk.supervisor.turn() {
+                Turn::Unwanted if !on_turn => {
+                    waits_for_turn = None;
+                    drop(turn.take());
+                }
+                Turn::Wanted if waits_for_turn.is_none() => {
+                    waits_for_turn = Some(Box::pin(Arc::clone(&turns).acquire_owned()));
+                }
+                _ => {}
+            }
             let talking = call.is_some();
             let mut call = pin!(async {
                 match call {
@@ -94,6 +115,16 @@ impl Task {
                         desk.supervisor.handle_reply(Instant::now(), reply);
                         break;
                     }
+                    granted = next_turn(&mut waits_for_turn) => {
+                        waits_for_turn = None;
+                        turn = granted;
+                        desk.supervisor.grant_turn();
+                        // A poll in flight is not disturbed by it.
+                        if talking {
+                            continue;
+                        }
+                        true
+                    }
                     () = &mut timer => true,
                 };
                 if drops || !talking {
@@ -102,7 +133,22 @@ impl Task {
                 }
                 desk.publish();
             }
+            if on_turn {
+                drop(turn.take());
+            }
         }
+    }
+}
+
+/// The turn of a drive that waits for it, and for ever otherwise.
+async fn next_turn<F>(waits: &mut Option<Pin<Box<F>>>) -> Option<OwnedSemaphorePermit>
+where
+    F: Future<Output = Result<OwnedSemaphorePermit, AcquireError>>,
+{
+    match waits {
+        // Nobody closes the row.
+        Some(waits) => waits.await.ok(),
+        None => std::future::pending().await,
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) struct Checks {
     contract: Option<WatchdogContract>,
     /// Whether the bus can set it.
     settable: bool,
+    /// The time of a watchdog that the drive has whether anybody wants it or not.
+    fixed: Option<Duration>,
     watchdog: WatchdogCheck,
     watchdog_at: Option<Instant>,
     /// The watchdog was verified at some time since the program started, so it acts while the drive is lost.
@@ -47,6 +49,7 @@ impl Checks {
             identity_at: None,
             contract: settings.watchdog,
             settable: capabilities.watchdog.is_some_and(|watchdog| watchdog.settable),
+            fixed: fixed_watchdog(capabilities),
             watchdog,
             watchdog_at: None,
             armed: false,
@@ -63,9 +66,9 @@ impl Checks {
         &self.watchdog
     }
 
-    /// The time of a watchdog that was seen armed.
+    /// The time of a watchdog that was seen armed, or that the drive always has.
     pub(crate) fn armed_for(&self) -> Option<Duration> {
-        self.contract.filter(|_| self.armed).map(|contract| contract.timeout)
+        self.contract.filter(|_| self.armed).map(|contract| contract.timeout).or(self.fixed)
     }
 
     /// A connection begins: everything is checked anew.
@@ -86,10 +89,11 @@ impl Checks {
 
     /// When the watchdog wants a frame of its own.
     pub(crate) fn feed_at(&self) -> Option<Instant> {
-        let WatchdogCheck::Verified(Watchdog { timeout: Some(timeout), .. }) = self.watchdog else {
-            return None;
+        let verified = match self.watchdog {
+            WatchdogCheck::Verified(Watchdog { timeout, .. }) => timeout,
+            _ => None,
         };
-        let at = self.heard? + timeout / FEED_PART;
+        let at = self.heard? + verified.or(self.fixed)? / FEED_PART;
         Some(self.feed_again.map_or(at, |again| at.max(again)))
     }
 
@@ -97,7 +101,7 @@ impl Checks {
     pub(crate) fn wake_at(&self) -> Option<Instant> {
         let identity = self.identity_at.filter(|_| self.identity == IdentityCheck::Unchecked);
         let watchdog = self.watchdog_at.filter(|_| self.wants_watchdog());
-        [identity, watchdog, self.feed_at()].into_iter().flatten().min()
+        [identity, watchdog].into_iter().flatten().min()
     }
 
     fn wants_watchdog(&self) -> bool {
@@ -224,10 +228,16 @@ impl Checks {
     }
 
     pub(crate) fn handle_kept_alive(&mut self, now: Instant, answered: bool) {
-        if let (false, Some(contract)) = (answered, self.contract) {
-            self.feed_again = Some(now + contract.timeout / (2 * FEED_PART));
+        let timeout = self.contract.map(|contract| contract.timeout).or(self.fixed);
+        if let (false, Some(timeout)) = (answered, timeout) {
+            self.feed_again = Some(now + timeout / (2 * FEED_PART));
         }
     }
+}
+
+/// The time of a watchdog that the bus cannot set and the drive therefore has as it is.
+pub(crate) fn fixed_watchdog(capabilities: &Capabilities) -> Option<Duration> {
+    capabilities.watchdog.filter(|watchdog| !watchdog.settable).map(|watchdog| watchdog.max)
 }
 
 /// Whether a family or a drive has nothing to say of what it is.

@@ -13,6 +13,8 @@ pub(crate) enum Step {
     /// Talk to the drive.
     Do {
         job: Job,
+        /// Whether it is done on the drive's turn.
+        on_turn: bool,
         /// How long its calls may wait until they are sent.
         lifetime: Option<Duration>,
         /// When to drop it, because something else must not wait for it.
@@ -22,6 +24,18 @@ pub(crate) enum Step {
     Wait(Instant),
     /// The exit is done.
     Finished,
+}
+
+/// Whether a drive has its turn at what the drives of a line do one after the other: what takes many exchanges of the
+/// lowest class. If all did it at once none would be done in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// It wants none.
+    Unwanted,
+    /// It waits for it.
+    Wanted,
+    /// It has it.
+    Granted,
 }
 
 /// One call of the drive.

@@ -26,7 +26,7 @@ use std::{
 use drive_core::{Capabilities, Error, ErrorKind, Measurements, PortError, Status};
 use tokio::time::Instant;
 
-pub(crate) use self::job::{Job, Reply, Step};
+pub(crate) use self::job::{Job, Reply, Step, Turn};
 use self::{
     checks::Checks,
     exit::Exit,
@@ -103,6 +103,7 @@ pub(crate) struct Supervisor {
     silent_since: Instant,
     last_error: Option<Error>,
     in_flight: Option<Job>,
+    turn: Turn,
     /// A poll has given way to an order since the last status.
     yielded: bool,
     outputs: VecDeque<Output>,
@@ -132,6 +133,7 @@ impl Supervisor {
             silent_since: now,
             last_error: None,
             in_flight: None,
+            turn: Turn::Unwanted,
             yielded: false,
             outputs: VecDeque::new(),
             changed: true,
@@ -150,13 +152,15 @@ impl Supervisor {
         if let Exit::Done(_) = self.exit {
             return Step::Finished;
         }
-        let Some((job, until)) = self.choose(now) else {
+        let urgent = self.choose(now);
+        let Some((job, until)) = urgent.or_else(|| self.choose_background(now)) else {
             return Step::Wait(self.wake_at(now));
         };
+        let on_turn = urgent.is_none();
         let lifetime = self.lifetime(now, job);
         self.in_flight = Some(job);
         self.changed = true;
-        Step::Do { job, lifetime, until }
+        Step::Do { job, on_turn, lifetime, until }
     }
 
     /// What is most urgent, and how long it may hold up the rest.
@@ -164,26 +168,46 @@ impl Supervisor {
         if let Some(job) = self.stop_job(now) {
             return Some((job, None));
         }
-        let feed_at = self.checks.feed_at();
+        let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
+        let hungry = feed_at.is_some_and(|at| at <= now);
+        let status = (Job::Status { anew: self.link != Link::Connected }, feed_at);
         // A stream of orders must not blind the fleet for the drive that it commands.
-        if self.pace.status_due() + self.settings.periods.rest <= now {
-            return Some((Job::Status { anew: self.link != Link::Connected }, feed_at));
+        if !hungry && self.pace.status_due() + self.settings.periods.rest <= now {
+            return Some(status);
         }
         if let Some(order) = self.order_job(now) {
             return Some(order);
         }
-        if self.link == Link::Connected && feed_at.is_some_and(|at| at <= now) {
+        if hungry {
             return Some((Job::KeepAlive, None));
         }
-        if self.pace.status_due() <= now {
-            return Some((Job::Status { anew: self.link != Link::Connected }, feed_at));
-        }
-        if self.link != Link::Connected {
+        (self.pace.status_due() <= now).then_some(status)
+    }
+
+    /// What is done on the drive's turn, when it has it.
+    fn choose_background(&mut self, now: Instant) -> Option<(Job, Option<Instant>)> {
+        let wanted = (self.link == Link::Connected).then(|| self.background_job(now)).flatten();
+        let Some(job) = wanted else {
+            self.turn = Turn::Unwanted;
+            return None;
+        };
+        if self.turn != Turn::Granted {
+            self.turn = Turn::Wanted;
             return None;
         }
-        let job = self.background_job(now)?;
+        self.turn = Turn::Unwanted;
         let holds = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
-        Some((job, Some(feed_at.map_or(holds, |at| at.min(holds)))))
+        Some((job, Some(self.checks.feed_at().map_or(holds, |at| at.min(holds)))))
+    }
+
+    /// Whether the drive wants its turn.
+    pub(crate) const fn turn(&self) -> Turn {
+        self.turn
+    }
+
+    /// The drive has its turn.
+    pub(crate) const fn grant_turn(&mut self) {
+        self.turn = Turn::Granted;
     }
 
     fn background_job(&self, now: Instant) -> Option<Job> {
@@ -210,8 +234,12 @@ impl Supervisor {
     fn wake_at(&self, now: Instant) -> Instant {
         let mut at = self.pace.status_due();
         if self.link == Link::Connected {
-            at = at.min(self.pace.slow_due()).min(self.lost_at());
-            at = self.checks.wake_at().into_iter().fold(at, Instant::min);
+            at = at.min(self.lost_at());
+            at = self.checks.feed_at().into_iter().fold(at, Instant::min);
+            if self.turn == Turn::Unwanted {
+                at = at.min(self.pace.slow_due());
+                at = self.checks.wake_at().into_iter().fold(at, Instant::min);
+            }
         }
         let stop = self.stopping.as_ref().and_then(Stopping::wake_at);
         let order = self.active.as_ref().and_then(Active::wake_at);

@@ -60,10 +60,6 @@ impl Supervisor {
         if status.value.is_standstill() && !self.is_starting() {
             self.started_here = false;
         }
-        if status.value.control.is_some_and(|control| control != Control::Bus) {
-            // Whoever has control may give another reference.
-            self.given = None;
-        }
         self.check_limit("current", {
             let limit = self.settings.alarms.current;
             status
@@ -100,13 +96,15 @@ impl Supervisor {
         {
             self.emit(EventKind::Warning { present });
         }
-        let controlled = before.and_then(|before| before.control).unwrap_or(Control::Bus);
-        match status.control {
-            Some(Control::Bus) if controlled != Control::Bus => self.emit(EventKind::ControlReturned),
-            Some(control) if control != Control::Bus && control != controlled => {
-                self.emit(EventKind::ControlTaken(control));
-            }
-            _ => {}
+        let (Some(was), Some(is)) = (before.and_then(|before| before.control), status.control) else {
+            return;
+        };
+        if was != Control::Bus && is == Control::Bus {
+            self.emit(EventKind::ControlReturned);
+        } else if was != is {
+            // Whoever has control now may give another reference.
+            self.given = None;
+            self.emit(EventKind::ControlTaken(is));
         }
     }
 

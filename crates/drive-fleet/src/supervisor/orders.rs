@@ -204,13 +204,14 @@ impl Supervisor {
         self.end_queue(&Refused::Stopped);
     }
 
+    /// The drive was lost. What was sent and is still uncertain keeps its time to be read back: a drive may be deaf for a
+    /// while because of it.
     pub(super) fn end_orders_by_loss(&mut self) {
-        if let Some(Active { phase: Phase::Verifying { error, .. }, .. }) = &self.active {
-            let outcome = Outcome::OutcomeUnknown(error.clone());
-            self.end_order(outcome);
-        }
-        // The reply to what is in flight is still to come, and may tell more.
-        if !self.active.as_ref().is_some_and(|active| matches!(active.phase, Phase::Sending(_))) {
+        let uncertain = self
+            .active
+            .as_ref()
+            .is_some_and(|active| matches!(active.phase, Phase::Sending(_) | Phase::Verifying { .. }));
+        if !uncertain {
             self.end_active(Refused::NotConnected, Unconfirmed::Lost);
         }
         self.end_queue(&Refused::NotConnected);

@@ -1,6 +1,6 @@
 //! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings.
 
-use drive_core::{Control, Direction, Result, Setpoint, State, Status};
+use drive_core::{Direction, Result, Setpoint, State, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, orders::QUEUE};
@@ -144,13 +144,11 @@ impl Supervisor {
         }
     }
 
-    /// What holds for motion besides: a state that the manual explains, no fault, control here, the watchdog armed.
+    /// What holds for motion besides: a state that the manual explains, no fault, the watchdog armed. Who has control is
+    /// for the family to judge, which reads it anew before a start: on some drives a command of the bus takes it.
     fn allow_motion(&mut self, now: Instant, status: &Status) -> Result<(), Blocked> {
         if status.is_fault() {
             return Err(Refused::Tripped(status.fault_code).into());
-        }
-        if let Some(control) = status.control.filter(|control| *control != Control::Bus) {
-            return Err(Refused::NotInControl(control).into());
         }
         if matches!(status.state, State::Unknown | State::NotReady) {
             return Err(Refused::State(status.state).into());

@@ -202,6 +202,12 @@ impl Supervisor {
         if alarm {
             stopping.alarm_at = None;
         }
+        if alarm && stopping.taken && stopping.mode == StopMode::DcInjection {
+            // Some drives inject for as long as they are told to; their ramp ends it.
+            stopping.mode = StopMode::Ramp;
+            stopping.taken = false;
+            stopping.next_try = Some(now);
+        }
         let (over, waiting): (Vec<_>, Vec<_>) =
             stopping.waiters.drain(..).partition(|waiter| waiter.until <= now);
         stopping.waiters = waiting;

@@ -212,11 +212,13 @@ impl Rig {
             turns += 1;
             assert!(turns < 10_000, "the machine spins at {:?}", self.machine);
             match self.machine.next(self.now) {
-                Step::Do { job, .. } => {
+                Step::Do { job, until, .. } => {
+                    assert!(until.is_none_or(|until| until > self.now), "{job:?} would never be done");
                     self.now += 20 * MS;
                     let reply = self.drive.answer(job);
                     self.machine.handle_reply(self.now, reply);
                 }
+                Step::Wait(_) if self.machine.turn() == Turn::Wanted => self.machine.grant_turn(),
                 Step::Wait(at) => self.now = at.clamp(self.now + Duration::from_micros(1), until),
                 Step::Finished => self.now = until,
             }

@@ -1,0 +1,484 @@
+//! The rules of motion, each for every family that can do it, against the simulator in virtual time.
+
+use std::time::Duration;
+
+use drive_core::{Class, Direction, Frequency, Identity, Reaction, SerialSettings, State, StopMode};
+use drive_families::Family;
+use drive_fleet::{
+    DriveSettings, EventKind, ExitAction, Link, OnExit, OnFault, Outcome, Periods, Refused, Times,
+    WatchdogContract,
+};
+use drive_sim::{Fault, Panel};
+use support::plant::{ADDRESS, MOTOR, Plant, Site, common_settings, contract, controlled};
+use tokio::time::{Instant, sleep};
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A test of every family that the condition lets through.
+async fn each(test: impl AsyncFn(Family)) {
+    for family in Family::ALL {
+        test(family).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_1_a_stop_is_repeated_until_the_drive_confirms_it_and_ends_in_an_alarm_when_it_cannot() {
+    each(async |family| {
+        let mut plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        plant.machine().mute();
+        let outcome = plant.motor().stop(StopMode::Ramp).await;
+        assert!(!outcome.is_confirmed(), "{family}: {outcome}");
+        plant.event("the alarm", |kind| matches!(kind, EventKind::StopUnconfirmed { .. })).await;
+        assert!(plant.motor().snapshot().stop.is_some(), "{family}: it goes on");
+        plant.machine().unmute();
+        plant.event("the confirmation", |kind| *kind == EventKind::StopConfirmed).await;
+        assert!(!plant.machine().observe().running, "{family}");
+        assert_eq!(plant.motor().snapshot().stop, None);
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_1_a_stop_outranks_a_line_full_of_polls_and_commands() {
+    let members = (1..=31)
+        .map(|address| {
+            let periods =
+                Periods { running: 2 * SECOND, rest: 2 * SECOND, max_age: 5 * SECOND, ..Periods::default() };
+            let settings = DriveSettings { periods, ..DriveSettings::controlled(format!("drive {address}")) };
+            (Family::Atv312, address, settings)
+        })
+        .collect();
+    let plant = Plant::open(vec![Site::new(common_settings(), members)]).expect("it can be");
+    for drive in plant.fleet.drives() {
+        drive.ready(60 * SECOND).await.expect("it gets ready");
+    }
+    let stopped = plant.drive("drive 17");
+    for round in 0..50_u16 {
+        let everybody = plant.fleet.drives();
+        let setpoints: Vec<_> = everybody
+            .into_iter()
+            .map(|drive| {
+                tokio::spawn(async move { drive.set_setpoint(Frequency::from_hertz(10 + round % 20)).await })
+            })
+            .collect();
+        sleep(Duration::from_millis(7 * u64::from(round))).await;
+        assert_eq!(stopped.stop(StopMode::Ramp).await, Outcome::Confirmed);
+        for setpoint in setpoints {
+            setpoint.await.expect("it ends");
+        }
+    }
+    let stats = plant.lines[0].stats();
+    let (wait, bound) = (stats.class(Class::Stop).wait.max(), plant.lines[0].worst_case_stop());
+    assert!(stats.class(Class::Stop).sent >= 50);
+    assert!(wait <= bound, "{wait:?} of {bound:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_2_a_command_expires_and_is_never_sent_late_nor_replayed_after_a_reconnect() {
+    each(async |family| {
+        // A neighbour holds up the line for longer than the command lives.
+        let times = Times { lifetime: Duration::from_millis(20), ..Times::default() };
+        let settings = DriveSettings { times, ..controlled(family, MOTOR) };
+        let neighbour = DriveSettings::watched("neighbour");
+        let members = vec![(family, ADDRESS, settings), (family, ADDRESS + 1, neighbour)];
+        let plant = Plant::open(vec![Site::new(common_settings(), members)]).expect("it can be fed");
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        let neighbour = plant.machine_of("neighbour");
+        neighbour.hold_next_answer();
+        neighbour.wait_until_held().await;
+        let writes = Plant::writes(plant.machine());
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert_eq!(outcome, Outcome::Expired, "{family}");
+        sleep(30 * SECOND).await;
+        assert_eq!(Plant::writes(plant.machine()), writes, "{family}");
+
+        // A command that falls into a lost line is not carried out when the line is back.
+        plant.machine().mute();
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert!(!outcome.is_confirmed(), "{family}: {outcome}");
+        sleep(30 * SECOND).await;
+        plant.machine().unmute();
+        plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
+        sleep(30 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_3_nothing_is_confirmed_that_the_machine_does_not_do() {
+    each(async |family| {
+        let plant = Plant::single(family, |settings| {
+            settings.watchdog = None;
+            settings.periods.max_age = 20 * SECOND;
+        });
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        plant.sites[0].simulated.set_faults(drive_sim::Faults::seeded(6).with(Fault::Lost, 100_000));
+        let mut confirmed = 0;
+        for round in 0..40_u16 {
+            let setpoint = Frequency::from_hertz(20 + round % 10);
+            let outcome = plant.motor().run(Direction::Forward, setpoint).await;
+            let seen = plant.machine().observe();
+            if outcome.is_confirmed() {
+                confirmed += 1;
+                assert!(
+                    seen.running && seen.setpoint == i32::from(20 + round % 10) * 100,
+                    "{family}: {seen:?}"
+                );
+            }
+            let outcome = plant.motor().stop(StopMode::Ramp).await;
+            assert!(
+                !outcome.is_confirmed() || !plant.machine().observe().running,
+                "{family}: {outcome}, {:?}",
+                plant.machine().observe()
+            );
+        }
+        assert!(confirmed >= 20, "{family}: {confirmed} of 40 got through a line that loses a tenth");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_4_motion_needs_a_drive_that_answers() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.machine().mute();
+        sleep(10 * SECOND).await;
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert_eq!(outcome, Outcome::Refused(Refused::NotConnected), "{family}");
+        assert_eq!(Plant::writes(plant.machine()), 0, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_4_motion_needs_a_drive_without_a_fault() {
+    each(async |family| {
+        let mut plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        plant.machine().trip(support::drives::a_trip(family));
+        plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
+        let writes = Plant::writes(plant.machine());
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert!(matches!(outcome, Outcome::Refused(Refused::Tripped(_))), "{family}: {outcome}");
+        assert_eq!(Plant::writes(plant.machine()), writes, "{family}");
+        let explained =
+            plant.event("its explanation", |kind| matches!(kind, EventKind::TripExplained(_))).await;
+        let EventKind::TripExplained(trip) = explained else { unreachable!() };
+        assert_eq!(trip.before.expect("it ran before").value.state, State::Running, "{family}");
+        let present = trip.faults.expect("it was read").present.first().map(|fault| fault.code);
+        assert_eq!(present, Some(support::drives::a_trip(family)), "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_4_motion_needs_control_here() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        plant.machine().panel(Panel::TakeControl);
+        if !plant.machine().observe().local {
+            // This family has no such key.
+            return;
+        }
+        sleep(5 * SECOND).await;
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert!(matches!(outcome, Outcome::Refused(_)), "{family}: {outcome}");
+        assert!(!plant.machine().observe().running, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_4_motion_needs_the_drive_that_is_remembered_until_another_is_accepted() {
+    each(async |family| {
+        let remembered = Identity { model: Some("another".to_owned()), ..Identity::default() };
+        let mut plant = Plant::single(family, |settings| settings.identity = Some(remembered));
+        if family.capabilities().identification.is_none() {
+            plant.motor().ready(60 * SECOND).await.expect("it cannot say what it is");
+            return;
+        }
+        plant.event("the change", |kind| matches!(kind, EventKind::IdentityChanged { .. })).await;
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert_eq!(outcome, Outcome::Refused(Refused::IdentityChanged), "{family}");
+        assert_eq!(Plant::writes(plant.machine()), 0, "{family}: not even its watchdog is written");
+        assert!(plant.motor().accept_identity().await.is_confirmed());
+        plant.run_at(20).await;
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_5_nothing_restarts_after_a_power_cycle() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        plant.machine().power_cycle();
+        sleep(60 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{family}");
+        plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
+        assert!(!plant.motor().snapshot().started_here, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_5_nothing_restarts_after_a_fault_and_its_reset() {
+    each(async |family| {
+        let mut plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        plant.machine().trip(support::drives::a_trip(family));
+        plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
+        plant.machine().wait_until(|machine| machine.shaft_frequency == 0).await;
+        let outcome = plant.motor().reset_faults().await;
+        assert!(outcome.is_confirmed(), "{family}: {outcome}");
+        sleep(60 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{family}");
+        assert_eq!(plant.machine().observe().trip, None, "{family}");
+        plant.run_at(20).await;
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_5_nothing_restarts_after_a_lost_line() {
+    each(async |family| {
+        let mut plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        plant.machine().mute();
+        plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
+        sleep(20 * SECOND).await;
+        let ran_on = plant.machine().observe().running;
+        assert_eq!(ran_on, family.capabilities().watchdog.is_none(), "{family}: a watchdog stops it");
+        plant.machine().unmute();
+        plant.event("the return", |kind| matches!(kind, EventKind::Connected(_))).await;
+        sleep(60 * SECOND).await;
+        assert_eq!(plant.machine().observe().running, ran_on, "{family}: what it does is adopted");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_6_a_reset_is_written_once_and_not_held() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        for _ in 0..2 {
+            plant.machine().trip(support::drives::a_trip(family));
+            plant
+                .motor()
+                .wait_until(|snapshot| snapshot.status.as_ref().is_some_and(|status| status.value.is_fault()))
+                .await;
+            plant.machine().wait_until(|machine| machine.shaft_frequency == 0).await;
+            assert!(plant.motor().reset_faults().await.is_confirmed(), "{family}");
+            plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
+            sleep(10 * SECOND).await;
+            let writes = Plant::writes(plant.machine());
+            sleep(60 * SECOND).await;
+            assert_eq!(Plant::writes(plant.machine()), writes, "{family}: nothing is held");
+            // A bit that was held could not rise a second time.
+            assert_eq!(plant.machine().observe().trip, None, "{family}");
+        }
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_7_a_running_state_is_adopted_and_nothing_is_written_until_somebody_commands() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        let writes = Plant::writes(plant.machine());
+        let plant = plant.restarted().await;
+        let adopted = plant.motor().wait_until(|snapshot| snapshot.status.is_some()).await;
+        assert_eq!(
+            adopted.status.as_ref().map(|status| status.value.state),
+            Some(State::Running),
+            "{family}"
+        );
+        sleep(60 * SECOND).await;
+        assert_eq!(Plant::writes(plant.machine()), writes, "{family}");
+        assert_eq!(plant.machine().observe().output_frequency, 3_000, "{family}");
+        assert!(!plant.motor().snapshot().started_here, "{family}");
+        assert!(plant.motor().set_setpoint(Frequency::from_hertz(25)).await.is_confirmed(), "{family}");
+        plant.machine().wait_until(|machine| machine.output_frequency == 2_500).await;
+        assert!(plant.motor().stop(StopMode::Ramp).await.is_confirmed(), "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_8_on_exit_what_was_started_here_stops_and_what_was_not_is_left() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        let actions = plant.fleet.shutdown(60 * SECOND).await;
+        assert_eq!(actions, [(MOTOR.into(), ExitAction::Stopped(Outcome::Confirmed))], "{family}");
+        assert!(!plant.machine().observe().running, "{family}");
+
+        let plant = Plant::single(family, |settings| settings.on_exit = OnExit::Leave);
+        plant.run_at(30).await;
+        let actions = plant.fleet.shutdown(60 * SECOND).await;
+        assert_eq!(actions, [(MOTOR.into(), ExitAction::Left)], "{family}");
+        assert!(plant.machine().observe().running, "{family}");
+
+        let mut plant = plant.restarted().await;
+        plant.event("the adoption", |kind| matches!(kind, EventKind::Connected(_))).await;
+        let actions = plant.fleet.shutdown(60 * SECOND).await;
+        assert_eq!(actions, [(MOTOR.into(), ExitAction::Left)], "{family}: it was not started here");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_8_on_exit_control_is_released_where_the_family_can() {
+    each(async |family| {
+        let plant = Plant::single(family, |settings| settings.on_exit = OnExit::Release(StopMode::Ramp));
+        plant.run_at(30).await;
+        let actions = plant.fleet.shutdown(60 * SECOND).await;
+        let [(_, ExitAction::Released(outcome))] = &actions[..] else { panic!("{family}: {actions:?}") };
+        assert_eq!(outcome.is_confirmed(), family.capabilities().release, "{family}: {outcome}");
+        assert!(!plant.machine().observe().running, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_9_a_watchdog_is_armed_verified_fed_and_trips_in_its_time_when_the_line_is_lost() {
+    each(async |family| {
+        let Some(contract) = contract(family) else { return };
+        let mut plant = Plant::single(family, |_| {});
+        let verified =
+            plant.event("the contract", |kind| matches!(kind, EventKind::WatchdogVerified { .. })).await;
+        let EventKind::WatchdogVerified { watchdog, written } = verified else { unreachable!() };
+        assert_eq!(watchdog.timeout, Some(contract.timeout), "{family}");
+        let settable = family.capabilities().watchdog.is_some_and(|watchdog| watchdog.settable);
+        assert_eq!(written, settable, "{family}");
+        plant.run_at(30).await;
+        sleep(600 * SECOND).await;
+        assert_eq!(plant.machine().observe().trip, None, "{family}: it is fed");
+
+        plant.machine().mute();
+        let cut = Instant::now();
+        plant.machine().wait_until(|machine| machine.trip.is_some()).await;
+        assert!(
+            cut.elapsed() <= contract.timeout + Duration::from_millis(5),
+            "{family}: {:?}",
+            cut.elapsed()
+        );
+        plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
+        plant.machine().unmute();
+        let tripped = plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
+        let EventKind::Tripped(trip) = tripped else { unreachable!() };
+        assert!(trip.watchdog_after.is_some_and(|silence| silence >= contract.timeout), "{family}: {trip:?}");
+        sleep(60 * SECOND).await;
+        assert!(plant.machine().observe().trip.is_some(), "{family}: it waits for a hand");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_9_a_watchdogs_trip_is_reset_by_the_policy_that_says_so_and_the_motor_stays() {
+    each(async |family| {
+        if contract(family).is_none() {
+            return;
+        }
+        let mut plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);
+        plant.run_at(30).await;
+        plant.machine().mute();
+        plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
+        plant.machine().wait_until(|machine| machine.trip.is_some() && machine.shaft_frequency == 0).await;
+        plant.machine().unmute();
+        plant.machine().wait_until(|machine| machine.trip.is_none()).await;
+        sleep(60 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_9_a_watchdog_that_the_line_cannot_feed_is_refused_with_the_arithmetic() {
+    let timeout = Duration::from_millis(500);
+    let members = (1..=31)
+        .map(|address| {
+            let periods =
+                Periods { running: 2 * SECOND, rest: 2 * SECOND, max_age: 5 * SECOND, ..Periods::default() };
+            let watchdog = Some(WatchdogContract { timeout, reaction: Reaction::Ramp });
+            let name = format!("drive {address}");
+            (Family::Atv312, address, DriveSettings { periods, watchdog, ..DriveSettings::controlled(name) })
+        })
+        .collect();
+    let Err(error) = Plant::open(vec![Site::new(SerialSettings::MODBUS_DEFAULT, members)]) else {
+        panic!("31 watchdogs of 500 ms cannot be fed at 19200 bit/s")
+    };
+    let text = error.to_string();
+    assert!(
+        text.contains("the watchdog of drive 1 is 500ms") && text.contains("31 watched drives"),
+        "{text}"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_10_eeprom_is_written_only_when_asked_refused_when_nothing_changed_and_counted() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        let written = plant.machine().observe().eeprom_writes;
+        for hertz in 20..30 {
+            assert!(
+                plant.motor().set_setpoint(Frequency::from_hertz(hertz)).await.is_confirmed(),
+                "{family}"
+            );
+        }
+        assert!(plant.motor().stop(StopMode::Ramp).await.is_confirmed(), "{family}");
+        plant.run_at(30).await;
+        assert!(plant.motor().stop(StopMode::Ramp).await.is_confirmed(), "{family}");
+        sleep(600 * SECOND).await;
+        assert_eq!(plant.machine().observe().eeprom_writes, written, "{family}");
+        let outcome = plant.motor().persist().await;
+        let counted = plant.motor().snapshot().counters.saves;
+        if outcome.is_confirmed() {
+            assert_eq!(counted, 1, "{family}: the watchdog was set up and is saved");
+            assert_eq!(plant.machine().observe().eeprom_writes, written + 1, "{family}");
+            let again = plant.motor().persist().await;
+            assert!(matches!(again, Outcome::Refused(Refused::Drive(_))), "{family}: {again}");
+        } else {
+            assert!(matches!(outcome, Outcome::Refused(Refused::Drive(_))), "{family}: {outcome}");
+            assert_eq!((counted, plant.machine().observe().eeprom_writes), (0, written), "{family}");
+        }
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_11_without_control_nothing_is_ever_written() {
+    each(async |family| {
+        let plant = Plant::single(family, |settings| {
+            settings.control = false;
+            settings.on_fault = OnFault::ResetWatchdogTrip;
+            settings.on_loss = drive_fleet::OnLoss::Stop(StopMode::Ramp);
+        });
+        sleep(10 * SECOND).await;
+        let motor = plant.motor();
+        for outcome in [
+            motor.run(Direction::Forward, Frequency::from_hertz(20)).await,
+            motor.stop(StopMode::Ramp).await,
+            motor.reset_faults().await,
+            motor.release().await,
+            motor.persist().await,
+        ] {
+            assert_eq!(outcome, Outcome::Refused(Refused::ReadOnly), "{family}");
+        }
+        plant.machine().mute();
+        sleep(10 * SECOND).await;
+        plant.machine().unmute();
+        sleep(10 * SECOND).await;
+        plant.machine().trip(support::drives::a_trip(family));
+        sleep(10 * SECOND).await;
+        assert_eq!(plant.fleet.shutdown(SECOND).await, [(MOTOR.into(), ExitAction::Left)], "{family}");
+        assert_eq!(Plant::writes(plant.machine()), 0, "{family}");
+    })
+    .await;
+}
