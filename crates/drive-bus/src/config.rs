@@ -33,6 +33,21 @@ pub enum Echo {
     Auto,
 }
 
+/// The kernel's RS-485 mode: it switches the transmitter with RTS (Linux `TIOCSRS485`). For UARTs whose driver has it;
+/// USB adapters switch by themselves and have none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Rs485 {
+    /// RTS is low while we transmit, high otherwise; usually it is the other way round.
+    pub inverted: bool,
+    /// From the switch of RTS to the first bit, in whole milliseconds.
+    pub delay_before_send: Duration,
+    /// From the last bit to the switch of RTS, in whole milliseconds. It must be shorter than t3.5, or the beginning of
+    /// an answer is lost.
+    pub delay_after_send: Duration,
+    /// Leave the receiver on while we transmit: what we send comes back as an echo.
+    pub receive_while_sending: bool,
+}
+
 /// Configuration of a line. Start from one of the constructors and change what is special:
 ///
 /// ```
@@ -72,6 +87,12 @@ pub struct LineConfig {
     pub chunk_gap: Duration,
     /// Whether the adapter echoes.
     pub echo: Echo,
+    /// The kernel's RS-485 mode, where the port has it. `None`: left as it is.
+    pub rs485: Option<Rs485>,
+    /// Ask a USB adapter to deliver at once: writes its latency timer (FTDI: 16 ms as delivered, which is longer than
+    /// most answers) where the user may do that. What it is can be read with
+    /// [`adapter_latency`](crate::adapter_latency).
+    pub low_latency: bool,
     /// How many requests may wait; more are refused with [`PortError::QueueFull`](drive_core::PortError::QueueFull).
     pub queue_limit: usize,
     /// How often a read, or a write of a level inside its lifetime, is sent again after silence or damage.
@@ -125,6 +146,8 @@ impl LineConfig {
             slave_change_gap: Duration::ZERO,
             chunk_gap: Duration::from_millis(20),
             echo: Echo::Off,
+            rs485: None,
+            low_latency: true,
             queue_limit: 1_024,
             retries: 2,
             offline_after: 3,

@@ -70,8 +70,8 @@ mod task;
 pub mod timeout;
 mod transport;
 
-pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
+pub use config::{Echo, Endpoint, LineConfig, Rs485, SlaveSettings};
 pub use line::Line;
 pub use slave::Slave;
 pub use stats::Stats;
-pub use transport::OpenError;
+pub use transport::{OpenError, adapter_latency};

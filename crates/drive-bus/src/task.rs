@@ -122,8 +122,13 @@ impl Task {
             match timeout(WRITE_LIMIT, stream.write_all(&frame)).await {
                 Ok(Ok(())) => {
                     let now = Instant::now();
-                    self.shared.master().handle_sent(now);
+                    let deadline = {
+                        let mut master = self.shared.master();
+                        master.handle_sent(now);
+                        master.deadline()
+                    };
                     self.shared.tap().take_if(|tap| !tap.sent(now, &frame));
+                    return Some(deadline);
                 }
                 Ok(Err(error)) => self.lose(&error.to_string()),
                 Err(_) => self.lose("the port takes no bytes"),

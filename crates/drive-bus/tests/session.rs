@@ -199,6 +199,23 @@ async fn a_port_in_use_is_named_and_a_free_one_serves() {
     line.close().await;
 }
 
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn a_port_without_an_rs485_mode_says_so() {
+    use tokio_serial::{SerialPort, SerialStream};
+
+    let (_far, near) = SerialStream::pair().unwrap();
+    let path = near.name().unwrap();
+    drop(near);
+    let config = LineConfig {
+        rs485: Some(drive_bus::Rs485::default()),
+        ..LineConfig::serial(&path, SerialSettings::MODBUS_DEFAULT)
+    };
+    let error = Line::open(config).await.unwrap_err();
+    assert!(matches!(error, OpenError::Rs485 { .. }), "{error}");
+    assert_eq!(drive_bus::adapter_latency(path.as_ref()), None);
+}
+
 #[tokio::test]
 async fn modbus_tcp_ignores_a_late_answer_by_its_number_and_a_foreign_unit_by_its_address() {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();

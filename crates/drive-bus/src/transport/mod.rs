@@ -2,6 +2,8 @@
 
 mod serial;
 
+pub use serial::adapter_latency;
+
 use std::{io, path::PathBuf, pin::Pin, time::Duration};
 
 use tokio::{
@@ -53,6 +55,14 @@ pub enum OpenError {
         /// What the system says.
         reason: String,
     },
+    /// The port cannot be switched to RS-485 as configured.
+    #[error("serial port {} has no RS-485 mode of the kernel: {reason} (an adapter that switches by itself needs none)", path.display())]
+    Rs485 {
+        /// The path asked for.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
     /// The far end of a connection cannot be reached.
     #[error("cannot connect to {address}: {reason}")]
     Connect {
@@ -68,7 +78,7 @@ pub enum OpenError {
 
 /// Opens the stream of a line, again and again.
 pub(crate) enum Connector {
-    Serial(LineConfig),
+    Serial(Box<LineConfig>),
     Tcp(String),
     Given(Given),
     None,
@@ -77,7 +87,7 @@ pub(crate) enum Connector {
 impl Connector {
     pub(crate) fn to(config: &LineConfig) -> Result<Self, OpenError> {
         match &config.endpoint {
-            Endpoint::Serial(_) => Ok(Self::Serial(config.clone())),
+            Endpoint::Serial(_) => Ok(Self::Serial(Box::new(config.clone()))),
             Endpoint::RtuOverTcp(address) | Endpoint::ModbusTcp(address) => Ok(Self::Tcp(address.clone())),
             Endpoint::Stream => Err(OpenError::NoPort),
         }
