@@ -1,6 +1,6 @@
 //! The task that owns the port: it writes, reads, waits, and does what the master decides.
 
-use std::{io, sync::Arc, time::Duration};
+use std::{future::poll_fn, io, pin::pin, sync::Arc, task::Poll, time::Duration};
 
 use drive_clock::Timer;
 use tokio::{
@@ -119,8 +119,8 @@ impl Task {
             }
             let Some(frame) = frame else { return (!finished).then_some(deadline) };
             let Port::Open(stream) = &mut self.port else { return Some(deadline) };
-            match timeout(WRITE_LIMIT, stream.write_all(&frame)).await {
-                Ok(Ok(())) => {
+            match write(stream, &frame).await {
+                Ok(()) => {
                     let now = Instant::now();
                     let deadline = {
                         let mut master = self.shared.master();
@@ -130,8 +130,7 @@ impl Task {
                     self.shared.tap().take_if(|tap| !tap.sent(now, &frame));
                     return Some(deadline);
                 }
-                Ok(Err(error)) => self.lose(&error.to_string()),
-                Err(_) => self.lose("the port takes no bytes"),
+                Err(error) => self.lose(&error.to_string()),
             }
         }
     }
@@ -181,6 +180,16 @@ impl Task {
     fn lengthen_backoff(&mut self) {
         self.backoff = (self.backoff * 2).min(REOPEN_BACKOFF.1);
     }
+}
+
+/// Writes a frame. A port nearly always takes it at once; only one that does not is worth a timer.
+async fn write(stream: &mut BoxedStream, frame: &[u8]) -> io::Result<()> {
+    let mut writing = pin!(stream.write_all(frame));
+    if let Poll::Ready(written) = poll_fn(|context| Poll::Ready(writing.as_mut().poll(context))).await {
+        return written;
+    }
+    let limit = || io::Error::new(io::ErrorKind::TimedOut, "the port takes no bytes");
+    timeout(WRITE_LIMIT, writing).await.unwrap_or_else(|_| Err(limit()))
 }
 
 async fn port_event(port: &mut Port, received: &mut [u8]) -> Event {

@@ -165,17 +165,19 @@ impl Rtu {
             let Some((offset, len)) = found else { return Step::More };
             let from_the_start = offset == 0;
             self.judge(offset);
-            let frame: Vec<u8> = self.received.drain(..len.min(self.received.len())).collect();
-            if let Some(step) = self.accept(frame, from_the_start) {
+            if let Some(step) = self.accept(len, from_the_start) {
                 return step;
             }
         }
     }
 
-    /// A frame that has the form of the answer.
-    fn accept(&mut self, frame: Vec<u8>, from_the_start: bool) -> Option<Step> {
+    /// What was received begins with a frame of this length that has the form of the answer.
+    fn accept(&mut self, len: usize, from_the_start: bool) -> Option<Step> {
         let current = self.current.as_mut()?;
-        let equals = frame == current.sent;
+        let frame = self.received.get(..len)?;
+        let equals = *frame == current.sent;
+        let pdu = Bytes::copy_from_slice(frame.get(1..len.saturating_sub(2))?);
+        self.received.drain(..len);
         if equals && self.echo == EchoState::Present && !current.echo_taken {
             current.echo_taken = true;
             self.strays.push(Stray::Echo);
@@ -185,8 +187,6 @@ impl Rtu {
             current.misfit = Some("an echo could not be told from it".to_owned());
             return None;
         }
-        let frame = Bytes::from(frame);
-        let pdu = frame.slice(1..frame.len().saturating_sub(2));
         match answer::check(&current.request, &pdu) {
             Ok(answer) => {
                 if self.echo == EchoState::Unknown && from_the_start && !equals {
@@ -262,8 +262,7 @@ impl Rtu {
             });
             if let Some(offset) = whole {
                 self.judge(offset);
-                let frame = std::mem::take(&mut self.received);
-                if let Some(step) = self.accept(frame, offset == 0) {
+                if let Some(step) = self.accept(self.received.len(), offset == 0) {
                     return step;
                 }
             }
