@@ -65,7 +65,7 @@ pub enum FleetError {
         /// The drive.
         drive: String,
         /// Which and why.
-        problem: String,
+        problem: SettingProblem,
     },
     /// The drives of a line want more than it gives.
     #[error("line {line:?}: {problem}")]
@@ -75,6 +75,16 @@ pub enum FleetError {
         /// The arithmetic.
         problem: PlanProblem,
     },
+}
+
+/// A setting that contradicts another one or the family.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{reason}")]
+pub struct SettingProblem {
+    /// The field of [`DriveSettings`].
+    pub setting: &'static str,
+    /// One sentence: why, and what was expected.
+    pub reason: String,
 }
 
 /// What a drive is before the fleet starts.
@@ -185,27 +195,34 @@ impl FleetBuilder {
 /// Checks what the settings of a drive say against each other and against its family.
 ///
 /// # Errors
-/// One sentence: which setting, and what was expected.
-pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> Result<(), String> {
+/// [`SettingProblem`] with the first that does not fit.
+pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> Result<(), SettingProblem> {
+    let problem = |setting, reason| Err(SettingProblem { setting, reason });
     if settings.name.trim().is_empty() {
-        return Err("a drive needs a name".to_owned());
+        return problem("name", "a drive needs a name".to_owned());
     }
     let periods = settings.periods;
     for (name, period) in [("running", periods.running), ("rest", periods.rest)] {
         if period.is_zero() {
-            return Err(format!("the period {name:?} is zero: expected the time between two statuses"));
+            return problem("periods", format!("{name} is zero: expected the time between two statuses"));
         }
         if period >= periods.max_age {
-            return Err(format!(
-                "a status every {period:?} ({name}) is never fresh with a max_age of {:?}: expected a longer max_age",
-                periods.max_age
-            ));
+            return problem(
+                "periods",
+                format!(
+                    "with a status every {period:?} ({name}) and a max_age of {:?} no value is ever fresh: expected a \
+                     longer max_age",
+                    periods.max_age
+                ),
+            );
         }
     }
-    settings.limits.check()?;
-    match settings.watchdog {
-        Some(contract) => check_watchdog(contract, capabilities),
-        None => Ok(()),
+    if let Err(reason) = settings.limits.check() {
+        return problem("limits", reason);
+    }
+    match settings.watchdog.map(|contract| check_watchdog(contract, capabilities)) {
+        Some(Err(reason)) => problem("watchdog", reason),
+        _ => Ok(()),
     }
 }
 

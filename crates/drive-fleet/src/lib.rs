@@ -56,7 +56,7 @@ mod task;
 #[cfg(test)]
 mod testing;
 
-pub use builder::{FleetBuilder, FleetError, check_settings};
+pub use builder::{FleetBuilder, FleetError, SettingProblem, check_settings};
 pub use event::{Event, EventKind, ExitAction, Limit};
 pub use fleet::{Events, Fleet, Received};
 pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};

@@ -8,6 +8,7 @@ use tracing::Level;
 use crate::{
     commands::{demo, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
     failure::Failure,
+    run,
 };
 
 /// What holds for all subcommands.
@@ -29,6 +30,8 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Demo(demo::Args),
+    Run(run::Args),
+    Check(run::CheckArgs),
     Sim(sim::Args),
     Plan(plan::Args),
     Poll(poll::Args),
@@ -48,6 +51,7 @@ impl Command {
     pub(crate) fn log_level(&self) -> Option<Level> {
         match self {
             Self::Demo(args) => args.log_level(),
+            Self::Run(_) => Some(Level::INFO),
             Self::Sim(_) | Self::Poll(_) => Some(Level::WARN),
             _ => Some(Level::ERROR),
         }
@@ -56,6 +60,8 @@ impl Command {
     async fn run(self) -> Result<(), Failure> {
         match self {
             Self::Demo(args) => demo::run(args).await,
+            Self::Run(args) => run::run(args).await,
+            Self::Check(args) => run::check(&args),
             Self::Sim(args) => sim::run(args).await,
             Self::Plan(args) => plan::run(&args),
             Self::Poll(args) => poll::run(args).await,

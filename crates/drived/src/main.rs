@@ -9,6 +9,7 @@ mod line_spec;
 mod logging;
 mod one_drive;
 mod output;
+mod run;
 mod signals;
 mod simulated;
 

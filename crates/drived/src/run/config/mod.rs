@@ -1,0 +1,289 @@
+//! The configuration of the daemon: lines, drives, periods, policies.
+//!
+//! Read in two steps: the keys one by one ([`raw`], [`values`]), then seen together, against the families and against the
+//! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
+
+mod place;
+mod raw;
+mod values;
+
+use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
+
+use drive_bus::LineConfig;
+use drive_core::{Capabilities, StopMode};
+use drive_fleet::{
+    Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, LinePlan, OnExit, OnFault,
+    OnLoss, Periods, WatchdogContract, check_settings, plan,
+};
+
+pub(crate) use self::place::ConfigError;
+use self::{
+    place::Source,
+    raw::{DriveEntry, File, LineEntry},
+    values::Exit,
+};
+use crate::drive_spec::DriveName;
+
+/// How often snapshots are printed unless the file says otherwise.
+const SNAPSHOTS: Duration = Duration::from_secs(5);
+/// How long the exit may take unless the file says otherwise.
+const SHUTDOWN: Duration = Duration::from_secs(60);
+/// How long an answer may take unless the file says otherwise: the slowest family needs 50 ms.
+const RESPONSE_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// A configuration that can work.
+#[derive(Debug)]
+pub(crate) struct Config {
+    /// How often a snapshot of every drive is printed; zero: never.
+    pub(crate) snapshots: Duration,
+    /// How long the exit may take.
+    pub(crate) shutdown: Duration,
+    pub(crate) lines: Vec<LinePart>,
+}
+
+/// A line and its drives.
+#[derive(Debug)]
+pub(crate) struct LinePart {
+    pub(crate) name: String,
+    pub(crate) config: LineConfig,
+    pub(crate) budget: LineBudget,
+    pub(crate) plan: LinePlan,
+    pub(crate) drives: Vec<(DriveName, DriveSettings)>,
+}
+
+impl Config {
+    /// Reads a file.
+    pub(crate) fn load(file: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(file);
+        let source = Source { file, text: text.as_deref().unwrap_or_default() };
+        match &text {
+            Ok(text) => Self::read(file, text),
+            Err(error) => Err(source.error_of_file(format_args!("cannot be read: {error}"))),
+        }
+    }
+
+    /// Reads the text of a file.
+    pub(crate) fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
+        let source = Source { file, text };
+        let raw: File = toml::from_str(text).map_err(|error| match error.span() {
+            Some(span) => source.error(span, error.message()),
+            None => source.error_of_file(error.message()),
+        })?;
+        let groups = Groups::of(source, &raw)?;
+        let mut lines = Vec::new();
+        for (name, entry) in &raw.lines {
+            lines.push(line_part(source, name.get_ref(), name.span(), entry, &groups)?);
+        }
+        Ok(Self {
+            snapshots: raw.snapshots.map_or(SNAPSHOTS, |time| time.0.0),
+            shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
+            lines,
+        })
+    }
+}
+
+/// The drives of the file, by line, with the place where each was named.
+struct Groups(BTreeMap<String, Vec<(DriveName, DriveSettings, Range<usize>)>>);
+
+impl Groups {
+    fn of(source: Source<'_>, raw: &File) -> Result<Self, ConfigError> {
+        let none = DriveEntry::default();
+        let defaults = raw.defaults.as_ref().unwrap_or(&none);
+        let misplaced = [
+            defaults.line.as_ref().map(toml::Spanned::span),
+            defaults.drive.as_ref().map(toml::Spanned::span),
+            defaults.name.as_ref().map(toml::Spanned::span),
+        ];
+        if let Some(span) = misplaced.into_iter().flatten().next() {
+            return Err(source.error(span, "a default names no line and no drive: expected in [[drives]]"));
+        }
+        if raw.drives.is_empty() {
+            return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
+        }
+        let mut groups: BTreeMap<String, Vec<(DriveName, DriveSettings, Range<usize>)>> = BTreeMap::new();
+        let mut names = BTreeMap::new();
+        for entry in &raw.drives {
+            let (span, entry) = (entry.span(), entry.get_ref());
+            let Some(line) = &entry.line else {
+                return Err(source.error(span, "expected line = \"NAME\" of one of the lines"));
+            };
+            if !raw.lines.keys().any(|name| name.get_ref() == line.get_ref()) {
+                let problem = format_args!("there is no line {:?}: expected a [lines.NAME]", line.get_ref());
+                return Err(source.error(line.span(), problem));
+            }
+            let Some(drive) = &entry.drive else {
+                return Err(source.error(span, "expected drive = \"FAMILY@ADDRESSES\", such as atv312@1-31"));
+            };
+            let named: Vec<DriveName> = drive.get_ref().0.names().collect();
+            for name in &named {
+                let place = entry.name.as_ref().map_or(drive.span(), toml::Spanned::span);
+                let settings = settings(source, entry, defaults, *name, named.len())?;
+                if names.insert(settings.name.clone(), *name).is_some() {
+                    let problem = format_args!("two drives are named {:?}", settings.name);
+                    return Err(source.error(place, problem));
+                }
+                let group = groups.entry(line.get_ref().clone()).or_default();
+                if group.iter().any(|(other, ..)| other.slave == name.slave) {
+                    let problem = format_args!("address {} of this line is taken", name.slave);
+                    return Err(source.error(drive.span(), problem));
+                }
+                group.push((*name, settings, drive.span()));
+            }
+        }
+        Ok(Self(groups))
+    }
+}
+
+fn line_part(
+    source: Source<'_>,
+    name: &str,
+    span: Range<usize>,
+    entry: &LineEntry,
+    groups: &Groups,
+) -> Result<LinePart, ConfigError> {
+    let Some(group) = groups.0.get(name) else {
+        return Err(source.error(span, "no drive is on this line: expected a [[drives]] that names it"));
+    };
+    let names: Vec<DriveName> = group.iter().map(|(name, ..)| *name).collect();
+    let port = entry.port.get_ref();
+    let config = port.0.config(&names).map_err(|error| source.error(entry.port.span(), error))?;
+    let config = LineConfig {
+        response_timeout: entry.response_timeout.map_or(RESPONSE_TIMEOUT, |time| time.0.0),
+        slave_change_gap: entry.slave_change_gap.map_or(config.slave_change_gap, |time| time.0.0),
+        low_latency: entry.low_latency.unwrap_or(config.low_latency),
+        ..config
+    };
+    let budget = LineBudget::of(&config);
+    let budget = LineBudget { response: entry.response.map_or(budget.response, |time| time.0.0), ..budget };
+    let demands: Vec<_> = group
+        .iter()
+        .map(|(name, settings, _)| Demand {
+            drive: settings.name.clone(),
+            capabilities: name.family.capabilities(),
+            periods: settings.periods,
+            watchdog: settings.watchdog,
+        })
+        .collect();
+    let plan = plan(budget, &demands).map_err(|problem| source.error(span, problem))?;
+    let drives = group.iter().map(|(name, settings, _)| (*name, settings.clone())).collect();
+    Ok(LinePart { name: name.to_owned(), config, budget, plan, drives })
+}
+
+/// The settings of one drive: what its entry says, else the defaults, else what holds anyway.
+fn settings(
+    source: Source<'_>,
+    entry: &DriveEntry,
+    defaults: &DriveEntry,
+    drive: DriveName,
+    of: usize,
+) -> Result<DriveSettings, ConfigError> {
+    let capabilities = drive.family.capabilities();
+    let name = name(source, entry, drive, of)?;
+    let anyway = Periods::default();
+    let period = |of: fn(&DriveEntry) -> Option<Duration>, anyway| {
+        of(entry).or_else(|| of(defaults)).unwrap_or(anyway)
+    };
+    let periods = Periods {
+        running: period(|entry| entry.running.as_ref().map(|time| time.get_ref().0.0), anyway.running),
+        rest: period(|entry| entry.rest.as_ref().map(|time| time.get_ref().0.0), anyway.rest),
+        slow: period(|entry| entry.slow.as_ref().map(|time| time.get_ref().0.0), anyway.slow),
+        max_age: period(|entry| entry.max_age.as_ref().map(|time| time.get_ref().0.0), anyway.max_age),
+    };
+    let mode = entry.stop_mode.or(defaults.stop_mode).map_or(StopMode::Ramp, |mode| mode.0.0);
+    let settings = DriveSettings {
+        control: entry.control.or(defaults.control).unwrap_or(false),
+        commanders: match entry.commanders.as_ref().or(defaults.commanders.as_ref()) {
+            Some(names) => Commanders::Only(names.clone()),
+            None => Commanders::Anyone,
+        },
+        periods,
+        limits: limits(entry, defaults),
+        alarms: alarms(entry, defaults),
+        watchdog: watchdog(entry, defaults, capabilities),
+        on_exit: match entry.on_exit.or(defaults.on_exit).map_or(Exit::Stop, |policy| policy.0.0) {
+            Exit::Stop => OnExit::Stop(mode),
+            Exit::Release => OnExit::Release(mode),
+            Exit::Leave => OnExit::Leave,
+        },
+        on_loss: match entry.on_loss.or(defaults.on_loss).is_some_and(|policy| policy.0.0) {
+            true => OnLoss::Stop(mode),
+            false => OnLoss::Report,
+        },
+        on_fault: match entry.on_fault.or(defaults.on_fault).is_some_and(|policy| policy.0.0) {
+            true => OnFault::ResetWatchdogTrip,
+            false => OnFault::Report,
+        },
+        ..DriveSettings::watched(name)
+    };
+    check_settings(&settings, capabilities).map_err(|problem| {
+        let place = place_of(problem.setting, entry).or_else(|| place_of(problem.setting, defaults));
+        let place = place.or_else(|| entry.drive.as_ref().map(toml::Spanned::span)).unwrap_or_default();
+        source.error(place, format_args!("{}: {problem}", settings.name))
+    })?;
+    Ok(settings)
+}
+
+/// Where a setting of a drive is written.
+fn place_of(setting: &str, entry: &DriveEntry) -> Option<Range<usize>> {
+    match setting {
+        "name" => entry.name.as_ref().map(toml::Spanned::span),
+        "watchdog" => entry.watchdog.as_ref().map(toml::Spanned::span),
+        "limits" => entry.frequency.as_ref().map(toml::Spanned::span),
+        "periods" => [&entry.max_age, &entry.running, &entry.rest]
+            .into_iter()
+            .find_map(|time| time.as_ref().map(toml::Spanned::span)),
+        _ => None,
+    }
+}
+
+/// The name of one drive of an entry: `{}` stands for its address.
+fn name(source: Source<'_>, entry: &DriveEntry, drive: DriveName, of: usize) -> Result<String, ConfigError> {
+    let address = drive.slave.to_string();
+    match &entry.name {
+        Some(name) if of > 1 && !name.get_ref().contains("{}") => Err(source
+            .error(name.span(), format_args!("{of} drives have this name: expected {{}} for the address"))),
+        Some(name) => Ok(name.get_ref().replace("{}", &address)),
+        None => {
+            let line = entry.line.as_ref().map_or("", |line| line.get_ref().as_str());
+            Ok(format!("{line} {address}"))
+        }
+    }
+}
+
+fn limits(entry: &DriveEntry, defaults: &DriveEntry) -> FrequencyLimits {
+    let Some(frequency) = entry.frequency.as_ref().or(defaults.frequency.as_ref()) else {
+        return FrequencyLimits::default();
+    };
+    let frequency = frequency.get_ref();
+    FrequencyLimits {
+        low: frequency.low.map(|value| value.0),
+        high: frequency.high.map(|value| value.0),
+        forbidden: frequency.forbidden.iter().map(|[low, high]| Band { low: low.0, high: high.0 }).collect(),
+        change_per_second: frequency.change_per_second.map(|value| value.0),
+    }
+}
+
+fn alarms(entry: &DriveEntry, defaults: &DriveEntry) -> Alarms {
+    let alarms = entry.alarms.or(defaults.alarms).unwrap_or_default();
+    Alarms {
+        current: alarms.current.map(|value| value.0),
+        drive_thermal: alarms.drive_thermal.map(|value| value.0),
+        motor_thermal: alarms.motor_thermal.map(|value| value.0),
+    }
+}
+
+/// The contract for the watchdog. A default holds for the families whose watchdog the bus can set; what an entry says
+/// itself has to fit.
+fn watchdog(
+    entry: &DriveEntry,
+    defaults: &DriveEntry,
+    capabilities: &Capabilities,
+) -> Option<WatchdogContract> {
+    let settable = capabilities.watchdog.is_some_and(|watchdog| watchdog.settable);
+    let by_default = defaults.watchdog.as_ref().filter(|_| settable);
+    let watchdog = entry.watchdog.as_ref().or(by_default)?.get_ref();
+    Some(WatchdogContract { timeout: watchdog.time.0.0, reaction: watchdog.reaction.0.0 })
+}
+
+#[cfg(test)]
+mod tests;

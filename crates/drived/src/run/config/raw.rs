@@ -1,0 +1,87 @@
+//! The file as it is written: every key, before the keys are seen together.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::values::{
+    CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, Parsed, PercentValue,
+    ReactionValue,
+};
+use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
+
+/// The whole file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    /// How often a snapshot of every drive is printed; 0: never.
+    pub(super) snapshots: Option<Parsed<Time>>,
+    /// How long the exit may take.
+    pub(super) shutdown: Option<Parsed<Time>>,
+    /// What holds for every drive that does not say otherwise.
+    pub(super) defaults: Option<DriveEntry>,
+    #[serde(default)]
+    pub(super) lines: BTreeMap<Spanned<String>, LineEntry>,
+    #[serde(default)]
+    pub(super) drives: Vec<Spanned<DriveEntry>>,
+}
+
+/// `[lines.NAME]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LineEntry {
+    /// As `--line` has it.
+    pub(super) port: Spanned<Parsed<LineSpec>>,
+    pub(super) response_timeout: Option<Parsed<Time>>,
+    pub(super) response: Option<Parsed<Time>>,
+    pub(super) slave_change_gap: Option<Parsed<Time>>,
+    pub(super) low_latency: Option<bool>,
+}
+
+/// `[[drives]]`, and `[defaults]` without the first three.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DriveEntry {
+    pub(super) line: Option<Spanned<String>>,
+    pub(super) drive: Option<Spanned<Parsed<DriveSpec>>>,
+    pub(super) name: Option<Spanned<String>>,
+    pub(super) control: Option<bool>,
+    pub(super) commanders: Option<Vec<String>>,
+    pub(super) running: Option<Spanned<Parsed<Time>>>,
+    pub(super) rest: Option<Spanned<Parsed<Time>>>,
+    pub(super) slow: Option<Spanned<Parsed<Time>>>,
+    pub(super) max_age: Option<Spanned<Parsed<Time>>>,
+    pub(super) watchdog: Option<Spanned<WatchdogEntry>>,
+    pub(super) frequency: Option<Spanned<FrequencyEntry>>,
+    pub(super) alarms: Option<AlarmEntry>,
+    pub(super) stop_mode: Option<Parsed<Mode>>,
+    pub(super) on_exit: Option<Parsed<ExitPolicy>>,
+    pub(super) on_loss: Option<Parsed<LossPolicy>>,
+    pub(super) on_fault: Option<Parsed<FaultPolicy>>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WatchdogEntry {
+    pub(super) time: Parsed<Time>,
+    pub(super) reaction: Parsed<ReactionValue>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FrequencyEntry {
+    pub(super) low: Option<FrequencyValue>,
+    pub(super) high: Option<FrequencyValue>,
+    #[serde(default)]
+    pub(super) forbidden: Vec<[FrequencyValue; 2]>,
+    pub(super) change_per_second: Option<FrequencyValue>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AlarmEntry {
+    pub(super) current: Option<CurrentValue>,
+    pub(super) drive_thermal: Option<PercentValue>,
+    pub(super) motor_thermal: Option<PercentValue>,
+}

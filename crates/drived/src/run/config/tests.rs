@@ -1,0 +1,159 @@
+//! Files that can work, and what is said of those that cannot.
+
+use std::path::Path;
+
+use drive_core::{Frequency, Reaction};
+
+use super::*;
+
+const FULL: &str = r#"
+snapshots = "1s"
+
+[defaults]
+control = true
+running = "1s"
+rest = "2s"
+max_age = "5s"
+watchdog = { time = "5s", reaction = "ramp" }
+
+[lines.north]
+port = "/dev/ttyUSB0,19200,8N1"
+
+[lines.south]
+port = "tcp://gateway:502"
+response_timeout = "100ms"
+
+[[drives]]
+line = "north"
+drive = "atv312@1-10"
+name = "fan {}"
+frequency = { low = 10, high = 47.5, forbidden = [[20, 22.5]], change_per_second = 2 }
+commanders = ["operator", "scada"]
+
+[[drives]]
+line = "north"
+drive = "atv28@20"
+control = false
+on_exit = "leave"
+
+[[drives]]
+line = "south"
+drive = "atv21@1"
+on_exit = "release"
+stop_mode = "freewheel"
+on_fault = "reset-watchdog-trip"
+alarms = { current = 12.5, motor_thermal = 110 }
+"#;
+
+fn read(text: &str) -> Result<Config, String> {
+    Config::read(Path::new("drives.toml"), text).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_full_file_says_what_it_says() {
+    let config = read(FULL).unwrap();
+    assert_eq!(config.snapshots, Duration::from_secs(1));
+    let [north, south] = &config.lines[..] else { panic!("{config:?}") };
+    assert_eq!(north.drives.len(), 11);
+    let (name, fan) = &north.drives[6];
+    assert_eq!((name.to_string().as_str(), fan.name.as_str()), ("atv312@7", "fan 7"));
+    assert_eq!(fan.limits.high, Some(Frequency::from_centihertz(4_750)));
+    assert_eq!(fan.limits.forbidden[0].high, Frequency::from_centihertz(2_250));
+    assert_eq!(fan.commanders, Commanders::Only(vec!["operator".to_owned(), "scada".to_owned()]));
+    let contract = WatchdogContract { timeout: Duration::from_secs(5), reaction: Reaction::Ramp };
+    assert_eq!(fan.watchdog, Some(contract));
+    let (_, watched) = &north.drives[10];
+    assert_eq!((watched.control, watched.on_exit, watched.watchdog), (false, OnExit::Leave, None));
+    assert_eq!(watched.name, "north 20");
+    let (_, released) = &south.drives[0];
+    assert_eq!(released.on_exit, OnExit::Release(StopMode::Freewheel));
+    assert_eq!(released.on_fault, OnFault::ResetWatchdogTrip);
+    assert_eq!(south.config.response_timeout, Duration::from_millis(100));
+}
+
+#[test]
+fn thirty_one_equal_drives_are_three_lines() {
+    let text = "lines.a.port = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1-31\"\nrest = \"3s\"\nrunning = \"3s\"\nmax_age = \"9s\"\n";
+    assert_eq!(read(text).unwrap().lines[0].drives.len(), 31);
+}
+
+#[test]
+fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
+    for (instead_of, with, told) in [
+        ("snapshots = \"1s\"", "snapshots = 1", "drives.toml:2: snapshots: "),
+        (
+            "running = \"1s\"",
+            "running = \"fast\"",
+            "drives.toml:6: running: \"fast\": expected a whole number and a unit",
+        ),
+        ("running = \"1s\"", "runing = \"1s\"", "drives.toml:6: runing: unknown field `runing`, expected"),
+        ("time = \"5s\"", "time = \"5\"", "drives.toml:9: time: \"5\": expected a whole number and a unit"),
+        (
+            "reaction = \"ramp\" }",
+            "reaction = \"beep\" }",
+            "drives.toml:9: reaction: \"beep\": expected one of ramp fast",
+        ),
+        (
+            "19200,8N1",
+            "19200,8X1",
+            "drives.toml:12: port: \"/dev/ttyUSB0,19200,8X1\": \"8X1\" is not a character format",
+        ),
+        ("19200,8N1", "19200,8E1", "drives.toml:12: port: atv28@20: format 8E1"),
+        (
+            "line = \"north\"\ndrive = \"atv312",
+            "line = \"nord\"\ndrive = \"atv312",
+            "drives.toml:19: line: there is no line \"nord\"",
+        ),
+        (
+            "atv312@1-10",
+            "atv999@1-10",
+            "drives.toml:20: drive: \"atv999@1-10\": \"atv999\" is not a family of drives",
+        ),
+        (
+            "\"fan {}\"",
+            "\"fan\"",
+            "drives.toml:21: name: 10 drives have this name: expected {} for the address",
+        ),
+        (
+            "low = 10,",
+            "low = 60,",
+            "drives.toml:22: frequency: fan 1: the lowest frequency 60.00 Hz is above",
+        ),
+        ("47.5", "47.555", "drives.toml:22: high: expected a number from 0 on with at most 2 decimals"),
+        ("atv28@20", "atv28@7", "drives.toml:27: drive: address 7 of this line is taken"),
+        (
+            "on_exit = \"leave\"",
+            "on_exit = \"explode\"",
+            "drives.toml:29: on_exit: \"explode\": expected one of stop release leave",
+        ),
+        ("max_age = \"5s\"", "max_age = \"1s\"", "drives.toml:8: max_age: fan 1: with a status every 1s"),
+        (
+            "port = \"/dev/ttyUSB0,19200,8N1\"",
+            "port = \"/dev/ttyUSB0,19200,8N1\"\nresponse_timeout = \"3s\"",
+            "drives.toml:11: lines.north: the watchdog of fan 1 is 5s, and it might hear nothing for",
+        ),
+        (
+            "control = false",
+            "control = false\nwatchdog = { time = \"5s\", reaction = \"ramp\" }",
+            "drives.toml:29: watchdog: north 20: the bus can neither read nor set",
+        ),
+        (
+            "running = \"1s\"",
+            "running = \"100ms\"",
+            "drives.toml:11: lines.north: one status of 11 drives takes",
+        ),
+    ] {
+        let text = FULL.replacen(instead_of, with, 1);
+        assert_ne!(text, FULL, "{instead_of}");
+        let error = read(&text).expect_err(told);
+        assert!(error.starts_with(told), "{error}\nexpected {told}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn a_file_without_drives_or_a_line_without_any_is_refused() {
+    assert!(read("").unwrap_err().starts_with("drives.toml: no drive: expected [[drives]]"));
+    let lonely = format!("{FULL}\n[lines.east]\nport = \"/dev/ttyUSB9\"\n");
+    assert!(read(&lonely).unwrap_err().contains("no drive is on this line"));
+}

@@ -1,0 +1,148 @@
+//! Values of the file as a person writes them: `"500ms"`, `47.5`, `"ramp"`.
+
+use std::{fmt, str::FromStr};
+
+use drive_core::{Current, Frequency, Percent, Reaction, StopMode};
+use serde::{Deserialize, Deserializer, de};
+
+/// A value that is written as a text and read by its own rules, whose error says what was expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Parsed<T>(pub(super) T);
+
+impl<'de, T> Deserialize<'de> for Parsed<T>
+where
+    T: FromStr<Err: fmt::Display>,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map(Self).map_err(|error| de::Error::custom(format_args!("{text:?}: {error}")))
+    }
+}
+
+/// A text that is none of a few words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected one of {0}")]
+pub(super) struct NotAmong(&'static str);
+
+/// Declares a value that is one of a few words.
+macro_rules! words {
+    ($(#[$meta:meta])* $name:ident($inner:ty): $($word:literal => $value:expr),+) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub(super) struct $name(pub(super) $inner);
+
+        impl FromStr for $name {
+            type Err = NotAmong;
+
+            fn from_str(text: &str) -> Result<Self, NotAmong> {
+                match text {
+                    $($word => Ok(Self($value)),)+
+                    _ => Err(NotAmong(concat!($($word, " "),+))),
+                }
+            }
+        }
+    };
+}
+
+words! {
+    /// How to stop.
+    Mode(StopMode):
+    "ramp" => StopMode::Ramp,
+    "fast" => StopMode::Fast,
+    "freewheel" => StopMode::Freewheel,
+    "dc-injection" => StopMode::DcInjection
+}
+
+words! {
+    /// What a watchdog does.
+    ReactionValue(Reaction):
+    "ramp" => Reaction::Ramp,
+    "fast" => Reaction::Fast,
+    "freewheel" => Reaction::Freewheel,
+    "dc-injection" => Reaction::DcInjection
+}
+
+/// What happens at the exit; the stop mode is said apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Exit {
+    Stop,
+    Release,
+    Leave,
+}
+
+words! {
+    /// What happens at the exit.
+    ExitPolicy(Exit):
+    "stop" => Exit::Stop,
+    "release" => Exit::Release,
+    "leave" => Exit::Leave
+}
+
+words! {
+    /// Whether a drive that was lost is stopped when it returns.
+    LossPolicy(bool):
+    "report" => false,
+    "stop" => true
+}
+
+words! {
+    /// Whether the trip of a watchdog is reset.
+    FaultPolicy(bool):
+    "report" => false,
+    "reset-watchdog-trip" => true
+}
+
+/// A number with at most so many decimals, as an integer of them.
+fn decimal<'de, D: Deserializer<'de>>(deserializer: D, decimals: u8) -> Result<u32, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected a number")]
+    enum Number {
+        Whole(i64),
+        Fraction(f64),
+    }
+    let scale = 10_i64.pow(u32::from(decimals));
+    let scaled = match Number::deserialize(deserializer)? {
+        Number::Whole(whole) => whole.checked_mul(scale).and_then(|scaled| u32::try_from(scaled).ok()),
+        Number::Fraction(fraction) => {
+            // A person wrote it: it has to be the number that its decimals say.
+            let scaled = (fraction * scale as f64).round();
+            let exact = (scaled / scale as f64 - fraction).abs() < f64::EPSILON * fraction.abs().max(1.0);
+            (exact && (0.0..=f64::from(u32::MAX)).contains(&scaled)).then_some(scaled as u32)
+        }
+    };
+    scaled.ok_or_else(|| {
+        de::Error::custom(format_args!("expected a number from 0 on with at most {decimals} decimals"))
+    })
+}
+
+/// A frequency in hertz.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct FrequencyValue(pub(super) Frequency);
+
+impl<'de> Deserialize<'de> for FrequencyValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        decimal(deserializer, 2).map(|value| Self(Frequency::from_centihertz(value)))
+    }
+}
+
+/// A current in amperes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct CurrentValue(pub(super) Current);
+
+impl<'de> Deserialize<'de> for CurrentValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        decimal(deserializer, 1).map(|value| Self(Current::from_deciamperes(value)))
+    }
+}
+
+/// A share in percent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct PercentValue(pub(super) Percent);
+
+impl<'de> Deserialize<'de> for PercentValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = decimal(deserializer, 2)?;
+        let value = i32::try_from(value).map_err(|_| de::Error::custom("expected a smaller percentage"))?;
+        Ok(Self(Percent::from_hundredths(value)))
+    }
+}

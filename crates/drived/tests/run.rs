@@ -1,0 +1,76 @@
+//! `run` and `check`: the fleet as a daemon, over a pty.
+#![cfg(unix)]
+
+mod support;
+
+use std::fs;
+
+use support::{Running, Sim, run};
+
+/// A configuration of this test alone; removed when dropped.
+struct File(std::path::PathBuf);
+
+impl File {
+    fn new(name: &str, text: &str) -> Self {
+        let path = support::path(&format!("{name}.toml"));
+        fs::write(&path, text).expect("the directory can be written");
+        Self(path)
+    }
+
+    fn path(&self) -> &str {
+        self.0.to_str().expect("the path is text")
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn configuration(port: &str, drives: &str, defaults: &str) -> String {
+    format!(
+        "snapshots = \"500ms\"\n[defaults]\n{defaults}\n[lines.bench]\nport = \"{port},19200,8E1\"\n\
+         [[drives]]\nline = \"bench\"\ndrive = \"{drives}\"\nname = \"pump {{}}\"\n"
+    )
+}
+
+#[test]
+fn a_daemon_tells_events_and_snapshots_and_at_its_end_what_each_drive_did() {
+    let sim = Sim::serve("daemon", &["atv312@1-2"]);
+    let control = "control = true\nwatchdog = { time = \"5s\", reaction = \"ramp\" }";
+    let file = File::new("daemon", &configuration(sim.link(), "atv312@1-2", control));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    let connected: serde_json::Value =
+        serde_json::from_str(&daemon.wait_for(r#""event":"connected""#)).expect("an object");
+    assert_eq!(connected["drive"], "pump 1");
+    daemon.wait_for(r#""event":"watchdog verified""#);
+    let snapshot: serde_json::Value =
+        serde_json::from_str(&daemon.wait_for(r#""kind":"snapshot""#)).expect("an object");
+    assert_eq!((&snapshot["link"], &snapshot["freshness"]), (&"connected".into(), &"fresh".into()));
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    for drive in ["pump 1", "pump 2"] {
+        let left = rest.lines().filter(|line| line.contains(drive) && line.contains(r#""exit":"left""#));
+        assert_eq!(left.count(), 1, "{rest}");
+    }
+}
+
+#[test]
+fn a_configuration_is_checked_without_a_port() {
+    let file = File::new("check", &configuration("/dev/nowhere", "atv312@1-10", "control = true"));
+    let checked = run(&["check", "--config", file.path()]);
+    assert!(checked.assert_done().starts_with("line bench: 10 drives, 10 under control"), "{checked:?}");
+    run(&["run", "--config", file.path()]).assert_refused(2, "/dev/nowhere");
+}
+
+#[test]
+fn what_is_wrong_is_one_line_with_file_line_and_field() {
+    let text = configuration("/dev/nowhere", "atv312@1-20", "running = \"soon\"");
+    let file = File::new("wrong", &text);
+    for subcommand in ["check", "run"] {
+        let refused = run(&[subcommand, "--config", file.path()]);
+        refused.assert_refused(2, ".toml:3: running: \"soon\": expected a whole number and a unit");
+    }
+    run(&["check", "--config", "nowhere.toml"]).assert_refused(2, "nowhere.toml: cannot be read");
+}
