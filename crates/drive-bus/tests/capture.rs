@@ -125,6 +125,7 @@ async fn wireshark_decodes_a_capture_as_modbus_rtu_without_any_setting() {
     let output = std::process::Command::new("tshark").arg("-r").arg(&path).args(fields).output();
     std::fs::remove_file(&path).unwrap();
     let Ok(output) = output else {
+        assert!(std::env::var_os("CI").is_none(), "tshark is not installed, and CI must have it");
         println!("skipped: tshark is not installed");
         return;
     };
