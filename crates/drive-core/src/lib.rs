@@ -2,7 +2,7 @@
 //!
 //! This crate is the contract between the drives and everything else: the [`Drive`] trait, what a drive says
 //! ([`Status`], [`Measurements`], [`Faults`]), what is asked of it ([`Setpoint`], [`Direction`], [`StopMode`]), what
-//! can go wrong ([`Error`]), the register tables ([`registers`]) and the way to the line ([`Port`]). It has no task,
+//! can go wrong ([`Error`]), the register tables ([`registers`](mod@registers)) and the way to the line ([`Port`]). It has no task,
 //! no port and no clock.
 //!
 //! A program that uses drives reads [`Drive`]. A crate that adds a family lists its registers with

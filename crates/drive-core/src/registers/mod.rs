@@ -32,7 +32,7 @@
 //! }
 //! ```
 //!
-//! Nor does writing a register that can only be read, because [`Registers::write`](crate::Registers::write) takes
+//! Nor does writing a register that can only be read, because [`Calls::write`](crate::Calls::write) takes
 //! a `Register<impl Writable>`:
 //!
 //! ```compile_fail
@@ -118,7 +118,7 @@ pub const fn assert_addresses_differ(rows: &[Row]) {
 ///
 /// A row is `CONSTANT: Access(address, mnemonic, name, Storage, unit, range, factory, Confidence, source);` with the
 /// variants of [`Access`](crate::registers::Access), [`Storage`](crate::registers::Storage) and
-/// [`Confidence`](crate::registers::Confidence) by their bare names. See the [module](crate::registers) for examples.
+/// [`Confidence`](crate::registers::Confidence) by their bare names. See the [module](mod@crate::registers) for examples.
 #[macro_export]
 macro_rules! registers {
     (
