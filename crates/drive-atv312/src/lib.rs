@@ -113,10 +113,14 @@ impl<P: Port> Drive for Atv312<P> {
         self.command = None;
     }
 
-    /// W3201 to W3207 in one exchange; the first after [`forget`](Self::forget) reads `CMI` before, whose bit 9 tells
-    /// what a count of the output frequency is.
+    /// W3201 to W3207 in one exchange. The first after [`forget`](Self::forget) reads `CMI` before, whose bit 9 tells
+    /// what a count of the output frequency is, and afterwards the settings on which a stop along the ramp depends, so
+    /// that a later [`stop`](Self::stop) is one write and waits for no reading: 2 exchanges, 11 at access level L3.
     async fn status(&mut self) -> Result<Status> {
-        self.fast_status(Class::Status).await
+        let status = self.fast_status(Class::Status).await?;
+        // The status is good without them; a stop reads what is still missing.
+        let _ = self.control_settings(Class::Status).await;
+        Ok(status)
     }
 
     async fn measurements(&mut self) -> Result<Measurements> {
