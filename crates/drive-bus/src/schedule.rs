@@ -4,7 +4,8 @@
 //!   else starts.
 //! - **Inside a class** the earliest deadline goes first, fair among slaves: the second request of one slave waits until
 //!   every other slave has had its first.
-//! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's.
+//! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
+//!   ten times as fast and goes first among what has aged: behind a stream of commands its drive would trip.
 //! - **Background** gets every twentieth turn when it would otherwise get none.
 //! - What is not yet sent may be **replaced** by a later request with the same key, **expires** at its lifetime, and may
 //!   be **withdrawn**.
@@ -18,6 +19,9 @@ use tokio::time::Instant;
 
 /// At most every so-many-th turn goes to what has aged.
 const AGED_TURN: u32 = 4;
+
+/// A keep-alive ages so many times as fast as anything else.
+const KEEP_ALIVE_AGING: u32 = 10;
 
 /// At least every so-many-th turn goes to Background while some waits: 5 %.
 const BACKGROUND_TURN: u32 = 20;
@@ -259,7 +263,9 @@ impl<T> Schedule<T> {
         if self.since_aged + 1 >= AGED_TURN
             && let Some((index, _)) = all()
                 .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
-                .min_by_key(|(_, (entry, _))| (entry.arrived, entry.ticket))
+                .min_by_key(|(_, (entry, _))| {
+                    (entry.terms.class != Class::KeepAlive, entry.arrived, entry.ticket)
+                })
         {
             return Some(Best::Now(index));
         }
@@ -284,7 +290,11 @@ impl<T> Schedule<T> {
     }
 
     fn has_aged(&self, now: Instant, entry: &Entry<T>) -> bool {
-        now.saturating_duration_since(entry.arrived) >= self.rules.aging
+        let aging = match entry.terms.class {
+            Class::KeepAlive => self.rules.aging / KEEP_ALIVE_AGING,
+            _ => self.rules.aging,
+        };
+        now.saturating_duration_since(entry.arrived) >= aging
     }
 
     fn count_turn(&mut self, now: Instant, chosen: usize) {

@@ -255,6 +255,7 @@ fn check_watchdog(contract: WatchdogContract, capabilities: &Capabilities) -> Re
 fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore>) -> Arc<Entry> {
     let Member { line, settings, drive } = member;
     let (slave, capabilities, control) = (drive.slave(), drive.capabilities(), settings.control);
+    let reference = settings.times.reference;
     let broadcasts = StopMode::ALL
         .into_iter()
         .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
@@ -275,6 +276,7 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore
         slave,
         capabilities,
         control,
+        reference,
         broadcasts,
         messages,
         urgent,

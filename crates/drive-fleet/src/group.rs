@@ -3,15 +3,23 @@
 use std::{borrow::Cow, collections::BTreeSet, fmt, sync::Arc, time::Duration};
 
 use drive_core::{BroadcastWrite, Class, Direction, Setpoint, StopMode, Terms};
-use futures_util::future::{join, join_all};
+use futures_util::{
+    StreamExt,
+    future::{join, join_all},
+    stream,
+};
+use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
     fleet::{Fleet, LineEntry},
     handle::{DriveHandle, Entry},
-    outcome::{Order, Outcome, Refused, Until},
+    outcome::{Order, Outcome, Refused, Unconfirmed, Until},
     snapshot::Link,
 };
+
+/// Commands of a group that are on their way on one line at a time: enough to keep it busy.
+const AT_ONCE: usize = 3;
 
 /// Mute drives that a stop of a line is reckoned with at least.
 const MUTE: u32 = 3;
@@ -61,7 +69,7 @@ pub struct GroupStart {
     pub setpoint: Option<Setpoint>,
     /// From one start to the next; zero: as close together as the line allows, all setpoints first.
     pub spacing: Duration,
-    /// When a start counts as done. With a spacing it counts from the start, not from the last drive's reference.
+    /// When a start counts as done.
     pub until: Until,
 }
 
@@ -201,19 +209,27 @@ impl Group {
         if !unready.is_empty() {
             return Err(GroupFailure::NotReady(unready));
         }
-        let together = spacing.is_zero();
-        if let (Some(setpoint), true) = (setpoint, together) {
-            let given = self.each(async |member| member.set_setpoint(setpoint).await).await;
-            self.keep_or_stop(given).await?;
+        let started = if spacing.is_zero() {
+            if let Some(setpoint) = setpoint {
+                self.keep_or_stop(self.set_setpoint(setpoint).await).await?;
+            }
+            self.each(async |member| member.start(direction).await).await
+        } else {
+            let order = Order::Start { direction, setpoint, until: Until::InForce };
+            let begin = Instant::now();
+            let starts = self.members.iter().zip(0_u32..).map(async |(member, number)| {
+                sleep_until(begin + spacing.saturating_mul(number)).await;
+                (Arc::clone(member.name()), member.order(order).await)
+            });
+            join_all(starts).await
+        };
+        self.keep_or_stop(started).await?;
+        if until == Until::AtReference {
+            let reached =
+                self.members.iter().map(async |member| (Arc::clone(member.name()), reach(member).await));
+            self.keep_or_stop(join_all(reached).await).await?;
         }
-        let order = Order::Start { direction, setpoint: setpoint.filter(|_| !together), until };
-        let begin = tokio::time::Instant::now();
-        let starts = self.members.iter().zip(0_u32..).map(async |(member, number)| {
-            tokio::time::sleep_until(begin + spacing.saturating_mul(number)).await;
-            (Arc::clone(member.name()), member.order(order).await)
-        });
-        let started = join_all(starts).await;
-        self.keep_or_stop(started).await
+        Ok(())
     }
 
     /// Gives every drive of the group a setpoint.
@@ -222,10 +238,25 @@ impl Group {
         self.each(async |member| member.set_setpoint(setpoint).await).await
     }
 
+    /// Commands every drive, the lines beside each other. On a line that has watchdogs to feed, commands take one half of
+    /// the time and leave the other to the rest; on another as many go at once as keep it busy.
     async fn each(&self, command: impl AsyncFn(&DriveHandle) -> Outcome) -> Vec<(Arc<str>, Outcome)> {
         let command = &command;
-        join_all(self.members.iter().map(async |member| (Arc::clone(member.name()), command(member).await)))
-            .await
+        let lines = self.fleet.lines().iter().enumerate().map(async |(number, line)| {
+            let watched = line.plan.feed_gap.is_some();
+            let members = self.members.iter().filter(|member| member.entry.line == number);
+            let commands = members.map(async |member| {
+                let begun = Instant::now();
+                let outcome = command(member).await;
+                if watched {
+                    sleep(begun.elapsed()).await;
+                }
+                (Arc::clone(member.name()), outcome)
+            });
+            let at_once = if watched { 1 } else { AT_ONCE };
+            stream::iter(commands).buffer_unordered(at_once).collect::<Vec<_>>().await
+        });
+        join_all(lines).await.into_iter().flatten().collect()
     }
 
     async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> Result<(), GroupFailure> {
@@ -236,6 +267,20 @@ impl Group {
         // A drive whose start is uncertain is among those that are stopped.
         let stopped = Box::pin(self.stop(StopMode::Ramp)).await;
         Err(GroupFailure::Failed { outcomes, stopped })
+    }
+}
+
+/// Waits until a drive that was started shows that it has reached its reference.
+async fn reach(member: &DriveHandle) -> Outcome {
+    let after = member.entry.reference;
+    let there = member.wait_until(|snapshot| snapshot.is_at_setpoint() || !snapshot.started_here);
+    match timeout(after, there).await {
+        Ok(snapshot) if snapshot.is_at_setpoint() => Outcome::Confirmed,
+        Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),
+        Err(_) => {
+            let status = member.snapshot().status.as_ref().map(|status| Arc::clone(&status.value));
+            Outcome::NotConfirmed(Unconfirmed::TimeOver { after, status })
+        }
     }
 }
 

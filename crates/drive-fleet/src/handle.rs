@@ -22,6 +22,8 @@ pub(crate) struct Entry {
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
     pub(crate) control: bool,
+    /// How long it may take to its reference.
+    pub(crate) reference: Duration,
     /// The writes that stop every drive of its family on a line, by mode.
     pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
     pub(crate) messages: mpsc::Sender<Message>,

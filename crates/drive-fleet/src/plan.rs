@@ -183,14 +183,17 @@ pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProbl
     };
     let sweep = drives.iter().map(status).sum();
     let utilisation_ppm = drives.iter().fold(0_u64, |sum, demand| {
-        let fast = share(status(demand), demand.periods.running.min(demand.periods.rest));
+        let fast = |period: Duration| {
+            // A watchdog that wants to hear more often than it is polled gets frames of its own between two polls.
+            let fed = demand.feed_within().map(|timeout| timeout / FEED_PART);
+            let frames = fed.and_then(|fed| period.as_nanos().div_ceil(fed.as_nanos().max(1)).checked_sub(1));
+            let frames = frames.and_then(|frames| u32::try_from(frames).ok()).unwrap_or_default();
+            share(status(demand).saturating_add(read.saturating_mul(frames)), period)
+        };
         let slow = read * u32::from(demand.capabilities.measurement_exchanges.max(1));
         let slow = if demand.periods.slow.is_zero() { 0 } else { share(slow, demand.periods.slow) };
-        sum.saturating_add(fast).saturating_add(slow)
+        sum.saturating_add(fast(demand.periods.running).max(fast(demand.periods.rest))).saturating_add(slow)
     });
-    if utilisation_ppm > 1_000_000 {
-        return Err(PlanProblem::Overloaded { sweep, drives: drives.len(), utilisation_ppm });
-    }
     let watched = drives.iter().filter(|demand| demand.feed_within().is_some()).count();
     let frames = read.saturating_mul(u32::try_from(watched).unwrap_or(u32::MAX));
     let lost = budget.lost_slot();
@@ -211,6 +214,9 @@ pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProbl
             frames,
             watched,
         });
+    }
+    if utilisation_ppm > 1_000_000 {
+        return Err(PlanProblem::Overloaded { sweep, drives: drives.len(), utilisation_ppm });
     }
     Ok(LinePlan {
         sweep,

@@ -2,8 +2,13 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use drive_core::{Faults, Identity, Measurements, Setpoint, Status, StopMode, Watchdog};
+use drive_core::{Faults, Frequency, Identity, Measurements, Setpoint, State, Status, StopMode, Watchdog};
 use tokio::time::Instant;
+
+/// How far the output may be from a setpoint that it has reached by its frequency alone.
+const NEAR: Frequency = Frequency::from_centihertz(50);
+/// The same where the drive itself says that it is at its reference: its slip compensation moves the output.
+const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
 
 /// A value and when it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,11 +74,13 @@ pub enum IdentityCheck {
 }
 
 /// What is known of the drive's communication watchdog.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum WatchdogCheck {
-    /// The settings have no contract for it.
-    #[default]
-    NoContract,
+    /// The settings have no contract for it. As it was found it is fed all the same.
+    NoContract {
+        /// As it was found; `None` where it has not been read, or cannot be.
+        found: Option<Watchdog>,
+    },
     /// Not read since the drive was connected.
     Unchecked,
     /// It is set otherwise and the motor turns, so it is set up at the next standstill.
@@ -87,7 +94,7 @@ pub enum WatchdogCheck {
 impl WatchdogCheck {
     /// Whether motion may be asked for.
     pub(crate) const fn allows_motion(&self) -> bool {
-        matches!(self, Self::NoContract | Self::Verified(_))
+        matches!(self, Self::NoContract { .. } | Self::Verified(_))
     }
 }
 
@@ -188,5 +195,25 @@ impl Snapshot {
             Freshness::Fresh => self.status.as_ref().map(|status| &*status.value),
             Freshness::Stale | Freshness::Never => None,
         }
+    }
+
+    /// Whether the drive's words show that the output has reached the setpoint that this fleet gave it.
+    #[must_use]
+    pub fn is_at_setpoint(&self) -> bool {
+        self.status.as_ref().is_some_and(|status| has_reached(self.setpoint, &status.value))
+    }
+}
+
+/// Whether a status shows that the output has reached a setpoint.
+pub(crate) fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
+    if status.state != State::Running || status.at_reference == Some(false) {
+        return false;
+    }
+    let near = if status.at_reference.is_some() { NEAR_WITH_SLIP } else { NEAR };
+    match (setpoint, status.output_frequency) {
+        (Some(Setpoint::Frequency(setpoint)), Some(output)) => {
+            output.centihertz().abs_diff(setpoint.centihertz()) <= near.centihertz()
+        }
+        _ => status.at_reference == Some(true),
     }
 }

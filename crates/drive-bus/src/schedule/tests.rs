@@ -70,6 +70,21 @@ fn aging_never_lifts_a_poll_above_a_stop() {
 }
 
 #[test]
+fn a_keep_alive_is_not_starved_by_a_stream_of_commands_nor_by_polls_that_have_aged_before_it() {
+    let (mut schedule, start) = (schedule(), Instant::now());
+    for slave in 1..=30 {
+        push(&mut schedule, start, slave, Terms::of(Class::Status), 0);
+    }
+    push(&mut schedule, start + 2_000 * MS, 31, Terms::of(Class::KeepAlive), 7);
+    let now = start + 2_100 * MS;
+    for slave in 40..60 {
+        push(&mut schedule, now, slave, Terms::of(Class::Command), 1);
+    }
+    let place = order(&mut schedule, now).iter().position(|work| *work == 7);
+    assert!(place.is_some_and(|place| place <= 3), "{place:?}");
+}
+
+#[test]
 fn what_has_aged_gets_every_fourth_turn_below_a_stream_of_commands() {
     let (mut schedule, start) = (schedule(), Instant::now());
     push(&mut schedule, start, 1, Terms::of(Class::Status), 7);

@@ -25,6 +25,8 @@ pub(crate) struct Checks {
     remembered: Option<Arc<Identity>>,
     identity_at: Option<Instant>,
     contract: Option<WatchdogContract>,
+    /// Whether the bus can read it.
+    readable: bool,
     /// Whether the bus can set it.
     settable: bool,
     /// The time of a watchdog that the drive has whether anybody wants it or not.
@@ -41,13 +43,14 @@ impl Checks {
     pub(crate) fn new(settings: &DriveSettings, capabilities: &Capabilities) -> Self {
         let watchdog = match settings.watchdog {
             Some(_) => WatchdogCheck::Unchecked,
-            None => WatchdogCheck::NoContract,
+            None => WatchdogCheck::NoContract { found: None },
         };
         Self {
             identity: IdentityCheck::Unchecked,
             remembered: settings.identity.clone().map(Arc::new),
             identity_at: None,
             contract: settings.watchdog,
+            readable: capabilities.watchdog.is_some(),
             settable: capabilities.watchdog.is_some_and(|watchdog| watchdog.settable),
             fixed: fixed_watchdog(capabilities),
             watchdog,
@@ -76,9 +79,10 @@ impl Checks {
         self.identity = IdentityCheck::Unchecked;
         self.identity_at = Some(now);
         self.watchdog_at = Some(now);
-        if self.contract.is_some() {
-            self.watchdog = WatchdogCheck::Unchecked;
-        }
+        self.watchdog = match self.contract {
+            Some(_) => WatchdogCheck::Unchecked,
+            None => WatchdogCheck::NoContract { found: None },
+        };
     }
 
     /// The drive received a frame and answered.
@@ -89,11 +93,14 @@ impl Checks {
 
     /// When the watchdog wants a frame of its own.
     pub(crate) fn feed_at(&self) -> Option<Instant> {
-        let verified = match self.watchdog {
-            WatchdogCheck::Verified(Watchdog { timeout, .. }) => timeout,
-            _ => None,
+        let set = match self.watchdog {
+            WatchdogCheck::Verified(watchdog) | WatchdogCheck::WaitsForStandstill(watchdog) => {
+                watchdog.timeout
+            }
+            WatchdogCheck::NoContract { found } => found.and_then(|watchdog| watchdog.timeout),
+            WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => None,
         };
-        let at = self.heard? + verified.or(self.fixed)? / FEED_PART;
+        let at = self.heard? + set.or(self.fixed)? / FEED_PART;
         Some(self.feed_again.map_or(at, |again| at.max(again)))
     }
 
@@ -105,7 +112,11 @@ impl Checks {
     }
 
     fn wants_watchdog(&self) -> bool {
-        matches!(self.watchdog, WatchdogCheck::Unchecked | WatchdogCheck::Broken(_))
+        match self.watchdog {
+            WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => true,
+            WatchdogCheck::NoContract { found: None } => self.readable,
+            _ => false,
+        }
     }
 
     /// The check that is due. The watchdog is written at standstill, and only to the drive that the settings are for.
@@ -178,7 +189,10 @@ impl Checks {
         control: bool,
         result: Result<Watchdog>,
     ) -> Option<EventKind> {
-        let contract = self.contract?;
+        let Some(contract) = self.contract else {
+            self.adopt_watchdog(now, result);
+            return None;
+        };
         match result {
             Ok(watchdog) if self.keeps(watchdog, contract) => {
                 self.armed = true;
@@ -214,6 +228,18 @@ impl Checks {
         }
     }
 
+    /// Without a contract the watchdog is left as it is, and fed as it is.
+    fn adopt_watchdog(&mut self, now: Instant, result: Result<Watchdog>) {
+        self.watchdog_at = match result {
+            Ok(watchdog) => {
+                self.watchdog = WatchdogCheck::NoContract { found: Some(watchdog) };
+                None
+            }
+            Err(Error::Port { .. }) => Some(now + AGAIN),
+            Err(_) => None,
+        };
+    }
+
     /// Whether a watchdog is as the contract says. What the bus cannot set has the drive's own reaction.
     fn keeps(&self, watchdog: Watchdog, contract: WatchdogContract) -> bool {
         watchdog.timeout == Some(contract.timeout)
@@ -228,9 +254,9 @@ impl Checks {
     }
 
     pub(crate) fn handle_kept_alive(&mut self, now: Instant, answered: bool) {
-        let timeout = self.contract.map(|contract| contract.timeout).or(self.fixed);
-        if let (false, Some(timeout)) = (answered, timeout) {
-            self.feed_again = Some(now + timeout / (2 * FEED_PART));
+        if let (false, Some(heard), Some(at)) = (answered, self.heard, self.feed_at()) {
+            // Half of the half that is left.
+            self.feed_again = Some(now + at.saturating_duration_since(heard) / FEED_PART);
         }
     }
 }

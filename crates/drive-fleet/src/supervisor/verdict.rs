@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Control, Direction, Error, ErrorKind, Frequency, Measurements, PortError, Result, Setpoint, State, Status,
+    Control, Direction, Error, ErrorKind, Measurements, PortError, Result, Setpoint, State, Status,
 };
 use tokio::time::Instant;
 
@@ -14,15 +14,11 @@ use super::{
 use crate::{
     limits::Given,
     outcome::{Order, Outcome, Refused, Unconfirmed, Until},
+    snapshot::has_reached,
 };
 
 /// Until a reference is read back again after that has failed.
 const READ_AGAIN: Duration = Duration::from_millis(100);
-/// How far the output may be from a setpoint that it has reached by its frequency alone.
-const NEAR: Frequency = Frequency::from_centihertz(50);
-/// The same where the drive itself says that it is at its reference: its slip compensation moves the output.
-const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
-
 impl Supervisor {
     pub(super) fn handle_setpoint_reply(&mut self, now: Instant, result: Result<()>) {
         let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint)), .. }) = self.active else {
@@ -203,18 +199,5 @@ fn denied(error: &Error) -> Option<Outcome> {
             Some(Outcome::Refused(Refused::Drive(error.clone())))
         }
         _ => None,
-    }
-}
-
-fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
-    if status.state != State::Running || status.at_reference == Some(false) {
-        return false;
-    }
-    let near = if status.at_reference.is_some() { NEAR_WITH_SLIP } else { NEAR };
-    match (setpoint, status.output_frequency) {
-        (Some(Setpoint::Frequency(setpoint)), Some(output)) => {
-            output.centihertz().abs_diff(setpoint.centihertz()) <= near.centihertz()
-        }
-        _ => status.at_reference == Some(true),
     }
 }
