@@ -42,14 +42,14 @@ fn decode(criterion: &mut Criterion) {
     criterion.bench_function("exchange: a read of 8 registers, answered whole", |bench| {
         bench.iter(|| {
             machine.start(1, Arc::clone(&request), &encoded);
-            machine.handle_sent(now);
+            machine.handle_sent(now, now);
             machine.handle_bytes(now, black_box(&bytes))
         });
     });
     criterion.bench_function("exchange: a read of 8 registers, answered byte by byte", |bench| {
         bench.iter(|| {
             machine.start(1, Arc::clone(&request), &encoded);
-            machine.handle_sent(now);
+            machine.handle_sent(now, now);
             bytes.iter().map(|byte| machine.handle_bytes(now, &[*byte])).last()
         });
     });

@@ -191,6 +191,26 @@ impl LineConfig {
         under_way + silence + settling
     }
 
+    /// How many characters the frame of a request with a PDU of this length has.
+    pub(crate) const fn request_len(&self, pdu: usize) -> usize {
+        pdu + 3
+    }
+
+    /// How many characters come back until the answer with a PDU of this length has come.
+    pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
+        pdu + 3
+    }
+
+    /// The time that so many characters take on the line.
+    pub(crate) fn characters(&self, characters: usize) -> Duration {
+        if self.is_paced() { self.serial.characters(characters) } else { Duration::ZERO }
+    }
+
+    /// The silence before any request.
+    pub(crate) const fn silence(&self) -> Duration {
+        if self.is_paced() { self.serial.t3_5() } else { Duration::ZERO }
+    }
+
     /// Whether frames need silences between them.
     pub(crate) const fn is_paced(&self) -> bool {
         !self.unpaced && !self.is_mbap()

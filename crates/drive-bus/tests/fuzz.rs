@@ -44,7 +44,7 @@ fn feed(
 ) -> Instant {
     let pdu = pdu::encode(&request).unwrap();
     machine.start(1, Arc::new(request), &pdu);
-    machine.handle_sent(now + 50 * MS);
+    machine.handle_sent(now, now + 50 * MS);
     for chunk in chunks {
         now += 7 * MS;
         machine.handle_bytes(now, chunk);
@@ -66,7 +66,7 @@ fn answers(machine: &mut dyn Exchange, now: Instant, answer: impl Fn(&[u8]) -> V
     let request = Request::ReadInputRegisters(0, 1);
     let pdu = pdu::encode(&request).unwrap();
     let sent = machine.start(1, Arc::new(request), &pdu);
-    machine.handle_sent(now + 500 * MS);
+    machine.handle_sent(now, now + 500 * MS);
     let step = machine.handle_bytes(now + 5 * MS, &answer(&sent));
     assert_eq!(step, Step::Done(Ok(Ok(Response::ReadInputRegisters(vec![7])))));
 }

@@ -90,7 +90,7 @@ impl Exchange for Mbap {
         frame.freeze()
     }
 
-    fn handle_sent(&mut self, answer_by: Instant) {
+    fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
         if let Some(current) = &mut self.current {
             current.answer_by = Some(answer_by);
         }

@@ -2,14 +2,18 @@
 //!
 //! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
 
+mod echo;
 pub mod mbap;
 pub mod rtu;
 
 use std::sync::Arc;
 
 use bytes::Bytes;
+use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response};
+
+use crate::pdu;
 
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
@@ -19,7 +23,7 @@ pub type Answer = Result<Response, ExceptionCode>;
 pub enum Step {
     /// More bytes, or the passing of [`Exchange::deadline`].
     More,
-    /// These bytes sent now; the exchange goes on.
+    /// These bytes sent now; the exchange goes on. [`Exchange::handle_sent`] **must** follow.
     Send(Bytes),
     /// Nothing: it is over.
     Done(Result<Answer, Failure>),
@@ -34,6 +38,8 @@ pub enum Failure {
     Damaged(&'static str),
     /// No answer came in time, but an intact frame of the slave that does not fit the request. The answer may still come.
     Mismatch(String),
+    /// The slave has refused the frame, so that nothing of it was carried out.
+    Refused(&'static str),
 }
 
 /// What came in and was no part of the exchange.
@@ -54,12 +60,27 @@ pub enum Stray {
 
 /// The machine of one protocol, used for one exchange after another.
 pub trait Exchange: Send {
+    /// Whether the protocol has a form for this request to this slave, and whether the class may carry it.
+    ///
+    /// # Errors
+    /// Why it has none, in words. The request is then never started.
+    fn carries(&self, slave: u8, request: &Request<'_>, class: Class) -> Result<(), String> {
+        let _ = (slave, request, class);
+        Ok(())
+    }
+
+    /// Whether the request may change something in the slave, so that it is not repeated as a read is.
+    fn is_write(&self, request: &Request<'_>) -> bool {
+        pdu::is_write(request)
+    }
+
     /// Begins an exchange and gives the bytes that open it. `pdu` is the request, encoded.
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes;
 
-    /// The bytes have been written. The first character of the answer, and as many more as the answer likely has, are
-    /// due at `answer_by`.
-    fn handle_sent(&mut self, answer_by: Instant);
+    /// The bytes that [`start`](Self::start) or [`Step::Send`] gave have been written; their last bit ends at `end`. The
+    /// first character of the answer, and as many more as the answer likely has, are due at `answer_by`, which is
+    /// reckoned from the end of what opened the exchange.
+    fn handle_sent(&mut self, end: Instant, answer_by: Instant);
 
     /// Bytes came in at `now`. Bytes that come when no exchange is under way are strays.
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step;
@@ -82,6 +103,12 @@ pub trait Exchange: Send {
     /// Whether a late answer can be taken for the answer to a later request, so that a slave must be left alone after a
     /// timeout.
     fn confuses_late_answers(&self) -> bool;
+
+    /// The kind of answer that a function has. Requests whose answers are of one kind wait for each other's late
+    /// answers.
+    fn kind_of_answer(&self, function: u8) -> u8 {
+        function
+    }
 
     /// Whether it is unknown if the adapter echoes, so that an answer that equals its request proves nothing yet.
     fn echo_is_unknown(&self) -> bool {

@@ -12,7 +12,7 @@ use drive_core::serial::SerialSettings;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Exchange, Failure, Step, Stray};
+use super::{Exchange, Failure, Step, Stray, echo::EchoState};
 use crate::{
     answer::{self, Extent},
     config::Echo,
@@ -102,23 +102,6 @@ struct Current {
     misfit: Option<String>,
     /// What is there ends in a CRC that fits, and the function has no length of its own: silence ends it.
     ends_with_silence: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum EchoState {
-    Unknown,
-    Absent,
-    Present,
-}
-
-impl From<Echo> for EchoState {
-    fn from(echo: Echo) -> Self {
-        match echo {
-            Echo::Off => Self::Absent,
-            Echo::On => Self::Present,
-            Echo::Auto => Self::Unknown,
-        }
-    }
 }
 
 /// What stands at one place of what was received.
@@ -343,7 +326,7 @@ impl Exchange for Rtu {
         sent
     }
 
-    fn handle_sent(&mut self, answer_by: Instant) {
+    fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
         if let Some(current) = &mut self.current {
             current.answer_by = Some(answer_by);
         }

@@ -18,8 +18,7 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take() else { return };
         self.to_send = None;
         let slave = flight.slave;
-        let t3_5 = if self.config.is_paced() { self.config.serial.t3_5() } else { Duration::ZERO };
-        self.stats.busy += now.saturating_duration_since(flight.started) + t3_5;
+        self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => {
                 // The slave heard the end of our request, whatever was computed for it.
@@ -32,8 +31,10 @@ impl<C> Master<C> {
             Purpose::Call(Some(entry)) => match result {
                 Ok(answer) => self.outcomes.push_back((entry.work.caller, Ok(answer))),
                 Err(failure) => {
-                    let timeout = flight.sent.map_or(Duration::ZERO, |sent| sent.timeout);
-                    self.fail(now, entry, failure, timeout);
+                    let waited = flight.sent.map_or(Duration::ZERO, |sent| {
+                        sent.timeout.min(now.saturating_duration_since(sent.end))
+                    });
+                    self.fail(now, entry, failure, waited);
                 }
             },
             Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
@@ -48,9 +49,8 @@ impl<C> Master<C> {
     }
 
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
-        let expected = answer::likely_len(&flight.request) + 3;
-        let characters =
-            if self.config.is_paced() { self.config.serial.characters(expected) } else { Duration::ZERO };
+        let expected = answer::likely_len(&flight.request);
+        let characters = self.config.characters(self.config.answer_len(expected));
         let station = self.station(flight.slave);
         if let Some(sent) = flight.sent {
             let after = now.saturating_duration_since(sent.end).saturating_sub(characters);
@@ -70,7 +70,7 @@ impl<C> Master<C> {
         let confuses = self.exchange.confuses_late_answers();
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
-            Failure::Damaged(_) => {
+            Failure::Damaged(_) | Failure::Refused(_) => {
                 station.stats.outcomes.damaged += 1;
                 return;
             }
@@ -79,7 +79,8 @@ impl<C> Master<C> {
         }
         if confuses {
             let sent = flight.sent.map_or(now, |sent| sent.end);
-            station.expect_late(flight.request.function_code().value(), sent + self.config.late_window);
+            let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
+            station.expect_late(kind, sent + self.config.late_window);
         }
         if *failure == Failure::Timeout && station.missed(now, &self.config) {
             self.go_offline(now, flight.slave);
@@ -98,13 +99,14 @@ impl<C> Master<C> {
     }
 
     /// An attempt has failed: once more, or the end.
-    fn fail(&mut self, now: Instant, mut entry: Entry<Job<C>>, failure: Failure, timeout: Duration) {
+    fn fail(&mut self, now: Instant, mut entry: Entry<Job<C>>, failure: Failure, waited: Duration) {
         let write = entry.work.is_write;
         let error = match failure {
+            Failure::Refused(why) => PortError::NotCarried(why.to_owned()),
             Failure::Timeout if write => PortError::OutcomeUnknown("no answer"),
             Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
             Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),
-            Failure::Timeout => PortError::Timeout { after: timeout },
+            Failure::Timeout => PortError::Timeout { after: waited },
             Failure::Damaged(why) => PortError::Damaged(why),
             Failure::Mismatch(why) => PortError::Mismatch(why),
         };

@@ -77,7 +77,8 @@ struct Flight<C> {
     purpose: Purpose<C>,
     slave: u8,
     request: Arc<Request<'static>>,
-    frame_len: usize,
+    /// How many characters are being sent.
+    sending: usize,
     started: Instant,
     sent: Option<Sent>,
 }
@@ -87,6 +88,8 @@ struct Sent {
     /// Computed end of transmission.
     end: Instant,
     timeout: Duration,
+    /// When the answer is due.
+    answer_by: Instant,
     /// Nobody answers; it is over at this time.
     unanswered_until: Option<Instant>,
 }
@@ -170,7 +173,7 @@ impl<C> Master<C> {
                 station.stats.outcomes.refused += 1;
             }
         })?;
-        let is_write = pdu::is_write(&request);
+        let is_write = self.exchange.is_write(&request);
         if terms.class == Class::Stop {
             self.clear_the_way(now, slave);
         }
@@ -202,11 +205,13 @@ impl<C> Master<C> {
                 "nobody answers a broadcast, so that it cannot read".to_owned(),
             ));
         }
+        self.exchange.carries(slave, request, terms.class).map_err(PortError::NotCarried)?;
         if let Link::Down(reason) = &self.link {
             return Err(PortError::LineDown(reason.clone()));
         }
+        let is_write = self.exchange.is_write(request);
         let station = self.station(slave);
-        station.ask(now, request, pdu::is_write(request));
+        station.ask(now, request, is_write);
         if terms.class != Class::Stop
             && let Some(at) = station.probe_at()
         {
@@ -228,10 +233,10 @@ impl<C> Master<C> {
         };
         self.exchange.abandon();
         self.to_send = None;
-        let function = flight.request.function_code().value();
+        let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
         let until = flight.sent.map_or(now, |sent| sent.end) + self.config.late_window;
         let station = self.station(flight.slave);
-        station.expect_late(function, until);
+        station.expect_late(kind, until);
         station.probe_again(until);
         self.quiet_from = self.quiet_from.max(now);
     }
@@ -280,7 +285,7 @@ impl<C> Master<C> {
     }
 
     fn choose(&mut self, now: Instant, free_at: Instant) -> Choice<Job<C>> {
-        let Self { schedule, stations, config, last_slave, .. } = self;
+        let Self { schedule, stations, config, last_slave, exchange, .. } = self;
         schedule.choose(now, |entry| {
             let mut at = free_at;
             if last_slave.is_some_and(|last| last != entry.slave) {
@@ -291,18 +296,20 @@ impl<C> Master<C> {
             if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
                 if entry.terms.class != Class::Stop || !entry.work.is_write {
-                    at = at.max(station.late_until(request.function_code().value()).unwrap_or(at));
+                    let kind = exchange.kind_of_answer(request.function_code().value());
+                    at = at.max(station.late_until(kind).unwrap_or(at));
                 }
                 takes = station.timeout.typical();
             }
-            takes += config.serial.characters(entry.work.pdu.len() + answer::likely_len(request) + 6);
+            let pdus = (entry.work.pdu.len(), answer::likely_len(request));
+            takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
             Readiness { at, takes }
         })
     }
 
     /// When the silence before any request is over.
     fn free_at(&self) -> Instant {
-        if self.config.is_paced() { self.quiet_from + self.config.serial.t3_5() } else { self.quiet_from }
+        self.quiet_from + self.config.silence()
     }
 
     fn next_probe(&self) -> Option<(u8, Instant)> {
@@ -353,29 +360,34 @@ impl<C> Master<C> {
         self.stats.silence.record(now.saturating_duration_since(self.quiet_from));
         let bytes = self.exchange.start(slave, Arc::clone(&request), pdu);
         self.flight =
-            Some(Flight { purpose, slave, request, frame_len: bytes.len(), started: now, sent: None });
+            Some(Flight { purpose, slave, request, sending: bytes.len(), started: now, sent: None });
         bytes
     }
 
     /// What [`poll_transmit`](Self::poll_transmit) gave has been handed to the port.
     pub fn handle_sent(&mut self, now: Instant) {
         let Some(flight) = &mut self.flight else { return };
-        let (paced, serial) = (self.config.is_paced(), self.config.serial);
-        let characters = |count| if paced { serial.characters(count) } else { Duration::ZERO };
-        let end = now + characters(flight.frame_len);
+        let end = now + self.config.characters(flight.sending);
+        self.quiet_from = end;
+        if let Some(sent) = flight.sent {
+            self.exchange.handle_sent(end, sent.answer_by);
+            return;
+        }
         let unanswered = flight.slave == 0 || pdu::is_unanswered(&flight.request);
         let station = self.stations.entry(flight.slave).or_insert_with(|| {
             Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
         });
         station.stats.sent += 1;
         let timeout = station.timeout.current();
+        let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
+        let answer_by = end + timeout + characters;
         flight.sent = Some(Sent {
             end,
             timeout,
+            answer_by,
             unanswered_until: unanswered.then(|| end + self.config.broadcast_turnaround),
         });
-        self.exchange.handle_sent(end + timeout + characters(answer::likely_len(&flight.request) + 3));
-        self.quiet_from = end;
+        self.exchange.handle_sent(end, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);
     }
 
@@ -425,7 +437,12 @@ impl<C> Master<C> {
             .is_some_and(|flight| flight.sent.is_some_and(|sent| sent.unanswered_until.is_some()));
         match step {
             Step::More => {}
-            Step::Send(bytes) => self.to_send = Some(bytes),
+            Step::Send(bytes) => {
+                if let Some(flight) = &mut self.flight {
+                    flight.sending = bytes.len();
+                    self.to_send = Some(bytes);
+                }
+            }
             Step::Done(_) if unanswered => {}
             Step::Done(result) => self.finish(now, result),
         }
@@ -437,8 +454,8 @@ impl<C> Master<C> {
                 Stray::Echo => self.stats.echoes += 1,
                 Stray::Noise(bytes) => self.stats.noise_bytes += bytes as u64,
                 Stray::Frame { slave, function } => {
-                    let late =
-                        self.stations.get_mut(&slave).is_some_and(|station| station.came_late(function));
+                    let kind = self.exchange.kind_of_answer(function & 0x7F);
+                    let late = self.stations.get_mut(&slave).is_some_and(|station| station.came_late(kind));
                     self.stats.foreign += u64::from(!late);
                 }
             }

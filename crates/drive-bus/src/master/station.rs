@@ -25,7 +25,7 @@ pub(super) struct Station {
     pub(super) stats: SlaveStats,
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
-    /// The functions whose answers may still come late, and until when.
+    /// The kinds of answer that may still come late, and until when.
     late: Vec<(u8, Instant)>,
     failures: u32,
     offline: Option<Offline>,
@@ -83,23 +83,23 @@ impl Station {
         self.offline.take().is_some()
     }
 
-    /// An answer to this function may still come, until `until`.
-    pub(super) fn expect_late(&mut self, function: u8, until: Instant) {
+    /// An answer of this kind may still come, until `until`.
+    pub(super) fn expect_late(&mut self, kind: u8, until: Instant) {
         if self.late.len() >= MOST_LATE {
             self.late.remove(0);
         }
-        self.late.push((function, until));
+        self.late.push((kind, until));
     }
 
-    /// Until when a request of this function must wait, because a late answer could be taken for its own.
-    pub(super) fn late_until(&self, function: u8) -> Option<Instant> {
-        self.late.iter().filter(|(late, _)| *late == function).map(|(_, until)| *until).max()
+    /// Until when a request with answers of this kind must wait, because a late answer could be taken for its own.
+    pub(super) fn late_until(&self, kind: u8) -> Option<Instant> {
+        self.late.iter().filter(|(late, _)| *late == kind).map(|(_, until)| *until).max()
     }
 
     /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
-    pub(super) fn came_late(&mut self, function: u8) -> bool {
+    pub(super) fn came_late(&mut self, kind: u8) -> bool {
         // What was waited for has come: one thing less to be afraid of.
-        let Some(index) = self.late.iter().position(|(late, _)| *late == function & 0x7F) else {
+        let Some(index) = self.late.iter().position(|(late, _)| *late == kind) else {
             return false;
         };
         self.late.remove(index);
