@@ -37,7 +37,7 @@ pub fn contract(family: Family) -> Option<WatchdogContract> {
     let WatchdogCapability { min, max, reactions, .. } = family.capabilities().watchdog?;
     let timeout = Duration::from_secs(2).clamp(min, max);
     let reaction = reactions.iter().copied().find(|reaction| *reaction != Reaction::Ignore);
-    Some(WatchdogContract { timeout, reaction: reaction.unwrap_or(Reaction::Unknown(0)) })
+    Some(WatchdogContract { timeout, reaction: reaction.unwrap_or(Reaction::Trip) })
 }
 
 /// Settings of a drive that is commanded, with its watchdog where the family has one.

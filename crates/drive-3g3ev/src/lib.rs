@@ -58,7 +58,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         min: TIME_OVER,
         max: TIME_OVER,
         step: TIME_OVER,
-        reactions: &[Reaction::Ignore, TIME_OVER_TRIP],
+        reactions: &[Reaction::Ignore, Reaction::Trip],
         settable: false,
     }),
     identification: None,
@@ -70,10 +70,6 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     status_exchanges: 2,
     measurement_exchanges: 2,
 };
-
-/// What the drive does when no message comes and n40 is 0: it trips with BUS. How the motor stops then, the manual does
-/// not say.
-pub const TIME_OVER_TRIP: Reaction = Reaction::Unknown(0);
 
 /// The silence that the drive needs between its answer and the next request at a speed in bit/s: 24 bits and 10 ms
 /// (VS-606V7 manual p. 92; the drawing of §3.3 is missing). [`CAPABILITIES`] holds the longest, that of 2400 bit/s; a
@@ -253,12 +249,12 @@ impl<P: Port> Drive for Drive3g3ev<P> {
         self.registers.at(Class::KeepAlive).echo(LOOP_BACK).await
     }
 
-    /// n40. The reaction of a detection is [`TIME_OVER_TRIP`].
+    /// n40. The reaction of a detection is [`Reaction::Trip`].
     async fn watchdog(&mut self) -> Result<Watchdog> {
         self.read_watchdog().await
     }
 
-    /// Checks that n40 already is as asked: 2 s with [`TIME_OVER_TRIP`], or any time with [`Reaction::Ignore`] for off.
+    /// Checks that n40 already is as asked: 2 s with [`Reaction::Trip`], or any time with [`Reaction::Ignore`] for off.
     /// It writes nothing, because a changed n40 acts after the next power-up only (§2.1, note 3).
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use drive_core::{
 };
 
 use crate::{
-    Drive3g3ev, TIME_OVER, TIME_OVER_TRIP,
+    Drive3g3ev, TIME_OVER,
     frequency::FrequencyUnit,
     registers::{N02, N05, N39, N40},
 };
@@ -89,7 +89,7 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
         let mut calls = self.registers.at(Class::Background);
         match calls.read(N40).await? {
-            0 => Ok(Watchdog { timeout: Some(TIME_OVER), reaction: Some(TIME_OVER_TRIP) }),
+            0 => Ok(Watchdog { timeout: Some(TIME_OVER), reaction: Some(Reaction::Trip) }),
             1 => Ok(Watchdog { timeout: None, reaction: Some(Reaction::Ignore) }),
             _ => {
                 let exchange = Exchange { function: 0x03, register: Some(N40.address()) };
@@ -101,7 +101,7 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn check_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
         let slave = self.registers.slave();
         let off = reaction == Reaction::Ignore;
-        if !off && reaction != TIME_OVER_TRIP {
+        if !off && reaction != Reaction::Trip {
             return Err(Error::Unsupported {
                 what: "a reaction of the watchdog",
                 reason: "the drive trips with BUS, and the manual does not say how the motor stops then",

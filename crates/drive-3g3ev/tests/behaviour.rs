@@ -4,7 +4,7 @@ mod rig;
 
 use std::time::Duration;
 
-use drive_3g3ev::{ROWS, TIME_OVER_TRIP, broadcast};
+use drive_3g3ev::{ROWS, broadcast};
 use drive_core::{
     Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Fault, Frequency, Percent, Reaction,
     Refusal, Row, Setpoint, SetpointProblem, State, StopMode, Watchdog, registers::Storage,
@@ -287,20 +287,20 @@ async fn a_pulse_of_an_input_that_the_drive_does_not_obey_is_not_confirmed() {
 #[tokio::test(start_paused = true)]
 async fn time_over_is_read_and_never_written() {
     let (mut drive, machine, _rig) = one();
-    let armed = Watchdog { timeout: Some(Duration::from_secs(2)), reaction: Some(TIME_OVER_TRIP) };
+    let armed = Watchdog { timeout: Some(Duration::from_secs(2)), reaction: Some(Reaction::Trip) };
     let off = Watchdog { timeout: None, reaction: Some(Reaction::Ignore) };
     let two = Duration::from_secs(2);
     assert_eq!(drive.watchdog().await, Ok(armed));
-    assert_eq!(drive.arm_watchdog(two, TIME_OVER_TRIP).await, Ok(armed));
+    assert_eq!(drive.arm_watchdog(two, Reaction::Trip).await, Ok(armed));
     let error = drive.arm_watchdog(two, Reaction::Ignore).await.unwrap_err();
     assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
-    let error = drive.arm_watchdog(Duration::from_secs(3), TIME_OVER_TRIP).await.unwrap_err();
+    let error = drive.arm_watchdog(Duration::from_secs(3), Reaction::Trip).await.unwrap_err();
     assert!(matches!(error, Error::WatchdogTime { .. }), "{error}");
     let error = drive.arm_watchdog(two, Reaction::Freewheel).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Unsupported);
     set_up(&machine, &[(0x0128, 1)]);
     assert_eq!(drive.arm_watchdog(two, Reaction::Ignore).await, Ok(off));
-    assert!(drive.arm_watchdog(two, TIME_OVER_TRIP).await.is_err());
+    assert!(drive.arm_watchdog(two, Reaction::Trip).await.is_err());
     assert_eq!(writes(&machine), 0);
 }
 

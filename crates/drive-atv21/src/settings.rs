@@ -139,7 +139,7 @@ impl<P: Port> Atv21<P> {
             Reaction::Freewheel => Some(0),
             Reaction::Ramp => Some(1),
             Reaction::DcInjection => Some(2),
-            Reaction::Fast | Reaction::Unknown(_) => {
+            Reaction::Fast | Reaction::Trip | Reaction::Unknown(_) => {
                 return Err(Error::Unsupported {
                     what: "this watchdog reaction",
                     reason: "F603 has freewheel, ramp stop and DC injection",

@@ -11,7 +11,7 @@ use crate::{
     Atv28,
     registers::{CMD, ETA, LFR, LFRD},
     status::{FastWords, raw_command},
-    words::{ControlWord, ExtendedStatus, StatusWord},
+    words::{ControlWord, StatusWord},
 };
 
 impl<P: Port> Atv28<P> {
@@ -20,7 +20,9 @@ impl<P: Port> Atv28<P> {
     }
 
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        drivecom::stop(self, mode, stop_word(mode).bits(), |status| shows_stop(status, mode)).await
+        let word = stop_word(mode);
+        let shows = |status: &Status| FastWords::of_raw(&status.raw).state_words().shows_stop(word);
+        drivecom::stop(self, mode, word.bits(), shows).await
     }
 }
 
@@ -35,7 +37,7 @@ impl<P: Port> Drivecom for Atv28<P> {
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let words = self.fast_words(class).await?;
         // A chart that has left operation enabled holds no run command, whatever was written before.
-        if words.chart() != Some(ChartState::OperationEnabled) {
+        if words.state_words().chart() != Some(ChartState::OperationEnabled) {
             self.command = self.command.filter(|command| !command.is_run());
         }
         Ok(words.status(self.command))
@@ -52,9 +54,9 @@ impl<P: Port> Drivecom for Atv28<P> {
     }
 
     async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
-        let words = FastWords::of_raw(&status.raw);
-        let turning = words.eti().contains(ExtendedStatus::MOTOR_RUNNING);
-        let forced_local = !words.eta().contains(StatusWord::REMOTE);
+        let words = FastWords::of_raw(&status.raw).state_words();
+        let turning = words.is_turning();
+        let forced_local = !words.eta.contains(StatusWord::NOT_FORCED_LOCAL);
         // At power-up the terminals command and the motor stands; the first command of the line takes over then. A motor
         // that somebody else has running is not taken away from him.
         let taken = turning && words.control() != Control::Bus;
@@ -97,28 +99,8 @@ pub(crate) const fn broadcast(mode: StopMode) -> Option<BroadcastWrite> {
 
 /// The stops by bits 12 to 14 keep operation enabled; without voltage the motor coasts (BBV51701 p. 11, 12, 19).
 const fn stop_word(mode: StopMode) -> ControlWord {
-    let enabled = ControlWord::from_bits_retain(drivecom::ENABLE_OPERATION);
-    match mode {
-        StopMode::Ramp => enabled.union(ControlWord::STOP),
-        StopMode::Fast => enabled.union(ControlWord::FAST_STOP),
-        StopMode::DcInjection => enabled.union(ControlWord::DC_INJECTION),
-        StopMode::Freewheel => ControlWord::from_bits_retain(drivecom::DISABLE_VOLTAGE),
-    }
-}
-
-/// Whether the drive itself shows that no run command acts: it has left "operation enabled", or there the motor stands,
-/// slows down or is braked.
-fn shows_stop(status: &Status, mode: StopMode) -> bool {
-    const BRAKES: ExtendedStatus =
-        ExtendedStatus::DECELERATING.union(ExtendedStatus::FAST_STOP).union(ExtendedStatus::DC_INJECTION);
-    let words = FastWords::of_raw(&status.raw);
-    match words.chart() {
-        None => false,
-        Some(ChartState::OperationEnabled) => {
-            let turning = words.eti().contains(ExtendedStatus::MOTOR_RUNNING);
-            mode != StopMode::Freewheel && (!turning || words.eti().intersects(BRAKES))
-        }
-        Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
-        Some(_) => true,
+    match ControlWord::enabled_stop(mode) {
+        Some(word) => word,
+        None => ControlWord::from_bits_retain(drivecom::DISABLE_VOLTAGE),
     }
 }

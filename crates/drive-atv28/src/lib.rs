@@ -15,7 +15,7 @@ use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, ExceptionMeaning, Fault, Faults, Identity,
     Lifetimes, Measurements, Percent, Port, RawWord, Registers, Result, Row, SerialSettings, Setpoint,
     SlaveAddress, Speed, Status, StopMode, Voltage, Written,
-    drivecom::{self, ChartState, Drivecom},
+    drivecom::{self, Drivecom, StatusWords},
     registers::{Register, access::Readable},
     serial::CharacterFormat,
 };
@@ -90,22 +90,15 @@ impl<P: Port> Atv28<P> {
     /// Reads the fast set, in two exchanges: seven words are the most that one carries.
     async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
         let mut calls = self.registers.at(class);
-        let first = calls.read_words(FIRST_BLOCK.0, FIRST_BLOCK.1).await?;
-        let second = calls.read_words(SECOND_BLOCK.0, SECOND_BLOCK.1).await?;
-        let exchange = drive_core::Exchange { function: 0x03, register: Some(SECOND_BLOCK.0) };
-        FastWords::of(&first, &second).ok_or_else(|| calls.answer(exchange, "words are missing"))
+        let first = calls.read_array(FIRST_BLOCK.0).await?;
+        let second = calls.read_array(SECOND_BLOCK.0).await?;
+        Ok(FastWords::of(first, second))
     }
 }
 
 /// The exceptions of the manual's last section.
 const fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
-    match code {
-        1 => ExceptionMeaning::NoSuchFunction,
-        2 => ExceptionMeaning::NoSuchRegister,
-        3 => ExceptionMeaning::ValueRefused,
-        4 => ExceptionMeaning::Failed,
-        _ => ExceptionMeaning::Unknown,
-    }
+    ExceptionMeaning::standard(code)
 }
 
 #[async_trait]
@@ -139,11 +132,8 @@ impl<P: Port> Drive for Atv28<P> {
     /// known.
     async fn measurements(&mut self) -> Result<Measurements> {
         let mut calls = self.registers.at(Class::Background);
-        let block = calls.read_words(FIRST_BLOCK.0, FIRST_BLOCK.1).await?;
-        let &[frh, _, _, _, uln, thr, thd] = block.as_slice() else {
-            let exchange = drive_core::Exchange { function: 0x03, register: Some(FIRST_BLOCK.0) };
-            return Err(calls.answer(exchange, "words are missing"));
-        };
+        let block = calls.read_array(FIRST_BLOCK.0).await?;
+        let [frh, _, _, _, uln, thr, thd] = block;
         let mut raw: Vec<_> = FastWords::first_block(&block);
         let iolr = keep(&mut raw, IOLR, calls.read(IOLR).await?);
         let otr = keep(&mut raw, OTR, calls.read(OTR).await?);
@@ -168,11 +158,7 @@ impl<P: Port> Drive for Atv28<P> {
 
     async fn faults(&mut self) -> Result<Faults> {
         let mut calls = self.registers.at(Class::Background);
-        let second = calls.read_words(SECOND_BLOCK.0, SECOND_BLOCK.1).await?;
-        let &[lft, eta, eti, _] = second.as_slice() else {
-            let exchange = drive_core::Exchange { function: 0x03, register: Some(SECOND_BLOCK.0) };
-            return Err(calls.answer(exchange, "words are missing"));
-        };
+        let [lft, eta, eti, _] = calls.read_array(SECOND_BLOCK.0).await?;
         let mut history = Vec::new();
         for register in [DP1, DP2, DP3, DP4] {
             let code = calls.read(register).await?;
@@ -180,15 +166,14 @@ impl<P: Port> Drive for Atv28<P> {
                 history.push(Fault::lookup(FAULTS, code));
             }
         }
-        let tripped =
-            matches!(ChartState::of(eta), Some(ChartState::Fault | ChartState::FaultReactionActive));
-        let eti = ExtendedStatus::from_bits_retain(eti);
-        let warnings = WARNINGS.iter().filter(|entry| eti.bits() >> entry.code & 1 == 1);
+        let state = StatusWords::new(eta, eti);
+        let tripped = state.is_tripped();
+        let warnings = WARNINGS.iter().filter(|entry| eti >> entry.code & 1 == 1);
         Ok(Faults {
             present: tripped.then(|| Fault::lookup(FAULTS, lft)).into_iter().collect(),
             history,
             warnings: warnings.map(|entry| Fault { code: entry.code, entry: Some(entry) }).collect(),
-            reset_allowed: tripped.then(|| eti.contains(ExtendedStatus::RESET_ALLOWED)),
+            reset_allowed: tripped.then(|| state.eti.contains(ExtendedStatus::RESET_AUTHORISED)),
         })
     }
 

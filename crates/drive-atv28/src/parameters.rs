@@ -1,10 +1,12 @@
 //! Setpoints and parameters.
 
-use drive_core::{Class, Error, Frequency, Port, Result, Row, Setpoint, SetpointProblem, Speed, Written};
+use drive_core::{
+    Class, Error, Frequency, Port, Result, Row, Setpoint, SetpointProblem, Speed, Written, drivecom,
+};
 
 use crate::{
     Atv28,
-    registers::{CMD, CMDD, HSP, LFR, LFRD, LSP, SMIL_LOW},
+    registers::{CMD, CMDD, HSP, LFR, LFRD, SMIL_LOW},
 };
 
 /// The drive's own limits, read when the first setpoint needs them.
@@ -40,37 +42,28 @@ impl<P: Port> Atv28<P> {
 
     async fn speed_word(&mut self, speed: Speed) -> Result<u16> {
         let setpoint = Setpoint::Speed(speed);
-        let word = i16::try_from(speed.rpm()).map(i16::cast_unsigned);
-        let word = word.map_err(|_| self.setpoint(setpoint, SetpointProblem::TooLarge))?;
-        let (low, high) = self.speed_limits().await?;
-        if speed < low || speed > high {
-            return Err(self.setpoint(setpoint, SetpointProblem::OutsideSpeedLimits { low, high }));
-        }
-        Ok(word)
+        let limits = self.speed_limits().await?;
+        drivecom::speed_word(speed, limits).map_err(|problem| self.setpoint(setpoint, problem))
     }
 
-    /// LSP and HSP, which stand side by side.
+    /// HSP and LSP, which follow each other.
     async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
         if let Some(limits) = self.limits.frequency {
             return Ok(limits);
         }
-        let words = self.registers.at(Class::Command).read_words(HSP.address(), 2).await?;
-        let word = |at: u16| words.get(usize::from(at - HSP.address())).copied().unwrap_or(0);
-        let frequency = |at| Frequency::from_decihertz(word(at));
-        let limits = (frequency(LSP.address()), frequency(HSP.address()));
+        let words: [u16; 2] = self.registers.at(Class::Command).read_array(HSP.address()).await?;
+        let [high, low] = words.map(Frequency::from_decihertz);
+        let limits = (low, high);
         self.limits.frequency = Some(limits);
         Ok(limits)
     }
 
-    /// SMIL and SMAL, each of two words, the low one first.
+    /// SMIL and SMAL, the same limits in rpm.
     async fn speed_limits(&mut self) -> Result<(Speed, Speed)> {
         if let Some(limits) = self.limits.speed {
             return Ok(limits);
         }
-        let words = self.registers.at(Class::Command).read_words(SMIL_LOW.address(), 4).await?;
-        let double =
-            |at: usize| words.iter().skip(at).take(2).rev().fold(0, |all, &word| all << 16 | u32::from(word));
-        let limits = (Speed::from_rpm(double(0)), Speed::from_rpm(double(2)));
+        let limits = drivecom::speed_limits(&mut self.registers.at(Class::Command), SMIL_LOW).await?;
         self.limits.speed = Some(limits);
         Ok(limits)
     }

@@ -70,7 +70,7 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
         const COMMAND: Command = Command::Release;
         let words = self.check_standing(COMMAND).await?;
-        if words.control() != Control::Bus {
+        if words.state_words().control() != Control::Bus {
             return self.fast_status(Class::Command).await;
         }
         if self.control_settings(Class::Command).await?.level != AccessLevel::L3 {

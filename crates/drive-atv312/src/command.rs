@@ -5,14 +5,14 @@ use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress, State, Status,
     StopMode,
-    drivecom::{self, ChartState, Drivecom},
+    drivecom::{self, ChartState, Drivecom, StatusWords},
     registers::Register,
 };
 
 use crate::{
     Atv312,
-    registers::{CMD, CMI, ETA, LFR, LFRD, LFT},
-    status::{FastWords, raw_command},
+    registers::{CMD, ETA, LFRD, LFT},
+    status::{FIRST, FastWords, raw_command},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
 };
 
@@ -22,8 +22,7 @@ impl<P: Port> Atv312<P> {
     /// at every access level.
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
         let word = self.stop_word(mode).await?;
-        let keeps_enabled = word.contains(ControlWord::ENABLE_OPERATION);
-        let shows = |status: &Status| FastWords::in_status(status).shows_stop(keeps_enabled);
+        let shows = |status: &Status| FastWords::in_status(status).state_words().shows_stop(word);
         let stopped = drivecom::stop(self, mode, word.bits(), shows).await;
         if matches!(stopped, Err(Error::NotConfirmed { .. })) {
             // The settings may have been changed at the drive: the next attempt reads them, or does without them.
@@ -53,21 +52,17 @@ impl<P: Port> Atv312<P> {
 
     /// Reads the fast words in a class, without making a status of them.
     pub(crate) async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
-        let (first, count) = crate::status::BLOCK;
-        let mut calls = self.registers.at(class);
-        let words = calls.read_words(first, count).await?;
-        let exchange = drive_core::Exchange { function: 0x03, register: Some(first) };
-        FastWords::of(&words)
-            .ok_or_else(|| calls.answer(exchange, "the answer holds another number of words"))
+        self.registers.at(class).read_array(FIRST).await.map(FastWords::of)
     }
 
     /// The fast set as a status.
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
         let resolution = self.resolution(class).await?;
         let words = self.fast_words(class).await?;
+        let state = words.state_words();
         // A chart that has left operation enabled holds no run command, whatever was written before; nor is one in force
         // again by itself when somebody else gives control back.
-        if words.chart() != Some(ChartState::OperationEnabled) || words.control() != Control::Bus {
+        if state.chart() != Some(ChartState::OperationEnabled) || state.control() != Control::Bus {
             self.command = self.command.filter(|command| !command.is_run());
         }
         Ok(words.status(resolution, self.command))
@@ -82,10 +77,10 @@ impl<P: Port> Atv312<P> {
     }
 
     /// Whose command the drive is under, for a start.
-    fn refuses_control(words: &FastWords, level: AccessLevel) -> Option<Refusal> {
+    fn refuses_control(words: StatusWords, level: AccessLevel) -> Option<Refusal> {
         let control = words.control();
         let not_ours = Some(Refusal::NotInControl(control)).filter(|_| control != Control::Bus);
-        if !words.eta().contains(StatusWord::NOT_FORCED_LOCAL) {
+        if !words.eta.contains(StatusWord::NOT_FORCED_LOCAL) {
             return not_ours;
         }
         match level {
@@ -104,20 +99,17 @@ impl<P: Port> Atv312<P> {
         const SIGN: Refusal =
             Refusal::Settings("the reference on the bus is negative: give a setpoint before the start");
         let mut calls = self.registers.at(Class::Command);
-        let words = calls.read_words(CMD.address(), 4).await?;
+        // CMD, LFr, PISP, CMI.
+        let [_, hertz, _, cmi] = calls.read_array(CMD.address()).await?;
         let rpm = calls.read(LFRD).await?;
-        let word = |address: u16| {
-            let index = address.checked_sub(CMD.address()).map(usize::from);
-            index.and_then(|index| words.get(index)).copied().unwrap_or(0)
-        };
-        let cmi = ExtendedControl::from_bits_retain(word(CMI.address()));
+        let cmi = ExtendedControl::from_bits_retain(cmi);
         self.learn_resolution(cmi);
         Ok(if cmi.contains(ExtendedControl::NO_CONSISTENCY_CHECK) {
             Some(Refusal::Settings("CMI bit 15: no consistency check, and locked on standstill"))
         } else if cmi.contains(ExtendedControl::LOCK) {
             Some(Refusal::Settings("CMI bit 13: locked on standstill"))
         } else {
-            (word(LFR.address()).cast_signed() < 0 || rpm.cast_signed() < 0).then_some(SIGN)
+            (hertz.cast_signed() < 0 || rpm.cast_signed() < 0).then_some(SIGN)
         })
     }
 }
@@ -152,9 +144,9 @@ impl<P: Port> Drivecom for Atv312<P> {
     }
 
     async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>> {
-        let words = FastWords::in_status(status);
+        let words = FastWords::in_status(status).state_words();
         let settings = self.control_settings(Class::Command).await?;
-        if let Some(reason) = Self::refuses_control(&words, settings.level) {
+        if let Some(reason) = Self::refuses_control(words, settings.level) {
             return Ok(Some(reason));
         }
         if words.chart() == Some(ChartState::QuickStopActive) && words.is_turning() {
@@ -177,9 +169,9 @@ impl<P: Port> Drivecom for Atv312<P> {
         status.raw.push(raw_command(held));
         let words = FastWords::in_status(status);
         let reverse = ControlWord::from_bits_retain(word).contains(ControlWord::REVERSE);
-        let asked = words.eti().contains(ExtendedStatus::REVERSE_REQUESTED);
+        let asked = words.state_words().eti.contains(ExtendedStatus::REVERSE_REQUESTED);
         let directed = words.word(crate::registers::FRH) == 0 || asked == reverse;
-        Ok(held == word && words.control() == Control::Bus && directed)
+        Ok(held == word && words.state_words().control() == Control::Bus && directed)
     }
 }
 

@@ -4,17 +4,17 @@ use std::time::Duration;
 
 use drive_core::{
     Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Result, Row,
-    Setpoint, Speed, Voltage, drivecom::ChartState,
+    Setpoint, Speed, Voltage, drivecom::StatusWords,
 };
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{
     Atv312, FAULTS, PastFault, WARNINGS,
     registers::{
-        ARE, DP1, DP2, DP3, DP4, EP1, EP2, EP3, EP4, ERRD, ETI, FRH, FRHD, INV, IOLR, LCR, LFT, LRS1, NCV,
-        OPR, OTR, RFRD, RTH, TDM, THD, THR, TSP, UDP, ULN, VCAL,
+        ARE, DP1, EP1, ERRD, ETI, FRH, FRHD, INV, IOLR, LCR, LFT, LRS1, NCV, OPR, OTR, RFRD, RTH, TDM, THD,
+        THR, TSP, UDP, ULN, VCAL,
     },
-    status::{FastWords, Resolution},
+    status::Resolution,
     words::{ExtendedStatus, ExtendedStatus1, FaultState, LogicIo, StatusWord},
 };
 
@@ -58,17 +58,18 @@ impl<P: Port> Atv312<P> {
         let words = self.fast_words(Class::Background).await?;
         let mut calls = self.registers.at(Class::Background);
         let last = calls.read(LFT).await?;
-        let past = calls.read_words(DP1.address(), 4).await?;
+        let past: [u16; 4] = calls.read_array(DP1.address()).await?;
         let lrs1 = ExtendedStatus1::from_bits_retain(calls.read(LRS1).await?);
         // LFt keeps the last fault after it is gone: only the state says that it is present.
-        let tripped = matches!(words.chart(), Some(ChartState::Fault | ChartState::FaultReactionActive));
+        let state = words.state_words();
+        let tripped = state.is_tripped();
         let present = tripped.then(|| Fault::lookup(FAULTS, last)).into_iter().collect();
         let history = past.into_iter().filter(|&code| code != 0).map(|code| Fault::lookup(FAULTS, code));
         Ok(Faults {
             present,
             history: history.collect(),
-            warnings: warnings(&words, lrs1),
-            reset_allowed: tripped.then(|| words.eti().contains(ExtendedStatus::RESET_AUTHORISED)),
+            warnings: warnings(state, lrs1),
+            reset_allowed: tripped.then(|| state.eti.contains(ExtendedStatus::RESET_AUTHORISED)),
         })
     }
 
@@ -78,26 +79,14 @@ impl<P: Port> Atv312<P> {
     /// # Errors
     /// Those of [`Drive::faults`](drive_core::Drive::faults).
     pub async fn past_faults(&mut self) -> Result<[PastFault; 4]> {
-        const LAYOUT: [(u16, u16); 4] = [
-            (DP1.address(), EP1.address()),
-            (DP2.address(), EP2.address()),
-            (DP3.address(), EP3.address()),
-            (DP4.address(), EP4.address()),
-        ];
         let mut calls = self.registers.at(Class::Background);
-        let codes = calls.read_words(DP1.address(), 4).await?;
-        let states = calls.read_words(EP1.address(), 4).await?;
-        let word = |words: &[u16], base: u16, address: u16| {
-            let index = address.checked_sub(base).map(usize::from);
-            index.and_then(|index| words.get(index)).copied().unwrap_or(0)
+        let [dp1, dp2, dp3, dp4] = calls.read_array(DP1.address()).await?;
+        let [ep1, ep2, ep3, ep4] = calls.read_array(EP1.address()).await?;
+        let past = |code, state| PastFault {
+            fault: (code != 0).then(|| Fault::lookup(FAULTS, code)),
+            state: FaultState::from_bits_retain(state),
         };
-        Ok(LAYOUT.map(|(code, state)| {
-            let code = word(&codes, DP1.address(), code);
-            PastFault {
-                fault: (code != 0).then(|| Fault::lookup(FAULTS, code)),
-                state: FaultState::from_bits_retain(word(&states, EP1.address(), state)),
-            }
-        }))
+        Ok([past(dp1, ep1), past(dp2, ep2), past(dp3, ep3), past(dp4, ep4)])
     }
 
     /// The CiA 402 error code `ERRD` (W8606), 0 where the drive has saved none.
@@ -139,8 +128,8 @@ impl<P: Port> Atv312<P> {
     }
 }
 
-fn warnings(words: &FastWords, lrs1: ExtendedStatus1) -> Vec<Fault> {
-    let eti = words.eti();
+fn warnings(words: StatusWords, lrs1: ExtendedStatus1) -> Vec<Fault> {
+    let eti = words.eti;
     let mut codes: Vec<u16> = [
         (eti.contains(ExtendedStatus::MOTOR_THERMAL_ALARM), 7),
         (eti.contains(ExtendedStatus::BRAKING_ALARM), 8),
@@ -151,7 +140,7 @@ fn warnings(words: &FastWords, lrs1: ExtendedStatus1) -> Vec<Fault> {
     .into_iter()
     .filter_map(|(present, code)| present.then_some(code))
     .collect();
-    if codes.is_empty() && words.eta().contains(StatusWord::ALARM) {
+    if codes.is_empty() && words.eta.contains(StatusWord::ALARM) {
         codes.push(0);
     }
     codes.into_iter().map(|code| Fault::lookup(WARNINGS, code)).collect()

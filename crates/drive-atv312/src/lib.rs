@@ -199,11 +199,8 @@ impl<P: Port> Drive for Atv312<P> {
 #[must_use]
 pub const fn exception_meaning(function: u8, code: u8) -> ExceptionMeaning {
     match (function, code) {
-        (_, 1) => ExceptionMeaning::NoSuchFunction,
-        (_, 2) => ExceptionMeaning::NoSuchRegister,
-        (0x2B, _) => ExceptionMeaning::Unknown,
-        (_, 3) => ExceptionMeaning::ValueRefused,
-        (_, 4) => ExceptionMeaning::Failed,
-        _ => ExceptionMeaning::Unknown,
+        // Only 1 and 2 are printed for it.
+        (0x2B, 3..) => ExceptionMeaning::Unknown,
+        _ => ExceptionMeaning::standard(code),
     }
 }

@@ -159,6 +159,6 @@ const fn reaction_code(reaction: Reaction) -> Option<u16> {
         Reaction::Freewheel => Some(1),
         Reaction::Ramp => Some(6),
         Reaction::Fast => Some(7),
-        Reaction::DcInjection | Reaction::Unknown(_) => None,
+        Reaction::DcInjection | Reaction::Trip | Reaction::Unknown(_) => None,
     }
 }

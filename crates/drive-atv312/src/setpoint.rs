@@ -1,6 +1,8 @@
 //! Setpoints: `LFr` in hertz, `LFRD` in rpm, both as magnitudes. The direction is the run command's.
 
-use drive_core::{Class, Command, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed};
+use drive_core::{
+    Class, Command, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed, drivecom,
+};
 
 use crate::{
     Atv312,
@@ -47,12 +49,8 @@ impl<P: Port> Atv312<P> {
                 reason: "CMI bit 9 (high resolution) makes LFRD a frequency",
             });
         }
-        let (low, high) = self.speed_limits().await?;
-        if !(low..=high).contains(&speed) {
-            return Err(self.bad_setpoint(setpoint, SetpointProblem::OutsideSpeedLimits { low, high }));
-        }
-        let word = u16::try_from(speed.rpm()).ok().filter(|&word| word <= i16::MAX.unsigned_abs());
-        word.ok_or_else(|| self.bad_setpoint(setpoint, SetpointProblem::TooLarge))
+        let limits = self.speed_limits().await?;
+        drivecom::speed_word(speed, limits).map_err(|problem| self.bad_setpoint(setpoint, problem))
     }
 
     const fn bad_setpoint(&self, setpoint: Setpoint, problem: SetpointProblem) -> Error {

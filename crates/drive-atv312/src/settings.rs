@@ -1,14 +1,11 @@
 //! Settings that are read once, before what depends on them, and forgotten with
 //! [`forget`](drive_core::Drive::forget): what the control word's bits do, where the reference comes from, the limits.
 
-use drive_core::{Class, Frequency, Port, Refusal, Result, Speed, StopMode};
+use drive_core::{Class, Frequency, Port, Refusal, Result, Speed, StopMode, drivecom};
 
 use crate::{
     Atv312,
-    registers::{
-        CCS, CHP, CMI, DCI, ETF, FR1, FR2, FST, HSP, LAC, LC2, LSP, PR2, PR4, PS2, PS16, RFC, RPS, SMAL,
-        SMAL_HIGH, SMIL, SMIL_HIGH, STT, TFR,
-    },
+    registers::{CCS, CHP, CMI, ETF, FR1, FR2, LAC, LC2, PR2, PR4, PS2, PS16, RFC, RPS, SMIL, STT, TFR},
     status::Resolution,
     words::{AccessLevel, ExtendedControl, StopType},
 };
@@ -114,16 +111,13 @@ impl<P: Port> Atv312<P> {
         }
         let mut calls = self.registers.at(class);
         let level = AccessLevel::from(calls.read(LAC).await?);
-        let stops = calls.read_words(STT.address(), 4).await?;
-        let word = |register: u16| {
-            let index = register.checked_sub(STT.address()).map(usize::from);
-            index.and_then(|index| stops.get(index)).copied().unwrap_or(0)
-        };
+        // Stt, nSt, dCI, FSt.
+        let [stt, _, dc_injection, fast_stop] = calls.read_array(STT.address()).await?;
         let mut settings = ControlSettings {
             level,
-            stop_type: StopType::from(word(STT.address())),
-            dc_injection: word(DCI.address()),
-            fast_stop: word(FST.address()),
+            stop_type: StopType::from(stt),
+            dc_injection,
+            fast_stop,
             assigned: [false; 5],
             reference_by_bus: false,
         };
@@ -150,17 +144,14 @@ impl<P: Port> Atv312<P> {
         Ok(settings)
     }
 
-    /// `LSP` to `HSP`, both within `tFr`: one exchange once.
+    /// `LSP` to `HSP`, both within `tFr`: the three follow each other, one exchange once.
     pub(crate) async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
         if let Some(limits) = self.known.frequencies {
             return Ok(limits);
         }
-        let words = self.registers.at(Class::Command).read_words(TFR.address(), 3).await?;
-        let value = |address: u16| {
-            let index = address.checked_sub(TFR.address()).map(usize::from);
-            Frequency::from_decihertz(index.and_then(|index| words.get(index)).copied().unwrap_or(0))
-        };
-        let limits = (value(LSP.address()), value(HSP.address()).min(value(TFR.address())));
+        let words: [u16; 3] = self.registers.at(Class::Command).read_array(TFR.address()).await?;
+        let [tfr, hsp, lsp] = words.map(Frequency::from_decihertz);
+        let limits = (lsp, hsp.min(tfr));
         self.known.frequencies = Some(limits);
         Ok(limits)
     }
@@ -170,14 +161,7 @@ impl<P: Port> Atv312<P> {
         if let Some(limits) = self.known.speeds {
             return Ok(limits);
         }
-        let count = span(SMIL.address(), SMAL_HIGH.address());
-        let words = self.registers.at(Class::Command).read_words(SMIL.address(), count).await?;
-        let word = |address: u16| {
-            let index = address.checked_sub(SMIL.address()).map(usize::from);
-            u32::from(index.and_then(|index| words.get(index)).copied().unwrap_or(0))
-        };
-        let long = |low: u16, high: u16| Speed::from_rpm(word(high) << 16 | word(low));
-        let limits = (long(SMIL.address(), SMIL_HIGH.address()), long(SMAL.address(), SMAL_HIGH.address()));
+        let limits = drivecom::speed_limits(&mut self.registers.at(Class::Command), SMIL).await?;
         self.known.speeds = Some(limits);
         Ok(limits)
     }

@@ -1,66 +1,10 @@
 //! The bits of the control and status words (BBV51701 06/2009, page at each word). Bits without a name are kept.
 
 use bitflags::bitflags;
-use drive_core::{Control, Direction, StopMode, drivecom};
+use drive_core::Control;
 
-bitflags! {
-    /// `CMD` (W8501) and `CMDD` (W8601), p. 16 and 19. Bits 4 to 6 and 8 to 10 are reserved and stay 0. Bits 11 to 14
-    /// have these meanings at the access levels L1 and L2; at L3 bits 11 and 12 have them in the factory setting, and
-    /// each of 11 to 15 has the function that was assigned to it.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub struct ControlWord: u16 {
-        /// Switch on.
-        const SWITCH_ON = 1 << 0;
-        /// Enable voltage: 0 disables it.
-        const ENABLE_VOLTAGE = 1 << 1;
-        /// No quick stop: 0 is a quick stop.
-        const NO_QUICK_STOP = 1 << 2;
-        /// Enable operation.
-        const ENABLE_OPERATION = 1 << 3;
-        /// Fault reset, on the rising edge.
-        const FAULT_RESET = 1 << 7;
-        /// Reverse.
-        const REVERSE = 1 << 11;
-        /// Stop as `Stt` says.
-        const STOP = 1 << 12;
-        /// Stop by DC injection.
-        const DC_INJECTION = 1 << 13;
-        /// Fast stop.
-        const FAST_STOP = 1 << 14;
-    }
-}
-
-impl ControlWord {
-    /// Enable operation, in a direction: 000Fh and 080Fh.
-    pub(crate) const fn run(direction: Direction) -> Self {
-        let enabled = Self::from_bits_retain(drivecom::ENABLE_OPERATION);
-        match direction {
-            Direction::Forward => enabled,
-            Direction::Reverse => enabled.union(Self::REVERSE),
-        }
-    }
-
-    /// The stops that keep operation enabled: 100Fh, 400Fh, 200Fh. `None`: freewheel is no such stop.
-    pub(crate) const fn enabled_stop(mode: StopMode) -> Option<Self> {
-        let enabled = Self::from_bits_retain(drivecom::ENABLE_OPERATION);
-        match mode {
-            StopMode::Ramp => Some(enabled.union(Self::STOP)),
-            StopMode::Fast => Some(enabled.union(Self::FAST_STOP)),
-            StopMode::DcInjection => Some(enabled.union(Self::DC_INJECTION)),
-            StopMode::Freewheel => None,
-        }
-    }
-
-    /// Whether it holds a run command: operation enabled and no stop.
-    pub(crate) const fn is_run(self) -> bool {
-        self.contains(Self::run(Direction::Forward)) && !self.is_stop()
-    }
-
-    /// Whether it holds one of the stops that keep operation enabled.
-    pub(crate) const fn is_stop(self) -> bool {
-        self.intersects(Self::STOP.union(Self::DC_INJECTION).union(Self::FAST_STOP))
-    }
-}
+/// `CMD` (W8501) and `CMDD` (W8601); `ETI` (W3206); `ETA` (W3201) and `ETAD` (W8603).
+pub use drive_core::drivecom::{ControlWord, ExtendedStatus, StatusWord};
 
 bitflags! {
     /// `CMI` (W8504), p. 20. Bits 2, 5 to 8 and 10 to 12 are reserved.
@@ -82,97 +26,6 @@ bitflags! {
         const NO_TIMEOUT = 1 << 14;
         /// No parameter consistency check, and the drive locked on standstill.
         const NO_CONSISTENCY_CHECK = 1 << 15;
-    }
-}
-
-bitflags! {
-    /// `ETA` (W3201) and `ETAD` (W8603), p. 13, 17 and 21. The states are in
-    /// [`ChartState`](drive_core::drivecom::ChartState). Bits 8, 12 and 13 are reserved, bit 4 is always 0.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub struct StatusWord: u16 {
-        /// Ready to switch on.
-        const READY = 1 << 0;
-        /// Switched on.
-        const SWITCHED_ON = 1 << 1;
-        /// Operation enabled.
-        const OPERATION_ENABLED = 1 << 2;
-        /// Fault.
-        const FAULT = 1 << 3;
-        /// Voltage disabled; always 0.
-        const VOLTAGE_DISABLED = 1 << 4;
-        /// No quick stop: 0 while one is active.
-        const NO_QUICK_STOP = 1 << 5;
-        /// Switch on disabled.
-        const SWITCH_ON_DISABLED = 1 << 6;
-        /// Alarm.
-        const ALARM = 1 << 7;
-        /// No forced local mode: 0 while it is in progress.
-        const NOT_FORCED_LOCAL = 1 << 9;
-        /// Reference reached.
-        const REFERENCE_REACHED = 1 << 10;
-        /// `LFRD` below `LSP` or above `HSP`.
-        const REFERENCE_EXCEEDED = 1 << 11;
-        /// Stopped by the STOP key.
-        const STOP_KEY = 1 << 14;
-        /// The output turns in reverse.
-        const REVERSE = 1 << 15;
-    }
-}
-
-impl StatusWord {
-    /// Direction of the output.
-    pub(crate) const fn direction(self) -> Direction {
-        if self.contains(Self::REVERSE) { Direction::Reverse } else { Direction::Forward }
-    }
-}
-
-bitflags! {
-    /// `ETI` (W3206), p. 22. Bit 3 is reserved; bits 13 and 14 are told by [`ExtendedStatus::control`].
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub struct ExtendedStatus: u16 {
-        /// The EEPROM is being written: no parameter can be written now.
-        const EEPROM_BUSY = 1 << 0;
-        /// Parameters are checked for consistency; 0: no check, and the drive locked on standstill.
-        const CONSISTENCY_CHECK = 1 << 1;
-        /// A fault reset is authorised.
-        const RESET_AUTHORISED = 1 << 2;
-        /// Motor running.
-        const MOTOR_RUNNING = 1 << 4;
-        /// DC injection.
-        const DC_INJECTION = 1 << 5;
-        /// Transient state.
-        const TRANSIENT = 1 << 6;
-        /// Motor thermal overload alarm.
-        const MOTOR_THERMAL_ALARM = 1 << 7;
-        /// Alarm: excessive braking.
-        const BRAKING_ALARM = 1 << 8;
-        /// Accelerating.
-        const ACCELERATING = 1 << 9;
-        /// Decelerating.
-        const DECELERATING = 1 << 10;
-        /// Current limit alarm.
-        const CURRENT_LIMIT = 1 << 11;
-        /// Fast stop in progress.
-        const FAST_STOP = 1 << 12;
-        /// Low bit of the control source.
-        const SOURCE_LOW = 1 << 13;
-        /// High bit of the control source.
-        const SOURCE_HIGH = 1 << 14;
-        /// Reverse requested by the reference.
-        const REVERSE_REQUESTED = 1 << 15;
-    }
-}
-
-impl ExtendedStatus {
-    /// Who commands, by bits 14 and 13. Terminals and the built-in keypad have one pattern.
-    #[must_use]
-    pub const fn control(self) -> Control {
-        match (self.contains(Self::SOURCE_HIGH), self.contains(Self::SOURCE_LOW)) {
-            (false, false) => Control::Local,
-            (false, true) => Control::Panel,
-            (true, false) => Control::Bus,
-            (true, true) => Control::OtherBus,
-        }
     }
 }
 

@@ -123,13 +123,7 @@ impl<P: Port> Atv58<P> {
 
 /// The exceptions of p. 22/46.
 const fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
-    match code {
-        1 => ExceptionMeaning::NoSuchFunction,
-        2 => ExceptionMeaning::NoSuchRegister,
-        3 => ExceptionMeaning::ValueRefused,
-        4 => ExceptionMeaning::Failed,
-        _ => ExceptionMeaning::Unknown,
-    }
+    ExceptionMeaning::standard(code)
 }
 
 #[async_trait]

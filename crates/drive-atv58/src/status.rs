@@ -61,7 +61,7 @@ impl Words {
     }
 
     pub(crate) fn is_tripped(&self, map: &Atv58Map) -> bool {
-        matches!(self.chart(map), Some(ChartState::Fault | ChartState::FaultReactionActive))
+        self.chart(map).is_some_and(ChartState::is_fault)
     }
 
     /// Whether the output turns the motor, where a word tells it.
@@ -113,17 +113,8 @@ impl Words {
     }
 
     fn state(&self, map: &Atv58Map) -> State {
-        match self.chart(map) {
-            None => State::Unknown,
-            Some(ChartState::NotReadyToSwitchOn) => State::NotReady,
-            Some(ChartState::SwitchOnDisabled | ChartState::ReadyToSwitchOn) => State::Disabled,
-            Some(ChartState::SwitchedOn) if self.is_turning(map) => State::Stopping,
-            Some(ChartState::SwitchedOn) => State::Ready,
-            Some(ChartState::OperationEnabled) => self.enabled(map),
-            Some(ChartState::QuickStopActive) => State::QuickStop,
-            Some(ChartState::FaultReactionActive) => State::FaultReaction,
-            Some(ChartState::Fault) => State::Fault,
-        }
+        let enabled = self.enabled(map);
+        self.chart(map).map_or(State::Unknown, |chart| chart.state(self.is_turning(map), enabled))
     }
 
     /// In the state "operation enabled" a run command is in force, unless the control word was read with these words and

@@ -144,8 +144,8 @@ impl<P: Port> Calls<'_, P> {
 
     /// Reads one word at an address.
     pub async fn read_word(&mut self, address: u16) -> Result<u16> {
-        let words = self.read_words(address, 1).await?;
-        words.first().copied().ok_or_else(|| self.answer(Self::reading(address), "the answer holds no word"))
+        let [word] = self.read_array(address).await?;
+        Ok(word)
     }
 
     /// Reads `count` consecutive words in one request.
@@ -163,6 +163,17 @@ impl<P: Port> Calls<'_, P> {
             return Err(self.answer(exchange, "the answer holds another number of words"));
         }
         Ok(words)
+    }
+
+    /// Reads the `N` consecutive words from `first` on in one request.
+    ///
+    /// # Errors
+    /// As [`read_words`](Self::read_words).
+    pub async fn read_array<const N: usize>(&mut self, first: u16) -> Result<[u16; N]> {
+        let count = u16::try_from(N).unwrap_or(u16::MAX);
+        let words = self.read_words(first, count).await?;
+        let exchange = Self::reading(first);
+        words.try_into().map_err(|_| self.answer(exchange, "the answer holds another number of words"))
     }
 
     /// Writes one register, with function 06 where the family has it and function 16 where it has not. When it is

@@ -113,6 +113,8 @@ pub enum Reaction {
     Fast,
     /// It trips and stops by DC injection.
     DcInjection,
+    /// It trips. How the motor stops is not in its manual.
+    Trip,
     /// A value that the manual does not explain.
     Unknown(u16),
 }
@@ -125,6 +127,7 @@ impl fmt::Display for Reaction {
             Self::Ramp => f.write_str("ramp stop"),
             Self::Fast => f.write_str("fast stop"),
             Self::DcInjection => f.write_str("DC injection"),
+            Self::Trip => f.write_str("trip (how the motor stops is not in the manual)"),
             Self::Unknown(value) => write!(f, "unknown ({value})"),
         }
     }

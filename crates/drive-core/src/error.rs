@@ -86,6 +86,18 @@ pub enum ExceptionMeaning {
 }
 
 impl ExceptionMeaning {
+    /// What the Modbus specification says of the codes 1 to 4, for families whose manual says the same.
+    #[must_use]
+    pub const fn standard(code: u8) -> Self {
+        match code {
+            1 => Self::NoSuchFunction,
+            2 => Self::NoSuchRegister,
+            3 => Self::ValueRefused,
+            4 => Self::Failed,
+            _ => Self::Unknown,
+        }
+    }
+
     /// Whether the same request may succeed later without anybody changing anything.
     #[must_use]
     pub const fn is_worth_a_retry(self) -> bool {

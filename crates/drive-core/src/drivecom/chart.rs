@@ -1,5 +1,7 @@
 //! The chart itself, as pure functions.
 
+use crate::status::State;
+
 /// A state of the chart, from the status word ETA under the mask 006Fh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ChartState {
@@ -21,14 +23,14 @@ pub enum ChartState {
     Fault,
 }
 
-impl ChartState {
-    /// The bits of ETA that tell the state.
-    pub const MASK: u16 = 0x006F;
+/// The bits of ETA that tell the state.
+const MASK: u16 = 0x006F;
 
+impl ChartState {
     /// The state in a status word; `None` for a pattern that the manual's table does not have.
     #[must_use]
     pub const fn of(eta: u16) -> Option<Self> {
-        Some(match eta & Self::MASK {
+        Some(match eta & MASK {
             0x0000 | 0x0020 => Self::NotReadyToSwitchOn,
             0x0040 | 0x0060 => Self::SwitchOnDisabled,
             0x0021 => Self::ReadyToSwitchOn,
@@ -40,27 +42,38 @@ impl ChartState {
             _ => return None,
         })
     }
+
+    /// Whether a fault is present.
+    #[must_use]
+    pub const fn is_fault(self) -> bool {
+        matches!(self, Self::Fault | Self::FaultReactionActive)
+    }
+
+    /// The same in the terms that all families share. What the chart alone does not tell: whether the motor is
+    /// `turning`, and what the drive does while operation is `enabled`.
+    #[must_use]
+    pub const fn state(self, turning: bool, enabled: State) -> State {
+        match self {
+            Self::NotReadyToSwitchOn => State::NotReady,
+            Self::SwitchOnDisabled | Self::ReadyToSwitchOn => State::Disabled,
+            Self::SwitchedOn if turning => State::Stopping,
+            Self::SwitchedOn => State::Ready,
+            Self::OperationEnabled => enabled,
+            Self::QuickStopActive => State::QuickStop,
+            Self::FaultReactionActive => State::FaultReaction,
+            Self::Fault => State::Fault,
+        }
+    }
 }
 
-/// Where a ladder leads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Goal {
-    /// Run commands act.
-    OperationEnabled,
-    /// Switched on, no run command in force.
-    SwitchedOn,
-    /// No voltage at the output; from operation enabled the motor coasts.
-    SwitchOnDisabled,
-}
-
-/// What to do next on the way to a goal.
+/// What to do next on the way to operation enabled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Step {
     /// Write this to the low byte of the control word, then read the status again.
     Write(u16),
     /// Read the status again: the drive leaves this state by itself.
     Wait,
-    /// The goal is reached.
+    /// Run commands act.
     Reached,
     /// A fault stands in the way; only a reset leads on, and nobody resets unasked.
     Faulted,
@@ -79,21 +92,17 @@ pub const ENABLE_OPERATION: u16 = 0x000F;
 /// CMD 0080h: fault reset on its rising edge.
 pub const FAULT_RESET: u16 = 0x0080;
 
-/// The next step from a state to a goal.
+/// The next step from a state to operation enabled.
 #[must_use]
-pub const fn next_step(state: ChartState, goal: Goal) -> Step {
-    match (state, goal) {
-        (ChartState::Fault | ChartState::FaultReactionActive, _) => Step::Faulted,
-        (ChartState::NotReadyToSwitchOn, _) => Step::Wait,
-        (ChartState::OperationEnabled, Goal::OperationEnabled)
-        | (ChartState::SwitchedOn, Goal::SwitchedOn)
-        | (ChartState::SwitchOnDisabled, Goal::SwitchOnDisabled) => Step::Reached,
-        (_, Goal::SwitchOnDisabled) | (ChartState::QuickStopActive, _) => Step::Write(DISABLE_VOLTAGE),
-        (ChartState::SwitchOnDisabled, _) => Step::Write(SHUTDOWN),
-        (ChartState::ReadyToSwitchOn, _) | (ChartState::OperationEnabled, Goal::SwitchedOn) => {
-            Step::Write(SWITCH_ON)
-        }
-        (ChartState::SwitchedOn, Goal::OperationEnabled) => Step::Write(ENABLE_OPERATION),
+pub const fn next_step(state: ChartState) -> Step {
+    match state {
+        ChartState::Fault | ChartState::FaultReactionActive => Step::Faulted,
+        ChartState::NotReadyToSwitchOn => Step::Wait,
+        ChartState::QuickStopActive => Step::Write(DISABLE_VOLTAGE),
+        ChartState::SwitchOnDisabled => Step::Write(SHUTDOWN),
+        ChartState::ReadyToSwitchOn => Step::Write(SWITCH_ON),
+        ChartState::SwitchedOn => Step::Write(ENABLE_OPERATION),
+        ChartState::OperationEnabled => Step::Reached,
     }
 }
 
@@ -111,7 +120,6 @@ mod tests {
         ChartState::FaultReactionActive,
         ChartState::Fault,
     ];
-    const GOALS: [Goal; 3] = [Goal::OperationEnabled, Goal::SwitchedOn, Goal::SwitchOnDisabled];
 
     #[test]
     fn every_status_word_has_the_state_that_the_table_of_page_10_gives_or_none() {
@@ -138,47 +146,39 @@ mod tests {
     #[test]
     fn only_the_control_words_of_the_manual_are_ever_written() {
         for state in STATES {
-            for goal in GOALS {
-                if let Step::Write(word) = next_step(state, goal) {
-                    assert!([DISABLE_VOLTAGE, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION].contains(&word));
-                }
+            if let Step::Write(word) = next_step(state) {
+                assert!([DISABLE_VOLTAGE, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION].contains(&word));
             }
         }
     }
 
     #[test]
-    fn no_goal_leads_out_of_a_fault() {
-        for goal in GOALS {
-            assert_eq!(next_step(ChartState::Fault, goal), Step::Faulted);
-            assert_eq!(next_step(ChartState::FaultReactionActive, goal), Step::Faulted);
+    fn nothing_leads_out_of_a_fault() {
+        for state in STATES {
+            assert_eq!(next_step(state) == Step::Faulted, state.is_fault(), "{state:?}");
         }
     }
 
     #[test]
-    fn the_ladder_reaches_each_goal_from_every_state_without_a_fault() {
+    fn the_ladder_reaches_operation_enabled_from_every_state_without_a_fault() {
         // The drive's side of the table on page 12, for the words that the ladder writes.
         let follow = |state, word| match (state, word) {
             (_, DISABLE_VOLTAGE) => ChartState::SwitchOnDisabled,
             (ChartState::SwitchOnDisabled, SHUTDOWN) => ChartState::ReadyToSwitchOn,
-            (ChartState::ReadyToSwitchOn | ChartState::OperationEnabled, SWITCH_ON) => ChartState::SwitchedOn,
+            (ChartState::ReadyToSwitchOn, SWITCH_ON) => ChartState::SwitchedOn,
             (ChartState::SwitchedOn, ENABLE_OPERATION) => ChartState::OperationEnabled,
             (state, word) => panic!("{word:04X}h does nothing in {state:?}"),
         };
         for start in STATES {
-            for goal in GOALS {
-                let mut state = start;
-                for _ in 0..5 {
-                    match next_step(state, goal) {
-                        Step::Write(word) => state = follow(state, word),
-                        Step::Wait => state = ChartState::SwitchOnDisabled,
-                        Step::Reached | Step::Faulted => break,
-                    }
+            let mut state = start;
+            for _ in 0..5 {
+                match next_step(state) {
+                    Step::Write(word) => state = follow(state, word),
+                    Step::Wait => state = ChartState::SwitchOnDisabled,
+                    Step::Reached | Step::Faulted => break,
                 }
-                assert!(
-                    matches!(next_step(state, goal), Step::Reached | Step::Faulted),
-                    "{start:?} to {goal:?}"
-                );
             }
+            assert!(matches!(next_step(state), Step::Reached | Step::Faulted), "{start:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use async_trait::async_trait;
 
-use super::chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, Goal, Step, next_step};
+use super::chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, Step, next_step};
 use crate::{
     error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
     port::{Class, Effect},
@@ -69,7 +69,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
     match chart_of(eta, &status) {
         None => return Err(refused(Refusal::State(State::Unknown))),
-        Some(state) if next_step(state, Goal::OperationEnabled) == Step::Faulted => {
+        Some(state) if state.is_fault() => {
             return Err(refused(tripped(&status)));
         }
         Some(_) => {}
@@ -80,7 +80,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     let mut given = false;
     for _ in 0..CONFIRMING_READS {
         let state = chart_of(eta, &status).ok_or_else(|| refused(Refusal::State(State::Unknown)))?;
-        match next_step(state, Goal::OperationEnabled) {
+        match next_step(state) {
             Step::Faulted => return Err(refused(tripped(&status))),
             Step::Wait => {}
             Step::Reached if given => {
@@ -133,9 +133,7 @@ pub async fn stop<D: Drivecom>(
 /// [`Error::NotConfirmed`] when the drive still shows a fault after [`CONFIRMING_READS`] reads.
 pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     let eta = drive.status_register();
-    let healthy = |status: &Status| {
-        chart_of(eta, status).is_some_and(|state| next_step(state, Goal::SwitchOnDisabled) != Step::Faulted)
-    };
+    let healthy = |status: &Status| chart_of(eta, status).is_some_and(|state| !state.is_fault());
     let mut status = drive.read_status(Class::Command).await?;
     if healthy(&status) {
         return Ok(status);

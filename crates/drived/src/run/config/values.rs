@@ -59,7 +59,8 @@ words! {
     "ramp" => Reaction::Ramp,
     "fast" => Reaction::Fast,
     "freewheel" => Reaction::Freewheel,
-    "dc-injection" => Reaction::DcInjection
+    "dc-injection" => Reaction::DcInjection,
+    "trip" => Reaction::Trip
 }
 
 /// What happens at the exit; the stop mode is said apart.

@@ -1,0 +1,310 @@
+//! The control and status words of the Altivar 312 with the bits above the chart (BBV51701 06/2009, page at each word),
+//! and what they say together. The Altivar 28 has them too, as at the Altivar 312's access level L1, "interchangeable
+//! with ATV28" (p. 35). Bits without a name are kept.
+
+use bitflags::bitflags;
+
+use super::chart::{ChartState, ENABLE_OPERATION};
+use crate::{
+    setpoint::{Direction, StopMode},
+    status::{Control, State, Status},
+};
+
+bitflags! {
+    /// `CMD` and `CMDD`, p. 16 and 19. Bits 4 to 6 and 8 to 10 are reserved and stay 0. Bits 11 to 14 have these meanings
+    /// at the access levels L1 and L2; at L3 bits 11 and 12 have them in the factory setting, and each of 11 to 15 has
+    /// the function that was assigned to it.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub struct ControlWord: u16 {
+        /// Switch on.
+        const SWITCH_ON = 1 << 0;
+        /// Enable voltage: 0 disables it.
+        const ENABLE_VOLTAGE = 1 << 1;
+        /// No quick stop: 0 is a quick stop.
+        const NO_QUICK_STOP = 1 << 2;
+        /// Enable operation.
+        const ENABLE_OPERATION = 1 << 3;
+        /// Fault reset, on the rising edge.
+        const FAULT_RESET = 1 << 7;
+        /// Reverse.
+        const REVERSE = 1 << 11;
+        /// Stop as `Stt` says: along the ramp unless changed.
+        const STOP = 1 << 12;
+        /// Stop by DC injection.
+        const DC_INJECTION = 1 << 13;
+        /// Fast stop.
+        const FAST_STOP = 1 << 14;
+    }
+}
+
+impl ControlWord {
+    /// Enable operation, in a direction: 000Fh and 080Fh.
+    #[must_use]
+    pub const fn run(direction: Direction) -> Self {
+        let enabled = Self::from_bits_retain(ENABLE_OPERATION);
+        match direction {
+            Direction::Forward => enabled,
+            Direction::Reverse => enabled.union(Self::REVERSE),
+        }
+    }
+
+    /// The stops that keep operation enabled: 100Fh, 400Fh, 200Fh. `None`: freewheel is no such stop.
+    #[must_use]
+    pub const fn enabled_stop(mode: StopMode) -> Option<Self> {
+        let enabled = Self::from_bits_retain(ENABLE_OPERATION);
+        match mode {
+            StopMode::Ramp => Some(enabled.union(Self::STOP)),
+            StopMode::Fast => Some(enabled.union(Self::FAST_STOP)),
+            StopMode::DcInjection => Some(enabled.union(Self::DC_INJECTION)),
+            StopMode::Freewheel => None,
+        }
+    }
+
+    /// Whether it holds a run command: operation enabled and no stop.
+    #[must_use]
+    pub const fn is_run(self) -> bool {
+        self.contains(Self::run(Direction::Forward)) && !self.is_stop()
+    }
+
+    /// Whether it holds one of the stops that keep operation enabled.
+    #[must_use]
+    pub const fn is_stop(self) -> bool {
+        self.intersects(Self::STOP.union(Self::DC_INJECTION).union(Self::FAST_STOP))
+    }
+}
+
+bitflags! {
+    /// `ETA` and `ETAD`, p. 13, 17 and 21. The states are in [`ChartState`]. Bits 8, 12 and 13 are reserved, bit 4 is
+    /// always 0.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub struct StatusWord: u16 {
+        /// Ready to switch on.
+        const READY = 1 << 0;
+        /// Switched on.
+        const SWITCHED_ON = 1 << 1;
+        /// Operation enabled.
+        const OPERATION_ENABLED = 1 << 2;
+        /// Fault.
+        const FAULT = 1 << 3;
+        /// Voltage disabled; always 0.
+        const VOLTAGE_DISABLED = 1 << 4;
+        /// No quick stop: 0 while one is active.
+        const NO_QUICK_STOP = 1 << 5;
+        /// Switch on disabled.
+        const SWITCH_ON_DISABLED = 1 << 6;
+        /// Alarm.
+        const ALARM = 1 << 7;
+        /// No forced local mode: 0 while it is in progress.
+        const NOT_FORCED_LOCAL = 1 << 9;
+        /// Reference reached.
+        const REFERENCE_REACHED = 1 << 10;
+        /// `LFRD` below `LSP` or above `HSP`.
+        const REFERENCE_EXCEEDED = 1 << 11;
+        /// Stopped by the STOP key.
+        const STOP_KEY = 1 << 14;
+        /// The output turns in reverse.
+        const REVERSE = 1 << 15;
+    }
+}
+
+impl StatusWord {
+    /// Direction of the output.
+    #[must_use]
+    pub const fn direction(self) -> Direction {
+        if self.contains(Self::REVERSE) { Direction::Reverse } else { Direction::Forward }
+    }
+}
+
+bitflags! {
+    /// `ETI`, p. 22. Bit 3 is reserved; bits 13 and 14 are told by [`ExtendedStatus::control`].
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub struct ExtendedStatus: u16 {
+        /// The EEPROM is being written: no parameter can be written now.
+        const EEPROM_BUSY = 1 << 0;
+        /// Parameters are checked for consistency; 0: no check, and the drive locked on standstill.
+        const CONSISTENCY_CHECK = 1 << 1;
+        /// A fault reset is authorised.
+        const RESET_AUTHORISED = 1 << 2;
+        /// Motor running.
+        const MOTOR_RUNNING = 1 << 4;
+        /// DC injection.
+        const DC_INJECTION = 1 << 5;
+        /// Transient state.
+        const TRANSIENT = 1 << 6;
+        /// Motor thermal overload alarm.
+        const MOTOR_THERMAL_ALARM = 1 << 7;
+        /// Alarm: excessive braking.
+        const BRAKING_ALARM = 1 << 8;
+        /// Accelerating.
+        const ACCELERATING = 1 << 9;
+        /// Decelerating.
+        const DECELERATING = 1 << 10;
+        /// Current limit alarm.
+        const CURRENT_LIMIT = 1 << 11;
+        /// Fast stop in progress.
+        const FAST_STOP = 1 << 12;
+        /// Low bit of the control source.
+        const SOURCE_LOW = 1 << 13;
+        /// High bit of the control source.
+        const SOURCE_HIGH = 1 << 14;
+        /// Reverse requested by the reference.
+        const REVERSE_REQUESTED = 1 << 15;
+    }
+}
+
+impl ExtendedStatus {
+    /// Who commands, by bits 14 and 13. Terminals and the built-in keypad have one pattern.
+    #[must_use]
+    pub const fn control(self) -> Control {
+        match (self.contains(Self::SOURCE_HIGH), self.contains(Self::SOURCE_LOW)) {
+            (false, false) => Control::Local,
+            (false, true) => Control::Panel,
+            (true, false) => Control::Bus,
+            (true, true) => Control::OtherBus,
+        }
+    }
+}
+
+/// `ETA` and `ETI` as they were read together: what the drive says of its state and of who commands it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct StatusWords {
+    /// The status word.
+    pub eta: StatusWord,
+    /// The extended status word.
+    pub eti: ExtendedStatus,
+}
+
+impl StatusWords {
+    /// The two words.
+    #[must_use]
+    pub const fn new(eta: u16, eti: u16) -> Self {
+        Self { eta: StatusWord::from_bits_retain(eta), eti: ExtendedStatus::from_bits_retain(eti) }
+    }
+
+    /// The state of the chart; `None` for a pattern that the manual's table does not have.
+    #[must_use]
+    pub const fn chart(self) -> Option<ChartState> {
+        ChartState::of(self.eta.bits())
+    }
+
+    /// Whether a fault is present.
+    #[must_use]
+    pub fn is_tripped(self) -> bool {
+        self.chart().is_some_and(ChartState::is_fault)
+    }
+
+    /// Whether the drive turns the motor.
+    #[must_use]
+    pub const fn is_turning(self) -> bool {
+        self.eti.contains(ExtendedStatus::MOTOR_RUNNING)
+    }
+
+    /// Who commands: ETA says whether local control is forced, ETI who it is otherwise.
+    #[must_use]
+    pub const fn control(self) -> Control {
+        if self.eta.contains(StatusWord::NOT_FORCED_LOCAL) { self.eti.control() } else { Control::Local }
+    }
+
+    /// The state. `command` is the control word that the drive was last seen to hold, if any: in the state "operation
+    /// enabled" these words alone do not tell a motor that slows down to stop from one that slows down to a lower
+    /// setpoint, nor a stopped one from one that runs at a setpoint of zero.
+    #[must_use]
+    pub fn state(self, command: Option<ControlWord>) -> State {
+        self.chart().map_or(State::Unknown, |chart| chart.state(self.is_turning(), self.enabled(command)))
+    }
+
+    /// What these words say of the fast set; frequency, current, fault code and raw words are the family's to add.
+    #[must_use]
+    pub fn status(self, command: Option<ControlWord>) -> Status {
+        Status {
+            state: self.state(command),
+            direction: Some(self.eta.direction()),
+            at_reference: Some(self.eta.contains(StatusWord::REFERENCE_REACHED)),
+            warning: Some(self.eta.contains(StatusWord::ALARM)),
+            control: Some(self.control()),
+            ..Status::default()
+        }
+    }
+
+    /// Whether the drive itself shows that no run command acts after the stop `word`: it has left "operation enabled",
+    /// or there, where the word keeps it, the motor stands, slows down or is braked. A quick stop still drives the
+    /// motor, so it does not show a stop without voltage.
+    #[must_use]
+    pub fn shows_stop(self, word: ControlWord) -> bool {
+        const BRAKES: ExtendedStatus =
+            ExtendedStatus::DECELERATING.union(ExtendedStatus::FAST_STOP).union(ExtendedStatus::DC_INJECTION);
+        match self.chart() {
+            None | Some(ChartState::NotReadyToSwitchOn) => false,
+            Some(ChartState::OperationEnabled) => {
+                word.contains(ControlWord::ENABLE_OPERATION)
+                    && (!self.is_turning() || self.eti.intersects(BRAKES))
+            }
+            Some(ChartState::QuickStopActive) => word.contains(ControlWord::ENABLE_VOLTAGE),
+            Some(_) => true,
+        }
+    }
+
+    fn enabled(self, command: Option<ControlWord>) -> State {
+        let command = command.filter(|_| self.control() == Control::Bus);
+        let stopping = self.eti.intersects(ExtendedStatus::FAST_STOP.union(ExtendedStatus::DC_INJECTION))
+            || command.is_some_and(ControlWord::is_stop);
+        match (self.is_turning(), command) {
+            (true, _) if stopping => State::Stopping,
+            (true, _) => State::Running,
+            // At a setpoint of zero a run command is in force and nothing turns.
+            (false, Some(command)) if command.is_run() => State::Running,
+            (false, _) => State::Ready,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pair_of_words_has_a_state_and_none_outside_the_table_is_called_a_known_one() {
+        for eta in 0..=u16::MAX {
+            for eti in [0x0000, 0x4000, 0x4010, 0xFFFF] {
+                let words = StatusWords::new(eta, eti);
+                assert_eq!(words.state(None) == State::Unknown, ChartState::of(eta).is_none(), "{eta:04X}h");
+                assert_eq!(words.status(None).is_fault(), words.is_tripped(), "{eta:04X}h");
+            }
+        }
+    }
+
+    #[test]
+    fn forced_local_mode_outranks_the_control_source() {
+        assert_eq!(StatusWords::new(0x0227, 0x4000).control(), Control::Bus);
+        assert_eq!(StatusWords::new(0x0027, 0x4000).control(), Control::Local);
+    }
+
+    #[test]
+    fn the_control_word_tells_a_stop_from_a_run_while_the_bus_commands() {
+        let [run, stop] = [0x000F, 0x100F].map(|word| Some(ControlWord::from_bits_retain(word)));
+        let turning = StatusWords::new(0x0227, 0x4410);
+        assert_eq!(turning.state(run), State::Running);
+        assert_eq!(turning.state(stop), State::Stopping);
+        let standing = StatusWords::new(0x0627, 0x4002);
+        assert_eq!(standing.state(run), State::Running, "at a setpoint of zero");
+        assert_eq!(standing.state(stop), State::Ready);
+        let by_terminals = StatusWords::new(0x0227, 0x0410);
+        assert_eq!(by_terminals.state(stop), State::Running, "the word is not in force");
+    }
+
+    #[test]
+    fn a_stop_shows_where_no_run_command_acts() {
+        let [ramp, quick, freewheel] = [0x100F, 0x0002, 0x0000].map(ControlWord::from_bits_retain);
+        let running = StatusWords::new(0x0627, 0x4010);
+        let slowing = StatusWords::new(0x0227, 0x4410);
+        let quick_stop = StatusWords::new(0x0207, 0x5010);
+        let disabled = StatusWords::new(0x0240, 0x4000);
+        let shown = |words: StatusWords| [ramp, quick, freewheel].map(|word| words.shows_stop(word));
+        assert_eq!(shown(running), [false; 3]);
+        assert_eq!(shown(slowing), [true, false, false]);
+        assert_eq!(shown(quick_stop), [true, true, false]);
+        assert_eq!(shown(disabled), [true; 3]);
+        assert_eq!(shown(StatusWords::new(0x0200, 0)), [false; 3], "initialising");
+        assert_eq!(shown(StatusWords::new(0x0201, 0)), [false; 3], "a pattern that the table does not have");
+    }
+}
