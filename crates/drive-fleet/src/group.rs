@@ -138,11 +138,14 @@ impl Group {
     /// that its line's plan gives. Stops that are not confirmed go on being repeated.
     pub async fn stop(&self, mode: StopMode) -> StopReport {
         let mut report = StopReport::default();
-        let (members, read_only): (Vec<_>, Vec<_>) =
-            self.members.iter().partition(|member| member.entry.control);
-        report.read_only = read_only.into_iter().map(|member| Arc::clone(member.name())).collect();
-        let lines = self.fleet.lines().iter().enumerate();
-        let stops = lines.map(|(number, line)| self.stop_line(number, line, &members, mode));
+        let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
+            self.members.iter().cloned().partition(|member| member.entry.control);
+        report.read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
+        let mut stops = Vec::new();
+        for (number, line) in self.fleet.lines().iter().enumerate() {
+            let members = members.iter().filter(|member| member.entry.line == number);
+            stops.push(stop_line(line, self.common_write(number, mode), members.cloned().collect(), mode));
+        }
         for (broadcast, outcomes) in join_all(stops).await {
             report.broadcasts.extend(broadcast);
             for (name, outcome) in outcomes {
@@ -154,31 +157,6 @@ impl Group {
             }
         }
         report
-    }
-
-    async fn stop_line(
-        &self,
-        number: usize,
-        line: &LineEntry,
-        members: &[&DriveHandle],
-        mode: StopMode,
-    ) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
-        let members: Vec<_> = members.iter().filter(|member| member.entry.line == number).collect();
-        let write = self.common_write(number, mode);
-        let broadcast = async {
-            match write {
-                Some(write) if send(line, write).await => Some(Arc::clone(&line.name)),
-                _ => None,
-            }
-        };
-        let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
-        let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
-        let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
-        let stops = members
-            .into_iter()
-            .map(async |member| (Arc::clone(member.name()), member.stop_within(mode, Some(patience)).await));
-        // Both at once: the broadcast is first on the line, and no start of before can come behind it.
-        join(broadcast, join_all(stops)).await
     }
 
     /// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
@@ -202,9 +180,7 @@ impl Group {
     /// [`GroupFailure`] names who was not ready, or did not start.
     pub async fn start(&self, start: GroupStart) -> Result<(), GroupFailure> {
         let GroupStart { direction, setpoint, spacing, until } = start;
-        let asked = self.members.iter().map(async |member| {
-            member.unready(setpoint).await.map(|refused| (Arc::clone(member.name()), refused))
-        });
+        let asked: Vec<_> = self.members.iter().map(|member| ask(member.clone(), setpoint)).collect();
         let unready: Vec<_> = join_all(asked).await.into_iter().flatten().collect();
         if !unready.is_empty() {
             return Err(GroupFailure::NotReady(unready));
@@ -213,20 +189,19 @@ impl Group {
             if let Some(setpoint) = setpoint {
                 self.keep_or_stop(self.set_setpoint(setpoint).await).await?;
             }
-            self.each(async |member| member.start(direction).await).await
+            self.each(Order::Start { direction, setpoint: None, until: Until::InForce }).await
         } else {
             let order = Order::Start { direction, setpoint, until: Until::InForce };
             let begin = Instant::now();
-            let starts = self.members.iter().zip(0_u32..).map(async |(member, number)| {
-                sleep_until(begin + spacing.saturating_mul(number)).await;
-                (Arc::clone(member.name()), member.order(order).await)
-            });
+            let mut starts = Vec::new();
+            for (member, number) in self.members.iter().zip(0_u32..) {
+                starts.push(order_one(member.clone(), order, begin + spacing.saturating_mul(number)));
+            }
             join_all(starts).await
         };
         self.keep_or_stop(started).await?;
         if until == Until::AtReference {
-            let reached =
-                self.members.iter().map(async |member| (Arc::clone(member.name()), reach(member).await));
+            let reached: Vec<_> = self.members.iter().map(|member| reach(member.clone())).collect();
             self.keep_or_stop(join_all(reached).await).await?;
         }
         Ok(())
@@ -234,28 +209,17 @@ impl Group {
 
     /// Gives every drive of the group a setpoint.
     pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Vec<(Arc<str>, Outcome)> {
-        let setpoint = setpoint.into();
-        self.each(async |member| member.set_setpoint(setpoint).await).await
+        self.each(Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce }).await
     }
 
     /// Commands every drive, the lines beside each other. On a line that has watchdogs to feed, commands take one half of
     /// the time and leave the other to the rest; on another as many go at once as keep it busy.
-    async fn each(&self, command: impl AsyncFn(&DriveHandle) -> Outcome) -> Vec<(Arc<str>, Outcome)> {
-        let command = &command;
-        let lines = self.fleet.lines().iter().enumerate().map(async |(number, line)| {
-            let watched = line.plan.feed_gap.is_some();
+    async fn each(&self, order: Order) -> Vec<(Arc<str>, Outcome)> {
+        let mut lines = Vec::new();
+        for (number, line) in self.fleet.lines().iter().enumerate() {
             let members = self.members.iter().filter(|member| member.entry.line == number);
-            let commands = members.map(async |member| {
-                let begun = Instant::now();
-                let outcome = command(member).await;
-                if watched {
-                    sleep(begun.elapsed()).await;
-                }
-                (Arc::clone(member.name()), outcome)
-            });
-            let at_once = if watched { 1 } else { AT_ONCE };
-            stream::iter(commands).buffer_unordered(at_once).collect::<Vec<_>>().await
-        });
+            lines.push(order_line(members.cloned().collect(), order, line.plan.feed_gap.is_some()));
+        }
         join_all(lines).await.into_iter().flatten().collect()
     }
 
@@ -270,18 +234,70 @@ impl Group {
     }
 }
 
+/// Stops drives of one line, after a broadcast where there is one.
+async fn stop_line(
+    line: &LineEntry,
+    write: Option<BroadcastWrite>,
+    members: Vec<DriveHandle>,
+    mode: StopMode,
+) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
+    let broadcast = async {
+        match write {
+            Some(write) if send(line, write).await => Some(Arc::clone(&line.name)),
+            _ => None,
+        }
+    };
+    let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
+    let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
+    let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
+    let stops: Vec<_> = members.into_iter().map(|member| stop_one(member, mode, patience)).collect();
+    // Both at once: the broadcast is first on the line, and no start of before can come behind it.
+    join(broadcast, join_all(stops)).await
+}
+
+async fn stop_one(member: DriveHandle, mode: StopMode, patience: Duration) -> (Arc<str>, Outcome) {
+    let outcome = member.stop_within(mode, Some(patience)).await;
+    (Arc::clone(member.name()), outcome)
+}
+
+async fn ask(member: DriveHandle, setpoint: Option<Setpoint>) -> Option<(Arc<str>, Refused)> {
+    let refused = member.unready(setpoint).await?;
+    Some((Arc::clone(member.name()), refused))
+}
+
+async fn order_one(member: DriveHandle, order: Order, at: Instant) -> (Arc<str>, Outcome) {
+    sleep_until(at).await;
+    let outcome = member.order(order).await;
+    (Arc::clone(member.name()), outcome)
+}
+
+/// Commands the drives of one line; `watched`: it has watchdogs to feed.
+async fn order_line(members: Vec<DriveHandle>, order: Order, watched: bool) -> Vec<(Arc<str>, Outcome)> {
+    let commands = members.into_iter().map(|member| async move {
+        let begun = Instant::now();
+        let ended = order_one(member, order, begun).await;
+        if watched {
+            sleep(begun.elapsed()).await;
+        }
+        ended
+    });
+    let at_once = if watched { 1 } else { AT_ONCE };
+    stream::iter(commands).buffer_unordered(at_once).collect().await
+}
+
 /// Waits until a drive that was started shows that it has reached its reference.
-async fn reach(member: &DriveHandle) -> Outcome {
+async fn reach(member: DriveHandle) -> (Arc<str>, Outcome) {
     let after = member.entry.reference;
     let there = member.wait_until(|snapshot| snapshot.is_at_setpoint() || !snapshot.started_here);
-    match timeout(after, there).await {
+    let outcome = match timeout(after, there).await {
         Ok(snapshot) if snapshot.is_at_setpoint() => Outcome::Confirmed,
         Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),
         Err(_) => {
             let status = member.snapshot().status.as_ref().map(|status| Arc::clone(&status.value));
             Outcome::NotConfirmed(Unconfirmed::TimeOver { after, status })
         }
-    }
+    };
+    (Arc::clone(member.name()), outcome)
 }
 
 /// Sends a broadcast; whether it went out.

@@ -115,7 +115,11 @@ impl DriveHandle {
         let mut watch = self.watch();
         loop {
             watch.mark_unchanged();
-            let Some(refused) = self.unready(None).await else { return Ok(()) };
+            let refused = match self.unready(None).await {
+                // Whether a setpoint is allowed is not a matter of the drive.
+                None | Some(Refused::Limit(_)) => return Ok(()),
+                Some(refused) => refused,
+            };
             match tokio::time::timeout_at(deadline, watch.changed()).await {
                 Ok(Ok(())) => {}
                 Ok(Err(_)) | Err(_) => return Err(refused),

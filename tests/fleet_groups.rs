@@ -1,0 +1,197 @@
+//! Groups and policies of a fleet over the simulator, in virtual time.
+
+use std::time::Duration;
+
+use drive_core::{Direction, Frequency, SerialSettings, StopMode};
+use drive_families::Family;
+use drive_fleet::{
+    Band, Commanders, DriveSettings, EventKind, FrequencyLimits, GroupFailure, GroupStart, Limit,
+    LimitProblem, OnLoss, Outcome, Refused, Until,
+};
+use support::{
+    drives,
+    plant::{ADDRESS, MOTOR, Plant, Site, common_settings, controlled},
+};
+use tokio::time::{Instant, sleep};
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// Four drives of four families, ready.
+async fn four() -> Plant {
+    let families = [Family::Atv312, Family::Atv28, Family::Atv21, Family::Omron3g3ev];
+    let member = |(family, address): (Family, u8)| (family, address, controlled(family, &family.to_string()));
+    let site = Site::new(common_settings(), families.into_iter().zip(1..).map(member).collect());
+    let plant = Plant::open(vec![site]).expect("it can be fed");
+    for drive in plant.fleet.drives() {
+        drive.ready(60 * SECOND).await.expect("it gets ready");
+    }
+    plant
+}
+
+fn start(spacing: Duration) -> GroupStart {
+    let setpoint = Some(Frequency::from_hertz(30).into());
+    GroupStart { direction: Direction::Forward, setpoint, spacing, until: Until::AtReference }
+}
+
+fn nobody_runs(plant: &Plant) -> bool {
+    plant.fleet.drives().iter().all(|drive| !plant.machine_of(drive.name()).observe().running)
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_group_starts_together_and_reaches_its_reference() {
+    let plant = four().await;
+    plant.fleet.all().start(start(Duration::ZERO)).await.expect("all start");
+    for drive in plant.fleet.drives() {
+        assert_eq!(plant.machine_of(drive.name()).observe().output_frequency, 3_000, "{}", drive.name());
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_staggered_group_starts_one_after_the_other() {
+    let plant = four().await;
+    let fleet = plant.fleet.clone();
+    let begin = Instant::now();
+    let started = tokio::spawn(async move { fleet.all().start(start(5 * SECOND)).await });
+    for (drive, number) in plant.fleet.drives().iter().zip(0..) {
+        plant.machine_of(drive.name()).wait_until(|machine| machine.running).await;
+        assert!(begin.elapsed() >= 5 * SECOND * number, "{}", drive.name());
+        assert!(begin.elapsed() <= 5 * SECOND * number + SECOND, "{}: {:?}", drive.name(), begin.elapsed());
+    }
+    started.await.expect("it ends").expect("all start");
+}
+
+#[tokio::test(start_paused = true)]
+async fn when_one_is_not_ready_it_is_named_and_nobody_starts() {
+    let mut plant = four().await;
+    plant.machine_of("atv28").trip(drives::a_trip(Family::Atv28));
+    plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
+    let failure = plant.fleet.all().start(start(Duration::ZERO)).await.expect_err("one has tripped");
+    let GroupFailure::NotReady(unready) = failure else { panic!("{failure}") };
+    let names: Vec<_> = unready.iter().map(|(name, _)| name.to_string()).collect();
+    assert_eq!(names, ["atv28"]);
+    sleep(5 * SECOND).await;
+    assert!(nobody_runs(&plant));
+}
+
+#[tokio::test(start_paused = true)]
+async fn when_one_does_not_start_the_others_are_stopped_again() {
+    let plant = four().await;
+    // It trips after everybody was asked, before its own start.
+    let machine = plant.machine_of("3g3ev").clone();
+    let others = plant.machine_of("atv312").clone();
+    tokio::spawn(async move {
+        others.wait_until(|machine| machine.running).await;
+        machine.trip(drives::a_trip(Family::Omron3g3ev));
+    });
+    let failure = plant.fleet.all().start(start(2 * SECOND)).await.expect_err("one trips");
+    let GroupFailure::Failed { outcomes, stopped } = failure else { panic!("{failure}") };
+    let names: Vec<_> = outcomes.iter().map(|(name, _)| name.to_string()).collect();
+    assert_eq!(names, ["3g3ev"]);
+    assert!(stopped.is_confirmed(), "{stopped}");
+    assert!(nobody_runs(&plant));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_group_takes_a_setpoint_and_each_drives_outcome_is_told() {
+    let plant = four().await;
+    plant.fleet.all().start(start(Duration::ZERO)).await.expect("all start");
+    let group = plant.fleet.group(["atv312", "atv21"]).expect("they are there");
+    let outcomes = group.set_setpoint(Frequency::from_hertz(20)).await;
+    assert!(outcomes.iter().all(|(_, outcome)| outcome.is_confirmed()), "{outcomes:?}");
+    plant.machine_of("atv312").wait_until(|machine| machine.output_frequency == 2_000).await;
+    plant.machine_of("atv21").wait_until(|machine| machine.output_frequency == 2_000).await;
+    assert_eq!(plant.machine_of("atv28").observe().output_frequency, 3_000);
+    assert!(plant.fleet.group(["nobody"]).is_err());
+}
+
+#[tokio::test(start_paused = true)]
+async fn limits_bands_and_rates_keep_a_setpoint_from_the_machine() {
+    let hertz = Frequency::from_hertz;
+    let plant = Plant::single(Family::Atv312, |settings| {
+        settings.limits = FrequencyLimits {
+            low: Some(hertz(10)),
+            high: Some(hertz(45)),
+            forbidden: vec![Band { low: hertz(20), high: hertz(25) }],
+            change_per_second: Some(hertz(2)),
+        };
+    });
+    plant.run_at(30).await;
+    let motor = plant.motor();
+    for (asked, expected) in [(46, "outside"), (9, "outside"), (22, "forbidden band")] {
+        let outcome = motor.set_setpoint(hertz(asked)).await;
+        assert!(outcome.to_string().contains(expected), "{asked} Hz: {outcome}");
+    }
+    sleep(SECOND).await;
+    assert!(motor.set_setpoint(hertz(32)).await.is_confirmed());
+    let outcome = motor.set_setpoint(hertz(44)).await;
+    assert!(matches!(outcome, Outcome::Refused(Refused::Limit(LimitProblem::TooFast { .. }))), "{outcome}");
+    sleep(10 * SECOND).await;
+    assert!(motor.set_setpoint(hertz(44)).await.is_confirmed());
+}
+
+#[tokio::test(start_paused = true)]
+async fn only_those_who_may_command_do_and_anybody_may_stop() {
+    let plant = Plant::single(Family::Atv312, |settings| {
+        settings.commanders = Commanders::Only(vec!["operator".to_owned()]);
+    });
+    let operator = plant.motor().commanded_by("operator");
+    operator.ready(60 * SECOND).await.expect("it gets ready");
+    let visitor = plant.motor().commanded_by("visitor");
+    let outcome = visitor.start(Direction::Forward).await;
+    assert_eq!(outcome, Outcome::Refused(Refused::Commander("visitor".to_owned())));
+    assert!(operator.run(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+    assert!(visitor.stop(StopMode::Ramp).await.is_confirmed());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_was_lost_is_stopped_on_its_return_where_its_policy_says_so() {
+    let mut plant = Plant::single(Family::Atv28, |settings| settings.on_loss = OnLoss::Stop(StopMode::Ramp));
+    plant.run_at(30).await;
+    plant.machine().mute();
+    plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
+    sleep(10 * SECOND).await;
+    assert!(plant.machine().observe().running, "it has no watchdog");
+    plant.machine().unmute();
+    plant.event("the stop", |kind| *kind == EventKind::StopConfirmed).await;
+    assert!(!plant.machine().observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_current_above_its_alarm_is_told_and_told_when_it_is_back() {
+    let mut plant = Plant::single(Family::Atv312, |settings| {
+        settings.alarms.current = Some(drive_core::Current::from_deciamperes(20));
+    });
+    plant.run_at(30).await;
+    plant.machine().set_load(100);
+    let told = plant.event("too much", |kind| matches!(kind, EventKind::Limit { exceeded: true, .. })).await;
+    assert!(matches!(told, EventKind::Limit { limit: Limit::Current { .. }, .. }));
+    plant.machine().set_load(0);
+    plant.event("enough", |kind| matches!(kind, EventKind::Limit { exceeded: false, .. })).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_panel_that_takes_a_running_drive_is_told() {
+    let mut plant = Plant::single(Family::Atv312, |_| {});
+    plant.run_at(30).await;
+    plant.machine().panel(drive_sim::Panel::TakeControl);
+    plant.event("the panel", |kind| matches!(kind, EventKind::ControlTaken(_))).await;
+    plant.machine().panel(drive_sim::Panel::ReleaseControl);
+    plant.event("the bus again", |kind| *kind == EventKind::ControlReturned).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn two_drives_at_one_address_or_of_one_name_are_refused() {
+    let settings = |name: &str| DriveSettings::watched(name);
+    let site = Site::new(SerialSettings::MODBUS_DEFAULT, vec![(Family::Atv312, ADDRESS, settings(MOTOR))]);
+    let mut twice = site.members.clone();
+    twice.push((Family::Atv312, ADDRESS, settings("another")));
+    let Err(error) = Plant::open(vec![Site { members: twice, ..site }]) else {
+        panic!("one address, two drives")
+    };
+    assert_eq!(error.to_string(), "another: address 5 of line \"line 0\" is taken");
+    let members = vec![(Family::Atv312, 1, settings(MOTOR)), (Family::Atv312, 2, settings(MOTOR))];
+    let Err(error) = Plant::open(vec![Site::new(SerialSettings::MODBUS_DEFAULT, members)]) else {
+        panic!("one name, two drives")
+    };
+    assert_eq!(error.to_string(), "\"motor\": the name is taken");
+}
