@@ -102,6 +102,8 @@ pub(crate) struct Supervisor {
     /// Since when there has been no valid status.
     silent_since: Instant,
     last_error: Option<Error>,
+    /// A status has failed since the last that came: the drive may have been switched off and on.
+    doubtful: bool,
     in_flight: Option<Job>,
     turn: Turn,
     /// A poll has given way to an order since the last status.
@@ -132,6 +134,7 @@ impl Supervisor {
             counters: Counters::default(),
             silent_since: now,
             last_error: None,
+            doubtful: false,
             in_flight: None,
             turn: Turn::Unwanted,
             yielded: false,
@@ -170,7 +173,7 @@ impl Supervisor {
         }
         let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
         let hungry = feed_at.is_some_and(|at| at <= now);
-        let status = (Job::Status { anew: self.link != Link::Connected }, feed_at);
+        let status = (Job::Status { anew: self.doubtful || self.link != Link::Connected }, feed_at);
         // A stream of orders must not blind the fleet for the drive that it commands.
         if !hungry && self.pace.status_due() + self.settings.periods.rest <= now {
             return Some(status);

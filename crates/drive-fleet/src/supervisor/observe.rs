@@ -1,6 +1,6 @@
 //! What a status tells: events, trips with their freeze-frame, loss and return.
 
-use std::{collections::VecDeque, sync::Arc};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use drive_core::{Control, Faults, Measurements, Result, Status};
 use tokio::time::Instant;
@@ -14,6 +14,9 @@ use crate::{
 
 /// How many trips are kept for each drive.
 const TRIPS: usize = 16;
+/// A silence in which a drive can have been switched off and on, or exchanged: what is checked at a connect is checked
+/// again.
+const SWITCHED_OFF: Duration = Duration::from_secs(1);
 /// How often the explanation of a trip is asked for.
 const EXPLANATIONS: u8 = 3;
 
@@ -28,7 +31,10 @@ impl Supervisor {
                 self.counters.missed += u64::from(!in_time);
                 self.accept_status(now, status);
             }
-            Err(_) => self.counters.missed += 1,
+            Err(_) => {
+                self.counters.missed += 1;
+                self.doubtful = true;
+            }
         }
     }
 
@@ -47,7 +53,10 @@ impl Supervisor {
             self.checks.connected(now);
             self.pace.reconnected(now);
             self.emit(EventKind::Connected(Arc::clone(&status.value)));
+        } else if self.doubtful && silent_for >= SWITCHED_OFF {
+            self.checks.connected(now);
         }
+        self.doubtful = false;
         self.compare(before.as_ref().map(|before| &*before.value), &status.value);
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());

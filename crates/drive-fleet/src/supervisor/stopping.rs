@@ -15,6 +15,9 @@ use crate::{
 /// The shortest and the longest pause between two attempts of a stop.
 const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
+/// Longer than any exit: its own limit ends it.
+const EXIT: Duration = Duration::from_secs(86_400);
+
 /// A stop under way.
 #[derive(Debug)]
 pub(super) struct Stopping {
@@ -87,7 +90,9 @@ impl Supervisor {
         if mode != asked {
             self.emit(EventKind::StopModeReplaced { asked, used: mode });
         }
-        let waiter = Waiter { asker, asked, until: now + patience };
+        // The exit has its own limit; until then the stop is repeated.
+        let until = if asker == Asker::Exit { now + EXIT } else { now + patience };
+        let waiter = Waiter { asker, asked, until };
         match &mut self.stopping {
             Some(stopping) => {
                 if stopping.mode != mode {

@@ -7,7 +7,7 @@ mod output;
 use std::path::PathBuf;
 
 use drive_bus::Line;
-use drive_fleet::{Fleet, FleetBuilder};
+use drive_fleet::{Fleet, FleetBuilder, Periods};
 
 use self::{
     config::{Config, LinePart},
@@ -44,6 +44,14 @@ pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
             console::milliseconds(plan.sweep),
             console::percent(plan.utilisation_ppm),
         ))?;
+        let slowest =
+            drives.iter().map(|(_, settings)| settings.periods).max_by_key(|periods| periods.running);
+        if let Some(Periods { running, rest, slow, max_age }) = slowest {
+            console::say(format_args!(
+                "line {name}: status every {running:?} running, {rest:?} at rest, measurements every {slow:?}, a status \
+                 is fresh for {max_age:?}"
+            ))?;
+        }
         if let Some(gap) = plan.feed_gap {
             console::say(format_args!(
                 "line {name}: a watched drive hears something at the latest after {}",

@@ -189,3 +189,17 @@ fn a_watchdog_that_reads_back_otherwise_forbids_motion() {
     rig.pass(100 * MS);
     assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::WatchdogUnverified)));
 }
+
+#[test]
+fn after_a_silence_in_which_it_can_have_been_switched_off_a_drive_is_checked_again() {
+    let mut rig = Rig::ready();
+    rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+    rig.pass(1_500 * MS);
+    assert_eq!(rig.machine.snapshot().link, Link::Connected, "it is not lost yet");
+    rig.drive.failing = None;
+    rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
+    rig.drive.log.clear();
+    rig.pass(1_500 * MS);
+    let arm = Job::ArmWatchdog(CONTRACT.timeout, CONTRACT.reaction);
+    assert_eq!(rig.drive.log[..4], [Job::Status { anew: true }, Job::Identify, Job::Watchdog, arm]);
+}

@@ -98,3 +98,18 @@ fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
         }
     }
 }
+
+#[test]
+fn the_exit_goes_on_stopping_a_mute_drive_until_its_own_limit() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.machine.handle_exit(rig.now);
+    rig.machine.handle_dropped();
+    rig.pass(30_000 * MS);
+    assert_eq!(rig.machine.exit_action(), None);
+    assert!(rig.events().contains(&"stop unconfirmed"));
+    rig.machine.handle_exit_time_over();
+    assert_eq!(rig.machine.exit_action(), Some(&ExitAction::TimeOver));
+}

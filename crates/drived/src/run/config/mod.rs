@@ -13,7 +13,7 @@ use drive_bus::LineConfig;
 use drive_core::{Capabilities, StopMode};
 use drive_fleet::{
     Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, LinePlan, OnExit, OnFault,
-    OnLoss, Periods, WatchdogContract, check_settings, plan,
+    OnLoss, Periods, PlanProblem, WatchdogContract, check_settings, plan,
 };
 
 pub(crate) use self::place::ConfigError;
@@ -30,6 +30,11 @@ const SNAPSHOTS: Duration = Duration::from_secs(5);
 const SHUTDOWN: Duration = Duration::from_secs(60);
 /// How long an answer may take unless the file says otherwise: the slowest family needs 50 ms.
 const RESPONSE_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// The part of a line that polls of unnamed periods may take, in millionths; the rest is for commands.
+const ROOM_PPM: u64 = 800_000;
+/// Periods of more than half a minute are nobody's wish.
+const LONGEST_STRETCH: u32 = 60;
 
 /// A configuration that can work.
 #[derive(Debug)]
@@ -82,8 +87,18 @@ impl Config {
     }
 }
 
-/// The drives of the file, by line, with the place where each was named.
-struct Groups(BTreeMap<String, Vec<(DriveName, DriveSettings, Range<usize>)>>);
+/// The drives of the file, by line.
+struct Groups(BTreeMap<String, Vec<Member>>);
+
+/// One drive of a line.
+struct Member {
+    drive: DriveName,
+    settings: DriveSettings,
+    /// Where it was named.
+    place: Range<usize>,
+    /// Whether the file says how often it is asked.
+    has_own_periods: bool,
+}
 
 impl Groups {
     fn of(source: Source<'_>, raw: &File) -> Result<Self, ConfigError> {
@@ -100,7 +115,7 @@ impl Groups {
         if raw.drives.is_empty() {
             return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
         }
-        let mut groups: BTreeMap<String, Vec<(DriveName, DriveSettings, Range<usize>)>> = BTreeMap::new();
+        let mut groups: BTreeMap<String, Vec<Member>> = BTreeMap::new();
         let mut names = BTreeMap::new();
         for entry in &raw.drives {
             let (span, entry) = (entry.span(), entry.get_ref());
@@ -123,11 +138,12 @@ impl Groups {
                     return Err(source.error(place, problem));
                 }
                 let group = groups.entry(line.get_ref().clone()).or_default();
-                if group.iter().any(|(other, ..)| other.slave == name.slave) {
+                if group.iter().any(|other| other.drive.slave == name.slave) {
                     let problem = format_args!("address {} of this line is taken", name.slave);
                     return Err(source.error(drive.span(), problem));
                 }
-                group.push((*name, settings, drive.span()));
+                let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
+                group.push(Member { drive: *name, settings, place: drive.span(), has_own_periods });
             }
         }
         Ok(Self(groups))
@@ -144,7 +160,7 @@ fn line_part(
     let Some(group) = groups.0.get(name) else {
         return Err(source.error(span, "no drive is on this line: expected a [[drives]] that names it"));
     };
-    let names: Vec<DriveName> = group.iter().map(|(name, ..)| *name).collect();
+    let names: Vec<DriveName> = group.iter().map(|member| member.drive).collect();
     let port = entry.port.get_ref();
     let config = port.0.config(&names).map_err(|error| source.error(entry.port.span(), error))?;
     let config = LineConfig {
@@ -155,18 +171,56 @@ fn line_part(
     };
     let budget = LineBudget::of(&config);
     let budget = LineBudget { response: entry.response.map_or(budget.response, |time| time.0.0), ..budget };
-    let demands: Vec<_> = group
-        .iter()
-        .map(|(name, settings, _)| Demand {
-            drive: settings.name.clone(),
-            capabilities: name.family.capabilities(),
+    let (plan, stretch) = fitting_plan(budget, group).map_err(|problem| source.error(span, problem))?;
+    let drives = group.iter().map(|member| (member.drive, member.settings_with(stretch))).collect();
+    Ok(LinePart { name: name.to_owned(), config, budget, plan, drives })
+}
+
+/// The plan of a line and by how much the periods that the file does not name are longer than usual: as little as leaves
+/// a fifth of the line for commands. Periods that the file names stay as they are, or there is no plan.
+fn fitting_plan(budget: LineBudget, group: &[Member]) -> Result<(LinePlan, u32), PlanProblem> {
+    let reckon = |stretch: u32| {
+        let demands: Vec<_> = group.iter().map(|member| member.demand(stretch)).collect();
+        plan(budget, &demands)
+    };
+    let usual = reckon(1);
+    if group.iter().all(|member| member.has_own_periods) {
+        return usual.map(|plan| (plan, 1));
+    }
+    let fits = |stretch| {
+        reckon(stretch).ok().filter(|plan| plan.utilisation_ppm <= ROOM_PPM).map(|plan| (plan, stretch))
+    };
+    match (1..=LONGEST_STRETCH).find_map(fits) {
+        Some(fitting) => Ok(fitting),
+        None => usual.map(|plan| (plan, 1)),
+    }
+}
+
+impl Member {
+    /// Its settings, with periods that the file does not name so many times as long.
+    fn settings_with(&self, stretch: u32) -> DriveSettings {
+        let mut settings = self.settings.clone();
+        if !self.has_own_periods {
+            let Periods { running, rest, slow, max_age } = settings.periods;
+            settings.periods = Periods {
+                running: running * stretch,
+                rest: rest * stretch,
+                slow: slow * stretch,
+                max_age: max_age * stretch,
+            };
+        }
+        settings
+    }
+
+    fn demand(&self, stretch: u32) -> Demand {
+        let settings = self.settings_with(stretch);
+        Demand {
+            drive: settings.name,
+            capabilities: self.drive.family.capabilities(),
             periods: settings.periods,
             watchdog: settings.watchdog,
-        })
-        .collect();
-    let plan = plan(budget, &demands).map_err(|problem| source.error(span, problem))?;
-    let drives = group.iter().map(|(name, settings, _)| (*name, settings.clone())).collect();
-    Ok(LinePart { name: name.to_owned(), config, budget, plan, drives })
+        }
+    }
 }
 
 /// The settings of one drive: what its entry says, else the defaults, else what holds anyway.

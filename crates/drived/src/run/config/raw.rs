@@ -61,6 +61,13 @@ pub(super) struct DriveEntry {
     pub(super) on_fault: Option<Parsed<FaultPolicy>>,
 }
 
+impl DriveEntry {
+    /// Whether it says how often a drive is asked.
+    pub(super) fn has_periods(&self) -> bool {
+        [&self.running, &self.rest, &self.slow, &self.max_age].into_iter().any(Option::is_some)
+    }
+}
+
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WatchdogEntry {

@@ -157,3 +157,9 @@ fn a_file_without_drives_or_a_line_without_any_is_refused() {
     let lonely = format!("{FULL}\n[lines.east]\nport = \"/dev/ttyUSB9\"\n");
     assert!(read(&lonely).unwrap_err().contains("no drive is on this line"));
 }
+
+#[test]
+fn the_example_is_a_configuration_that_works() {
+    let config = read(include_str!("../../../../../examples/drives.toml")).unwrap();
+    assert_eq!(config.lines.iter().map(|line| line.drives.len()).collect::<Vec<_>>(), [31, 3]);
+}
