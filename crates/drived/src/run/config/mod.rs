@@ -94,8 +94,6 @@ struct Groups(BTreeMap<String, Vec<Member>>);
 struct Member {
     drive: DriveName,
     settings: DriveSettings,
-    /// Where it was named.
-    place: Range<usize>,
     /// Whether the file says how often it is asked.
     has_own_periods: bool,
 }
@@ -143,7 +141,7 @@ impl Groups {
                     return Err(source.error(drive.span(), problem));
                 }
                 let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
-                group.push(Member { drive: *name, settings, place: drive.span(), has_own_periods });
+                group.push(Member { drive: *name, settings, has_own_periods });
             }
         }
         Ok(Self(groups))

@@ -45,6 +45,13 @@ on_fault = "reset-watchdog-trip"
 alarms = { current = 12.5, motor_thermal = 110 }
 "#;
 
+const THIRTY_ONE: &str = r#"
+lines.a.port = "/dev/ttyUSB0"
+[[drives]]
+line = "a"
+drive = "atv312@1-31"
+"#;
+
 fn read(text: &str) -> Result<Config, String> {
     Config::read(Path::new("drives.toml"), text).map_err(|error| error.to_string())
 }
@@ -73,8 +80,33 @@ fn a_full_file_says_what_it_says() {
 
 #[test]
 fn thirty_one_equal_drives_are_three_lines() {
-    let text = "lines.a.port = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1-31\"\nrest = \"3s\"\nrunning = \"3s\"\nmax_age = \"9s\"\n";
-    assert_eq!(read(text).unwrap().lines[0].drives.len(), 31);
+    assert_eq!(read(THIRTY_ONE).unwrap().lines[0].drives.len(), 31);
+}
+
+#[test]
+fn periods_that_the_file_does_not_name_leave_room_on_the_line() {
+    let line = &read(THIRTY_ONE).unwrap().lines[0];
+    assert!(line.plan.utilisation_ppm <= ROOM_PPM);
+    let Periods { running, rest, slow, max_age } = line.drives[0].1.periods;
+    let usual = Periods::default();
+    assert!(running > usual.running);
+    assert_eq!(rest.as_millis() * usual.running.as_millis(), usual.rest.as_millis() * running.as_millis());
+    assert!(slow > usual.slow && max_age > usual.max_age);
+
+    let few = THIRTY_ONE.replace("1-31", "1-5");
+    assert_eq!(
+        read(&few).unwrap().lines[0].drives[0].1.periods,
+        usual,
+        "where they fit they are the usual ones"
+    );
+}
+
+#[test]
+fn periods_that_the_file_names_are_kept_or_refused() {
+    let kept = format!("{THIRTY_ONE}running = \"1s\"\nslow = \"0s\"\n");
+    assert_eq!(read(&kept).unwrap().lines[0].drives[0].1.periods.running, Duration::from_secs(1));
+    let refused = format!("{THIRTY_ONE}running = \"500ms\"\n");
+    assert!(read(&refused).unwrap_err().contains("lengthen the periods"));
 }
 
 #[test]
