@@ -16,6 +16,8 @@ use tokio::{
     time::Instant,
 };
 
+use crate::{config::LineConfig, protocol::Protocol};
+
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE: u32 = 1;
 const ENHANCED_PACKET: u32 = 6;
@@ -58,13 +60,24 @@ pub enum Dissector {
     Rtu,
     /// Modbus TCP.
     Tcp,
+    /// Bytes: Wireshark has no dissector for Modbus ASCII and UNI-TELWAY that a capture could name.
+    Data,
 }
 
 impl Dissector {
+    pub(crate) const fn of(config: &LineConfig) -> Self {
+        match config.protocol {
+            _ if config.is_mbap() => Self::Tcp,
+            Protocol::Rtu => Self::Rtu,
+            Protocol::Ascii(_) | Protocol::UniTelway(_) => Self::Data,
+        }
+    }
+
     const fn name(self) -> &'static [u8] {
         match self {
             Self::Rtu => b"mbrtu",
             Self::Tcp => b"mbtcp",
+            Self::Data => b"data",
         }
     }
 }

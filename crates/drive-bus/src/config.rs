@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
-use crate::exchange::rtu;
+use crate::{
+    exchange::{ascii, rtu, unitelway},
+    protocol::Protocol,
+};
 
 /// Where a line goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -66,6 +69,8 @@ pub struct Rs485 {
 pub struct LineConfig {
     /// Where the line goes.
     pub endpoint: Endpoint,
+    /// What the line speaks; on Modbus TCP it has no effect.
+    pub protocol: Protocol,
     /// Speed and format. On RTU over TCP: those of the far serial side; all silences follow from them.
     pub serial: SerialSettings,
     /// The longest time from the end of a request to the first character of its answer. The ceiling of what the line
@@ -138,6 +143,7 @@ impl LineConfig {
     fn to(endpoint: Endpoint, serial: SerialSettings) -> Self {
         Self {
             endpoint,
+            protocol: Protocol::Rtu,
             serial,
             response_timeout: Duration::from_millis(500),
             timeout_floor: Duration::from_millis(50),
@@ -178,27 +184,43 @@ impl LineConfig {
         if !self.is_paced() {
             return timeout.max(self.broadcast_turnaround);
         }
-        let frame = |pdu: usize| self.serial.characters(pdu + 3);
+        let characters = |count| self.serial.characters(count);
         let exchange = |request, answer| {
-            frame(request) + timeout + frame(answer) + rtu::overtime(self.serial, self.chunk_gap)
+            let (request, answer) = (self.request_len(request), self.answer_len(answer));
+            let overtime = match self.protocol {
+                Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
+                Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
+                Protocol::UniTelway(settings) => {
+                    unitelway::overtime(self.serial, settings, self.chunk_gap, request, answer)
+                }
+            };
+            characters(request) + timeout + characters(answer) + overtime
         };
-        let broadcast = frame(longest_request) + self.broadcast_turnaround;
+        let broadcast = characters(self.request_len(longest_request)) + self.broadcast_turnaround;
         let under_way = exchange(longest_request, longest_answer).max(broadcast);
         let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
-        let silence = self.serial.t3_5() + pauses.max(self.slave_change_gap);
-        let settling =
-            if self.echo == Echo::Auto { exchange(5, longest_answer) + silence } else { Duration::ZERO };
+        let silence = self.silence() + pauses.max(self.slave_change_gap);
+        let settles = self.echo == Echo::Auto && !matches!(self.protocol, Protocol::UniTelway(_));
+        let settling = if settles { exchange(5, longest_answer) + silence } else { Duration::ZERO };
         under_way + silence + settling
     }
 
     /// How many characters the frame of a request with a PDU of this length has.
     pub(crate) const fn request_len(&self, pdu: usize) -> usize {
-        pdu + 3
+        match self.protocol {
+            Protocol::Rtu => pdu + 3,
+            Protocol::Ascii(_) => ascii::len(pdu),
+            Protocol::UniTelway(_) => unitelway::request_len(pdu),
+        }
     }
 
     /// How many characters come back until the answer with a PDU of this length has come.
     pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
-        pdu + 3
+        match self.protocol {
+            Protocol::Rtu => pdu + 3,
+            Protocol::Ascii(_) => ascii::len(pdu),
+            Protocol::UniTelway(_) => unitelway::reply_len(pdu),
+        }
     }
 
     /// The time that so many characters take on the line.
@@ -206,9 +228,17 @@ impl LineConfig {
         if self.is_paced() { self.serial.characters(characters) } else { Duration::ZERO }
     }
 
-    /// The silence before any request.
+    /// The silence before any request: t3.5 in RTU. The other protocols need none to tell frames apart; a slave needs it
+    /// to let go of the line, and gets a character's time in ASCII.
     pub(crate) const fn silence(&self) -> Duration {
-        if self.is_paced() { self.serial.t3_5() } else { Duration::ZERO }
+        if !self.is_paced() {
+            return Duration::ZERO;
+        }
+        match self.protocol {
+            Protocol::Rtu => self.serial.t3_5(),
+            Protocol::Ascii(_) => self.serial.bits(self.serial.format().bits()),
+            Protocol::UniTelway(settings) => self.serial.bits(settings.turnaround_bits),
+        }
     }
 
     /// Whether frames need silences between them.

@@ -63,15 +63,18 @@ pub mod exchange;
 mod line;
 pub mod master;
 pub mod pdu;
+pub mod protocol;
 pub mod schedule;
 mod slave;
 pub mod stats;
 mod task;
 pub mod timeout;
 mod transport;
+pub mod unite;
 
 pub use config::{Echo, Endpoint, LineConfig, Rs485, SlaveSettings};
 pub use line::Line;
+pub use protocol::Protocol;
 pub use slave::Slave;
 pub use stats::Stats;
 pub use transport::{OpenError, adapter_latency};

@@ -129,8 +129,8 @@ impl Line {
     /// # Errors
     /// The sink's, when it does not take the head of the file.
     pub fn capture(&self, sink: impl io::Write + Send + 'static) -> io::Result<Writing> {
-        let mbap = self.handle.shared.master().config().is_mbap();
-        let (tap, writing) = capture::start(sink, if mbap { Dissector::Tcp } else { Dissector::Rtu })?;
+        let dissector = Dissector::of(self.handle.shared.master().config());
+        let (tap, writing) = capture::start(sink, dissector)?;
         *self.handle.shared.tap() = Some(tap);
         Ok(writing)
     }

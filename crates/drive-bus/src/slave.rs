@@ -11,7 +11,7 @@ use tokio_modbus::{
     slave::SlaveContext,
 };
 
-use crate::{line::Handle, master::Outcome, schedule::Ticket};
+use crate::{line::Handle, master::Outcome, protocol::Protocol, schedule::Ticket, unite::UniTe};
 
 /// One slave of a [`Line`](crate::Line): a tokio-modbus [`Client`] and a drive's [`Port`]. Cheap to clone; each clone has
 /// its own [`Terms`].
@@ -39,6 +39,20 @@ impl Slave {
     #[must_use]
     pub const fn address(&self) -> u8 {
         self.address
+    }
+
+    /// Its UNI-TE requests beyond reading and writing, on a line that speaks UNI-TELWAY, under the same terms.
+    #[must_use]
+    pub fn unite(&self) -> UniTe {
+        UniTe::new(self.clone())
+    }
+
+    pub(crate) const fn terms(&self) -> Terms {
+        self.terms
+    }
+
+    pub(crate) fn speaks_unite(&self) -> bool {
+        matches!(self.handle.shared.master().config().protocol, Protocol::UniTelway(_))
     }
 
     /// This slave under other terms.

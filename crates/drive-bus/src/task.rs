@@ -1,6 +1,6 @@
 //! The task that owns the port: it writes, reads, waits, and does what the master decides.
 
-use std::{future::poll_fn, io, pin::pin, sync::Arc, task::Poll, time::Duration};
+use std::{future::poll_fn, io, mem, pin::pin, sync::Arc, task::Poll, time::Duration};
 
 use drive_clock::Timer;
 use tokio::{
@@ -114,10 +114,18 @@ impl Task {
                 self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
                 (frame, master.deadline(), master.is_finished())
             };
+            let answered = !self.ended.is_empty();
             for (caller, outcome) in self.ended.drain(..) {
                 caller.answer(outcome);
             }
-            let Some(frame) = frame else { return (!finished).then_some(deadline) };
+            let Some(frame) = frame else {
+                if answered && !finished {
+                    // Whoever got an answer usually asks again at once: one look at the port and one timer for both.
+                    give_way().await;
+                    continue;
+                }
+                return (!finished).then_some(deadline);
+            };
             let Port::Open(stream) = &mut self.port else { return Some(deadline) };
             match write(stream, &frame).await {
                 Ok(()) => {
@@ -190,6 +198,19 @@ async fn write(stream: &mut BoxedStream, frame: &[u8]) -> io::Result<()> {
     }
     let limit = || io::Error::new(io::ErrorKind::TimedOut, "the port takes no bytes");
     timeout(WRITE_LIMIT, writing).await.unwrap_or_else(|_| Err(limit()))
+}
+
+/// Lets the tasks run that are ready now, without a look at the ports in between (as `yield_now` would take).
+async fn give_way() {
+    let mut given = false;
+    poll_fn(|context| {
+        if mem::replace(&mut given, true) {
+            return Poll::Ready(());
+        }
+        context.waker().wake_by_ref();
+        Poll::Pending
+    })
+    .await;
 }
 
 async fn port_event(port: &mut Port, received: &mut [u8]) -> Event {

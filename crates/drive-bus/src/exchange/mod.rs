@@ -2,9 +2,11 @@
 //!
 //! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
 
+pub mod ascii;
 mod echo;
 pub mod mbap;
 pub mod rtu;
+pub mod unitelway;
 
 use std::sync::Arc;
 

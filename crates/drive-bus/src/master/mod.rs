@@ -20,8 +20,9 @@ use tokio_modbus::Request;
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
-    exchange::{Answer, Exchange, Step, Stray, mbap::Mbap, rtu::Rtu},
+    exchange::{Answer, Exchange, Step, Stray, ascii::Ascii, mbap::Mbap, rtu::Rtu, unitelway::UniTelway},
     pdu,
+    protocol::Protocol,
     schedule::{Choice, Entry, Readiness, Rules, Schedule, Ticket},
     stats::Stats,
 };
@@ -119,7 +120,12 @@ impl<C> Master<C> {
         let exchange: Box<dyn Exchange> = if config.is_mbap() {
             Box::new(Mbap::new())
         } else {
-            Box::new(Rtu::new(config.serial, config.chunk_gap, config.echo))
+            let (serial, chunk_gap, echo) = (config.serial, config.chunk_gap, config.echo);
+            match config.protocol {
+                Protocol::Rtu => Box::new(Rtu::new(serial, chunk_gap, echo)),
+                Protocol::Ascii(settings) => Box::new(Ascii::new(serial, settings, echo)),
+                Protocol::UniTelway(settings) => Box::new(UniTelway::new(serial, settings, chunk_gap)),
+            }
         };
         Self {
             exchange,

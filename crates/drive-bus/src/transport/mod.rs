@@ -11,7 +11,10 @@ use tokio::{
     net::TcpStream,
 };
 
-use crate::config::{Endpoint, LineConfig};
+use crate::{
+    config::{Endpoint, LineConfig},
+    protocol::ProtocolMismatch,
+};
 
 /// How long a connection may take to come about.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
@@ -71,6 +74,9 @@ pub enum OpenError {
         /// What the system says.
         reason: String,
     },
+    /// The protocol cannot be spoken with the configured characters.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolMismatch),
     /// A line over a given stream has nothing that could be opened.
     #[error("the configuration names no port")]
     NoPort,
@@ -86,6 +92,9 @@ pub(crate) enum Connector {
 
 impl Connector {
     pub(crate) fn to(config: &LineConfig) -> Result<Self, OpenError> {
+        if !config.is_mbap() {
+            config.protocol.check(config.serial)?;
+        }
         match &config.endpoint {
             Endpoint::Serial(_) => Ok(Self::Serial(Box::new(config.clone()))),
             Endpoint::RtuOverTcp(address) | Endpoint::ModbusTcp(address) => Ok(Self::Tcp(address.clone())),

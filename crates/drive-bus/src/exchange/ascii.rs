@@ -1,0 +1,338 @@
+//! Modbus ASCII: `:`, hexadecimal pairs, LRC, CR, LF (MODBUS over Serial Line V1.02 p. 16–18; VVDED397054 p. 23/47).
+//!
+//! - `:` begins a frame wherever it stands, also inside another one, which was damaged then.
+//! - Digits are 0 to 9 and A to F. The specification has no lower-case ones: a frame with them is damaged, as one with
+//!   any other character is.
+//! - Characters may follow each other after up to a second ([`AsciiSettings::character_gap`]); after more the frame has
+//!   broken off.
+//! - After CR whatever comes ends the frame, unless it is a `:`. Which character a slave ends its answers with is its own
+//!   affair, the LRC tells whether they are whole; which one **it** waits for is ours to know: function 08/03 changes it
+//!   in one slave, and each slave is asked with its own. A slave that has forgotten it (power cycle, restart) hears
+//!   nothing any more, so that from the second unanswered request on the line tries the former one in turn.
+//! - The LRC is a sum of eight bits. Two damaged digits can cancel each other out in it; a format with parity finds them.
+
+mod frame;
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use bytes::Bytes;
+use drive_core::{Class, serial::SerialSettings};
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+pub use frame::{frame, len};
+
+use self::frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver};
+use super::{Answer, Exchange, Failure, Step, Stray, echo::EchoState};
+use crate::{answer, config::Echo};
+
+/// What may come in during one exchange before it is given up: somebody who never stops talking.
+const MAX_RECEIVED: usize = 4 * MAX_FRAME;
+
+/// After how many unanswered requests a slave may wait for another last character.
+const DOUBT_AFTER: u32 = 2;
+
+/// What a line in Modbus ASCII can be set to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct AsciiSettings {
+    /// The longest pause between two characters of a frame (p. 17: 1 s, and 4 to 5 s over wide-area networks).
+    pub character_gap: Duration,
+    /// The last character of a frame, after CR, for slaves that were not told another one by function 08/03.
+    pub delimiter: u8,
+}
+
+impl Default for AsciiSettings {
+    /// 1 s, line feed.
+    fn default() -> Self {
+        Self { character_gap: Duration::from_secs(1), delimiter: LINE_FEED }
+    }
+}
+
+/// How long an exchange may go on after the time of its answer is over, because something is still coming in.
+#[must_use]
+pub fn overtime(serial: SerialSettings, settings: AsciiSettings) -> Duration {
+    serial.characters(MAX_FRAME) + settings.character_gap
+}
+
+/// The machine.
+#[derive(Debug)]
+pub struct Ascii {
+    settings: AsciiSettings,
+    /// How long an answer that has begun may go on after its time is over.
+    longest: Duration,
+    echo: EchoState,
+    configured: Echo,
+    /// The slaves whose last character may not be the usual one.
+    delimiters: BTreeMap<u8, Delimiter>,
+    current: Option<Current>,
+    receiver: Receiver,
+    last_character: Option<Instant>,
+    strays: Vec<Stray>,
+}
+
+#[derive(Debug)]
+struct Current {
+    slave: u8,
+    request: Arc<Request<'static>>,
+    pdu: Bytes,
+    answer_by: Option<Instant>,
+    /// The echo of this request has been taken away.
+    echo_taken: bool,
+    /// Characters received since the request.
+    received: usize,
+    /// An intact frame came that did not fit.
+    misfit: Option<String>,
+}
+
+/// Which last character a slave waits for.
+#[derive(Debug, Clone, Copy)]
+struct Delimiter {
+    likely: u8,
+    other: u8,
+    unanswered: u32,
+}
+
+impl Ascii {
+    /// A machine for a line with these settings.
+    #[must_use]
+    pub fn new(serial: SerialSettings, settings: AsciiSettings, echo: Echo) -> Self {
+        Self {
+            settings,
+            longest: overtime(serial, settings),
+            echo: echo.into(),
+            configured: echo,
+            delimiters: BTreeMap::new(),
+            current: None,
+            receiver: Receiver::default(),
+            last_character: None,
+            strays: Vec::new(),
+        }
+    }
+
+    /// A frame whose LRC fits.
+    fn heard(&mut self, slave: u8, pdu: &Bytes) -> Step {
+        let stray = Stray::Frame { slave, function: pdu.first().copied().unwrap_or_default() };
+        let Some(current) = self.current.as_mut().filter(|current| current.slave == slave) else {
+            self.strays.push(stray);
+            return Step::More;
+        };
+        if *pdu == current.pdu && !current.echo_taken {
+            // Nobody answers a broadcast, so that what equals it is an echo.
+            let sure = self.echo == EchoState::Present || slave == 0;
+            if sure || !answer::equals_its_request(&current.request) {
+                current.echo_taken = true;
+                self.echo = EchoState::Present;
+                self.strays.push(Stray::Echo);
+                return Step::More;
+            }
+            if self.echo == EchoState::Unknown {
+                current.misfit = Some("an echo could not be told from it".to_owned());
+                return Step::More;
+            }
+        }
+        match answer::check(&current.request, pdu) {
+            Ok(answer) => {
+                if self.echo == EchoState::Unknown {
+                    self.echo = EchoState::Absent;
+                }
+                self.answered(&answer);
+                Step::Done(Ok(answer))
+            }
+            Err(why) => {
+                current.misfit = Some(why);
+                self.strays.push(stray);
+                Step::More
+            }
+        }
+    }
+
+    /// Something that began as a frame and is none. Where it begins as the answer does, it is the answer, damaged;
+    /// anything else may be somebody else's, with the answer still to come.
+    fn garbled(&mut self, head: Option<(u8, u8)>, len: usize, why: &'static str) -> Step {
+        self.strays.push(Stray::Noise(len));
+        let resembles = self.current.as_ref().is_some_and(|current| {
+            head.is_some_and(|(slave, function)| {
+                slave == current.slave && function & 0x7F == current.request.function_code().value()
+            })
+        });
+        if !resembles {
+            return Step::More;
+        }
+        self.current = None;
+        Step::Done(Err(Failure::Damaged(why)))
+    }
+
+    fn act(&mut self, heard: Heard) -> Step {
+        match heard {
+            Heard::Frame { slave, pdu } => self.heard(slave, &pdu),
+            Heard::Garbled { head, len, why } => self.garbled(head, len, why),
+        }
+    }
+
+    /// The exchange ends with this answer: the slave heard the end of its request, and may have another one from now on.
+    fn answered(&mut self, answer: &Answer) {
+        let Some(current) = self.current.take() else { return };
+        let usual = self.settings.delimiter;
+        let present = self.delimiters.get(&current.slave).map_or(usual, |delimiter| delimiter.likely);
+        if let (Some(new), Ok(_)) = (new_delimiter(&current.request), answer) {
+            let changed = Delimiter { likely: new, other: present, unanswered: 0 };
+            self.delimiters.insert(current.slave, changed);
+        } else if let Some(delimiter) = self.delimiters.get_mut(&current.slave) {
+            delimiter.unanswered = 0;
+        }
+    }
+
+    /// The time for the answer is over.
+    fn fail(&mut self) -> Step {
+        let Some(current) = self.current.take() else { return Step::More };
+        let failure = current.misfit.map_or(Failure::Timeout, Failure::Mismatch);
+        if failure == Failure::Timeout {
+            // An adapter that echoes would have echoed: silence is an answer to that question.
+            if self.echo == EchoState::Unknown && current.received == 0 {
+                self.echo = EchoState::Absent;
+            }
+            self.doubt(current.slave, &current.request);
+        }
+        Step::Done(Err(failure))
+    }
+
+    /// A request was not answered: perhaps its slave waited for another last character.
+    fn doubt(&mut self, slave: u8, request: &Request<'_>) {
+        if let Some(new) = new_delimiter(request) {
+            let usual = self.settings.delimiter;
+            let delimiter = self.delimiters.entry(slave).or_insert(Delimiter {
+                likely: usual,
+                other: usual,
+                unanswered: 0,
+            });
+            delimiter.other = new;
+        }
+        let Some(delimiter) = self.delimiters.get_mut(&slave) else { return };
+        delimiter.unanswered = delimiter.unanswered.saturating_add(1);
+        if delimiter.unanswered >= DOUBT_AFTER {
+            std::mem::swap(&mut delimiter.likely, &mut delimiter.other);
+        }
+    }
+}
+
+/// The last character that a request makes its slave wait for: function 08/03, `XX 00`.
+fn new_delimiter(request: &Request<'_>) -> Option<u8> {
+    match request {
+        Request::Custom(0x08, data) => match **data {
+            [0, 3, new, ..] => Some(new),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+impl Exchange for Ascii {
+    fn carries(&self, _: u8, request: &Request<'_>, _: Class) -> Result<(), String> {
+        match new_delimiter(request) {
+            Some(BEGIN) => Err("a frame that ends with \":\" has no end".to_owned()),
+            Some(new) if !new.is_ascii() => Err(format!("{new:02X}h is not an ASCII character")),
+            _ => Ok(()),
+        }
+    }
+
+    fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
+        if let Some(Heard::Garbled { len, .. }) = self.receiver.give_up() {
+            self.strays.push(Stray::Noise(len));
+        }
+        let delimiter = self.delimiters.get(&slave).map_or(self.settings.delimiter, |known| known.likely);
+        self.current = Some(Current {
+            slave,
+            request,
+            pdu: pdu.clone(),
+            answer_by: None,
+            echo_taken: false,
+            received: 0,
+            misfit: None,
+        });
+        frame(slave, pdu, delimiter)
+    }
+
+    fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
+        if let Some(current) = &mut self.current {
+            current.answer_by = Some(answer_by);
+        }
+    }
+
+    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step {
+        self.last_character = Some(now);
+        let mut step = Step::More;
+        for &character in bytes {
+            if let Some(heard) = self.receiver.hear(character) {
+                // After the answer nothing more is expected: what follows it is stray.
+                let next = self.act(heard);
+                step = if step == Step::More { next } else { step };
+            }
+        }
+        let noise = self.receiver.take_noise();
+        if noise > 0 {
+            self.strays.push(Stray::Noise(noise));
+        }
+        if let Some(current) = &mut self.current {
+            current.received += bytes.len();
+            if current.received > MAX_RECEIVED {
+                self.current = None;
+                return Step::Done(Err(Failure::Damaged("more characters than a frame has")));
+            }
+        }
+        step
+    }
+
+    fn handle_timeout(&mut self, now: Instant) -> Step {
+        if self.deadline().is_none_or(|deadline| now < deadline) {
+            return Step::More;
+        }
+        if let Some(broken_off) = self.receiver.give_up() {
+            let step = self.act(broken_off);
+            if step != Step::More {
+                return step;
+            }
+        }
+        let over = self.current.as_ref().and_then(|current| current.answer_by).is_some_and(|by| now >= by);
+        if over { self.fail() } else { Step::More }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        let answer_by = self.current.as_ref().and_then(|current| current.answer_by);
+        match self.last_character {
+            Some(last) if self.receiver.is_open() => {
+                let pause = last + self.settings.character_gap;
+                Some(answer_by.map_or(pause, |by| pause.min(by + self.longest)))
+            }
+            _ => answer_by,
+        }
+    }
+
+    fn abandon(&mut self) {
+        self.current = None;
+    }
+
+    fn reset(&mut self) {
+        self.current = None;
+        self.receiver = Receiver::default();
+        // As in RTU: one that was seen to echo is trusted to do it again.
+        if self.echo == EchoState::Absent {
+            self.echo = self.configured.into();
+        }
+    }
+
+    fn take_strays(&mut self) -> Vec<Stray> {
+        std::mem::take(&mut self.strays)
+    }
+
+    fn confuses_late_answers(&self) -> bool {
+        true
+    }
+
+    fn echo_is_unknown(&self) -> bool {
+        self.echo == EchoState::Unknown
+    }
+
+    fn echoes(&self) -> bool {
+        self.echo == EchoState::Present
+    }
+}
