@@ -1,5 +1,7 @@
 //! The log: to stderr, as much as `DRIVED_LOG` says (`debug`, `drive_bus=trace,warn`).
 
+use std::io::{self, IsTerminal as _};
+
 use tracing::Level;
 use tracing_subscriber::{EnvFilter, filter::LevelFilter};
 
@@ -12,5 +14,10 @@ pub(crate) fn start(level: Option<Level>) {
         .with_default_directive(LevelFilter::from_level(level).into())
         .with_env_var(VARIABLE)
         .from_env_lossy();
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal())
+        .with_target(false)
+        .init();
 }
