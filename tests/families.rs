@@ -2,7 +2,14 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Direction, Error, ErrorKind, Frequency, Reaction, Refusal, State, StopMode};
+use drive_bus::{
+    Protocol,
+    protocol::{AsciiSettings, NetworkHeader, UniTelwaySettings},
+};
+use drive_core::{
+    Command, Direction, Error, ErrorKind, Frequency, Reaction, Refusal, SerialSettings, State, StopMode,
+    serial::CharacterFormat,
+};
 use drive_families::Family;
 use support::{drives, rig::Rig};
 
@@ -24,6 +31,27 @@ async fn an_altivar_58_starts_reverses_stops_trips_and_recovers() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn an_altivar_58_lives_the_same_story_in_modbus_ascii() {
+    for format in [CharacterFormat::F7E1, CharacterFormat::F8O1] {
+        let settings = SerialSettings::new(9_600, format).expect("it is a speed of the card");
+        live(
+            Rig::speaking(Family::Atv58, Protocol::Ascii(AsciiSettings::default()), settings),
+            Family::Atv58,
+        )
+        .await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_altivar_58_lives_the_same_story_on_uni_telway() {
+    let settings = Family::Atv58.capabilities().factory;
+    for header in [NetworkHeader::default(), NetworkHeader::Simplified] {
+        let protocol = Protocol::UniTelway(UniTelwaySettings { header, ..UniTelwaySettings::default() });
+        live(Rig::speaking(Family::Atv58, protocol, settings), Family::Atv58).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn an_altivar_312_starts_reverses_stops_trips_and_recovers() {
     lives_the_story(Family::Atv312).await;
 }
@@ -34,7 +62,10 @@ async fn a_3g3ev_starts_reverses_stops_trips_and_recovers() {
 }
 
 async fn lives_the_story(family: Family) {
-    let mut rig = Rig::new(family);
+    live(Rig::new(family), family).await;
+}
+
+async fn live(mut rig: Rig, family: Family) {
     nothing_moves_at_first(&mut rig).await;
     it_starts_and_reaches_its_reference(&mut rig).await;
     it_reverses(&mut rig).await;

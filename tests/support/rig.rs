@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Drive, Frequency, SlaveAddress, Status};
+use drive_bus::{Line, LineConfig, Protocol, SlaveSettings};
+use drive_core::{Drive, Frequency, SerialSettings, SlaveAddress, Status};
 use drive_families::Family;
 use drive_sim::{Observation, SimLine, SimSlave, Wiring};
 use tokio::time::{Instant, sleep, timeout_at};
@@ -35,12 +35,26 @@ impl Rig {
     /// Only when the rig itself is wrong.
     #[must_use]
     pub fn new(family: Family) -> Self {
+        Self::speaking(family, Protocol::Rtu, family.capabilities().factory)
+    }
+
+    /// The same on a line that speaks this protocol with these characters.
+    ///
+    /// # Panics
+    /// Only when the rig itself is wrong, or the protocol does not have these characters.
+    #[must_use]
+    pub fn speaking(family: Family, protocol: Protocol, settings: SerialSettings) -> Self {
+        protocol.check(settings).expect("the protocol has these characters");
         let capabilities = family.capabilities();
-        let settings = capabilities.factory;
-        let simulated = SimLine::new(Wiring::rtu(settings));
+        let spoken = match protocol {
+            Protocol::Rtu => drive_sim::Protocol::Rtu,
+            Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
+            Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
+        };
+        let simulated = SimLine::new(Wiring { protocol: spoken, ..Wiring::rtu(settings) });
         let machine = simulated.add_boxed(ADDRESS, drives::machine(family)).expect("the address is free");
         let turnaround = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
-        let config = LineConfig::stream(settings).slave(ADDRESS, turnaround);
+        let config = LineConfig { protocol, ..LineConfig::stream(settings) }.slave(ADDRESS, turnaround);
         let line = Line::over(simulated.in_memory(), config);
         let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
         let drive = drives::drive(family, line.slave(ADDRESS), slave);
