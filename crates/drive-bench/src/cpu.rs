@@ -2,69 +2,49 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig};
-use tokio::time::Instant;
-use tokio_modbus::{Request, client::Client};
+use drive_bus::Line;
 
 use crate::{
     Error,
-    rig::{FIRST, QUANTITY, Rig, runtime},
-    rivals, row,
-    usage::time_of_master,
+    masters::{by_hand, in_turn, stock},
+    report::{Goal, Report, Unit, micros},
+    rig::{DRIVES, Rig, runtime},
+    simulator::Plant,
+    usage::processor_time,
 };
 
-const DRIVES: u8 = 31;
+const SECTION: &str = "cpu";
 
-/// How often each master is measured; the least is taken, because everything else on the machine only adds.
+/// How often each master is measured, in turn with the others.
 const ROUNDS: u32 = 5;
 
-pub(crate) fn measure(time: Duration) -> Result<Vec<String>, Error> {
+pub(crate) fn measure(report: &mut Report, time: Duration) -> Result<(), Error> {
+    let rig = Rig::start(Plant { lines: 1, drives: DRIVES, unpaced: true })?;
+    let (config, port) = (rig.config()?, rig.port()?.clone());
     let each = time / (3 * ROUNDS);
-    let (mut ours, mut by_hand, mut stock) = (u64::MAX, u64::MAX, u64::MAX);
+    let (mut ours, mut hand, mut others) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
-        ours = ours.min(one(async |rig: &Rig| {
-            let line = Line::open(LineConfig { unpaced: true, ..rig.config() }).await?;
-            // As a task, for every wake-up of the main future of a runtime costs a system call.
-            let caller = line.clone();
-            let reads = tokio::spawn(async move { one_after_another(&caller, each).await }).await??;
-            line.close().await;
-            Ok(reads)
-        })?);
-        by_hand = by_hand.min(one(async |rig: &Rig| rivals::by_hand(rig, DRIVES, each).await)?);
-        stock = stock.min(one(async |rig: &Rig| rivals::stock(rig, DRIVES, each, false).await)?);
+        let config = config.clone();
+        ours.push(one(async move { in_turn(Line::open(config).await?, DRIVES, each).await })?);
+        hand.push(one(by_hand(port.clone(), DRIVES, each))?);
+        others.push(one(stock(port.clone(), DRIVES, each, false))?);
     }
-    let micros = |nanos: u64| format!("{}.{:02} µs", nanos / 1_000, nanos % 1_000 / 10);
-    let ratio = ours * 100 / by_hand.max(1);
-    Ok(vec![
-        row(
-            "processor time per transaction: this line",
-            format!("{}: {}.{:02} × the loop by hand", micros(ours), ratio / 100, ratio % 100),
-            "≤ 1.15 ×",
-        ),
-        row("processor time per transaction: loop by hand", micros(by_hand), ""),
-        row("processor time per transaction: stock tokio-modbus", micros(stock), ""),
-    ])
+    // The least of each: everything else on the machine only adds.
+    let [ours, hand, others] = [ours, hand, others].map(|times| times.into_iter().min().unwrap_or_default());
+    report.note(SECTION, "processor time per transaction, this line", Unit::Micros, micros(ours));
+    report.note(SECTION, "processor time per transaction, loop by hand", Unit::Micros, micros(hand));
+    report.note(SECTION, "processor time per transaction, stock tokio-modbus", Unit::Micros, micros(others));
+    let ratio = ours.as_secs_f64() / hand.as_secs_f64();
+    report.row(SECTION, "this line by the loop by hand", Unit::Times, ratio, Goal::AtMost(1.15));
+    Ok(())
 }
 
-/// Nanoseconds per transaction of one master on a new line.
-fn one(master: impl AsyncFnOnce(&Rig) -> Result<u64, Error>) -> Result<u64, Error> {
-    let rig = Rig::start(DRIVES, true)?;
+/// Processor time per transaction of one master, all threads of this process, the kernel's work for it included.
+fn one(master: impl Future<Output = Result<u64, Error>> + Send + 'static) -> Result<Duration, Error> {
     let runtime = runtime()?;
-    let before = time_of_master()?;
-    let reads = runtime.block_on(master(&rig))?;
-    let used = time_of_master()?.saturating_sub(before);
-    Ok(u64::try_from(used.as_nanos())?.checked_div(reads).unwrap_or(u64::MAX))
-}
-
-/// Reads one drive after another, as the other masters do it.
-async fn one_after_another(line: &Line, time: Duration) -> Result<u64, Error> {
-    let end = Instant::now() + time;
-    let mut reads = 0;
-    while Instant::now() < end {
-        for address in 1..=DRIVES {
-            line.slave(address).call(Request::ReadHoldingRegisters(FIRST, QUANTITY)).await??;
-            reads += 1;
-        }
-    }
-    Ok(reads)
+    let before = processor_time();
+    // As a task: every wake-up of the main future of a runtime costs a system call more.
+    let reads = runtime.block_on(async { tokio::spawn(master).await? })?;
+    let used = processor_time().saturating_sub(before);
+    Ok(used / u32::try_from(reads)?.max(1))
 }

@@ -2,68 +2,97 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::Line;
 use drive_core::serial::SerialSettings;
+use tokio::time::sleep;
 
-use crate::{Error, millis, rig::populated, row, share, usage::memory_kib, utilisation::saturate};
+use crate::{
+    Error,
+    masters::saturate,
+    report::{Goal, Report, Unit, micros, millis},
+    rig::{DRIVES, Rig},
+    simulator::{Order, Plant},
+    usage::{memory_kib, processor_time},
+};
 
-const DRIVES: u8 = 31;
+const SECTION: &str = "lines";
 
-pub(crate) fn measure(time: Duration, lines: u16) -> Result<Vec<String>, Error> {
+/// What each line should reach.
+const GOAL: f64 = 0.97;
+
+/// Until all lines are open and their timeouts learned.
+const SETTLE: Duration = Duration::from_secs(3);
+
+pub(crate) fn measure(report: &mut Report, time: Duration, lines: u16) -> Result<(), Error> {
+    let mut rig = Rig::start(Plant { lines, drives: DRIVES, unpaced: false })?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    let settings = SerialSettings::MODBUS_DEFAULT;
-    let (simulated, before, after) = runtime.block_on(async {
-        let mut simulated = Vec::new();
-        let mut streams = Vec::new();
-        for _ in 0..lines {
-            let line = populated(DRIVES, false)?;
-            streams.push(line.in_memory_precise());
-            simulated.push(line);
+    let before = memory_kib()?;
+    let masters: Vec<Line> = runtime.block_on(async {
+        let mut masters = Vec::new();
+        for config in rig.configs() {
+            masters.push(Line::open(config).await?);
         }
-        tokio::time::sleep(Duration::from_millis(200)).await;
-        let before = memory_kib()?;
-        let config = LineConfig { precise_timer: true, ..LineConfig::stream(settings) };
-        let masters: Vec<Line> =
-            streams.into_iter().map(|stream| Line::over(stream, config.clone())).collect();
-        let polls: Vec<_> = masters
-            .iter()
-            .map(|line| {
-                let line = line.clone();
-                tokio::spawn(async move { saturate(&line, DRIVES, time).await })
-            })
-            .collect();
-        tokio::time::sleep(time / 2).await;
-        let after = memory_kib()?;
+        Ok::<_, Error>(masters)
+    })?;
+    let polls: Vec<_> = masters
+        .iter()
+        .map(|line| {
+            let line = line.clone();
+            runtime.spawn(async move { saturate(&line, DRIVES, SETTLE + time).await })
+        })
+        .collect();
+    runtime.block_on(async { sleep(SETTLE).await });
+    let simulated_before = rig.order(&Order::Take)?.processor_time;
+    let own_before = processor_time();
+    runtime.block_on(async { sleep(time).await });
+    let own = processor_time().saturating_sub(own_before);
+    let memory = memory_kib()?.saturating_sub(before);
+    let taken = rig.order(&Order::Take)?;
+    runtime.block_on(async {
         for poll in polls {
             poll.await??;
         }
         for line in masters {
             line.close().await;
         }
-        Ok::<_, Error>((simulated, before, after))
+        Ok::<_, Error>(())
     })?;
-    let t3_5 = settings.t3_5();
-    let stats: Vec<_> = simulated.iter().map(drive_sim::SimLine::stats).collect();
-    let mut used: Vec<u64> = stats.iter().filter_map(|stats| stats.utilisation(t3_5)).collect();
-    used.sort_unstable();
-    let mean = used.iter().sum::<u64>().checked_div(used.len() as u64).unwrap_or_default();
-    let violations: u64 = stats.iter().map(|stats| stats.violations).sum();
-    let shortest = stats.iter().filter_map(|stats| stats.shortest_silence).min().unwrap_or_default();
-    Ok(vec![
-        row(
-            format!("{lines} lines in one process, simulators included: utilisation, mean and least"),
-            format!("{} and {}", share(mean), share(used.first().copied().unwrap_or_default())),
-            "≥ 0.97",
-        ),
-        row(
-            format!("{lines} lines: memory of a line with 31 polls"),
-            format!("{} KiB", after.saturating_sub(before) / u64::from(lines.max(1))),
-            "≤ 200 KiB",
-        ),
-        row(
-            format!("{lines} lines: silences shorter than {}", millis(t3_5)),
-            format!("{violations} (shortest {})", millis(shortest)),
-            "0",
-        ),
-    ])
+
+    let share = |ideal: Duration, time: Duration| ideal.as_secs_f64() / time.as_secs_f64();
+    let counted = taken.counted;
+    let number = counted.len().max(1);
+    let whole: Vec<f64> = counted.iter().map(|line| share(line.ideal, line.taken)).collect();
+    let without: Vec<f64> =
+        counted.iter().map(|line| share(line.ideal, line.taken.saturating_sub(line.late))).collect();
+    let mean = |shares: &[f64]| shares.iter().sum::<f64>() / number as f64;
+    let least = |shares: &[f64]| shares.iter().copied().fold(f64::INFINITY, f64::min);
+    let goal = Goal::AtLeast(GOAL);
+    report.row(SECTION, format!("{lines} lines: utilisation, mean"), Unit::Share, mean(&whole), goal);
+    report.row(SECTION, format!("{lines} lines: utilisation, the least"), Unit::Share, least(&whole), goal);
+    let what = format!("{lines} lines: without the simulator's own lateness, mean");
+    report.row(SECTION, what, Unit::Share, mean(&without), goal);
+    let what = format!("{lines} lines: without the simulator's own lateness, the least");
+    report.row(SECTION, what, Unit::Share, least(&without), goal);
+
+    let requests: u64 = counted.iter().map(|line| line.requests).sum();
+    let violations: u64 = counted.iter().map(|line| line.violations).sum();
+    let shortest = counted.iter().filter_map(|line| line.shortest_silence).min().unwrap_or_default();
+    let what = format!(
+        "{lines} lines: silences shorter than {:.3} ms in {requests} reads (the shortest {:.3} ms)",
+        millis(SerialSettings::MODBUS_DEFAULT.t3_5()),
+        millis(shortest)
+    );
+    report.row(SECTION, what, Unit::Count, violations as f64, Goal::AtMost(0.0));
+
+    let per_line = memory as f64 / number as f64;
+    let what = format!("{lines} lines: memory of a line with {DRIVES} polls");
+    report.row(SECTION, what, Unit::KiB, per_line, Goal::AtMost(200.0));
+    let each = |used: Duration| micros(used) / requests.max(1) as f64;
+    report.note(SECTION, "processor time per transaction, the lines", Unit::Micros, each(own));
+    let simulated = taken.processor_time.saturating_sub(simulated_before);
+    report.note(SECTION, "processor time per transaction, the simulator", Unit::Micros, each(simulated));
+    let cores = |used: Duration| used.as_secs_f64() / time.as_secs_f64();
+    report.note(SECTION, "processors in use, the lines", Unit::Times, cores(own));
+    report.note(SECTION, "processors in use, the simulator", Unit::Times, cores(simulated));
+    Ok(())
 }

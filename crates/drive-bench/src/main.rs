@@ -1,33 +1,45 @@
 //! `drive-bench`: what a line costs and keeps, measured against simulated drives that pace like a real line and record
-//! every silence. Times are real, so that a busy machine shows: run it alone.
+//! every silence. See the README for what each row means.
 
 mod cpu;
+mod dead;
+mod faults;
+mod ledger;
 mod lines;
+mod masters;
+mod report;
 mod rig;
-mod rivals;
+mod simulator;
 mod stop;
-mod sweep;
 mod usage;
 mod utilisation;
+mod virtual_line;
 
 use std::{process::ExitCode, time::Duration};
 
 use clap::{Parser, ValueEnum};
 
+use crate::report::Report;
+
 /// What can be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum What {
-    /// Utilisation of a saturated line of 31 drives, beside the stock tokio-modbus client.
+enum Section {
+    /// Utilisation and silences of a saturated line of 31 drives, beside the stock tokio-modbus client.
     Utilisation,
     /// The wait of a Stop behind saturated polling.
     Stop,
     /// The sweep of 28 living drives with 3 dead ones on the line.
-    Sweep,
+    Dead,
     /// Processor time of one transaction on a pty without pacing.
     Cpu,
     /// Many lines in one process.
     Lines,
+    /// Wrong values accepted as right, over every fault of the simulator.
+    Faults,
 }
+
+const EVERYTHING: [Section; 6] =
+    [Section::Utilisation, Section::Stop, Section::Dead, Section::Cpu, Section::Lines, Section::Faults];
 
 /// Measures a line of simulated drives.
 #[derive(Debug, Parser)]
@@ -35,54 +47,56 @@ enum What {
 struct Arguments {
     /// What to measure; everything when nothing is named.
     #[arg(value_enum)]
-    what: Vec<What>,
-    /// How long each part measures, in seconds.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    sections: Vec<Section>,
+    /// One JSON object a row instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// How long each measurement in real time lasts, in seconds.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u64).range(1..=86_400))]
     seconds: u64,
+    /// How many transactions each measurement in virtual time has.
+    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(100..=1_000_000_000))]
+    transactions: u64,
     /// How many lines in one process.
-    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..=4_096))]
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..=2_048))]
     lines: u16,
+    /// The seed of the faults.
+    #[arg(long, default_value_t = 2_026)]
+    seed: u64,
+    /// Be the simulator of another process, which says on the standard input what it wants.
+    #[arg(long, hide = true, value_name = "PLANT")]
+    simulate: Option<String>,
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let everything = [What::Utilisation, What::Stop, What::Sweep, What::Cpu, What::Lines];
-    let what = if arguments.what.is_empty() { &everything[..] } else { &arguments.what };
-    let time = Duration::from_secs(arguments.seconds);
-    println!("| Measured | Value | Goal |");
-    println!("|---|---|---|");
-    for what in what {
-        let measured = match what {
-            What::Utilisation => utilisation::measure(time),
-            What::Stop => stop::measure(time),
-            What::Sweep => sweep::measure(time),
-            What::Cpu => cpu::measure(time),
-            What::Lines => lines::measure(time, arguments.lines),
-        };
-        match measured {
-            Ok(rows) => rows.iter().for_each(|row| println!("{row}")),
+    if let Some(plant) = &arguments.simulate {
+        return match simulator::serve(plant) {
+            Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
-                eprintln!("drive-bench: {what:?}: {error}");
-                return ExitCode::FAILURE;
+                eprintln!("drive-bench: simulator: {error}");
+                ExitCode::FAILURE
             }
+        };
+    }
+    let sections = if arguments.sections.is_empty() { &EVERYTHING[..] } else { &arguments.sections };
+    let time = Duration::from_secs(arguments.seconds);
+    let mut report = Report::new(arguments.json);
+    for section in sections {
+        let measured = match section {
+            Section::Utilisation => utilisation::measure(&mut report, time, arguments.transactions),
+            Section::Stop => stop::measure(&mut report, time, arguments.transactions),
+            Section::Dead => dead::measure(&mut report, time),
+            Section::Cpu => cpu::measure(&mut report, time),
+            Section::Lines => lines::measure(&mut report, time, arguments.lines),
+            Section::Faults => faults::measure(&mut report, arguments.seed, arguments.transactions),
+        };
+        if let Err(error) = measured {
+            eprintln!("drive-bench: {section:?}: {error}");
+            return ExitCode::FAILURE;
         }
     }
     ExitCode::SUCCESS
-}
-
-/// One row of the table.
-fn row(measured: impl AsRef<str>, value: impl AsRef<str>, goal: &str) -> String {
-    format!("| {} | {} | {goal} |", measured.as_ref(), value.as_ref())
-}
-
-/// Parts per million as a share.
-fn share(ppm: u64) -> String {
-    format!("{}.{:04}", ppm / 1_000_000, ppm % 1_000_000 / 100)
-}
-
-/// A duration in milliseconds.
-fn millis(duration: Duration) -> String {
-    format!("{}.{:03} ms", duration.as_millis(), duration.as_micros() % 1_000)
 }
 
 /// What may go wrong in a measurement.

@@ -1,97 +1,139 @@
-//! Utilisation: the shortest time that the exchanges can take, by the time they took.
+//! Utilisation: the shortest time that the exchanges can take, by the time they took; and the silences.
 
-use std::time::Duration;
+use std::{sync::mpsc, thread, time::Duration};
 
-use drive_bus::{Line, Slave};
+use drive_bus::{Line, LineConfig, Stats};
 use drive_core::serial::SerialSettings;
-use drive_sim::LineStats;
-use tokio::time::Instant;
-use tokio_modbus::{Request, client::Client};
+use drive_sim::SimLine;
+use tokio::{io::DuplexStream, sync::oneshot};
 
 use crate::{
-    Error, millis,
-    rig::{FIRST, QUANTITY, Rig, runtime},
-    rivals, row, share,
+    Error,
+    masters::{saturate, stock},
+    report::{Goal, Report, Unit, micros, millis},
+    rig::{DRIVES, Rig, runtime},
+    simulator::{Counted, populated},
+    virtual_line,
 };
 
-const DRIVES: u8 = 31;
+const SECTION: &str = "utilisation";
 
-/// Polls one slave until `end`. How many reads were answered.
-pub(crate) async fn poll(mut slave: Slave, end: Instant) -> Result<u64, Error> {
-    let mut reads = 0;
-    while Instant::now() < end {
-        slave.call(Request::ReadHoldingRegisters(FIRST, QUANTITY)).await??;
-        reads += 1;
-    }
-    Ok(reads)
-}
+/// What a line of these exchanges should reach.
+const GOAL: f64 = 0.995;
 
-/// Polls every slave of a line as fast as it answers. How many reads were answered.
-pub(crate) async fn saturate(line: &Line, drives: u8, time: Duration) -> Result<u64, Error> {
-    let end = Instant::now() + time;
-    let polls: Vec<_> = (1..=drives).map(|slave| tokio::spawn(poll(line.slave(slave), end))).collect();
-    let mut reads = 0;
-    for poll in polls {
-        reads += poll.await??;
-    }
-    Ok(reads)
-}
-
-pub(crate) fn measure(time: Duration) -> Result<Vec<String>, Error> {
-    let t3_5 = SerialSettings::MODBUS_DEFAULT.t3_5();
-    let mut rows = Vec::new();
-
-    let rig = Rig::start(DRIVES, false)?;
+pub(crate) fn measure(report: &mut Report, time: Duration, transactions: u64) -> Result<(), Error> {
+    let mut rig = Rig::one_line()?;
     let stats = runtime()?.block_on(async {
-        let line = Line::open(rig.config()).await?;
-        saturate(&line, DRIVES, time / 10).await?;
-        let _warming_up = rig.line.take_stats();
-        tokio::spawn({
-            let line = line.clone();
-            async move { saturate(&line, DRIVES, time).await }
-        })
-        .await??;
-        let stats = line.stats();
-        line.close().await;
-        Ok::<_, Error>(stats)
+        let line = Line::open(rig.config()?).await?;
+        warm_up_and_saturate(&line, time, || rig.take().map(drop)).await
     })?;
-    let seen = rig.line.take_stats();
+    let counted = rig.take()?;
     drop(rig);
-    rows.extend(describe("this line", &seen, t3_5, "≥ 0.9950, none too short"));
-    rows.push(row(
-        "this line: late behind its silence, mean / p50 / p99",
-        format!(
-            "{} / {} / {}",
-            millis(stats.lag.mean()),
-            millis(stats.lag.quantile(500)),
-            millis(stats.lag.quantile(990))
-        ),
-        "",
-    ));
+    describe(report, "this line, pty", &counted, Goal::AtLeast(GOAL));
+    let late = micros(stats.lag.mean());
+    report.note(SECTION, "this line, pty: of it by choice, timer and write", Unit::Micros, late);
 
-    for (name, silence) in
-        [("stock tokio-modbus, sleep(t3.5)", true), ("stock tokio-modbus, no silence", false)]
-    {
-        let rig = Rig::start(DRIVES, false)?;
-        runtime()?.block_on(rivals::stock(&rig, DRIVES, time / 2, silence))?;
-        rows.extend(describe(name, &rig.line.take_stats(), t3_5, ""));
+    let counted = in_memory(time)?;
+    describe(report, "this line, in memory, real time", &counted, Goal::AtLeast(GOAL));
+
+    let counted = virtual_line::saturated(DRIVES, transactions)?;
+    describe(report, "its machines alone, virtual time", &counted, Goal::AtLeast(GOAL));
+
+    for (name, silence) in [("stock tokio-modbus with sleep(t3.5)", true), ("stock tokio-modbus", false)] {
+        let mut rig = Rig::one_line()?;
+        let port = rig.port()?.clone();
+        runtime()?.block_on(async { tokio::spawn(stock(port, DRIVES, time / 2, silence)).await? })?;
+        describe(report, name, &rig.take()?, Goal::None);
     }
-    Ok(rows)
+    Ok(())
 }
 
-/// The simulator's own lateness is taken out of the second number: a real drive's is its turnaround.
-fn describe(name: &str, seen: &LineStats, t3_5: Duration, goal: &str) -> Vec<String> {
-    let taken = seen.first.zip(seen.last).map_or(t3_5, |(first, last)| last - first + t3_5);
-    let ppm =
-        |time: Duration| (seen.ideal.as_nanos() * 1_000_000).checked_div(time.as_nanos()).unwrap_or_default();
-    let (whole, without) = (ppm(taken) as u64, ppm(taken.saturating_sub(seen.lag)) as u64);
-    vec![
-        row(format!("{name}: utilisation over {} reads", seen.requests), share(whole), goal),
-        row(format!("{name}: without the simulator's own lateness"), share(without), ""),
-        row(
-            format!("{name}: silences shorter than {}", millis(t3_5)),
-            format!("{} (shortest {})", seen.violations, millis(seen.shortest_silence.unwrap_or_default())),
-            if goal.is_empty() { "" } else { "0" },
+/// Saturates a line, after it has opened and learned its timeouts; `begin` is called between.
+async fn warm_up_and_saturate(
+    line: &Line,
+    time: Duration,
+    begin: impl FnOnce() -> Result<(), Error>,
+) -> Result<Stats, Error> {
+    // As a task: every wake-up of the main future of a runtime costs a system call more.
+    let run = |time| {
+        let line = line.clone();
+        tokio::spawn(async move { saturate(&line, DRIVES, time).await })
+    };
+    run(Duration::from_secs(1)).await??;
+    begin()?;
+    run(time).await??;
+    let stats = line.stats();
+    line.close().await;
+    Ok(stats)
+}
+
+/// The simulator in this process, on a thread of its own, joined by memory: what is missing is not the pty's.
+fn in_memory(time: Duration) -> Result<Counted, Error> {
+    let (started, when_started) = mpsc::channel::<Result<(SimLine, DuplexStream), Error>>();
+    let (stop, stopped) = oneshot::channel::<()>();
+    let simulator = thread::spawn(move || {
+        let begin = || -> Result<_, Error> {
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+            let line = populated(DRIVES, false)?;
+            let stream = runtime.block_on(async { line.in_memory_precise() });
+            Ok((runtime, line, stream))
+        };
+        match begin() {
+            Ok((runtime, line, stream)) => {
+                let _ = started.send(Ok((line, stream)));
+                // The end comes when the other side is dropped.
+                let _ = runtime.block_on(stopped);
+            }
+            Err(error) => {
+                let _ = started.send(Err(error));
+            }
+        }
+    });
+    let (simulated, stream) = when_started.recv()??;
+    let config = LineConfig { precise_timer: true, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
+    runtime()?.block_on(async {
+        let line = Line::over(stream, config);
+        warm_up_and_saturate(&line, time, || {
+            let _warming_up = simulated.take_stats();
+            Ok(())
+        })
+        .await
+    })?;
+    drop(stop);
+    simulator.join().map_err(|_| "the simulator panicked")?;
+    Ok(Counted::of(&simulated.take_stats(), SerialSettings::MODBUS_DEFAULT.t3_5()))
+}
+
+/// The utilisation of a line in whole and without the simulator's own lateness (a real drive's is its turnaround), and
+/// its silences.
+fn describe(report: &mut Report, name: &str, counted: &Counted, goal: Goal) {
+    let share = |time: Duration| counted.ideal.as_secs_f64() / time.as_secs_f64();
+    let own = counted.taken.saturating_sub(counted.late);
+    let slots = u32::try_from(counted.requests).unwrap_or(u32::MAX).max(1);
+    let lost = own.saturating_sub(counted.ideal) / slots;
+    let whole = share(counted.taken);
+    report.row(
+        SECTION,
+        format!("{name}: utilisation over {} reads", counted.requests),
+        Unit::Share,
+        whole,
+        goal,
+    );
+    if goal != Goal::None {
+        let what = format!("{name}: without the simulator's own lateness");
+        report.row(SECTION, what, Unit::Share, share(own), goal);
+        report.note(SECTION, format!("{name}: lost in each slot"), Unit::Micros, micros(lost));
+    }
+    let wanted = if goal == Goal::None { Goal::None } else { Goal::AtMost(0.0) };
+    let t3_5 = millis(SerialSettings::MODBUS_DEFAULT.t3_5());
+    report.row(
+        SECTION,
+        format!(
+            "{name}: silences shorter than {t3_5:.3} ms (the shortest {:.3} ms)",
+            millis(counted.shortest_silence.unwrap_or_default())
         ),
-    ]
+        Unit::Count,
+        counted.violations as f64,
+        wanted,
+    );
 }
