@@ -4,7 +4,8 @@
 use std::{env, path::PathBuf, process::Output};
 
 use drive_core::SerialSettings;
-use drive_sim::{Serving, SimLine, SimSlave, Wiring, models};
+use drive_families::Family;
+use drive_sim::{Model, Protocol, Serving, SimLine, SimSlave, Wiring, models};
 use support::peers;
 use tokio::process::Command;
 
@@ -49,7 +50,23 @@ async fn minimalmodbus_reads_and_writes_a_simulated_altivar_312() {
     assert_eq!((rig.drive.peek(9001), rig.drive.peek(9002)), (Some(20), Some(30)));
 }
 
-/// A simulated Altivar 312 at address 2 on a pty.
+#[tokio::test(flavor = "multi_thread")]
+async fn minimalmodbus_reads_and_writes_a_simulated_altivar_58_in_modbus_ascii() {
+    let Some(python) = peers::python_with("minimalmodbus") else { return };
+    let ascii = Wiring { protocol: Protocol::Ascii, ..Wiring::rtu(Family::Atv58.capabilities().factory) };
+    let rig = Rig::serving("minimalmodbus-ascii", ascii, models::atv58::Atv58::new());
+    let answer = run(Command::new(python)
+        .arg(peers::script("minimalmodbus_master.py"))
+        .arg(&rig.port)
+        // W250 HSP to W253; ACC to 1.0 s as the sample of VVDED397054 p. 23/47 writes it; CMD and W401; a word that the
+        // drive does not have.
+        .args(["ascii", "2", "r:250:4", "w:252:10", "m:400:6,500", "r:252:1", "r:900:1"]))
+    .await;
+    assert_eq!(text(&answer), "500 0 30 30\nwritten\nwritten\n10\nIllegalRequestError\n");
+    assert_eq!((rig.drive.peek(400), rig.drive.peek(401)), (Some(6), Some(500)));
+}
+
+/// A simulated drive at address 2 on a pty.
 struct Rig {
     port: PathBuf,
     drive: SimSlave,
@@ -58,8 +75,13 @@ struct Rig {
 
 impl Rig {
     fn new(name: &str) -> Self {
-        let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
-        let drive = line.add(2, models::atv312::Atv312::under_bus_control()).expect("address 2 is free");
+        let drive = models::atv312::Atv312::under_bus_control();
+        Self::serving(name, Wiring::rtu(SerialSettings::MODBUS_DEFAULT), drive)
+    }
+
+    fn serving(name: &str, wiring: Wiring, drive: impl Model + 'static) -> Self {
+        let line = SimLine::new(wiring);
+        let drive = line.add(2, drive).expect("address 2 is free");
         let port = env::temp_dir().join(format!("drived-interop-{name}-{}", std::process::id()));
         let serving = line.serve_pty(&port).expect("a pty can be had");
         Self { port, drive, _serving: serving }

@@ -3,7 +3,7 @@
 
 use std::{path::PathBuf, process::Stdio};
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
 use drive_core::SerialSettings;
 use support::{cable::Cable, peers};
 use tokio::{
@@ -35,6 +35,25 @@ async fn our_line_reads_writes_and_identifies_a_pymodbus_slave() {
     let objects: Vec<_> =
         identity.device_id_objects.iter().map(|object| (object.id, &object.value[..])).collect();
     assert_eq!(objects, [(0, &b"Telemecanique"[..]), (1, b"ATV31HU09M3S232"), (2, b"0201")]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn our_line_reads_and_writes_a_pymodbus_slave_in_modbus_ascii() {
+    let Some(python) = peers::python_with("pymodbus") else { return };
+    let cable = Cable::new();
+    let _slave = Pymodbus::start(&python, &cable, "ascii").await;
+    let config = LineConfig {
+        protocol: Protocol::Ascii(AsciiSettings::default()),
+        ..LineConfig::serial(cable.near(), SerialSettings::MODBUS_DEFAULT)
+    };
+    let line = Line::open(config).await.expect("it opens");
+    let mut slave = Context::from(line.slave(3));
+
+    assert_eq!(slave.read_holding_registers(3201, 4).await.unwrap().unwrap(), [0x0227, 500, 480, 12]);
+    slave.write_single_register(3202, 250).await.unwrap().unwrap();
+    slave.write_multiple_registers(3203, &[7, 8]).await.unwrap().unwrap();
+    assert_eq!(slave.read_holding_registers(3201, 4).await.unwrap().unwrap(), [0x0227, 250, 7, 8]);
+    assert_eq!(slave.read_holding_registers(9000, 1).await.unwrap(), Err(ExceptionCode::IllegalDataAddress));
 }
 
 /// pymodbus as slave 3 at the far end of a cable; it ends with this value.
