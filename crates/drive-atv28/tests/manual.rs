@@ -1,18 +1,22 @@
 //! The Altivar 28's map a second time, from the texts and not from the driver: the RS485 kit's manual (VVDED399092,
 //! 1999-11) and the table "Replacing an ATV28 with an ATV312" (BBV51701 06/2009, p. 57).
 
-mod wire;
-
 use drive_atv28::{Atv28, CAPABILITIES, FAULTS, ROWS, WARNINGS, words};
+use drive_bus::Line;
 use drive_core::{
-    Class, Drive, Error, ExceptionMeaning, Fault, Registers, Row, SlaveAddress, State, StopMode,
-    registers::Confidence, serial::CharacterFormat,
+    Class, Drive, Error, ExceptionMeaning, Fault, Registers, Row, State, StopMode, registers::Confidence,
+    serial::CharacterFormat,
 };
 use drive_sim::models;
-use wire::Wire;
+use drive_testing::{
+    bench::address as slave,
+    frames::{self, OtherEnd, Printed},
+    words::Words,
+};
 
-fn slave(number: u8) -> SlaveAddress {
-    SlaveAddress::try_from(number).unwrap()
+/// A line whose other end is played by the script. The manual prints no CRC: they are computed.
+fn scripted(script: &[Printed<'_>]) -> (Line, OtherEnd) {
+    frames::scripted(CAPABILITIES.factory, script)
 }
 
 /// Column by column as p. 57 prints it: ATV28 address, new address, code.
@@ -111,44 +115,45 @@ fn functions_limits_addresses_and_characters_are_those_of_the_kits_manual() {
     assert_eq!(CAPABILITIES.watchdog, None);
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn the_sample_of_function_03_is_what_a_status_sends_first() {
     // "Exemple : lecture des mots W450 à W456 de l'esclave 2". The answer's byte count is printed as 14, which is
     // decimal: 0Eh.
-    let wire = Wire::new(&[
+    let (line, other_end) = scripted(&[
         ("02 03 01C2 0007", "02 03 0E 01F4 FE0C 1234 002A 0FA3 0037 0028"),
         ("02 03 01C9 0004", "02 03 08 0000 8627 4010 0000"),
     ]);
-    let mut drive = Atv28::new(wire, slave(2));
+    let mut drive = Atv28::new(line.slave(2), slave(2));
     let status = drive.status().await.unwrap();
     assert_eq!(status.output_frequency.unwrap().centihertz(), 5_000);
     assert_eq!(status.current.unwrap().deciamperes(), 42);
     assert_eq!(status.raw(452), Some(0x1234));
     assert_eq!(status.state, State::Running);
     assert_eq!(status.to_string(), "running, reverse, 50.00 Hz, 4.2 A, at reference, control: bus");
-    assert!(drive.into_port().is_done());
+    other_end.is_done().await;
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn the_sample_of_function_16_is_what_the_register_access_sends() {
     // "Exemple : écriture des valeurs 15 et 200 dans les mots W400 et W401 de l'esclave 2".
-    let wire = Wire::new(&[("02 10 0190 0002 04 000F 00C8", "02 10 0190 0002")]);
+    let (line, other_end) = scripted(&[("02 10 0190 0002 04 000F 00C8", "02 10 0190 0002")]);
     let mut registers =
-        Registers::new(wire, slave(2), &CAPABILITIES, |_, _| drive_core::ExceptionMeaning::Unknown);
+        Registers::new(line.slave(2), slave(2), &CAPABILITIES, |_, _| drive_core::ExceptionMeaning::Unknown);
     registers.at(Class::Command).write_words(400, &[15, 200]).await.unwrap();
-    assert!(registers.into_port().is_done());
+    other_end.is_done().await;
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn function_06_is_laid_out_as_the_table_says() {
     // "Ecriture d'un mot de sortie : fonction 6": the answer repeats the question. CMD = 0 is a freewheel stop.
-    let wire = Wire::new(&[
+    let (line, other_end) = scripted(&[
         ("05 06 0190 0000", "05 06 0190 0000"),
         ("05 03 01C2 0007", "05 03 0E 0000 0000 0000 0000 0000 0000 0000"),
         ("05 03 01C9 0004", "05 03 08 0000 0240 4002 0000"),
     ]);
-    let mut drive = Atv28::new(wire, slave(5));
+    let mut drive = Atv28::new(line.slave(5), slave(5));
     assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().state, State::Disabled);
+    other_end.is_done().await;
 }
 
 #[tokio::test(start_paused = true)]
@@ -171,10 +176,10 @@ async fn the_simulated_drive_answers_as_the_frames_of_the_manual_say() {
         ("02 10 01C2 0008 10 0000 0000 0000 0000 0000 0000 0000 0000", "02 90 03"),
         ("02 06 000A 0020", "02 86 03"),
     ];
-    wire::answers(CAPABILITIES.factory, 2, models::atv28::Atv28::new(), &script).await;
+    frames::answered(CAPABILITIES.factory, 2, models::atv28::Atv28::new(), &script).await;
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn each_exception_has_its_meaning() {
     // "Réponses d'exception", codes 1 to 4; the answer's function is the question's + 80h.
     let meanings = [
@@ -185,20 +190,23 @@ async fn each_exception_has_its_meaning() {
         ("09", ExceptionMeaning::Unknown, false),
     ];
     for (code, expected, retry) in meanings {
-        let wire = Wire::new(&[("01 03 01CA 0001", &format!("01 83 {code}"))]);
-        let error = Atv28::new(wire, slave(1)).keep_alive().await.unwrap_err();
+        let (line, other_end) = scripted(&[("01 03 01CA 0001", &format!("01 83 {code}"))]);
+        let error = Atv28::new(line.slave(1), slave(1)).keep_alive().await.unwrap_err();
+        other_end.is_done().await;
         let Error::Exception { meaning, .. } = error else { panic!("{error}") };
         assert_eq!((meaning, meaning.is_worth_a_retry()), (expected, retry));
     }
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn more_words_than_the_manual_allows_are_never_sent() {
+    let (line, other_end) = scripted(&[]);
     let mut registers =
-        Registers::new(Wire::new(&[]), slave(1), &CAPABILITIES, |_, _| ExceptionMeaning::Unknown);
+        Registers::new(line.slave(1), slave(1), &CAPABILITIES, |_, _| ExceptionMeaning::Unknown);
     let mut calls = registers.at(Class::Background);
     assert!(matches!(calls.read_words(450, 8).await, Err(Error::TooManyWords { limit: 7, .. })));
     assert!(matches!(calls.write_words(264, &[0; 8]).await, Err(Error::TooManyWords { limit: 7, .. })));
+    other_end.is_done().await;
 }
 
 /// BBV51701 p. 24, W7121, code and mnemonic.
@@ -279,11 +287,8 @@ fn the_bits_are_those_of_the_twins() {
 async fn every_status_word_is_decoded_and_the_named_states_come_out_as_the_table_says() {
     // BBV51701 p. 10 and 21, ETA under the mask 006Fh. ETI = 4002h: the bus commands, the motor stands.
     for eta in 0..=u16::MAX {
-        let wire = Wire::new(&[
-            ("01 03 01C2 0007", "01 03 0E 0000 0000 0000 0000 0000 0000 0000"),
-            ("01 03 01C9 0004", &format!("01 03 08 0011 {eta:04X} 4002 FFFF")),
-        ]);
-        let status = Atv28::new(wire, slave(1)).status().await.unwrap();
+        let words = [(457, 0x11), (458, eta), (459, 0x4002), (460, 0xFFFF)];
+        let status = Atv28::new(Words::new(&CAPABILITIES, &words), slave(1)).status().await.unwrap();
         let expected = match eta & 0x006F {
             0x00 | 0x20 => State::NotReady,
             0x40 | 0x60 | 0x21 => State::Disabled,

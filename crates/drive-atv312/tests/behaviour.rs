@@ -1,18 +1,42 @@
 //! The drive against its simulated counterpart, over a real line in virtual time.
 
-mod rig;
-
 use std::time::Duration;
 
-use drive_atv312::words::FaultState;
+use drive_atv312::{Atv312, CAPABILITIES, ROWS, words::FaultState};
+use drive_bus::{Line, Slave};
 use drive_core::{
     Command, Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Frequency, Reaction, Refusal,
-    Setpoint, SetpointProblem, Speed, State, StopMode,
+    Row, Setpoint, SetpointProblem, Speed, State, StopMode,
 };
-use drive_sim::{Exception, Panel};
-use rig::{commands, factory, rig, row, running, writes};
+use drive_sim::{Exception, Panel, SimSlave, models};
+use drive_testing::bench::{self, writes};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
+
+/// A drive that is set up for the bus.
+fn rig() -> (Atv312<Slave>, SimSlave, Line) {
+    bench::on_a_line(&CAPABILITIES, models::atv312::Atv312::under_bus_control(), Atv312::new)
+}
+
+/// A drive as it leaves the factory.
+fn factory() -> (Atv312<Slave>, SimSlave, Line) {
+    bench::on_a_line(&CAPABILITIES, models::atv312::Atv312::new(), Atv312::new)
+}
+
+/// A drive that runs at 50 Hz.
+async fn running() -> (Atv312<Slave>, SimSlave, Line) {
+    let (mut drive, machine, line) = rig();
+    bench::run_at_fifty(&mut drive, &machine).await;
+    (drive, machine, line)
+}
+
+fn row(code: &str) -> &'static Row {
+    Row::find(ROWS, code).unwrap()
+}
+
+fn commands(machine: &SimSlave) -> Vec<u16> {
+    bench::written(machine, row("CMD").address)
+}
 
 fn refusal(error: &Error) -> Option<Refusal> {
     match error {
@@ -126,9 +150,9 @@ async fn a_stop_never_enables_a_drive_that_is_only_ready() {
         let (drive, machine, line) = rig();
         let write = drive.broadcast_stop(mode).unwrap();
         for step in [0x0006, 0x0007] {
-            rig::write(&line, 8501, step).await;
+            bench::write(&line, 8501, step).await;
         }
-        rig::broadcast(&line, write).await;
+        bench::broadcast(&line, write).await;
         assert_eq!(machine.peek(3201).unwrap() & 0x006F, 0x0040, "{mode}");
         assert!(drive.capabilities().broadcast_stops.contains(&mode));
     }
@@ -178,7 +202,7 @@ async fn a_start_is_refused_before_anything_is_written() {
 #[tokio::test(start_paused = true)]
 async fn a_start_out_of_a_quick_stop_waits_for_standstill() {
     let (mut drive, machine, line) = running().await;
-    rig::write(&line, 8501, 0x0002).await;
+    bench::write(&line, 8501, 0x0002).await;
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert_eq!(refusal(&error), Some(Refusal::State(State::QuickStop)));
     assert_eq!(drive.status().await.unwrap().state, State::QuickStop);

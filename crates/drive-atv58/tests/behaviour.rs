@@ -3,24 +3,21 @@
 
 use std::time::Duration;
 
-use drive_atv58::{Atv58, Atv58Map, ROWS};
-use drive_bus::{Line, LineConfig, Slave};
+use drive_atv58::{Atv58, Atv58Map, CAPABILITIES, ROWS};
+use drive_bus::{Line, Slave};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, Frequency, Reaction, Refusal, Row, SerialSettings, Setpoint,
-    SetpointProblem, SlaveAddress, Speed, State, StopMode, Watchdog, serial::CharacterFormat,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Reaction, Refusal, Row, Setpoint,
+    SetpointProblem, Speed, State, StopMode, Watchdog,
 };
-use drive_sim::{Panel, SimLine, SimSlave, Wiring, models};
+use drive_sim::{Panel, SimSlave, models};
+use drive_testing::bench;
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
 
-/// A line with one drive at address 1, and the machine beside it.
+/// A line with one drive, and the machine beside it.
 fn rig_with(map: Atv58Map) -> (Atv58<Slave>, SimSlave, Line) {
-    let settings = SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap();
-    let sim = SimLine::new(Wiring::rtu(settings));
-    let machine = sim.add(1, models::atv58::Atv58::new()).unwrap();
-    let line = Line::over(sim.in_memory(), LineConfig::stream(settings));
-    let drive = Atv58::with_map(line.slave(1), SlaveAddress::try_from(1).unwrap(), map);
-    (drive, machine, line)
+    let open = |port, slave| Atv58::with_map(port, slave, map);
+    bench::on_a_line(&CAPABILITIES, models::atv58::Atv58::new(), open)
 }
 
 fn rig() -> (Atv58<Slave>, SimSlave, Line) {
@@ -29,9 +26,7 @@ fn rig() -> (Atv58<Slave>, SimSlave, Line) {
 
 async fn running() -> (Atv58<Slave>, SimSlave, Line) {
     let (mut drive, machine, line) = rig();
-    drive.set_setpoint(FIFTY).await.unwrap();
-    drive.start(Direction::Forward).await.unwrap();
-    machine.wait_until(|seen| seen.output_frequency == 5_000).await;
+    bench::run_at_fifty(&mut drive, &machine).await;
     (drive, machine, line)
 }
 
@@ -39,11 +34,8 @@ fn row(code: &str) -> &'static Row {
     Row::find(ROWS, code).unwrap()
 }
 
-/// The words that were written to CMD.
 fn commands(machine: &SimSlave) -> Vec<u16> {
-    let received = machine.received();
-    let writes = received.iter().filter(|request| request.pdu.starts_with(&[0x06, 0x01, 0x90]));
-    writes.map(|request| u16::from_be_bytes([request.pdu[3], request.pdu[4]])).collect()
+    bench::written(machine, row("CMD").address)
 }
 
 #[tokio::test(start_paused = true)]
@@ -282,9 +274,7 @@ async fn a_broadcast_stop_stops_every_drive() {
     for mode in [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel] {
         let (drive, machine, line) = running().await;
         let write = drive.broadcast_stop(mode).unwrap();
-        let mut all: tokio_modbus::client::Context = line.broadcast().into();
-        let sent = tokio_modbus::client::Writer::write_single_register(&mut all, write.register, write.value);
-        sent.await.unwrap().unwrap();
+        bench::broadcast(&line, write).await;
         machine.wait_until(|seen| seen.shaft_frequency == 0 && !seen.running).await;
     }
 }

@@ -1,0 +1,14 @@
+//! What the tests of the drive families share.
+//!
+//! - [`frames`]: the frames that a manual prints, as bytes on a wire: what a driver sends on a real line and how it reads
+//!   the answer, and what a simulated drive answers.
+//! - [`words`]: a drive that is nothing but words, behind a plain port: what is asked of it, and what becomes of writes.
+//! - [`babble`]: a drive that answers any word to anything.
+//! - [`bench`](mod@bench): one simulated drive on a line in virtual time.
+//!
+//! This crate is for tests: its functions panic when what they check is not so.
+
+pub mod babble;
+pub mod bench;
+pub mod frames;
+pub mod words;
