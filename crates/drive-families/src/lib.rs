@@ -9,6 +9,8 @@
 //! # Ok::<(), drive_families::UnknownFamily>(())
 //! ```
 
+mod options;
+
 use std::{fmt, str::FromStr};
 
 use drive_3g3ev::Drive3g3ev;
@@ -17,6 +19,8 @@ use drive_atv28::Atv28;
 use drive_atv58::Atv58;
 use drive_atv312::Atv312;
 use drive_core::{Capabilities, Drive, Port, Row, SlaveAddress};
+
+pub use crate::options::{OPTIONS, OptionEntry, OptionError, Options};
 
 /// A family of drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -61,15 +65,52 @@ impl Family {
         }
     }
 
+    /// The serial protocols that it speaks, by the names that configurations use: `rtu`, `ascii`, `unitelway`.
+    #[must_use]
+    pub const fn protocols(self) -> &'static [&'static str] {
+        match self {
+            // Card VW3-A58303 (VVDED397054 p. 2 and 26).
+            Self::Atv58 => &["rtu", "ascii", "unitelway"],
+            Self::Atv21 | Self::Atv28 | Self::Atv312 | Self::Omron3g3ev => &["rtu"],
+        }
+    }
+
     /// A drive of this family behind a port. Nothing is sent by it.
     #[must_use]
     pub fn open(self, port: impl Port + 'static, slave: SlaveAddress) -> Box<dyn Drive> {
+        self.build(port, slave, &Options::default())
+    }
+
+    /// A drive of this family of which its owner says more than the bus can tell. Nothing is sent by it.
+    ///
+    /// # Errors
+    /// [`OptionError::Family`] for an option that is another family's.
+    pub fn open_with(
+        self,
+        port: impl Port + 'static,
+        slave: SlaveAddress,
+        options: &Options,
+    ) -> Result<Box<dyn Drive>, OptionError> {
+        options.check(self)?;
+        Ok(self.build(port, slave, options))
+    }
+
+    /// The drive with those of the options that are its family's.
+    fn build(self, port: impl Port + 'static, slave: SlaveAddress, options: &Options) -> Box<dyn Drive> {
         match self {
-            Self::Atv21 => Box::new(Atv21::new(port, slave)),
+            Self::Atv21 => {
+                Box::new(Atv21::new(port, slave).with_authority(options.authority.unwrap_or_default()))
+            }
             Self::Atv28 => Box::new(Atv28::new(port, slave)),
-            Self::Atv58 => Box::new(Atv58::new(port, slave)),
+            Self::Atv58 => Box::new(Atv58::with_map(port, slave, options.map.unwrap_or_default())),
             Self::Atv312 => Box::new(Atv312::new(port, slave)),
-            Self::Omron3g3ev => Box::new(Drive3g3ev::new(port, slave)),
+            Self::Omron3g3ev => {
+                let drive = Drive3g3ev::new(port, slave).with_saves(options.saves.unwrap_or_default());
+                Box::new(match options.fault_reset_function {
+                    Some(number) => drive.with_fault_reset_function(number),
+                    None => drive,
+                })
+            }
         }
     }
 }
