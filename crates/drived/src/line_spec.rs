@@ -1,16 +1,19 @@
-//! What `--line` says: `PATH[,BAUD[,FORMAT]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`, and the
-//! settings that the drives on it share.
+//! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
+//! and the settings that the drives on it share.
 
 use std::{fmt, str::FromStr};
 
-use drive_bus::{LineConfig, SlaveSettings};
+use drive_bus::{
+    LineConfig, Protocol, SlaveSettings,
+    protocol::{ProtocolError, ProtocolMismatch},
+};
 use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings};
 
 use crate::drive_spec::DriveName;
 
 /// What a line is, for the help of `--line`.
-pub(crate) const HELP: &str =
-    "The line: PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT";
+pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; PROTOCOL is \
+     rtu, ascii or unitelway";
 
 /// A line as a person names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,13 +34,17 @@ enum Target {
 pub(crate) struct SerialSpec {
     pub(crate) baud: Option<u32>,
     pub(crate) format: Option<CharacterFormat>,
+    pub(crate) protocol: Protocol,
 }
 
 impl LineSpec {
     /// The configuration of this line for these drives, checked against what each family can be set to.
     pub(crate) fn config(&self, drives: &[DriveName]) -> Result<LineConfig, LineSpecError> {
         let config = match &self.target {
-            Target::Serial(path) => LineConfig::serial(path, self.serial.settings(drives)?),
+            Target::Serial(path) => {
+                let config = LineConfig::serial(path, self.serial.settings(drives)?);
+                LineConfig { protocol: self.serial.protocol, ..config }
+            }
             Target::RtuOverTcp(address) => {
                 LineConfig::rtu_over_tcp(address.as_str(), self.serial.settings(drives)?)
             }
@@ -83,9 +90,15 @@ impl SerialSpec {
         };
         let settings = SerialSettings::new(baud, format)?;
         for name in drives {
+            let spoken = name.family.protocols();
+            if !spoken.contains(&self.protocol.to_string().as_str()) {
+                let problem = format!("it speaks {} and not {}", spoken.join(", "), self.protocol);
+                return Err(LineSpecError::Drive(*name, problem));
+            }
             let checked = name.family.capabilities().check_line(name.slave, settings);
             checked.map_err(|mismatch| LineSpecError::Drive(*name, mismatch.to_string()))?;
         }
+        self.protocol.check(settings)?;
         Ok(settings)
     }
 }
@@ -109,7 +122,9 @@ fn agreed<T: PartialEq + fmt::Display>(
 /// A text that is no line, or a line that the drives cannot share.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum LineSpecError {
-    #[error("expected PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT")]
+    #[error(
+        "expected PATH[,BAUD[,FORMAT[,PROTOCOL]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT"
+    )]
     Form,
     #[error("{0:?} is not HOST:PORT, such as gateway.local:502 or [::1]:502")]
     Address(String),
@@ -119,6 +134,12 @@ pub(crate) enum LineSpecError {
     Baud(#[from] BaudError),
     #[error(transparent)]
     Format(#[from] CharacterFormatError),
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
+    #[error(transparent)]
+    ProtocolMismatch(#[from] ProtocolMismatch),
+    #[error("over TCP the serial server speaks Modbus RTU: expected rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]")]
+    TcpProtocol,
     #[error("Modbus TCP has no speed and no format: expected tcp://HOST:PORT")]
     TcpSettings,
     #[error("no drive is named")]
@@ -153,21 +174,40 @@ impl FromStr for LineSpec {
             }
             (Target::Serial(path.to_owned()), settings)
         };
-        let serial = settings.map(str::parse).transpose()?.unwrap_or_default();
+        let serial: SerialSpec = settings.map(str::parse).transpose()?.unwrap_or_default();
+        if matches!(target, Target::RtuOverTcp(_)) && serial.protocol != Protocol::Rtu {
+            return Err(LineSpecError::TcpProtocol);
+        }
         Ok(Self { target, serial })
     }
 }
 
-/// It is written `BAUD[,FORMAT]`.
+/// It is written `BAUD[,FORMAT[,PROTOCOL]]`.
 impl FromStr for SerialSpec {
     type Err = LineSpecError;
 
     fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        let (baud, format) = match text.split_once(',') {
-            Some((baud, format)) => (baud, Some(format)),
-            None => (text, None),
-        };
-        Ok(Self { baud: Some(speed(baud)?), format: format.map(str::parse).transpose()? })
+        let (baud, rest) = split_settings(text);
+        let characters: Option<CharacterSpec> = rest.map(str::parse).transpose()?;
+        let CharacterSpec { format, protocol } = characters.unwrap_or_default();
+        Ok(Self { baud: Some(speed(baud)?), format, protocol })
+    }
+}
+
+/// Format and protocol, as `FORMAT[,PROTOCOL]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct CharacterSpec {
+    pub(crate) format: Option<CharacterFormat>,
+    pub(crate) protocol: Protocol,
+}
+
+impl FromStr for CharacterSpec {
+    type Err = LineSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LineSpecError> {
+        let (format, protocol) = split_settings(text);
+        let protocol = protocol.map(str::parse).transpose()?.unwrap_or_default();
+        Ok(Self { format: Some(format.parse()?), protocol })
     }
 }
 
@@ -225,6 +265,19 @@ mod tests {
             config("tcp://plant:502", &["atv312@1"]).unwrap().endpoint,
             Endpoint::ModbusTcp("plant:502".into())
         );
+    }
+
+    #[test]
+    fn the_protocol_stands_behind_the_format_for_the_drives_that_speak_it() {
+        let spoken = |line| config(line, &["atv58@1"]).map(|config| config.protocol.to_string());
+        assert_eq!(spoken("COM3,9600,8E1").unwrap(), "rtu");
+        assert_eq!(spoken("COM3,9600,7E1,ascii").unwrap(), "ascii");
+        assert_eq!(spoken("COM3,19200,8O1,unitelway").unwrap(), "unitelway");
+        let error = config("COM3,9600,8E1,ascii", &["atv312@1"]).unwrap_err().to_string();
+        assert_eq!(error, "atv312@1: it speaks rtu and not ascii");
+        assert!(spoken("COM3,9600,7E1").unwrap_err().to_string().contains("8 data bits"));
+        assert!(spoken("COM3,9600,8E1,unitelway").unwrap_err().to_string().contains("8O1"));
+        assert!("rtu+tcp://plant:4001,9600,7E1,ascii".parse::<LineSpec>().is_err());
     }
 
     #[test]

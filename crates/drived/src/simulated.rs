@@ -1,5 +1,6 @@
 //! Simulated drives, for `sim` and `demo`.
 
+use drive_bus::Protocol;
 use drive_families::Family;
 use drive_sim::{Model, models};
 
@@ -9,8 +10,17 @@ pub(crate) fn model(family: Family) -> Box<dyn Model> {
         Family::Atv21 => Box::new(models::atv21::Atv21::new().with_blocks()),
         Family::Atv28 => Box::new(models::atv28::Atv28::new()),
         Family::Atv58 => Box::new(models::atv58::Atv58::new()),
-        Family::Atv312 => Box::new(models::atv312::Atv312::new()),
+        Family::Atv312 => Box::new(models::atv312::Atv312::under_bus_control()),
         Family::Omron3g3ev => Box::new(models::drive_3g3ev::Drive3g3ev::new()),
+    }
+}
+
+/// The simulator's name of a protocol.
+pub(crate) const fn protocol(protocol: Protocol) -> drive_sim::Protocol {
+    match protocol {
+        Protocol::Rtu => drive_sim::Protocol::Rtu,
+        Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
+        Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
     }
 }
 

@@ -22,6 +22,21 @@ fn a_drive_is_started_watched_and_stopped_by_the_words_that_it_confirms() {
 }
 
 #[test]
+fn an_altivar_58_is_started_and_stopped_on_each_protocol_of_its_card() {
+    for (baud, format) in [("19200", "8O1"), ("9600", "7E1,ascii"), ("19200", "8O1,unitelway")] {
+        let sim = Sim::serve_with("protocols", &["atv58@1-3"], &["--baud", baud, "--format", format]);
+        let line = format!("{},{baud},{format}", sim.link());
+        let on = |subcommand: &[&str]| run(&[subcommand, &["--line", &line, "--drive", "atv58@2"]].concat());
+        assert!(on(&["setpoint", "30Hz"]).assert_done().contains("holds the setpoint 30.00 Hz"), "{format}");
+        assert!(
+            on(&["start"]).assert_done().contains("started forward: the drive shows running"),
+            "{format}"
+        );
+        assert!(on(&["stop"]).assert_done().contains("is stopping"), "{format}");
+    }
+}
+
+#[test]
 fn a_drive_without_a_fault_says_so() {
     let sim = Sim::serve("faults", &["atv312@1"]);
     let faults = sim.on("atv312@1", &["faults"]);

@@ -2,13 +2,12 @@
 
 use std::path::PathBuf;
 
-use drive_core::serial::CharacterFormat;
 use drive_sim::{SimLine, Wiring};
 
 use crate::{
     drive_spec::{self, DriveName, DriveSpec},
     failure::Failure,
-    line_spec::{self, SerialSpec},
+    line_spec::{self, CharacterSpec, SerialSpec},
     output,
     signals::Ending,
     simulated,
@@ -26,18 +25,20 @@ pub(crate) struct Args {
     /// Speed in bit/s; the drives' factory setting when it is not given
     #[arg(long, value_name = "N", value_parser = line_spec::speed)]
     baud: Option<u32>,
-    /// Character format, such as 8E1; the drives' factory setting when it is not given
-    #[arg(long, value_name = "FORMAT")]
-    format: Option<CharacterFormat>,
+    /// Character format, such as 8E1, and with a comma the protocol, such as 7E1,ascii or 8O1,unitelway; the drives'
+    /// factory setting and Modbus RTU when they are not given
+    #[arg(long, value_name = "FORMAT[,PROTOCOL]")]
+    format: Option<CharacterSpec>,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
     let drives = drive_spec::on_one_line(&args.drives).map_err(|error| input(&error))?;
-    let settings = SerialSpec { baud: args.baud, format: args.format }.settings(&drives);
+    let CharacterSpec { format, protocol } = args.format.unwrap_or_default();
+    let settings = SerialSpec { baud: args.baud, format, protocol }.settings(&drives);
     let settings = settings.map_err(|error| input(&error))?;
     let mut ending = Ending::listen()?;
-    let line = SimLine::new(Wiring::rtu(settings));
+    let line = SimLine::new(Wiring { protocol: simulated::protocol(protocol), ..Wiring::rtu(settings) });
     for name in &drives {
         let model = simulated::model(name.family);
         line.add_boxed(name.slave.number(), model).map_err(|error| input(&error))?;
@@ -45,7 +46,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let served = line.serve_pty(&args.pty);
     let mut serving = served.map_err(|error| Failure::Input(format!("--pty: {error}")))?;
 
-    output::say(format_args!("serving {settings} on {} (Ctrl-C ends it)", args.pty.display()))?;
+    output::say(format_args!("serving {settings} {protocol} on {} (Ctrl-C ends it)", args.pty.display()))?;
     for name in &drives {
         output::say(describe(name))?;
     }

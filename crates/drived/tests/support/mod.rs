@@ -116,8 +116,14 @@ pub(crate) struct Sim {
 
 impl Sim {
     pub(crate) fn serve(name: &str, drives: &[&str]) -> Self {
+        Self::serve_with(name, drives, &[])
+    }
+
+    /// The same with more arguments.
+    pub(crate) fn serve_with(name: &str, drives: &[&str], more: &[&str]) -> Self {
         let link = path(name);
         let mut arguments = vec!["sim", "--pty", link.to_str().expect("the path is text")];
+        arguments.extend(more);
         for drive in drives {
             arguments.extend(["--drive", drive]);
         }
