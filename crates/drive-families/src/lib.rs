@@ -75,16 +75,6 @@ impl Family {
         }
     }
 
-    /// The serial protocols that it speaks, by the names that configurations use: `rtu`, `ascii`, `unitelway`.
-    #[must_use]
-    pub const fn protocols(self) -> &'static [&'static str] {
-        match self {
-            // Card VW3-A58303 (VVDED397054 p. 2 and 26).
-            Self::Atv58 => &["rtu", "ascii", "unitelway"],
-            Self::Atv21 | Self::Atv28 | Self::Atv312 | Self::Omron3g3ev => &["rtu"],
-        }
-    }
-
     /// A drive of this family behind a port. Nothing is sent by it.
     #[must_use]
     pub fn open(self, port: impl Port + 'static, slave: SlaveAddress) -> Box<dyn Drive> {
