@@ -10,6 +10,7 @@ use drive_core::{
     Refusal, Row, Setpoint, SetpointProblem, State, StopMode, Watchdog, registers::Storage,
 };
 use drive_sim::{Panel, SimSlave, models::drive_3g3ev::Drive3g3ev as Model};
+use drive_testing::bench::{self, writes};
 use rig::{RESET, Rig, one};
 use tokio_modbus::{Request, client::Client};
 
@@ -42,15 +43,8 @@ fn set_up(machine: &SimSlave, parameters: &[(u16, u16)]) {
     machine.power_cycle();
 }
 
-/// The words that were written to 0001h.
 fn commands(machine: &SimSlave) -> Vec<u16> {
-    let received = machine.received();
-    let writes = received.iter().filter(|request| request.pdu.starts_with(&[0x10, 0, 1]));
-    writes.map(|request| u16::from_be_bytes([request.pdu[6], request.pdu[7]])).collect()
-}
-
-fn writes(machine: &SimSlave) -> u64 {
-    machine.requests(0x10)
+    bench::written(machine, 0x0001)
 }
 
 #[tokio::test(start_paused = true)]
@@ -256,7 +250,7 @@ async fn a_reset_without_an_input_for_it_is_unsupported_and_says_why() {
     let (drive, machine, rig) = one();
     machine.trip(0);
     drop(drive);
-    let mut unknowing = drive_3g3ev::Drive3g3ev::new(rig.line.slave(1), rig::address(1));
+    let mut unknowing = drive_3g3ev::Drive3g3ev::new(rig.line.slave(1), bench::address(1));
     let error = unknowing.reset_faults().await.unwrap_err();
     assert!(error.to_string().contains("was not given"), "{error}");
     machine.poke(0x0107, 2);

@@ -14,7 +14,12 @@ use drive_core::{
     serial::CharacterFormat,
 };
 use drive_sim::models::drive_3g3ev::Drive3g3ev as Model;
-use rig::{Rig, address};
+use drive_testing::{
+    bench::{self, address},
+    frames::{self, Printed},
+    words::Words,
+};
+use rig::Rig;
 use tokio_modbus::{Request, client::Client};
 
 fn row(address: u16) -> &'static Row {
@@ -231,35 +236,49 @@ fn the_faults_of_0021h_and_the_alarms_beside_them() {
     assert!(FAULTS.iter().chain(WARNINGS).all(|entry| entry.remedy.len() > 10));
 }
 
-/// "CRC-16": initialise to FFFFh; XOR each byte; shift right eight times, XOR A001h when a 1 falls out. What the manual
-/// calls "poids fort" and prints first is the low byte.
-fn crc(frame: &str) -> String {
-    let byte = |at: usize| u8::from_str_radix(&frame[at..at + 2], 16).unwrap();
-    let mut crc = 0xFFFF_u16;
-    for at in (0..frame.len()).step_by(2) {
-        crc ^= u16::from(byte(at));
-        for _ in 0..8 {
-            crc = if crc & 1 == 1 { crc >> 1 ^ 0xA001 } else { crc >> 1 };
-        }
-    }
-    let [low, high] = crc.to_le_bytes();
-    format!("{low:02X}{high:02X}")
+/// §4.1.2.
+const LOOP_BACK: Printed<'_> = ("01 08 0000 A537 | DA8D", "01 08 0000 A537 | DA8D");
+/// §4.2.2. Of what is refused only the answer is printed.
+const READ_FOUR: Printed<'_> = ("02 03 0020 0004 | 45F0", "02 03 08 0085 0000 0000 01F4 | 4E4C");
+const TOO_MANY: Printed<'_> = ("02 03 0020 0009", "02 83 03 | F131");
+/// §4.3.2. The answer's start register is printed 0120h; its CRC is that of 0001h.
+const WRITE_TWO: Printed<'_> = ("01 10 0001 0002 04 0001 0258 | 6339", "01 10 0001 0002 | 1008");
+const NO_REGISTER: Printed<'_> = ("01 10 0220 0001 02 0000", "01 90 02 | CDC1");
+/// §4.5. The answer is not printed.
+const ENTER: Printed<'_> = ("01 10 0900 0001 02 0000 | 3F50", "01 10 0900 0001");
+/// §6.
+const SIXTY_HERTZ_1: Printed<'_> = ("0110 0002 0001 02 0258 | A728", "0110 0002 0001 | A009");
+const SIXTY_HERTZ_2: Printed<'_> = ("0210 0002 0001 02 0258 | B3D8", "0210 0002 0001 | A03A");
+const RUN: Printed<'_> = ("0010 0001 0001 02 0001 | 6BD1", "");
+const OUTPUT_1: Printed<'_> = ("0103 0024 0001 | C401", "0103 02 0258 | B8DE");
+const OUTPUT_2: Printed<'_> = ("0203 0024 0001 | C432", "0203 02 0258 | FCDE");
+const STATE_2: Printed<'_> = ("0203 002C 0001 | 45F0", "0203 02 0065 | 3C6F");
+const ACCELERATION_1: Printed<'_> = ("0110 0114 0001 02 0014 | B58B", "0110 0114 0001 | 4031");
+
+#[tokio::test(start_paused = true)]
+async fn every_printed_frame_is_sent_and_read() {
+    let printed = [
+        LOOP_BACK,
+        READ_FOUR,
+        TOO_MANY,
+        WRITE_TWO,
+        NO_REGISTER,
+        ENTER,
+        SIXTY_HERTZ_1,
+        SIXTY_HERTZ_2,
+        RUN,
+        OUTPUT_1,
+        OUTPUT_2,
+        STATE_2,
+        ACCELERATION_1,
+    ];
+    assert_eq!(frames::with_crc(&printed), 22);
+    frames::sent_and_read(&CAPABILITIES, &printed).await;
 }
 
-/// Frames as the manual prints them: the last group of a frame is its CRC, or `crc` where it prints "+ CRC".
-fn printed(frames: &[&str]) -> Vec<String> {
-    let one = |text: &&str| match text.rsplit_once(' ').unwrap() {
-        (frame, "crc") => {
-            let frame = frame.replace(' ', "");
-            format!("{frame}{}", crc(&frame))
-        }
-        (frame, sum) => {
-            let frame = frame.replace(' ', "");
-            assert_eq!(crc(&frame), sum, "the printed CRC of {frame}");
-            format!("{frame}{sum}")
-        }
-    };
-    frames.iter().map(one).collect()
+/// The bytes of an exchange. In the tests below they cross the wire between the driver and the simulated drive.
+fn bytes((request, answer): Printed<'_>) -> [Vec<u8>; 2] {
+    [request, answer].map(frames::frame)
 }
 
 /// Two drives, as in §2.2, running at 60 Hz or not.
@@ -271,18 +290,11 @@ fn registers<P: Port>(port: P, number: u8) -> Registers<P> {
     Registers::new(port, address(number), &CAPABILITIES, |_, _| ExceptionMeaning::Unknown)
 }
 
-async fn send(rig: &Rig, write: drive_core::BroadcastWrite) {
-    let request = Request::WriteMultipleRegisters(write.register, vec![write.value].into());
-    assert_eq!(write.function, 0x10);
-    rig.line.broadcast().call(request).await.unwrap().unwrap();
-}
-
 #[tokio::test(start_paused = true)]
 async fn section_4_1_2_the_loop_back_is_the_keep_alive() {
     let rig = two();
     rig.drive(1).keep_alive().await.unwrap();
-    let frame = "01 08 0000 A537 DA8D";
-    assert_eq!(rig.frames.take(), printed(&[frame, frame]));
+    assert_eq!(rig.frames.take(), bytes(LOOP_BACK));
 }
 
 #[tokio::test(start_paused = true)]
@@ -294,8 +306,7 @@ async fn section_4_2_2_four_registers_are_read() {
     }
     let words = registers(rig.line.slave(2), 2).at(Class::Status).read_words(0x20, 4).await.unwrap();
     assert_eq!(words, [0x85, 0, 0, 0x01F4]);
-    let frames = ["02 03 0020 0004 45F0", "02 03 08 0085 0000 0000 01F4 4E4C"];
-    assert_eq!(rig.frames.take(), printed(&frames));
+    assert_eq!(rig.frames.take(), bytes(READ_FOUR));
 }
 
 #[tokio::test(start_paused = true)]
@@ -304,16 +315,14 @@ async fn section_4_2_2_too_many_registers_are_exception_03() {
     // Nine registers: past the limit that the driver keeps, so straight to the line.
     let answer = rig.line.slave(2).call(Request::ReadHoldingRegisters(0x20, 9)).await.unwrap();
     assert_eq!(u8::from(answer.unwrap_err()), 3);
-    assert_eq!(rig.frames.take()[1..], printed(&["02 83 03 F131"]));
+    assert_eq!(rig.frames.take(), bytes(TOO_MANY));
 }
 
 #[tokio::test(start_paused = true)]
 async fn section_4_3_2_two_registers_are_written() {
     let rig = two();
     registers(rig.line.slave(1), 1).at(Class::Command).write_words(1, &[1, 0x0258]).await.unwrap();
-    // The answer's start register is printed 0120h; its CRC is that of 0001h.
-    let frames = ["01 10 0001 0002 04 0001 0258 6339", "01 10 0001 0002 1008"];
-    assert_eq!(rig.frames.take(), printed(&frames));
+    assert_eq!(rig.frames.take(), bytes(WRITE_TWO));
     assert_eq!(rig.machines[0].peek(2), Some(600));
 }
 
@@ -323,7 +332,7 @@ async fn section_4_3_2_an_unknown_register_is_exception_02() {
     let mut registers = registers(rig.line.slave(1), 1);
     let error = registers.at(Class::Background).write_word(0x0120 + 0x100, 0).await.unwrap_err();
     assert!(matches!(error, Error::Exception { code: 2, .. }), "{error}");
-    assert_eq!(rig.frames.take()[1..], printed(&["01 90 02 CDC1"]));
+    assert_eq!(rig.frames.take(), bytes(NO_REGISTER));
 }
 
 #[tokio::test(start_paused = true)]
@@ -333,8 +342,7 @@ async fn section_4_5_enter_is_the_save() {
     drive.write_parameter(row(0x0114), 50).await.unwrap();
     rig.frames.take();
     assert_eq!(drive.persist().await, Ok(1));
-    let frames = ["01 10 0900 0001 02 0000 3F50", "01 10 0900 0001 crc"];
-    assert_eq!(rig.frames.take(), printed(&frames));
+    assert_eq!(rig.frames.take(), bytes(ENTER));
 }
 
 #[tokio::test(start_paused = true)]
@@ -343,12 +351,12 @@ async fn section_5_4_the_acceleration_time_is_read_and_changed() {
     rig.machines[0].poke(0x0114, 3);
     let mut drive = rig.drive(1);
     assert_eq!(drive.read_parameter(row(0x0114)).await, Ok(3));
-    let frames = printed(&["0103 0114 0001 crc", "0103 02 0003 crc"]);
-    assert_eq!(rig.frames.take(), frames);
+    let read = bytes(("0103 0114 0001", "0103 02 0003"));
+    assert_eq!(rig.frames.take(), read);
     drive.write_parameter(row(0x0114), row(0x0114).read("5").unwrap()).await.unwrap();
-    let written = printed(&["0110 0114 0001 02 0032 crc", "0110 0114 0001 crc"]);
+    let written = bytes(("0110 0114 0001 02 0032", "0110 0114 0001"));
     let sent = rig.frames.take();
-    assert_eq!((&sent[..2], &sent[2..4]), (&frames[..], &written[..]), "read first, then written");
+    assert_eq!((&sent[..2], &sent[2..4]), (&read[..], &written[..]), "read first, then written");
     assert_eq!(rig.machines[0].peek(0x0114), Some(50));
 }
 
@@ -361,34 +369,29 @@ async fn section_6_two_drives_at_60_hz() {
         drive.set_setpoint(Frequency::from_hertz(60).into()).await.unwrap();
     }
     let sent = rig.frames.take();
-    for pair in [
-        ["0110 0002 0001 02 0258 A728", "0110 0002 0001 A009"],
-        ["0210 0002 0001 02 0258 B3D8", "0210 0002 0001 A03A"],
-    ] {
-        let pair = printed(&pair);
-        assert!(sent.windows(2).any(|frames| frames == pair), "{pair:?} in {sent:?}");
+    for exchange in [SIXTY_HERTZ_1, SIXTY_HERTZ_2] {
+        let pair = bytes(exchange);
+        assert!(sent.windows(2).any(|frames| frames == pair), "{exchange:?} in {sent:02X?}");
     }
-    send(&rig, broadcast::run(Direction::Forward)).await;
-    assert_eq!(rig.frames.take(), printed(&["0010 0001 0001 02 0001 6BD1"]));
+    bench::broadcast(&rig.line, broadcast::run(Direction::Forward)).await;
+    assert_eq!(rig.frames.take(), bytes(RUN)[..1]);
     // The drives trip when nothing is said for 2 s.
     while rig.machines.iter().any(|machine| machine.observe().output_frequency != 6_000) {
         first.keep_alive().await.unwrap();
         second.keep_alive().await.unwrap();
     }
     rig.frames.take();
-    for (number, frames) in
-        [(1, ["0103 0024 0001 C401", "0103 02 0258 B8DE"]), (2, ["0203 0024 0001 C432", "0203 02 0258 FCDE"])]
-    {
+    for (number, exchange) in [(1, OUTPUT_1), (2, OUTPUT_2)] {
         let mut registers = registers(rig.line.slave(number), number);
         assert_eq!(registers.at(Class::Status).read(registers::OUTPUT_FREQUENCY).await, Ok(600));
-        assert_eq!(rig.frames.take(), printed(&frames));
+        assert_eq!(rig.frames.take(), bytes(exchange));
     }
     second.status().await.unwrap();
     // 0065h: running, at the reference, above n53, ready.
-    assert_eq!(rig.frames.take()[2..], printed(&["0203 002C 0001 45F0", "0203 02 0065 3C6F"]));
+    assert_eq!(rig.frames.take()[2..], bytes(STATE_2));
     first.write_parameter(row(0x0114), 0x14).await.unwrap();
     let sent = rig.frames.take();
-    assert_eq!(sent[2..4], printed(&["0110 0114 0001 02 0014 B58B", "0110 0114 0001 4031"]));
+    assert_eq!(sent[2..4], bytes(ACCELERATION_1));
     assert_eq!(rig.sim.violations(), []);
 }
 
@@ -403,9 +406,9 @@ async fn each_error_of_section_4_4_has_its_meaning() {
         (0x04, ExceptionMeaning::Unknown),
     ];
     for (code, expected) in meanings {
-        let mut words = rig::Words::ready();
+        let mut words = rig::ready();
         words.refused.insert(0x0114, code);
-        let error = words.drive().read_parameter(row(0x0114)).await.unwrap_err();
+        let error = rig::drive(words).read_parameter(row(0x0114)).await.unwrap_err();
         let Error::Exception { meaning, .. } = error else { panic!("{error}") };
         assert_eq!((meaning, meaning.is_worth_a_retry()), (expected, false), "{code:02X}h");
     }
@@ -423,7 +426,7 @@ fn broadcasts_have_the_bits_and_the_unit_of_section_5_1() {
     assert_eq!(reference(10_000).map(|write| (write.register, write.value)), Some((2, 30_000)));
     assert_eq!(reference(1).map(|write| write.value), Some(3));
     assert_eq!((reference(-1), reference(21_846), reference(i32::MAX)), (None, None, None));
-    let drive: Drive3g3ev<rig::Words> = rig::Words::ready().drive();
+    let drive: Drive3g3ev<Words> = rig::drive(rig::ready());
     assert_eq!(drive.broadcast_stop(StopMode::Ramp), Some(broadcast::stop()));
     assert_eq!(drive.broadcast_stop(StopMode::Freewheel), None);
 }

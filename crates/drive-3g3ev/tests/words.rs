@@ -7,7 +7,8 @@ use drive_core::{
     Class, Control, Direction, Drive, Error, ErrorKind, Frequency, PortError, State, Status, StopMode,
     Voltage,
 };
-use rig::{Asked, Words};
+use drive_testing::words::Asked;
+use rig::{ready, running, with};
 
 fn unknown() -> PortError {
     PortError::OutcomeUnknown("test")
@@ -15,12 +16,12 @@ fn unknown() -> PortError {
 
 /// What a status says that was made of these words.
 async fn status(words: &[(u16, u16)]) -> Status {
-    Words::with(words).drive().status().await.unwrap()
+    rig::drive(with(words)).status().await.unwrap()
 }
 
 #[tokio::test]
 async fn a_status_takes_two_exchanges_once_n39_is_known() {
-    let mut drive = Words::running().drive();
+    let mut drive = rig::drive(running());
     drive.status().await.unwrap();
     drive.status().await.unwrap();
     let two = [Asked::Read(Class::Status, 0x20, 8), Asked::Read(Class::Status, 0x2C, 1)];
@@ -32,7 +33,7 @@ async fn a_status_takes_two_exchanges_once_n39_is_known() {
 #[tokio::test]
 async fn measurements_take_two_exchanges_and_are_in_their_units() {
     let words = [(0x23, 500), (0x28, 198), (0x2B, 0x15), (0x2D, 2), (0x31, 325), (0x22, 8)];
-    let mut drive = Words::with(&words).drive();
+    let mut drive = rig::drive(with(&words));
     let measured = drive.measurements().await.unwrap();
     assert_eq!(measured.reference, Some(Frequency::from_hertz(50).into()));
     assert_eq!(measured.output_voltage, Some(Voltage::from_decivolts(1_980)));
@@ -45,10 +46,10 @@ async fn measurements_take_two_exchanges_and_are_in_their_units() {
 
 #[tokio::test]
 async fn a_drive_that_does_not_read_reserved_registers_is_read_round_them() {
-    let mut words = Words::running();
+    let mut words = running();
     words.words.insert(0x27, 42);
     words.refused.extend([0x25, 0x26, 0x2E, 0x2F, 0x30].map(|reserved| (reserved, 2)));
-    let mut drive = words.drive();
+    let mut drive = rig::drive(words);
     let first = drive.status().await.unwrap();
     assert_eq!(first.current.unwrap().deciamperes(), 42);
     assert_eq!(drive.status().await.unwrap(), first);
@@ -62,7 +63,7 @@ async fn a_drive_that_does_not_read_reserved_registers_is_read_round_them() {
 
 #[tokio::test]
 async fn a_stop_is_written_first_and_travels_as_a_stop() {
-    let mut drive = Words::ready().drive();
+    let mut drive = rig::drive(ready());
     drive.stop(StopMode::Ramp).await.unwrap();
     let asked = drive.into_port().asked;
     assert_eq!(asked[0], Asked::Write(Class::Stop, 1, vec![0]));
@@ -72,7 +73,7 @@ async fn a_stop_is_written_first_and_travels_as_a_stop() {
 
 #[tokio::test]
 async fn reading_a_drive_writes_nothing() {
-    let mut drive = Words::running().drive();
+    let mut drive = rig::drive(running());
     drive.status().await.unwrap();
     drive.measurements().await.unwrap();
     drive.faults().await.unwrap();
@@ -86,10 +87,10 @@ async fn reading_a_drive_writes_nothing() {
 #[tokio::test]
 async fn an_ambiguous_stop_is_read_back() {
     for (arrives, stops) in [(true, true), (false, false)] {
-        let mut words = Words::ready();
+        let mut words = ready();
         words.words.insert(1, 1);
         words.writes.push_back(Some((unknown(), arrives)));
-        let mut drive = words.drive();
+        let mut drive = rig::drive(words);
         let result = drive.stop(StopMode::Ramp).await;
         assert_eq!(result.is_ok(), stops, "{result:?}");
         if let Err(error) = result {
@@ -101,7 +102,7 @@ async fn an_ambiguous_stop_is_read_back() {
 
 #[tokio::test]
 async fn a_run_command_that_does_not_show_is_not_confirmed_after_a_bounded_number_of_reads() {
-    let mut drive = Words::ready().drive();
+    let mut drive = rig::drive(ready());
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed);
     let asked = drive.into_port().asked;
@@ -110,18 +111,18 @@ async fn a_run_command_that_does_not_show_is_not_confirmed_after_a_bounded_numbe
 
 #[tokio::test]
 async fn a_motor_that_the_terminals_keep_running_is_not_a_confirmed_stop() {
-    let mut words = Words::running();
+    let mut words = running();
     words.words.insert(0x2C, 0x0465);
-    let error = words.drive().stop(StopMode::Ramp).await.unwrap_err();
+    let error = rig::drive(words).stop(StopMode::Ramp).await.unwrap_err();
     let Error::NotConfirmed { status, .. } = error else { panic!("{error}") };
     assert_eq!((status.state, status.control), (State::Running, Some(Control::Local)));
 }
 
 #[tokio::test]
 async fn run_in_the_old_direction_does_not_confirm_a_turn() {
-    let mut words = Words::running();
+    let mut words = running();
     words.deaf = true;
-    let mut drive = words.drive();
+    let mut drive = rig::drive(words);
     assert!(drive.start(Direction::Forward).await.is_ok());
     let error = drive.start(Direction::Reverse).await.unwrap_err();
     let Error::NotConfirmed { status, .. } = error else { panic!("{error}") };
@@ -130,17 +131,17 @@ async fn run_in_the_old_direction_does_not_confirm_a_turn() {
 
 #[tokio::test]
 async fn a_stop_that_is_confirmed_and_not_carried_out_is_not_confirmed() {
-    let mut words = Words::running();
+    let mut words = running();
     words.deaf = true;
-    let error = words.drive().stop(StopMode::Ramp).await.unwrap_err();
+    let error = rig::drive(words).stop(StopMode::Ramp).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
 }
 
 #[tokio::test]
 async fn the_reset_bit_is_cleared_also_when_the_outcome_of_the_pulse_is_unknown() {
-    let mut words = Words::with(&[(0x20, 0x08), (0x21, 1), (0x0108, 77)]);
+    let mut words = with(&[(0x20, 0x08), (0x21, 1), (0x0108, 77)]);
     words.writes.extend([None, Some((unknown(), true)), None]);
-    let mut drive = words.drive().with_fault_reset_function(77);
+    let mut drive = rig::drive(words).with_fault_reset_function(77);
     let error = drive.reset_faults().await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     let port = drive.into_port();
@@ -149,18 +150,18 @@ async fn the_reset_bit_is_cleared_also_when_the_outcome_of_the_pulse_is_unknown(
 
 #[tokio::test]
 async fn a_pulse_that_was_not_sent_is_not_cleared() {
-    let mut words = Words::with(&[(0x20, 0x08), (0x21, 1), (0x0106, 77)]);
+    let mut words = with(&[(0x20, 0x08), (0x21, 1), (0x0106, 77)]);
     words.writes.extend([None, Some((PortError::Expired, false))]);
-    let mut drive = words.drive().with_fault_reset_function(77);
+    let mut drive = rig::drive(words).with_fault_reset_function(77);
     assert_eq!(drive.reset_faults().await.unwrap_err().kind(), ErrorKind::NotSent);
     assert_eq!(drive.into_port().written(), [(1, 0), (1, 0x10)]);
 }
 
 #[tokio::test]
 async fn a_save_whose_outcome_is_unknown_counts_and_is_not_repeated() {
-    let mut words = Words::ready();
+    let mut words = ready();
     words.writes.extend([None, Some((unknown(), true)), None]);
-    let mut drive = words.drive();
+    let mut drive = rig::drive(words);
     let n20 = drive_3g3ev::registers::parameter(20).unwrap();
     drive.write_parameter(n20, 50).await.unwrap();
     assert_eq!(drive.persist().await.unwrap_err().kind(), ErrorKind::OutcomeUnknown);
@@ -171,9 +172,9 @@ async fn a_save_whose_outcome_is_unknown_counts_and_is_not_repeated() {
 
 #[tokio::test]
 async fn a_setpoint_that_reads_back_otherwise_is_not_confirmed() {
-    let mut words = Words::ready();
+    let mut words = ready();
     words.deaf = true;
-    let mut drive = words.drive();
+    let mut drive = rig::drive(words);
     let error = drive.set_setpoint(Frequency::from_hertz(50).into()).await.unwrap_err();
     let Error::NotConfirmed { status, .. } = error else { panic!("{error}") };
     assert_eq!(status.raw(2), Some(0));
@@ -182,9 +183,9 @@ async fn a_setpoint_that_reads_back_otherwise_is_not_confirmed() {
 #[tokio::test]
 async fn an_ambiguous_setpoint_is_read_back() {
     for (arrives, taken) in [(true, true), (false, false)] {
-        let mut words = Words::ready();
+        let mut words = ready();
         words.writes.push_back(Some((unknown(), arrives)));
-        let mut drive = words.drive();
+        let mut drive = rig::drive(words);
         let result = drive.set_setpoint(Frequency::from_hertz(50).into()).await;
         assert_eq!(result.is_ok(), taken, "{result:?}");
         assert_eq!(drive.into_port().written().len(), 1);
@@ -193,9 +194,9 @@ async fn an_ambiguous_setpoint_is_read_back() {
 
 #[tokio::test]
 async fn a_unit_that_the_manual_does_not_list_is_never_guessed() {
-    let mut words = Words::ready();
+    let mut words = ready();
     words.words.insert(0x0127, 4);
-    let mut drive = words.drive();
+    let mut drive = rig::drive(words);
     assert_eq!(drive.status().await.unwrap().output_frequency, None);
     let error = drive.set_setpoint(Frequency::from_hertz(50).into()).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Answer);
@@ -248,7 +249,7 @@ async fn every_word_of_each_register_is_decoded_and_kept() {
 #[tokio::test]
 async fn every_fault_bit_is_listed_with_its_number_also_the_blank_ones() {
     for word in [0xFFFF, 0x8870, 0x5780] {
-        let faults = Words::with(&[(0x21, word)]).drive().faults().await.unwrap();
+        let faults = rig::drive(with(&[(0x21, word)])).faults().await.unwrap();
         let bits = faults.present.iter().fold(0, |all, fault| all | 1_u16 << fault.code);
         assert_eq!(bits, word);
         for fault in faults.present {
@@ -261,7 +262,7 @@ async fn every_fault_bit_is_listed_with_its_number_also_the_blank_ones() {
 async fn answers_of_all_ones_never_panic() {
     let all = (0..=0x44).map(|offset| 0x0100 + offset).chain(0..=0x3D).map(|address| (address, 0xFFFF));
     let all: Vec<_> = all.collect();
-    let mut drive = Words::with(&all).drive().with_fault_reset_function(0xFFFF);
+    let mut drive = rig::drive(with(&all)).with_fault_reset_function(0xFFFF);
     assert_eq!(drive.status().await.unwrap().state, State::Fault);
     drive.measurements().await.unwrap();
     assert_eq!(drive.faults().await.unwrap().warnings.len(), 13);

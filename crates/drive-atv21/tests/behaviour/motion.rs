@@ -207,10 +207,6 @@ async fn a_broadcast_stop_reaches_the_drive() {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
     let write = drive.broadcast_stop(StopMode::Freewheel).unwrap();
-    let mut all: tokio_modbus::client::Context = rig.line.broadcast().into();
-    tokio_modbus::prelude::Writer::write_single_register(&mut all, write.register, write.value)
-        .await
-        .unwrap()
-        .unwrap();
+    drive_testing::bench::broadcast(&rig.line, write).await;
     assert!(!rig.machine.observe().running);
 }

@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
-use drive_atv21::{Atv21, blocks::Blocks};
-use drive_bus::{Line, LineConfig, Slave};
-use drive_core::{
-    Direction, Drive, Error, Frequency, Refusal, Result, SerialSettings, SlaveAddress, State, Status,
-};
-use drive_sim::{Observation, SimLine, SimSlave, Wiring, models::atv21::Atv21 as Model};
+use drive_atv21::{Atv21, CAPABILITIES, blocks::Blocks};
+use drive_bus::{Line, Slave};
+use drive_core::{Direction, Drive, Error, Frequency, Refusal, Result, State, Status};
+use drive_sim::{Observation, SimSlave, models::atv21::Atv21 as Model};
+use drive_testing::bench;
 
 pub(crate) const SECOND: Duration = Duration::from_secs(1);
 pub(crate) const HALF_SPEED: Frequency = Frequency::from_hertz(25);
@@ -20,12 +19,9 @@ pub(crate) struct Rig {
 
 impl Rig {
     pub(crate) fn new(model: Model) -> (Self, Atv21<Slave>) {
-        let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
-        let machine = simulated.add(1, model).unwrap();
-        let line = Line::over(simulated.in_memory(), LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+        let (drive, machine, line) = bench::on_a_line(&CAPABILITIES, model, Atv21::new);
         // The time-out would trip a drive that a test leaves alone.
         machine.poke(0x0803, 0);
-        let drive = Atv21::new(line.slave(1), SlaveAddress::try_from(1).unwrap());
         (Self { machine, line }, drive)
     }
 

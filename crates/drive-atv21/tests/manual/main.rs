@@ -1,11 +1,12 @@
 //! The Altivar 21's map a second time, from the text of "Altivar 21 Modbus, guide d'exploitation", 10/2009, and not from
-//! the driver, and its printed frames as the driver sends and reads them. The simulator has the same frames in its own
-//! tests.
+//! the driver, and its printed frames.
 //!
 //! The text comes from a scan in which the seven-segment 8 of parameter titles reads B (FB29 is F829), and 0 reads D or
 //! O. Its misprints are corrected here: the CRC of the accepted block write (43 B3 for 46 B3, §7.8), the CRC of the 80 Hz
 //! example (B5 A6 for E1 12, §8.5), the reference mode FE45 for FE46 (§8.6), OL1 as hexadecimal P for D (§8.7), codes with a
 //! leading zero (0136 is decimal, §8.9), "Schneider Electric" in 13 bytes for Telemecanique (§7.9).
+
+mod frames;
 
 use std::time::Duration;
 
@@ -15,13 +16,11 @@ use drive_atv21::{
     StatusWord2, StatusWord3,
     blocks::{ReadSlot, WriteSlot},
 };
-use drive_bus::{Line, LineConfig};
 use drive_core::{
-    Class, Direction, Drive, Error, ExceptionMeaning, Fault, Frequency, Percent, Power, Registers,
-    SerialSettings, SlaveAddress, State, StopMode,
+    Drive, Fault, Power, SerialSettings, StopMode,
     registers::{Confidence, Factory, Storage},
 };
-use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
+use drive_testing::{bench, words::Words};
 
 /// §6, §8.2, §8.3: communication number, unit as printed, factory setting where there is one.
 const PRINTED: &str = "
@@ -43,10 +42,6 @@ const PRINTED: &str = "
 
 fn hex(text: &str) -> u16 {
     u16::from_str_radix(text, 16).unwrap()
-}
-
-fn slave() -> SlaveAddress {
-    SlaveAddress::try_from(1).unwrap()
 }
 
 #[test]
@@ -271,226 +266,9 @@ fn the_models_are_those_of_8_9() {
     assert_eq!(MODELS.len(), known);
 }
 
-/// A drive on a real line, whose other end is played by the script: each request byte for byte, then its answer.
-fn scripted(script: &[(&str, &str)]) -> (Line, tokio::task::JoinHandle<()>) {
-    let (ours, theirs) = tokio::io::duplex(512);
-    let line = Line::over(ours, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
-    let script = script.iter().map(|(request, answer)| (bytes(request), bytes(answer))).collect();
-    (line, tokio::spawn(play(theirs, script)))
-}
-
-async fn play(mut wire: DuplexStream, script: Vec<(Vec<u8>, Vec<u8>)>) {
-    for (request, answer) in script {
-        let mut sent = vec![0; request.len()];
-        wire.read_exact(&mut sent).await.unwrap();
-        assert_eq!(sent, request, "sent {sent:02X?} instead of {request:02X?}");
-        wire.write_all(&answer).await.unwrap();
-    }
-}
-
-/// A frame as printed. One that ends in `..` has no printed CRC: it is computed.
-fn bytes(text: &str) -> Vec<u8> {
-    let open = text.strip_suffix("..");
-    let digits: Vec<u8> =
-        open.unwrap_or(text).chars().filter_map(|c| c.to_digit(16)).map(|d| d as u8).collect();
-    let mut frame: Vec<u8> = digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect();
-    if open.is_some() {
-        let crc = frame.iter().fold(0xFFFF_u16, |crc, byte| {
-            (0..8).fold(
-                crc ^ u16::from(*byte),
-                |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xA001 } else { crc >> 1 },
-            )
-        });
-        frame.extend(crc.to_le_bytes());
-    }
-    frame
-}
-
-fn registers(line: &Line) -> Registers<drive_bus::Slave> {
-    fn meaning(_: u8, code: u8) -> ExceptionMeaning {
-        [ExceptionMeaning::ValueRefused, ExceptionMeaning::NoSuchRegister][usize::from(code == 2)]
-    }
-    Registers::new(line.slave(1), slave(), &CAPABILITIES, meaning)
-}
-
-fn exception(error: Error) -> u8 {
-    let Error::Exception { code, .. } = error else { panic!("{error}") };
-    code
-}
-
-const NO_BLOCK: [(&str, &str); 7] = [
-    ("01 03 0875 0001..", "01 03 02 0000.."),
-    ("01 03 0876 0001..", "01 03 02 0000.."),
-    ("01 03 0877 0001..", "01 03 02 0000.."),
-    ("01 03 0878 0001..", "01 03 02 0000.."),
-    ("01 03 0879 0001..", "01 03 02 0000.."),
-    ("01 03 0870 0001..", "01 03 02 0000.."),
-    ("01 03 0871 0001..", "01 03 02 0000.."),
-];
-
-#[tokio::test(start_paused = true)]
-async fn a_status_without_a_block_reads_the_output_frequency_as_in_7_4() {
-    let mut script = NO_BLOCK.to_vec();
-    script.extend([
-        ("01 03 FD01 0001..", "01 03 02 6400.."),
-        ("01 03 FD 00 00 01 B5 A6", "01 03 02 17 70 B6 50"),
-        ("01 03 FE03 0001..", "01 03 02 1388.."),
-        ("01 03 FE45 0001..", "01 03 02 0002.."),
-    ]);
-    let (line, other_end) = scripted(&script);
-    let status = Atv21::new(line.slave(1), slave()).status().await.unwrap();
-    assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
-    assert_eq!(status.current_share, Some(Percent::from_percent(50)));
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn two_words_beside_the_block_are_refused_as_in_7_4() {
-    let (line, other_end) = scripted(&[("01 03 FD 00 00 02 F5 A7", "01 83 03 01 31")]);
-    let error = registers(&line).at(Class::Status).read_words(0xFD00, 2).await.unwrap_err();
-    assert_eq!(exception(error), 3);
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_status_is_the_block_of_five_as_in_7_5() {
-    let (line, other_end) = scripted(&[
-        ("01 03 0875 0001..", "01 03 02 0001.."),
-        ("01 03 0876 0001..", "01 03 02 0002.."),
-        ("01 03 0877 0001..", "01 03 02 0003.."),
-        ("01 03 0878 0001..", "01 03 02 0004.."),
-        ("01 03 0879 0001..", "01 03 02 0005.."),
-        ("01 03 0870 0001..", "01 03 02 0001.."),
-        ("01 03 0871 0001..", "01 03 02 0003.."),
-        ("01 03 18 75 00 05 92 B3", "01 03 0A 64 04 17 70 00 00 26 FB 00 80 1E 29"),
-        ("01 03 18 75 00 05 92 B3", "01 03 0A 64 04 17 70 00 00 26 FB 00 80 1E 29"),
-    ]);
-    let mut drive = Atv21::new(line.slave(1), slave());
-    let status = drive.status().await.unwrap();
-    assert_eq!((status.state, status.direction), (State::Running, Some(Direction::Forward)));
-    assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
-    assert_eq!((status.current_share, status.warning), (Some(Percent::from_percent(0)), Some(true)));
-    // The output voltage is 99.79 %, the alarm undercurrent.
-    assert_eq!((status.raw(0xFE05), status.raw(0xFC91)), (Some(9_979), Some(Alarms::UNDERCURRENT.bits())));
-    assert_eq!(drive.status().await.unwrap(), status);
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_block_of_two_is_read_and_refused_as_in_7_5() {
-    let (line, other_end) = scripted(&[
-        ("01 03 18 75 00 02 D3 71", "01 03 04 64 04 17 70 AA D6"),
-        ("01 03 18 76 00 02 23 71", "01 83 03 01 31"),
-    ]);
-    let mut registers = registers(&line);
-    let mut calls = registers.at(Class::Status);
-    assert_eq!(calls.read_words(0x1875, 2).await.unwrap(), [0x6404, 0x1770]);
-    assert_eq!(exception(calls.read_words(0x1876, 2).await.unwrap_err()), 3);
-    // "Quantité des registres incorrecte": six words are refused here, before they are sent (01 03 18 75 00 06 D2 B2).
-    let error = calls.read_words(0x1875, 6).await.unwrap_err();
-    assert!(matches!(error, Error::TooManyWords { words: 6, limit: 5, .. }), "{error}");
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_setpoint_of_60_hertz_is_the_write_of_7_6_and_one_of_80_that_of_8_5() {
-    let (line, other_end) = scripted(&[
-        ("01 03 0012 0001..", "01 03 02 1F40.."),
-        ("01 03 FE46 0001..", "01 03 02 0004.."),
-        ("01 06 FA01 1770 E6C6", "01 06 FA01 1770 E6C6"),
-        ("01 03 FA01 0001..", "01 03 02 1770.."),
-        ("01 03 FE46 0001..", "01 03 02 0004.."),
-        ("01 06 FA 01 1F 40 E1 12", "01 06 FA 01 1F 40 E1 12"),
-        ("01 03 FA01 0001..", "01 03 02 1F40.."),
-        ("01 06 FFFF 0000 89EE", "01 86 02 C3A1"),
-    ]);
-    let mut drive = Atv21::new(line.slave(1), slave());
-    drive.set_setpoint(Frequency::from_hertz(60).into()).await.unwrap();
-    drive.set_setpoint(Frequency::from_hertz(80).into()).await.unwrap();
-    let error = registers(&line).at(Class::Command).write_word(0xFFFF, 0).await.unwrap_err();
-    assert_eq!(exception(error), 2);
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn function_16_writes_one_word_as_in_7_7() {
-    let (line, other_end) = scripted(&[("01 10 FA 01 00 01 02 17 70 F3 9A", "01 10 FA 01 00 01 60 D1")]);
-    registers(&line).at(Class::Command).write_words(0xFA01, &[6_000]).await.unwrap();
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn the_block_is_written_and_refused_as_in_7_8() {
-    let (line, other_end) = scripted(&[
-        ("01 10 18 70 00 02 04 C4 00 17 70 6D AF", "01 10 18 70 00 02 46 B3"),
-        ("01 10 18 70 00 02 04 C4 00 17 70 6D AF", "01 90 04 4D C3"),
-        ("01 10 18 71 00 02 04 C4 00 17 70 AC 63", "01 90 03 0C 01"),
-    ]);
-    let mut registers = registers(&line);
-    let mut calls = registers.at(Class::Command);
-    calls.write_words(0x1870, &[0xC400, 0x1770]).await.unwrap();
-    assert_eq!(exception(calls.write_words(0x1870, &[0xC400, 0x1770]).await.unwrap_err()), 4);
-    assert_eq!(exception(calls.write_words(0x1871, &[0xC400, 0x1770]).await.unwrap_err()), 3);
-    // Three words are refused here, before they are sent; a byte count that is not twice the quantity cannot be asked for.
-    let error = calls.write_words(0x1870, &[0xC400, 0x1770, 0]).await.unwrap_err();
-    assert!(matches!(error, Error::TooManyWords { words: 3, limit: 2, .. }), "{error}");
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn identification_is_asked_and_read_as_in_7_9() {
-    let (line, other_end) = scripted(&[
-        (
-            "01 2B 0E 01 00..",
-            "01 2B 0E 01 01 00 00 03  00 0D 54656C656D6563616E69717565  01 0C 41545632314830373 54D3358  02 04 30323031..",
-        ),
-        ("01 03 FB05 0001..", "01 03 02 0004.."),
-        ("01 03 FB72 0001..", "01 03 02 0000.."),
-    ]);
-    let identity = Atv21::new(line.slave(1), slave()).identify().await.unwrap();
-    assert_eq!(identity.vendor.as_deref(), Some("Telemecanique"));
-    assert_eq!(identity.model.as_deref(), Some("ATV21H075M3X"));
-    assert_eq!(identity.version.as_deref(), Some("0201"));
-    assert_eq!(identity.codes.iter().map(|code| code.value).collect::<Vec<_>>(), [4, 0]);
-    other_end.await.unwrap();
-}
-
-#[tokio::test(start_paused = true)]
-async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
-    for (authority, mode, direction, word) in [
-        (Authority::Settings, "0002", Direction::Forward, "0400"),
-        (Authority::Settings, "0002", Direction::Reverse, "0600"),
-        (Authority::Priority, "0000", Direction::Forward, "C400"),
-        (Authority::Priority, "0000", Direction::Reverse, "C600"),
-    ] {
-        let source = format!("01 03 02 {mode}..");
-        let write = format!("01 06 FA00 {word}..");
-        let running =
-            format!("01 03 02 {:04X}..", if direction == Direction::Forward { 0x6400 } else { 0x6600 });
-        let mut script = NO_BLOCK.to_vec();
-        script.extend([
-            ("01 03 FD01 0001..", "01 03 02 4000.."),
-            ("01 03 FD00 0001..", "01 03 02 0000.."),
-            ("01 03 FE03 0001..", "01 03 02 0000.."),
-            ("01 03 FE45 0001..", &source),
-            ("01 03 FE46 0001..", "01 03 02 0004.."),
-            (&write, &write),
-            ("01 03 FD01 0001..", &running),
-            ("01 03 FD00 0001..", "01 03 02 0000.."),
-            ("01 03 FE03 0001..", "01 03 02 0000.."),
-            ("01 03 FE45 0001..", "01 03 02 0002.."),
-        ]);
-        let (line, other_end) = scripted(&script);
-        let mut drive = Atv21::new(line.slave(1), slave()).with_authority(authority);
-        assert_eq!(drive.start(direction).await.unwrap().direction, Some(direction));
-        other_end.await.unwrap();
-    }
-}
-
-#[tokio::test(start_paused = true)]
-async fn every_stop_word_is_one_that_8_4_allows() {
-    let (line, _) = scripted(&[]);
-    let drive = Atv21::new(line.slave(1), slave());
+#[test]
+fn every_stop_word_is_one_that_8_4_allows() {
+    let drive = Atv21::new(Words::new(&CAPABILITIES, &[]), bench::address(1));
     let words = StopMode::ALL.map(|mode| drive.broadcast_stop(mode).map(|write| write.value));
     assert_eq!(words, [Some(0xC000), None, Some(0xC800), Some(0xC080)]);
     let drive = drive.with_authority(Authority::Settings);
