@@ -17,7 +17,8 @@
 //! - A request that the slave refuses (NAK) was not carried out. It is sent again, [`UniTelwaySettings::repeats`] times.
 //! - A request that the slave does not acknowledge may have been carried out. The exchange fails, a write's outcome is
 //!   unknown, and whether it is sent again is for the line to decide: an edge never is.
-//! - A reply that is damaged is refused and polled for again; nothing is carried out twice by that.
+//! - A reply that is damaged is refused and polled for again; nothing is carried out twice by that. A poll that is not
+//!   answered at all ends the exchange: the slave may only be late, and would answer a second poll too.
 //! - A reply says nothing of the request that it belongs to. So a slave whose last exchange did not end with its reply, or
 //!   of which nothing is known yet, is polled before its next request, and what it still holds is taken and dropped; and
 //!   after a timeout it gets no request of any kind in the line's late window, the write of a stop excepted.
@@ -106,7 +107,7 @@ pub struct UniTelwaySettings {
     pub link_timeout: Duration,
     /// From "nothing to say" to the next poll for the same reply.
     pub poll_pause: Duration,
-    /// How often a refused request is sent again, a damaged reply refused, and a poll repeated that nobody answers.
+    /// How often a refused request is sent again, and a damaged reply refused.
     pub repeats: u32,
 }
 
@@ -204,7 +205,6 @@ struct Current {
     leftovers: u32,
     refusals: u32,
     damaged: u32,
-    unanswered: u32,
     /// A reply came that did not fit.
     misfit: Option<String>,
 }
@@ -283,12 +283,10 @@ impl UniTelway {
     }
 
     fn signal(&mut self, now: Instant, byte: u8, alone: bool) -> Step {
-        if self.is_echo(&[byte]) {
-            return Step::More;
-        }
-        // Where the adapter echoes, what comes before the echo of our frame is the rest of an earlier one.
-        if self.echoes && !self.sent.is_empty() {
-            return self.noise(1);
+        // A single character proves no echo, it is only taken away where there is one.
+        if self.echoes && self.is_echo(&[byte]) {
+            let is_last = self.current.as_ref().is_some_and(|current| current.stage == Stage::Ending);
+            return if is_last { self.overdue() } else { Step::More };
         }
         let (turnaround, pause) = (self.turnaround, self.settings.poll_pause.max(self.turnaround));
         let repeats = self.settings.repeats;
@@ -309,7 +307,6 @@ impl UniTelway {
                 current.pause(now + turnaround, Next::Request);
             }
             (Stage::Polling, EOT) if alone && !current.is_late(now) => {
-                current.unanswered = 0;
                 current.pause(now + pause, Next::Poll);
             }
             (Stage::Polling, EOT) if alone => return self.fail(),
@@ -424,28 +421,25 @@ impl UniTelway {
     }
 
     /// The time of a stage is over.
-    fn overdue(&mut self, now: Instant) -> Step {
-        let repeats = self.settings.repeats;
+    fn overdue(&mut self) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         match current.stage {
             Stage::Before(next) | Stage::Answering(next) => self.send_next(next),
             // A slave that says nothing to a poll has nothing to say, or is not there: the request will show it.
             Stage::Emptying => self.send_next(Next::Request),
-            Stage::Requesting => self.fail(),
-            Stage::Polling => {
-                current.unanswered += 1;
-                if current.unanswered > repeats || current.is_late(now) {
-                    return self.fail();
+            // Polled again, it might answer twice, and the second answer be taken for a later request's.
+            Stage::Requesting | Stage::Polling => self.fail(),
+            Stage::Ending => {
+                // One that was taken for an echo once may have been none.
+                self.echoes &= self.sent.is_empty();
+                match current.answer.take() {
+                    Some(answer) => {
+                        self.empty.insert(current.slave);
+                        self.end(Ok(answer))
+                    }
+                    None => self.fail(),
                 }
-                self.send_next(Next::Poll)
             }
-            Stage::Ending => match current.answer.take() {
-                Some(answer) => {
-                    self.empty.insert(current.slave);
-                    self.end(Ok(answer))
-                }
-                None => self.fail(),
-            },
         }
     }
 
@@ -537,7 +531,6 @@ impl Exchange for UniTelway {
             leftovers: 0,
             refusals: 0,
             damaged: 0,
-            unanswered: 0,
             misfit: None,
         };
         let is_empty = self.empty.remove(&slave);
@@ -562,6 +555,8 @@ impl Exchange for UniTelway {
             }
             Stage::Emptying | Stage::Polling => end + link_timeout + current.reply,
             Stage::Answering(_) => end + self.turnaround,
+            // The echo of an acknowledgement must not be taken for one of the next request.
+            Stage::Ending if self.echoes => end + self.chunk_gap,
             Stage::Ending | Stage::Before(_) => end,
         });
     }
@@ -595,7 +590,7 @@ impl Exchange for UniTelway {
             }
         }
         let over = self.current.as_ref().and_then(|current| current.due).is_some_and(|due| now >= due);
-        if over { self.overdue(now) } else { Step::More }
+        if over { self.overdue() } else { Step::More }
     }
 
     fn deadline(&self) -> Option<Instant> {

@@ -1,0 +1,189 @@
+//! Whatever comes in on a line in Modbus ASCII or UNI-TELWAY: no panic, no wait without end, no wrong answer, and the next
+//! good frame is understood.
+
+mod support;
+
+use std::borrow::Cow;
+
+use drive_bus::{
+    Echo,
+    exchange::{
+        Exchange, Step,
+        ascii::{self, Ascii, AsciiSettings},
+        unitelway::{UniTelway, data_frame, poll},
+    },
+    protocol::UniTelwaySettings,
+};
+use drive_core::serial::SerialSettings;
+use proptest::prelude::*;
+use support::{MS, script::Script};
+use tokio_modbus::{Request, Response};
+
+const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
+const READ: Request<'static> = Request::ReadInputRegisters(0, 1);
+
+/// The longest that anything may take here: the machines' own limits, several times over.
+const FOR_EVER: u32 = 60_000;
+
+fn requests() -> impl Strategy<Value = Request<'static>> {
+    prop_oneof![
+        Just(Request::ReadHoldingRegisters(250, 4)),
+        Just(Request::WriteSingleRegister(400, 6)),
+        Just(Request::WriteMultipleRegisters(400, Cow::Borrowed(&[6, 500]))),
+        Just(Request::Custom(0x08, Cow::Borrowed(&[0, 0, 1, 2]))),
+    ]
+}
+
+/// Noise, frames of the protocol, and their parts, more often than chance makes them.
+fn chunks(
+    frame: impl Fn(u8, &[u8]) -> Vec<u8> + Clone + 'static,
+    special: &'static [u8],
+) -> impl Strategy<Value = Vec<Vec<u8>>> {
+    let noise = prop::collection::vec(any::<u8>(), 0..600);
+    let near = prop::collection::vec(prop::sample::select(special), 0..40);
+    let data = prop::collection::vec(any::<u8>(), 1..40);
+    let whole = (1_u8..4, data.clone()).prop_map({
+        let frame = frame.clone();
+        move |(slave, data)| frame(slave, &data)
+    });
+    let cut = (1_u8..4, data, 0_usize..30).prop_map(move |(slave, data, len)| {
+        let mut frame = frame(slave, &data);
+        frame.truncate(len);
+        frame
+    });
+    prop::collection::vec(prop_oneof![noise, near, whole, cut], 0..12)
+}
+
+fn ascii_chunks() -> impl Strategy<Value = Vec<Vec<u8>>> {
+    chunks(|slave, pdu| ascii::frame(slave, pdu, b'\n').to_vec(), b":0123456789ABCDEFabc\r\n!")
+}
+
+fn unitelway_chunks() -> impl Strategy<Value = Vec<Vec<u8>>> {
+    let frame = |slave, unite: &[u8]| data_frame(slave, &[&[0], unite].concat()).to_vec();
+    chunks(frame, &[0x10, 0x10, 0x02, 0x05, 0x01, 0x00, 0x06, 0x15, 0x04, 0x34, 0x66, 0xFD, 0xFE])
+}
+
+/// An exchange in the middle of all that. True: it has ended.
+fn feed<M: Exchange>(script: &mut Script<M>, request: &Request<'static>, chunks: &[Vec<u8>]) -> bool {
+    script.ask(1, request);
+    for chunk in chunks {
+        if let Step::Done(_) = script.hear(chunk) {
+            return true;
+        }
+        assert!(script.strays().len() <= 4 * chunk.len() + 16, "strays without bound");
+        if script.machine.deadline().is_some_and(|deadline| deadline <= script.now)
+            && let Step::Done(_) = script.wait()
+        {
+            return true;
+        }
+    }
+    false
+}
+
+/// Time alone ends it.
+fn end<M: Exchange>(script: &mut Script<M>) {
+    let began = script.now;
+    loop {
+        if let Step::Done(_) = script.wait() {
+            break;
+        }
+        assert!(script.now - began < FOR_EVER * MS, "the exchange never ends");
+    }
+    script.now += 1_000 * MS;
+}
+
+/// A whole exchange with a slave that is as it should be, until the answer has come.
+fn exchange(script: &mut Script<UniTelway>) -> Step {
+    let reply = data_frame(1, &[0, 0x34, 7, 0]);
+    let mut has_request = false;
+    let mut sent = script.ask(1, &READ);
+    for _ in 0..20 {
+        let step = if sent != poll(1) {
+            has_request = true;
+            script.hear(&[0x06])
+        } else if has_request {
+            script.hear(&reply)
+        } else {
+            script.hear(&[0x04])
+        };
+        match if step == Step::More { script.wait_for_step() } else { step } {
+            Step::Send(bytes) if *bytes == [0x06] => return script.wait_for_step(),
+            Step::Send(bytes) => sent = bytes,
+            step => return step,
+        }
+    }
+    Step::More
+}
+
+proptest! {
+    #[test]
+    fn the_ascii_machine_survives_anything_and_understands_the_next_answer(
+        request in requests(),
+        chunks in ascii_chunks(),
+        echo in prop::sample::select(vec![Echo::Off, Echo::On, Echo::Auto]),
+    ) {
+        let mut script = Script::new(Ascii::new(SERIAL, AsciiSettings::default(), echo));
+        if !feed(&mut script, &request, &chunks) {
+            end(&mut script);
+        }
+        script.ask(1, &READ);
+        let step = script.hear(&ascii::frame(1, &[4, 2, 0, 7], b'\n'));
+        prop_assert_eq!(step, Step::Done(Ok(Ok(Response::ReadInputRegisters(vec![7])))));
+    }
+
+    #[test]
+    fn the_uni_telway_machine_survives_anything_and_understands_the_next_reply(
+        request in requests(),
+        chunks in unitelway_chunks(),
+    ) {
+        let mut script = Script::new(UniTelway::new(SERIAL, UniTelwaySettings::default(), 20 * MS));
+        if !feed(&mut script, &request, &chunks) {
+            end(&mut script);
+        }
+        let step = exchange(&mut script);
+        prop_assert_eq!(step, Step::Done(Ok(Ok(Response::ReadInputRegisters(vec![7])))));
+    }
+
+    #[test]
+    fn bytes_outside_an_exchange_are_strays_and_nothing_else(
+        in_ascii in ascii_chunks(),
+        on_uni_telway in unitelway_chunks(),
+    ) {
+        let mut ascii = Script::new(Ascii::new(SERIAL, AsciiSettings::default(), Echo::Off));
+        for chunk in &in_ascii {
+            prop_assert_eq!(ascii.hear(chunk), Step::More);
+        }
+        let mut unitelway =
+            Script::new(UniTelway::new(SERIAL, UniTelwaySettings::default(), 20 * MS));
+        for chunk in &on_uni_telway {
+            prop_assert_eq!(unitelway.hear(chunk), Step::More);
+        }
+        let step = exchange(&mut unitelway);
+        prop_assert_eq!(step, Step::Done(Ok(Ok(Response::ReadInputRegisters(vec![7])))));
+    }
+
+    #[test]
+    fn a_damaged_reply_is_never_another_answer(
+        words in prop::collection::vec(any::<u16>(), 4),
+        at in any::<prop::sample::Index>(),
+        flipped in 0_u8..8,
+    ) {
+        let request = Request::ReadHoldingRegisters(250, 4);
+        let mut script = Script::new(UniTelway::new(SERIAL, UniTelwaySettings::default(), 20 * MS));
+        script.ask(1, &request);
+        script.hear(&[0x04]);
+        script.wait();
+        script.hear(&[0x06]);
+        script.wait();
+        let mut unite = vec![0, 0x66, 7];
+        unite.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+        let mut reply = data_frame(1, &unite).to_vec();
+        let at = at.index(reply.len());
+        reply[at] ^= 1 << flipped;
+        let mut step = script.hear(&reply);
+        while step == Step::More {
+            step = script.wait();
+        }
+        prop_assert_ne!(step, Step::Send(vec![0x06].into()), "{:02X?}", reply);
+    }
+}
