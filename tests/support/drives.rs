@@ -6,7 +6,7 @@ use drive_families::Family;
 use drive_sim::{Model, models};
 
 /// The number of "fault reset" in n06 to n08 of these 3G3EV; the manual gives none, so its owner must.
-const RESET_FUNCTION: u16 = 3;
+pub const RESET_FUNCTION: u16 = 3;
 
 /// A simulated machine of a family, set up for control by the bus.
 #[must_use]

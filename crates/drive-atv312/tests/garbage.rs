@@ -39,8 +39,7 @@ async fn whatever_the_drive_says_nothing_panics_and_only_the_manuals_control_wor
             let _ = drive.write_parameter(row, 1).await;
         }
         let _ = drive.persist().await;
-        let commands = drive.into_port().written.into_iter().filter(|(register, _)| *register == 8501);
-        for (_, command) in commands {
+        for command in drive.into_port().written(8501) {
             let index = ALLOWED.iter().position(|&word| word == command);
             written[index.unwrap_or_else(|| panic!("{command:04X}h was written"))] = true;
         }

@@ -1,28 +1,41 @@
 //! A drive that answers any word to anything.
 
-use std::io;
+use std::{
+    io,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use async_trait::async_trait;
 use drive_core::{Capabilities, Port};
 use tokio_modbus::{ExceptionCode, Request, Response, Slave, client::Client, slave::SlaveContext};
 
 /// Answers every read with the next words of a generator, and confirms every write. It panics when it is asked what the
-/// family does not have: a function, or more words than one request may carry.
+/// family does not have: a function, or more words than one request may carry. Clones share what was written.
 #[derive(Debug, Clone)]
 pub struct Babble {
     state: u32,
     plausible: &'static [u16],
     capabilities: &'static Capabilities,
-    /// Every word that was written, with its register.
-    pub written: Vec<(u16, u16)>,
+    written: Arc<Mutex<Vec<(u16, u16)>>>,
 }
 
 impl Babble {
     /// A drive of a family that says what follows from `seed`. Of sixteen words as many as there are `plausible` ones
     /// are from among these, so that it is not only refused: words that mean something somewhere.
     #[must_use]
-    pub const fn new(capabilities: &'static Capabilities, plausible: &'static [u16], seed: u32) -> Self {
-        Self { state: seed, plausible, capabilities, written: Vec::new() }
+    pub fn new(capabilities: &'static Capabilities, plausible: &'static [u16], seed: u32) -> Self {
+        Self { state: seed, plausible, capabilities, written: Arc::default() }
+    }
+
+    /// The words that were written to a register, in order.
+    #[must_use]
+    pub fn written(&self, register: u16) -> Vec<u16> {
+        let written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        written.iter().filter(|(at, _)| *at == register).map(|(_, word)| *word).collect()
+    }
+
+    fn keep(&self, words: impl IntoIterator<Item = (u16, u16)>) {
+        self.written.lock().unwrap_or_else(PoisonError::into_inner).extend(words);
     }
 
     fn word(&mut self) -> u16 {
@@ -52,12 +65,12 @@ impl Client for Babble {
                 Ok(Response::ReadHoldingRegisters((0..count).map(|_| self.word()).collect()))
             }
             Request::WriteSingleRegister(register, word) => {
-                self.written.push((register, word));
+                self.keep([(register, word)]);
                 Ok(Response::WriteSingleRegister(register, word))
             }
             Request::WriteMultipleRegisters(first, words) => {
                 assert!(words.len() <= usize::from(self.capabilities.write_words), "{} words", words.len());
-                self.written.extend((first..).zip(words.iter().copied()));
+                self.keep((first..).zip(words.iter().copied()));
                 Ok(Response::WriteMultipleRegisters(first, words.len() as u16))
             }
             Request::Custom(0x08, data) => Ok(Response::Custom(0x08, data.into_owned().into())),
