@@ -271,6 +271,17 @@ fn a_slave_that_says_nothing_to_the_first_poll_is_asked_all_the_same() {
 }
 
 #[test]
+fn a_slave_that_used_to_say_something_is_not_asked_when_it_says_nothing_until_the_second_time() {
+    let mut script = settled();
+    script.ask(1, &WRITE);
+    assert_eq!(script.wait(), Step::Done(Err(Failure::Timeout)));
+    assert_eq!(script.ask(1, &READ), poll(1));
+    assert_eq!(script.wait(), Step::Done(Err(Failure::Timeout)), "what it holds may come late");
+    assert_eq!(script.ask(1, &WRITE), poll(1));
+    assert_eq!(send(&mut script), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
+}
+
+#[test]
 fn a_refused_request_is_sent_again_and_then_given_up_as_not_carried_out() {
     let mut script = settled();
     let request = script.ask(1, &WRITE);

@@ -178,6 +178,10 @@ pub struct UniTelway {
     chunk_gap: Duration,
     /// Slaves that are known to hold no reply.
     empty: BTreeSet<u8>,
+    /// Slaves that have said before that they have nothing to say, so that their silence does not mean it.
+    outspoken: BTreeSet<u8>,
+    /// Those of them that kept silent all the same when they were polled last.
+    silent: BTreeSet<u8>,
     current: Option<Current>,
     receiver: Receiver,
     last_byte: Option<Instant>,
@@ -243,6 +247,8 @@ impl UniTelway {
             turnaround: serial.bits(settings.turnaround_bits),
             chunk_gap: chunk_gap.max(serial.t3_5()),
             empty: BTreeSet::new(),
+            outspoken: BTreeSet::new(),
+            silent: BTreeSet::new(),
             current: None,
             receiver: Receiver::default(),
             last_byte: None,
@@ -303,7 +309,8 @@ impl UniTelway {
                 return self.end(Err(Failure::Refused("the slave refuses the frame (NAK)")));
             }
             (Stage::Emptying, EOT) if alone => {
-                self.empty.insert(current.slave);
+                self.silent.remove(&current.slave);
+                self.outspoken.insert(current.slave);
                 current.pause(now + turnaround, Next::Request);
             }
             (Stage::Polling, EOT) if alone && !current.is_late(now) => {
@@ -340,6 +347,7 @@ impl UniTelway {
                 };
                 match answer {
                     Ok(answer) => {
+                        self.silent.remove(&current.slave);
                         current.stage = Stage::Ending;
                         current.answer = Some(answer);
                         self.send(Bytes::from_static(&[ACK]))
@@ -425,7 +433,14 @@ impl UniTelway {
         let Some(current) = &mut self.current else { return Step::More };
         match current.stage {
             Stage::Before(next) | Stage::Answering(next) => self.send_next(next),
-            // A slave that says nothing to a poll has nothing to say, or is not there: the request will show it.
+            // It may be late, with a reply that would then be taken for the next one. Not twice: a stop must go out.
+            Stage::Emptying
+                if self.outspoken.contains(&current.slave) && self.silent.insert(current.slave) =>
+            {
+                self.fail()
+            }
+            // A slave that never says anything to such a poll has nothing to say, or is not there: the request will
+            // show it.
             Stage::Emptying => self.send_next(Next::Request),
             // Polled again, it might answer twice, and the second answer be taken for a later request's.
             Stage::Requesting | Stage::Polling => self.fail(),
@@ -613,6 +628,7 @@ impl Exchange for UniTelway {
         self.receiver = Receiver::default();
         self.sent.clear();
         self.empty.clear();
+        self.silent.clear();
     }
 
     fn take_strays(&mut self) -> Vec<Stray> {
