@@ -14,7 +14,7 @@ use drive_atv58::{
     },
 };
 
-use super::drivecom::{CommandBits, Drivecom, LinkWatch, Reaction, Settings, Stop};
+use super::drivecom::{CommandBits, Drivecom, LinkWatch, Reaction, Settings, Stop, word};
 use crate::{
     Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Protocol, Ramp, Ramps, Rules, UniTe,
 };
@@ -148,11 +148,7 @@ impl Model for Atv58 {
     }
 
     fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.drive.force_local(true),
-            Panel::ReleaseControl => self.drive.force_local(false),
-            Panel::Stop => self.drive.stop_key(),
-        }
+        self.drive.panel(action);
     }
 
     fn observe(&self) -> Observation {
@@ -210,11 +206,6 @@ fn settings(bank: &Bank, protocol: Protocol) -> Settings {
         high_speed: u32::from(bank.value(W250.address())) * 10,
         link: LinkWatch { timeout: Some(watch), reaction: Reaction::Freewheel, code: LINK_FAULT },
     }
-}
-
-/// A number as a signed word of the drive.
-fn word(number: i32) -> u16 {
-    i16::try_from(number).map_or(u16::MAX, i16::cast_unsigned)
 }
 
 #[cfg(test)]

@@ -20,10 +20,9 @@ use drive_atv28::{
 };
 use drive_core::registers::Access;
 
-use super::drivecom::{Drivecom, Reaction};
+use super::drivecom::{Drivecom, Reaction, centihertz, profile_code, rpm, word};
 use crate::{
-    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules,
-    models::atv28::parameters::{rpm, settings},
+    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, models::atv28::parameters::settings,
 };
 
 const RULES: Rules = Rules {
@@ -140,7 +139,7 @@ impl Atv28 {
             _ if address == RTH.address() => {
                 u16::try_from(motor.fed_for().as_secs() / 3_600).unwrap_or(u16::MAX)
             }
-            _ if address == ERRD.address() => parameters::profile_code(fault(0)),
+            _ if address == ERRD.address() => profile_code(fault(0)),
             _ if address == CMDD.address() => self.bank.value(CMD.address()),
             _ if address == FRHD.address() => word(rpm(target)),
             _ if address == RFRD.address() => word(rpm(output)),
@@ -162,10 +161,10 @@ impl Atv28 {
         } else if address == LFR.address() {
             self.drive.reference(i32::from(value.cast_signed()) * 10);
         } else if address == LFRD.address() {
-            self.drive.reference(parameters::centihertz(i32::from(value.cast_signed())));
+            self.drive.reference(centihertz(i32::from(value.cast_signed())));
         } else if address == SMIL_LOW.address() || address == SMAL_LOW.address() {
             let limit = if address == SMIL_LOW.address() { LSP.address() } else { HSP.address() };
-            self.bank.set_for_good(limit, word(parameters::centihertz(i32::from(value)) / 10));
+            self.bank.set_for_good(limit, word(centihertz(i32::from(value)) / 10));
             self.take_settings();
         } else {
             let locks = self.bank.row(address).is_some_and(|row| row.access == Access::WriteStopped);
@@ -225,11 +224,7 @@ impl Model for Atv28 {
     }
 
     fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.drive.force_local(true),
-            Panel::ReleaseControl => self.drive.force_local(false),
-            Panel::Stop => self.drive.stop_key(),
-        }
+        self.drive.panel(action);
     }
 
     fn observe(&self) -> Observation {
@@ -251,11 +246,6 @@ impl Model for Atv28 {
         }
         kept
     }
-}
-
-/// A number as a signed word of the drive.
-fn word(number: i32) -> u16 {
-    i16::try_from(number).map_or(u16::MAX, i16::cast_unsigned)
 }
 
 #[cfg(test)]

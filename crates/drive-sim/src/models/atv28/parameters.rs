@@ -15,9 +15,6 @@ const LINK_FAULT: u16 = 5;
 const FAST_STOP_DIVIDER: u32 = 4;
 /// Time of the DC injection (tdC of the twin, p. 40).
 const INJECTION_TIME: Duration = Duration::from_millis(500);
-/// The motor has four poles: 50 Hz are 1500 rpm.
-const RPM_PER_10_CENTIHERTZ: i32 = 3;
-
 /// The settings that the registers make. A count of a ramp is taken for 0.1 s, as on the twin; direct current for a
 /// share of the nominal one.
 pub(super) fn settings(bank: &Bank, commanded: bool) -> Settings {
@@ -41,40 +38,5 @@ pub(super) fn settings(bank: &Bank, commanded: bool) -> Settings {
         high_speed: u32::from(bank.value(HSP.address())) * 10,
         // No document says that a silent line trips an Altivar 28.
         link: LinkWatch { timeout: None, reaction: Reaction::Ignore, code: LINK_FAULT },
-    }
-}
-
-/// Speed of the four-pole motor at a frequency in hundredths of a hertz.
-pub(super) const fn rpm(centihertz: i32) -> i32 {
-    centihertz * RPM_PER_10_CENTIHERTZ / 10
-}
-
-/// Frequency of a speed, in hundredths of a hertz.
-pub(super) const fn centihertz(rpm: i32) -> i32 {
-    rpm * 10 / RPM_PER_10_CENTIHERTZ
-}
-
-/// `ERRD` for a code of `LFt` (BBV51701 p. 17). Which code goes with LFt 55 is not printed; it is a short circuit.
-pub(super) const fn profile_code(lft: u16) -> u16 {
-    match lft {
-        10 | 17 | 24 => 0x1000,
-        9 => 0x2310,
-        31 => 0x2320,
-        32 | 55 => 0x2330,
-        23 => 0x2340,
-        19 => 0x3110,
-        22 => 0x3120,
-        21 => 0x3130,
-        18 | 20 | 33 => 0x3310,
-        16 => 0x4210,
-        30 => 0x5520,
-        26..=29 => 0x6100,
-        3 | 4 => 0x6300,
-        13 => 0x7300,
-        5 => 0x7510,
-        6 => 0x7520,
-        8 => 0x9000,
-        25 => 0xFF00,
-        _ => 0,
     }
 }

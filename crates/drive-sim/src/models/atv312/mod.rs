@@ -276,12 +276,9 @@ impl Model for Atv312 {
     }
 
     fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.drive.force_local(true),
-            Panel::ReleaseControl => self.drive.force_local(false),
-            // The key has priority over every channel as long as PSt says so (p. 38).
-            Panel::Stop if self.bank.value(64002) == 1 => self.drive.stop_key(),
-            Panel::Stop => {}
+        // The STOP key has priority over every channel as long as PSt says so (p. 38).
+        if action != Panel::Stop || self.bank.value(64002) == 1 {
+            self.drive.panel(action);
         }
     }
 

@@ -1,7 +1,9 @@
 //! The registers that the drive computes (p. 17–26).
 
+use drive_atv312::words::{ExtendedControl, ExtendedStatus1, ExtendedStatus3, LogicIo};
+
 use super::{Atv312, CMD, CMI, LFR, LFRD, PISP, settings};
-use drive_atv312::words::{ExtendedStatus1, ExtendedStatus3, LogicIo};
+use crate::models::drivecom::{profile_code, rpm, word};
 
 /// Line voltage in tenths of a volt.
 const LINE_VOLTAGE: u16 = 4_000;
@@ -45,12 +47,12 @@ impl Atv312 {
             8541 => self.bank.value(CMI),
             8601 => self.bank.value(CMD),
             8604 if self.is_high_resolution() => word(settings::counts(output, self.cmi())),
-            8604 => word(settings::rpm(output)),
-            8605 => word(settings::rpm(target)),
+            8604 => word(rpm(output)),
+            8605 => word(rpm(target)),
             8606 => profile_code(self.fault(0).0),
             // LSP and HSP once more, in rpm.
-            8607 => word(settings::rpm(i32::from(self.bank.value(3105)) * 10)),
-            8609 => word(settings::rpm(i32::from(self.bank.value(3104)) * 10)),
+            8607 => word(rpm(i32::from(self.bank.value(3105)) * 10)),
+            8609 => word(rpm(i32::from(self.bank.value(3104)) * 10)),
             8608 | 8610 => 0,
             8631 => self.bank.value(LFRD),
             12002 => self.customer_speed() as u16,
@@ -60,13 +62,13 @@ impl Atv312 {
     }
 
     fn is_high_resolution(&self) -> bool {
-        self.cmi().contains(drive_atv312::words::ExtendedControl::HIGH_RESOLUTION)
+        self.cmi().contains(ExtendedControl::HIGH_RESOLUTION)
     }
 
     /// `ETI`: what chart and motor say, and what belongs to the memory.
     fn eti(&self) -> u16 {
         let busy = if self.saving.is_some() { EEPROM_BUSY } else { 0 };
-        let unchecked = self.cmi().contains(drive_atv312::words::ExtendedControl::NO_CONSISTENCY_CHECK);
+        let unchecked = self.cmi().contains(ExtendedControl::NO_CONSISTENCY_CHECK);
         let checked = if unchecked { 0 } else { CONSISTENCY_CHECK };
         // The remote terminal commands where LCC says so, at L1 and L2 (p. 22, 38).
         let terminal = self.bank.value(64003) == 1 && self.bank.value(3006) != settings::L3;
@@ -118,37 +120,5 @@ impl Atv312 {
     fn customer_speed(&self) -> u32 {
         let tenths = self.drive.motor().output_frequency() / 10;
         (tenths * i32::from(self.bank.value(12001)) / 100).cast_unsigned()
-    }
-}
-
-/// A number as a signed word of the drive.
-fn word(number: i32) -> u16 {
-    i16::try_from(number).map_or(u16::MAX, i16::cast_unsigned)
-}
-
-/// `ERRD` for a code of `LFt` (p. 17). Which code goes with LFt 55 is not printed; it is a short circuit.
-const fn profile_code(lft: u16) -> u16 {
-    match lft {
-        10 | 17 | 24 => 0x1000,
-        9 => 0x2310,
-        31 | 36 => 0x2320,
-        32 | 55 => 0x2330,
-        23 => 0x2340,
-        19 => 0x3110,
-        22 => 0x3120,
-        21 => 0x3130,
-        18 | 20 | 33 => 0x3310,
-        16 => 0x4210,
-        30 => 0x5520,
-        26..=29 => 0x6100,
-        3 | 4 => 0x6300,
-        13 => 0x7300,
-        5 | 7 => 0x7510,
-        6 => 0x7520,
-        34 => 0x8100,
-        8 => 0x9000,
-        25 => 0xFF00,
-        35 => 0xFF01,
-        _ => 0,
     }
 }

@@ -7,11 +7,9 @@ use drive_atv312::words::ExtendedControl;
 use super::{CMI, factory::NOMINAL_CURRENT};
 use crate::{
     Bank, Ramp, Ramps,
-    models::drivecom::{CommandBits, LinkWatch, Reaction, Settings, Stop},
+    models::drivecom::{CommandBits, LinkWatch, Reaction, Settings, Stop, centihertz},
 };
 
-/// The motor has four poles: 50 Hz are 1500 rpm.
-const RPM_PER_10_CENTIHERTZ: i32 = 3;
 /// Access level L3 in `LAC`.
 pub(super) const L3: u16 = 2;
 
@@ -86,7 +84,7 @@ pub(super) fn frequency_of_speed(value: u16, cmi: ExtendedControl) -> i32 {
     if cmi.contains(ExtendedControl::HIGH_RESOLUTION) {
         return frequency(value, cmi);
     }
-    i32::from(value.cast_signed()) * 10 / RPM_PER_10_CENTIHERTZ
+    centihertz(i32::from(value.cast_signed()))
 }
 
 /// Hundredths of a hertz as a count of `rFr` or `LFr`.
@@ -96,11 +94,6 @@ pub(super) fn counts(centihertz: i32, cmi: ExtendedControl) -> i32 {
     } else {
         centihertz / 10
     }
-}
-
-/// Speed of the four-pole motor at a frequency in hundredths of a hertz.
-pub(super) const fn rpm(centihertz: i32) -> i32 {
-    centihertz * RPM_PER_10_CENTIHERTZ / 10
 }
 
 /// Whether `AC2` and `dE2` are in force (p. 20, 39). The threshold `Frt` is left out.

@@ -6,6 +6,7 @@
 //! [`eta`](Drivecom::eta), [`eti`](Drivecom::eti), the [`motor`](Drivecom::motor) and the
 //! [`faults`](Drivecom::faults).
 
+mod counts;
 mod settings;
 mod words;
 
@@ -13,8 +14,9 @@ use std::{collections::VecDeque, time::Duration};
 
 pub use settings::{CommandBits, LinkWatch, Reaction, Settings, Stop};
 
+pub(super) use self::counts::{centihertz, profile_code, rpm, word};
 use self::words::Order;
-use crate::{Motor, Nameplate, Observation, Watchdog};
+use crate::{Motor, Nameplate, Observation, Panel, Watchdog};
 
 /// Faults that a drive remembers: the last and four past ones (LFt, DP1–DP4).
 const REMEMBERED: usize = 5;
@@ -215,6 +217,15 @@ impl Drivecom {
         }
     }
 
+    /// Somebody does something at the panel.
+    pub fn panel(&mut self, action: Panel) {
+        match action {
+            Panel::TakeControl => self.force_local(true),
+            Panel::ReleaseControl => self.force_local(false),
+            Panel::Stop => self.stop_key(),
+        }
+    }
+
     /// Sets the load at the shaft in percent of nominal torque.
     pub fn set_load(&mut self, percent: u16) {
         self.motor.set_load(percent);
@@ -254,12 +265,6 @@ impl Drivecom {
     /// The remembered faults, the latest first.
     pub fn faults(&self) -> impl Iterator<Item = PastFault> {
         self.faults.iter().copied()
-    }
-
-    /// Whether panel or terminals have control.
-    #[must_use]
-    pub const fn is_local(&self) -> bool {
-        self.local
     }
 
     /// The reference in force in hundredths of a hertz, negative in reverse: what was asked within LSP and HSP.
