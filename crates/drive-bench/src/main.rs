@@ -1,6 +1,7 @@
 //! `drive-bench`: what a line costs and keeps, measured against simulated drives that pace like a real line and record
 //! every silence. See the README for what each row means.
 
+mod awake;
 mod cpu;
 mod dead;
 mod faults;
@@ -10,6 +11,7 @@ mod masters;
 mod report;
 mod rig;
 mod simulator;
+mod spinning;
 mod stop;
 mod usage;
 mod utilisation;
@@ -19,7 +21,7 @@ use std::{process::ExitCode, time::Duration};
 
 use clap::{Parser, ValueEnum};
 
-use crate::report::Report;
+use crate::report::{Report, Unit};
 
 /// What can be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -52,7 +54,7 @@ struct Arguments {
     #[arg(long)]
     json: bool,
     /// How long each measurement in real time lasts, in seconds.
-    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u64).range(1..=86_400))]
     seconds: u64,
     /// How many transactions each measurement in virtual time has.
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(100..=1_000_000_000))]
@@ -63,6 +65,9 @@ struct Arguments {
     /// The seed of the faults.
     #[arg(long, default_value_t = 2_026)]
     seed: u64,
+    /// Use a processor whenever nobody else wants it, until the standard input ends.
+    #[arg(long, hide = true)]
+    keep_awake: bool,
     /// Be the simulator of another process, which says on the standard input what it wants.
     #[arg(long, hide = true, value_name = "PLANT")]
     simulate: Option<String>,
@@ -70,6 +75,10 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    if arguments.keep_awake {
+        awake::spin();
+        return ExitCode::SUCCESS;
+    }
     if let Some(plant) = &arguments.simulate {
         return match simulator::serve(plant) {
             Ok(()) => ExitCode::SUCCESS,
@@ -80,23 +89,34 @@ fn main() -> ExitCode {
         };
     }
     let sections = if arguments.sections.is_empty() { &EVERYTHING[..] } else { &arguments.sections };
-    let time = Duration::from_secs(arguments.seconds);
     let mut report = Report::new(arguments.json);
     for section in sections {
-        let measured = match section {
-            Section::Utilisation => utilisation::measure(&mut report, time, arguments.transactions),
-            Section::Stop => stop::measure(&mut report, time, arguments.transactions),
-            Section::Dead => dead::measure(&mut report, time),
-            Section::Cpu => cpu::measure(&mut report, time),
-            Section::Lines => lines::measure(&mut report, time, arguments.lines),
-            Section::Faults => faults::measure(&mut report, arguments.seed, arguments.transactions),
-        };
+        let measured = usage::Machine::now().and_then(|before| {
+            measure(&mut report, *section, &arguments)?;
+            let name =
+                section.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            let others = before.others_since()?;
+            report.note(&name, "processors that other programs used meanwhile", Unit::Times, others);
+            Ok(())
+        });
         if let Err(error) = measured {
             eprintln!("drive-bench: {section:?}: {error}");
             return ExitCode::FAILURE;
         }
     }
     ExitCode::SUCCESS
+}
+
+fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Result<(), Error> {
+    let time = Duration::from_secs(arguments.seconds);
+    match section {
+        Section::Utilisation => utilisation::measure(report, time, arguments.transactions),
+        Section::Stop => stop::measure(report, time, arguments.transactions),
+        Section::Dead => dead::measure(report, time),
+        Section::Cpu => cpu::measure(report, time),
+        Section::Lines => lines::measure(report, time, arguments.lines),
+        Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
+    }
 }
 
 /// What may go wrong in a measurement.

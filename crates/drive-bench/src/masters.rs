@@ -19,6 +19,8 @@ use crate::{
     rig::{FIRST, QUANTITY},
 };
 
+const SETTINGS: SerialSettings = SerialSettings::MODBUS_DEFAULT;
+
 /// The one request of all measurements.
 pub(crate) const READ: Request<'static> = Request::ReadHoldingRegisters(FIRST, QUANTITY);
 
@@ -103,7 +105,7 @@ pub(crate) async fn stock(port: PathBuf, drives: u8, time: Duration, silence: bo
         for slave in 1..=drives {
             context.set_slave(tokio_modbus::Slave(slave));
             if silence {
-                tokio::time::sleep(SerialSettings::MODBUS_DEFAULT.t3_5()).await;
+                tokio::time::sleep(SETTINGS.t3_5()).await;
             }
             context.read_holding_registers(FIRST, QUANTITY).await??;
             reads += 1;

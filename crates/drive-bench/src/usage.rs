@@ -1,6 +1,9 @@
 //! What this process uses, as the kernel counts it.
 
-use std::{fs, time::Duration};
+use std::{
+    fs,
+    time::{Duration, Instant},
+};
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -18,6 +21,43 @@ pub(crate) fn monotonic() -> Duration {
 
 fn clock(id: ClockId) -> Duration {
     Duration::try_from(clock_gettime(id)).unwrap_or_default()
+}
+
+/// Who has used the processors so far, in ticks of the kernel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Machine {
+    at: Instant,
+    everybody: u64,
+    /// This process and those of its children that have ended.
+    ours: u64,
+}
+
+impl Machine {
+    pub(crate) fn now() -> Result<Self, Error> {
+        let stat = fs::read_to_string("/proc/stat")?;
+        let all: Vec<u64> = stat
+            .lines()
+            .next()
+            .and_then(|line| line.strip_prefix("cpu "))
+            .ok_or("no processors in /proc/stat")?
+            .split_whitespace()
+            .map(str::parse)
+            .collect::<Result<_, _>>()?;
+        // user, nice, system, idle, iowait, irq, softirq, steal; guests are counted in user already.
+        let everybody = [0, 1, 2, 5, 6, 7].iter().filter_map(|&column| all.get(column)).sum();
+        let stat = fs::read_to_string("/proc/self/stat")?;
+        // The name of the process may hold anything; what is wanted stands behind it.
+        let (_, rest) = stat.rsplit_once(')').ok_or("no name in /proc/self/stat")?;
+        let ours = rest.split_whitespace().skip(11).take(4).map(str::parse::<u64>).sum::<Result<_, _>>()?;
+        Ok(Self { at: Instant::now(), everybody, ours })
+    }
+
+    /// How many processors the others have used on the average since then, the kernel's own threads among them.
+    pub(crate) fn others_since(self) -> Result<f64, Error> {
+        let now = Self::now()?;
+        let ticks = (now.everybody - self.everybody).saturating_sub(now.ours - self.ours);
+        Ok(ticks as f64 / rustix::param::clock_ticks_per_second() as f64 / self.at.elapsed().as_secs_f64())
+    }
 }
 
 /// Memory that this process holds, in KiB: its resident pages.

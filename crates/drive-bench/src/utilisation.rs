@@ -9,10 +9,12 @@ use tokio::{io::DuplexStream, sync::oneshot};
 
 use crate::{
     Error,
+    awake::Awake,
     masters::{saturate, stock},
     report::{Goal, Report, Unit, micros, millis},
     rig::{DRIVES, Rig, runtime},
     simulator::{Counted, populated},
+    spinning::spinning,
     virtual_line,
 };
 
@@ -22,29 +24,38 @@ const SECTION: &str = "utilisation";
 const GOAL: f64 = 0.995;
 
 pub(crate) fn measure(report: &mut Report, time: Duration, transactions: u64) -> Result<(), Error> {
-    let mut rig = Rig::one_line()?;
-    let stats = runtime()?.block_on(async {
-        let line = Line::open(rig.config()?).await?;
-        warm_up_and_saturate(&line, time, || rig.take().map(drop)).await
-    })?;
-    let counted = rig.take()?;
-    drop(rig);
-    describe(report, "this line, pty", &counted, Goal::AtLeast(GOAL));
-    let late = micros(stats.lag.mean());
-    report.note(SECTION, "this line, pty: of it by choice, timer and write", Unit::Micros, late);
-
+    on_a_pty(report, "this line, pty", time)?;
+    if let Some(_awake) = Awake::begin() {
+        on_a_pty(report, "this line, pty, processors kept awake", time)?;
+    }
     let counted = in_memory(time)?;
-    describe(report, "this line, in memory, real time", &counted, Goal::AtLeast(GOAL));
-
+    describe(report, "this line, in memory", &counted, Goal::AtLeast(GOAL));
     let counted = virtual_line::saturated(DRIVES, transactions)?;
     describe(report, "its machines alone, virtual time", &counted, Goal::AtLeast(GOAL));
 
-    for (name, silence) in [("stock tokio-modbus with sleep(t3.5)", true), ("stock tokio-modbus", false)] {
+    for (name, silence) in
+        [("stock tokio-modbus with sleep(t3.5), pty", true), ("stock tokio-modbus, pty", false)]
+    {
         let mut rig = Rig::one_line()?;
         let port = rig.port()?.clone();
         runtime()?.block_on(async { tokio::spawn(stock(port, DRIVES, time / 2, silence)).await? })?;
         describe(report, name, &rig.take()?, Goal::None);
     }
+    let mut rig = Rig::one_line()?;
+    spinning(rig.port()?, DRIVES, time / 2)?;
+    describe(report, "loop that never sleeps, pty", &rig.take()?, Goal::None);
+    Ok(())
+}
+
+fn on_a_pty(report: &mut Report, name: &str, time: Duration) -> Result<(), Error> {
+    let mut rig = Rig::one_line()?;
+    let stats = runtime()?.block_on(async {
+        let line = Line::open(rig.config()?).await?;
+        warm_up_and_saturate(&line, time, || rig.take().map(drop)).await
+    })?;
+    describe(report, name, &rig.take()?, Goal::AtLeast(GOAL));
+    let late = micros(stats.lag.mean());
+    report.note(SECTION, format!("{name}: of it by choice, timer and write"), Unit::Micros, late);
     Ok(())
 }
 
@@ -122,8 +133,8 @@ fn describe(report: &mut Report, name: &str, counted: &Counted, goal: Goal) {
     if goal != Goal::None {
         let what = format!("{name}: without the simulator's own lateness");
         report.row(SECTION, what, Unit::Share, share(own), goal);
-        report.note(SECTION, format!("{name}: lost in each slot"), Unit::Micros, micros(lost));
     }
+    report.note(SECTION, format!("{name}: lost in each slot"), Unit::Micros, micros(lost));
     let wanted = if goal == Goal::None { Goal::None } else { Goal::AtMost(0.0) };
     let t3_5 = millis(SerialSettings::MODBUS_DEFAULT.t3_5());
     report.row(

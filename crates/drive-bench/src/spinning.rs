@@ -1,0 +1,51 @@
+//! The most that any master can reach on this machine.
+
+use std::{
+    fs::OpenOptions,
+    io::{self, Read, Write},
+    os::unix::fs::OpenOptionsExt,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use drive_bus::exchange::rtu;
+use drive_core::serial::SerialSettings;
+use rustix::fs::OFlags;
+
+use crate::{
+    Error,
+    rig::{FIRST, QUANTITY},
+};
+
+/// A loop that never sleeps: it spins on the port and on the clock, with a processor for itself, and does nothing else.
+/// How many reads were answered.
+pub(crate) fn spinning(port: &Path, drives: u8, time: Duration) -> Result<u64, Error> {
+    let mut port = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .custom_flags((OFlags::NONBLOCK | OFlags::NOCTTY).bits() as i32)
+        .open(port)?;
+    let [high, low] = FIRST.to_be_bytes();
+    let (start, mut reads, mut quiet_from) = (Instant::now(), 0, None);
+    for slave in (1..=drives).cycle() {
+        if start.elapsed() >= time {
+            break;
+        }
+        let request = rtu::frame(slave, &[3, high, low, 0, QUANTITY as u8]);
+        while quiet_from.is_some_and(|from: Instant| from.elapsed() < SerialSettings::MODBUS_DEFAULT.t3_5()) {
+            std::hint::spin_loop();
+        }
+        port.write_all(&request)?;
+        let (mut answer, mut length) = ([0; 5 + 2 * QUANTITY as usize], 0);
+        while length < answer.len() {
+            match port.read(&mut answer[length..]) {
+                Ok(received) => length += received,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+        quiet_from = Some(Instant::now());
+        reads += 1;
+    }
+    Ok(reads)
+}

@@ -1,0 +1,49 @@
+//! The program runs and says what a reader expects. No test here looks at how fast anything was.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// The rows of one run in its smallest form.
+fn rows(section: &str) -> Vec<Value> {
+    let output = Command::new(env!("CARGO_BIN_EXE_drive-bench"))
+        .args([section, "--json", "--seconds", "1", "--transactions", "4000", "--lines", "2"])
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn row<'a>(rows: &'a [Value], begins: &str) -> &'a Value {
+    let found = rows.iter().find(|row| row["measured"].as_str().is_some_and(|name| name.starts_with(begins)));
+    found.unwrap_or_else(|| panic!("no row {begins:?} in {rows:?}"))
+}
+
+#[test]
+fn over_every_fault_our_line_accepts_no_wrong_value() {
+    let rows = rows("faults");
+    let wrong = row(&rows, "wrong values accepted as right");
+    assert_eq!(wrong["value"], 0.0);
+    assert_eq!(wrong["met"], true);
+    assert!(row(&rows, "… answered right")["value"].as_f64().unwrap() > 2_000.0);
+}
+
+#[test]
+fn lines_in_one_process_are_counted_by_a_simulator_in_another() {
+    let rows = rows("lines");
+    assert!(rows.iter().all(|row| row["section"] == "lines"));
+    let utilisation = row(&rows, "2 lines: utilisation, mean");
+    assert_eq!(utilisation["goal"]["relation"], "≥");
+    assert!(utilisation["value"].as_f64().is_some_and(|value| value > 0.0));
+}
+
+#[test]
+fn three_masters_are_measured_on_a_line_without_pacing() {
+    let rows = rows("cpu");
+    for master in ["this line", "loop by hand", "stock tokio-modbus"] {
+        let each = row(&rows, &format!("processor time per transaction, {master}"));
+        assert!(each["value"].as_f64().is_some_and(|value| value > 0.0));
+    }
+}
