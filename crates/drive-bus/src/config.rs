@@ -207,20 +207,12 @@ impl LineConfig {
 
     /// How many characters the frame of a request with a PDU of this length has.
     pub(crate) const fn request_len(&self, pdu: usize) -> usize {
-        match self.protocol {
-            Protocol::Rtu => pdu + 3,
-            Protocol::Ascii(_) => ascii::len(pdu),
-            Protocol::UniTelway(_) => unitelway::request_len(pdu),
-        }
+        self.protocol.request_len(pdu)
     }
 
     /// How many characters come back until the answer with a PDU of this length has come.
     pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
-        match self.protocol {
-            Protocol::Rtu => pdu + 3,
-            Protocol::Ascii(_) => ascii::len(pdu),
-            Protocol::UniTelway(_) => unitelway::reply_len(pdu),
-        }
+        self.protocol.answer_len(pdu)
     }
 
     /// The time that so many characters take on the line.
@@ -228,17 +220,10 @@ impl LineConfig {
         if self.is_paced() { self.serial.characters(characters) } else { Duration::ZERO }
     }
 
-    /// The silence before any request: t3.5 in RTU. The other protocols need none to tell frames apart; a slave needs it
-    /// to let go of the line, and gets a character's time in ASCII.
-    pub(crate) const fn silence(&self) -> Duration {
-        if !self.is_paced() {
-            return Duration::ZERO;
-        }
-        match self.protocol {
-            Protocol::Rtu => self.serial.t3_5(),
-            Protocol::Ascii(_) => self.serial.bits(self.serial.format().bits()),
-            Protocol::UniTelway(settings) => self.serial.bits(settings.turnaround_bits),
-        }
+    /// The silence before any request, see [`Protocol::silence`].
+    #[must_use]
+    pub const fn silence(&self) -> Duration {
+        if self.is_paced() { self.protocol.silence(self.serial) } else { Duration::ZERO }
     }
 
     /// Whether frames need silences between them.

@@ -1,9 +1,10 @@
 //! Which protocol a serial line speaks.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, time::Duration};
 
 use drive_core::serial::{CharacterFormat, SerialSettings};
 
+use crate::exchange::{ascii, unitelway};
 pub use crate::exchange::{
     ascii::AsciiSettings,
     unitelway::{NetworkHeader, UniTelwaySettings},
@@ -22,6 +23,58 @@ pub enum Protocol {
 }
 
 impl Protocol {
+    /// The silence before any request: t3.5 in RTU. The other protocols need none to tell frames apart; a slave needs it
+    /// to let go of the line, and gets a character's time in ASCII and the link's turnaround in UNI-TELWAY.
+    #[must_use]
+    pub const fn silence(&self, serial: SerialSettings) -> Duration {
+        match self {
+            Self::Rtu => serial.t3_5(),
+            Self::Ascii(_) => serial.bits(serial.format().bits()),
+            Self::UniTelway(settings) => serial.bits(settings.turnaround_bits),
+        }
+    }
+
+    /// What an exchange takes besides the times that the slave needs: the characters of request and answer with PDUs of
+    /// these lengths, all that goes with them, and the silences.
+    #[must_use]
+    pub fn exchange_time(&self, serial: SerialSettings, request: usize, answer: usize) -> Duration {
+        let characters = self.request_len(request) + self.answer_len(answer);
+        serial.characters(characters) + self.silence(serial) * self.turns()
+    }
+
+    /// What a request takes with the silence before it.
+    #[must_use]
+    pub fn request_time(&self, serial: SerialSettings, request: usize) -> Duration {
+        serial.characters(self.request_len(request)) + self.silence(serial)
+    }
+
+    /// How often the slave speaks in one exchange.
+    #[must_use]
+    pub const fn turns(&self) -> u32 {
+        match self {
+            Self::Rtu | Self::Ascii(_) => 1,
+            Self::UniTelway(_) => 2,
+        }
+    }
+
+    /// How many characters the frame of a request with a PDU of this length has.
+    pub(crate) const fn request_len(&self, pdu: usize) -> usize {
+        match self {
+            Self::Rtu => pdu + 3,
+            Self::Ascii(_) => ascii::len(pdu),
+            Self::UniTelway(_) => unitelway::request_len(pdu),
+        }
+    }
+
+    /// How many characters come and go from the end of the request until the answer with a PDU of this length has come.
+    pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
+        match self {
+            Self::Rtu => pdu + 3,
+            Self::Ascii(_) => ascii::len(pdu),
+            Self::UniTelway(_) => unitelway::reply_len(pdu),
+        }
+    }
+
     /// Whether the protocol can be spoken with these characters.
     ///
     /// # Errors
@@ -92,6 +145,22 @@ mod tests {
             assert_eq!(text.parse::<Protocol>().unwrap().to_string(), text);
         }
         assert!("modbus".parse::<Protocol>().is_err());
+    }
+
+    #[test]
+    fn an_exchange_takes_what_its_characters_and_silences_take() {
+        let time = |protocol: &str, serial: SerialSettings| {
+            protocol.parse::<Protocol>().unwrap().exchange_time(serial, 5, 18).as_micros()
+        };
+        let even = SerialSettings::MODBUS_DEFAULT;
+        // FC03 × 8: 8 + 21 characters of 11 bits and 3.5 of silence, at 19200.
+        assert_eq!(time("rtu", even), (8 + 21) * 11 * 1_000_000 / 19_200 + 2_005);
+        let seven = SerialSettings::new(19_200, CharacterFormat::F7E1).unwrap();
+        // 17 + 43 characters of 10 bits and one of silence.
+        assert_eq!(time("ascii", seven), (17 + 43 + 1) * 10 * 1_000_000 / 19_200);
+        let odd = SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap();
+        // 20 characters, ACK, 3, 29, ACK, and twice 10 bits.
+        assert_eq!(time("unitelway", odd), ((20 + 1 + 3 + 29 + 1) * 11 + 2 * 10) * 1_000_000 / 19_200);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::{fmt, time::Duration};
 
-use drive_bus::{Endpoint, LineConfig};
+use drive_bus::{Endpoint, LineConfig, Protocol};
 use drive_core::{Capabilities, SerialSettings};
 
 use crate::{
@@ -13,9 +13,9 @@ use crate::{
 
 /// Words that an exchange of a status or of measurements is reckoned with.
 const WORDS: usize = 8;
-/// Characters of a request, of the frame around an answer's words, and of a write's confirmation.
-const REQUEST: usize = 8;
-const ANSWER: usize = 5;
+/// Bytes of a request without what its protocol puts round it, and of an answer besides its words.
+const REQUEST: usize = 5;
+const ANSWER: usize = 2;
 /// Exchanges of a stop besides its status: the ways down the state chart.
 const STOP_EXCHANGES: u32 = 3;
 
@@ -24,6 +24,8 @@ const STOP_EXCHANGES: u32 = 3;
 pub struct LineBudget {
     /// Speed and format; `None` for Modbus TCP, which takes no time for characters and keeps no silences.
     pub serial: Option<SerialSettings>,
+    /// What is spoken with these characters.
+    pub protocol: Protocol,
     /// The usual time from a request to its answer.
     pub response: Duration,
     /// How long the line waits for an answer that does not come.
@@ -43,6 +45,7 @@ impl LineBudget {
                 Endpoint::ModbusTcp(_) => None,
                 _ => Some(config.serial),
             },
+            protocol: config.protocol,
             response: Duration::from_millis(10),
             response_timeout: config.response_timeout,
             broadcast_turnaround: config.broadcast_turnaround,
@@ -50,21 +53,17 @@ impl LineBudget {
         }
     }
 
-    /// One exchange with so many characters there and back.
-    fn slot(&self, request: usize, answer: usize) -> Duration {
-        let wire = self.serial.map_or(Duration::ZERO, |serial| {
-            serial.characters(request) + serial.characters(answer) + serial.t3_5()
-        });
-        wire + self.response
-    }
-
+    /// One exchange that reads.
     fn read_slot(&self) -> Duration {
-        self.slot(REQUEST, ANSWER + 2 * WORDS)
+        self.serial.map_or(self.response, |serial| {
+            let wire = self.protocol.exchange_time(serial, REQUEST, ANSWER + 2 * WORDS);
+            wire + self.response * self.protocol.turns()
+        })
     }
 
     /// An exchange that brings no answer.
     fn lost_slot(&self) -> Duration {
-        let wire = self.serial.map_or(Duration::ZERO, |serial| serial.characters(REQUEST) + serial.t3_5());
+        let wire = self.serial.map_or(Duration::ZERO, |serial| self.protocol.request_time(serial, REQUEST));
         wire + self.response_timeout
     }
 }

@@ -164,9 +164,10 @@ pub(crate) const fn request_len(pdu: usize) -> usize {
     frame_len(pdu + STANDARD_LEN + 4)
 }
 
-/// How many characters come and go from the end of a request to the end of its reply.
+/// How many characters come and go from the end of a request to the end of its exchange: two acknowledgements, a poll and
+/// the reply.
 pub(crate) const fn reply_len(pdu: usize) -> usize {
-    1 + POLL_LEN + frame_len(pdu + STANDARD_LEN)
+    2 + POLL_LEN + frame_len(pdu + STANDARD_LEN)
 }
 
 /// The machine.
