@@ -50,6 +50,20 @@ impl Options {
         })
     }
 
+    /// Those of them that are this family's: for a list that holds options of several.
+    #[must_use]
+    pub fn of(&self, family: Family) -> Self {
+        let none = Self::default();
+        match family {
+            Family::Atv21 => Self { authority: self.authority, ..none },
+            Family::Atv58 => Self { map: self.map, ..none },
+            Family::Omron3g3ev => {
+                Self { fault_reset_function: self.fault_reset_function, saves: self.saves, ..none }
+            }
+            Family::Atv28 | Family::Atv312 => none,
+        }
+    }
+
     /// Whether a drive of this family can be opened with them.
     ///
     /// # Errors
@@ -128,7 +142,10 @@ mod tests {
                 assert_ne!(options.map, Some(Atv58Map::default()), "{}", entry.name);
             }
             for family in Family::ALL {
-                assert_eq!(options.check(family).is_ok(), family == entry.family, "{} {family}", entry.name);
+                let own = family == entry.family;
+                assert_eq!(options.check(family).is_ok(), own, "{} {family}", entry.name);
+                assert_eq!(options.of(family) == options, own, "{} {family}", entry.name);
+                assert!(options.of(family).check(family).is_ok());
             }
         }
     }

@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
 use crate::{
-    commands::{demo, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
+    commands::{demo, families, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
     failure::Failure,
     run,
 };
@@ -43,6 +43,7 @@ pub(crate) enum Command {
     Reset(reset::Args),
     #[command(subcommand)]
     Param(param::Command),
+    Families(families::Args),
 }
 
 impl Command {
@@ -72,6 +73,7 @@ impl Command {
             Self::Faults(args) => faults::run(args).await,
             Self::Reset(args) => reset::run(args).await,
             Self::Param(command) => param::run(command).await,
+            Self::Families(args) => families::run(&args),
         }
     }
 }

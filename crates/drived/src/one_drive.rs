@@ -2,8 +2,10 @@
 
 use drive_bus::{Line, LineConfig};
 use drive_core::{Drive, Error, ErrorKind};
+use drive_families::Options;
 
 use crate::{
+    drive_options::{self, OptionArgs},
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
@@ -18,6 +20,8 @@ pub(crate) struct OneDriveArgs {
     /// The drive, such as atv312@1
     #[arg(long, value_name = "FAMILY@ADDRESS")]
     drive: DriveSpec,
+    #[command(flatten)]
+    options: OptionArgs,
 }
 
 impl OneDriveArgs {
@@ -31,9 +35,12 @@ impl OneDriveArgs {
     /// Opens the line. Nothing is sent by it.
     pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
         let name = self.name()?;
+        let options = self.options.of(&[name])?;
         let config = self.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+        // No other drive waits behind a mute one here, so each request is really sent.
+        let config = LineConfig { offline_after: 0, ..config };
         let line = open_line(config.clone()).await?;
-        let drive = name.family.open(line.slave(name.slave.number()), name.slave);
+        let drive = open_drive(&line, name, &options)?;
         Ok(OneDrive { name, drive, config, line })
     }
 }
@@ -41,6 +48,13 @@ impl OneDriveArgs {
 /// Opens a line; a port that is missing or in use is the caller's input.
 pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
     Line::open(config).await.map_err(|error| Failure::Input(error.to_string()))
+}
+
+/// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.
+pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Result<Box<dyn Drive>, Failure> {
+    let DriveName { family, slave } = name;
+    let drive = family.open_with(line.slave(slave.number()), slave, &options.of(family));
+    drive.map_err(|error| Failure::Input(format!("{name}: {error}")))
 }
 
 /// A drive and its open line.
@@ -63,6 +77,7 @@ impl OneDrive {
             ErrorKind::OutcomeUnknown => {
                 format!("{name}: {error}: nobody knows whether it was carried out, read the status")
             }
+            ErrorKind::Unsupported => format!("{name}: {error}{}", drive_options::hint(name.family)),
             _ => format!("{name}: {error}"),
         })
     }

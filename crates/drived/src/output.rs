@@ -2,7 +2,7 @@
 
 use std::{
     fmt,
-    io::{self, Write},
+    io::{self, IsTerminal, Write},
     time::Duration,
 };
 
@@ -15,53 +15,126 @@ pub(crate) fn say(line: impl fmt::Display) -> Result<(), Failure> {
     writeln!(io::stdout().lock(), "{line}").map_err(|error| Failure::output(&error))
 }
 
-/// A table with aligned columns.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Prints a table, on a terminal no wider than that.
+pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
+    let width = io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten();
+    say(Table { available: width.map(|(columns, _)| usize::from(columns)), ..table })
+}
+
+/// Between two columns of a table.
+const GAP: usize = 2;
+
+/// No column is made narrower than this.
+const NARROWEST: usize = 12;
+
+/// A table with aligned columns. Where there is a limit to its width, the texts of its widest columns go on in further
+/// lines.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,
+    /// How many of the rows are heads.
+    heads: usize,
     /// Columns from this one on are numbers, set to the right.
-    numbers_from: usize,
+    numbers_from: Option<usize>,
+    /// How many characters a line may have.
+    available: Option<usize>,
 }
 
 impl Table {
+    /// A table of texts without heads.
+    pub(crate) fn texts() -> Self {
+        Self::default()
+    }
+
     /// A table of texts.
     pub(crate) fn new<const N: usize>(heads: [&str; N]) -> Self {
-        Self { rows: vec![heads.map(str::to_owned).to_vec()], numbers_from: usize::MAX }
+        Self { rows: vec![heads.map(str::to_owned).to_vec()], heads: 1, ..Self::default() }
     }
 
     /// The same, with numbers from a column on.
     pub(crate) fn with_numbers_from(self, column: usize) -> Self {
-        Self { numbers_from: column, ..self }
+        Self { numbers_from: Some(column), ..self }
     }
 
     pub(crate) fn row<const N: usize>(&mut self, cells: [String; N]) {
         self.rows.push(cells.to_vec());
     }
+
+    /// Whether it has no row below its heads.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.len() <= self.heads
+    }
+
+    /// The width of each column: that of its longest text, unless there is less room.
+    fn widths(&self) -> Vec<usize> {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or_default();
+        let longest = |column: usize| {
+            self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max()
+        };
+        let mut widths: Vec<usize> = (0..columns).map(|column| longest(column).unwrap_or_default()).collect();
+        let available = self.available.unwrap_or(usize::MAX).saturating_sub(GAP * columns.saturating_sub(1));
+        while widths.iter().sum::<usize>() > available {
+            match widths.iter_mut().max() {
+                Some(widest) if *widest > NARROWEST => *widest -= 1,
+                _ => break,
+            }
+        }
+        widths
+    }
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or_default();
-        let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
-        let width = |column| self.rows.iter().map(|row| cell(row, column).chars().count()).max();
-        let widths: Vec<usize> = (0..columns).map(|column| width(column).unwrap_or_default()).collect();
+        let widths = self.widths();
         for (index, row) in self.rows.iter().enumerate() {
-            let mut line = String::new();
-            for (column, width) in widths.iter().copied().enumerate() {
-                let text = cell(row, column);
-                if column >= self.numbers_from {
-                    line.push_str(&format!("{text:>width$}  "));
-                } else {
-                    line.push_str(&format!("{text:<width$}  "));
+            let cells: Vec<Vec<String>> =
+                row.iter().zip(&widths).map(|(cell, &width)| wrapped(cell, width)).collect();
+            let height = cells.iter().map(Vec::len).max().unwrap_or_default();
+            for line_of_row in 0..height {
+                let mut line = String::new();
+                for (column, (cell, &width)) in cells.iter().zip(&widths).enumerate() {
+                    let text = cell.get(line_of_row).map_or("", String::as_str);
+                    if self.numbers_from.is_some_and(|first| column >= first) {
+                        line.push_str(&format!("{text:>width$}"));
+                    } else {
+                        line.push_str(&format!("{text:<width$}"));
+                    }
+                    line.push_str(&" ".repeat(GAP));
                 }
+                if index + line_of_row > 0 {
+                    f.write_str("\n")?;
+                }
+                f.write_str(line.trim_end())?;
             }
-            if index > 0 {
-                f.write_str("\n")?;
-            }
-            f.write_str(line.trim_end())?;
         }
         Ok(())
     }
+}
+
+/// A text in lines of at most this width, broken between words where it has some; its indentation is kept.
+pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
+    if text.chars().count() <= width {
+        return vec![text.to_owned()];
+    }
+    let indent: String = text.chars().take_while(|character| *character == ' ').collect();
+    let mut lines = Vec::new();
+    let mut line = indent.clone();
+    for word in text.split_whitespace() {
+        let taken = line.chars().count();
+        if taken > indent.len() && taken + 1 + word.chars().count() > width {
+            lines.push(std::mem::replace(&mut line, indent.clone()));
+        } else if taken > indent.len() {
+            line.push(' ');
+        }
+        for character in word.chars() {
+            if line.chars().count() >= width.max(indent.len() + 1) {
+                lines.push(std::mem::replace(&mut line, indent.clone()));
+            }
+            line.push(character);
+        }
+    }
+    lines.push(line);
+    lines
 }
 
 /// A value, or a dash where there is none.
@@ -106,6 +179,26 @@ mod tests {
         table.row(["atv312@1".to_owned(), "7".to_owned()]);
         table.row(["atv21@2".to_owned(), "12345".to_owned()]);
         assert_eq!(table.to_string(), "drive      good\natv312@1      7\natv21@2   12345");
+    }
+
+    #[test]
+    fn a_table_goes_on_in_further_lines_where_there_is_no_room() {
+        let mut table = Table::new(["code", "name"]);
+        table.row(["ACC".to_owned(), "acceleration time to the nominal frequency".to_owned()]);
+        table.row(["dEC".to_owned(), "deceleration".to_owned()]);
+        let narrow = Table { available: Some(24), ..table.clone() };
+        assert_eq!(
+            narrow.to_string(),
+            "code  name\nACC   acceleration time\n      to the nominal\n      frequency\ndEC   deceleration"
+        );
+        assert_eq!(Table { available: Some(0), ..table.clone() }.to_string().lines().count(), 6);
+        assert_eq!(table.to_string().lines().count(), 3);
+    }
+
+    #[test]
+    fn a_word_without_room_is_broken() {
+        assert_eq!(wrapped("  abc defghij", 5), ["  abc", "  def", "  ghi", "  j"]);
+        assert_eq!(wrapped("abc", 0), ["a", "b", "c"]);
     }
 
     #[test]

@@ -1,18 +1,41 @@
 //! Simulated drives, for `sim` and `demo`.
 
 use drive_bus::Protocol;
-use drive_families::Family;
+use drive_families::{Family, Options};
 use drive_sim::{Model, models};
 
-/// A simulated drive of a family, set up for the bus.
-pub(crate) fn model(family: Family) -> Box<dyn Model> {
+/// The number that the simulated 3G3EV takes for "fault reset": its n08 holds it from the factory.
+const FAULT_RESET_FUNCTION: u16 = 3;
+
+/// How a simulated drive is set up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SetUp {
+    /// For command by the bus, as far as the family needs settings for it.
+    ForTheBus,
+    /// As it leaves the factory.
+    Factory,
+}
+
+/// A simulated drive of a family.
+pub(crate) fn model(family: Family, set_up: SetUp) -> Box<dyn Model> {
+    let for_the_bus = set_up == SetUp::ForTheBus;
     match family {
-        Family::Atv21 => Box::new(models::atv21::Atv21::new().with_blocks()),
+        Family::Atv21 if for_the_bus => Box::new(models::atv21::Atv21::new().with_blocks()),
+        Family::Atv21 => Box::new(models::atv21::Atv21::new()),
         Family::Atv28 => Box::new(models::atv28::Atv28::new()),
         Family::Atv58 => Box::new(models::atv58::Atv58::new()),
-        Family::Atv312 => Box::new(models::atv312::Atv312::under_bus_control()),
-        Family::Omron3g3ev => Box::new(models::drive_3g3ev::Drive3g3ev::new()),
+        Family::Atv312 if for_the_bus => Box::new(models::atv312::Atv312::under_bus_control()),
+        Family::Atv312 => Box::new(models::atv312::Atv312::new()),
+        Family::Omron3g3ev => {
+            let drive = models::drive_3g3ev::Drive3g3ev::new();
+            Box::new(if for_the_bus { drive.with_fault_reset_function(FAULT_RESET_FUNCTION) } else { drive })
+        }
     }
+}
+
+/// What the owner of the simulated drives that are set up for the bus says of them.
+pub(crate) fn options() -> Options {
+    Options { fault_reset_function: Some(FAULT_RESET_FUNCTION), ..Options::default() }
 }
 
 /// The simulator's name of a protocol.
@@ -41,19 +64,23 @@ mod tests {
     use drive_sim::{SimLine, Wiring};
 
     use super::*;
+    use crate::commands::reset::reset;
 
     #[tokio::test(start_paused = true)]
-    async fn the_trip_of_every_family_is_read_as_a_fault() {
+    async fn the_trip_of_every_family_is_read_as_a_fault_and_reset() {
         for family in Family::ALL {
             let settings = family.capabilities().factory;
             let simulated = SimLine::new(Wiring::rtu(settings));
-            let machine = simulated.add_boxed(1, model(family)).unwrap();
-            let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
-            let mut drive = family.open(line.slave(1), SlaveAddress::try_from(1).unwrap());
+            let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+            let machine = simulated.add_boxed(1, model(family, SetUp::ForTheBus)).unwrap();
+            let line = Line::over(simulated.in_memory(), config);
+            let slave = SlaveAddress::try_from(1).unwrap();
+            let mut drive = family.open_with(line.slave(1), slave, &options().of(family)).unwrap();
             assert!(!drive.status().await.unwrap().is_fault(), "{family}");
             machine.trip(trip_code(family));
             assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
             assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
+            assert!(!reset(&mut *drive).await.unwrap().is_fault(), "{family}");
         }
     }
 }

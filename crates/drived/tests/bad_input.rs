@@ -107,6 +107,21 @@ fn what_a_family_cannot_do_is_refused_before_the_port_is_opened() {
 }
 
 #[test]
+fn an_option_that_no_drive_of_the_line_has_is_refused() {
+    for (drive, option, reason) in [
+        ("3g3ev@1", "saves", "expected NAME=VALUE"),
+        ("3g3ev@1", "speed=5", "\"speed\" is not an option of a drive: expected one of authority,"),
+        ("3g3ev@1", "saves=many", "option saves: \"many\" is not a value of it: expected a whole number"),
+        ("atv312@1", "saves=1", "atv312@1: option saves belongs to the 3g3ev: the atv312 has none"),
+    ] {
+        for subcommand in ["poll", "status", "stop"] {
+            let ended = run(&[subcommand, "--line", PORT, "--drive", drive, "--option", option]);
+            ended.assert_refused(2, reason);
+        }
+    }
+}
+
+#[test]
 fn what_is_missing_or_misspelt_is_said() {
     for (arguments, reason) in [
         (&["poll"][..], "--line <LINE>"),

@@ -139,3 +139,50 @@ fn the_demo_drives_its_motors_and_stops_them_when_it_is_asked_to_end() {
     assert!(rest.contains("Ctrl-C: the motors were asked to stop"), "{rest}");
     assert!(rest.contains("stands still") && !rest.contains("NOT CONFIRMED"), "{rest}");
 }
+
+#[test]
+fn a_3g3ev_is_reset_once_its_owner_says_which_input_function_resets_faults() {
+    let sim = Sim::serve("option", &["3g3ev@4-5"]);
+    sim.on("3g3ev@4", &["setpoint", "30Hz"]).assert_done();
+    sim.on("3g3ev@4", &["start"]).assert_done();
+    // While only its neighbour is asked, its time-over detection trips. Every look feeds it anew.
+    let mut shown = String::new();
+    for seconds in ["3", "4", "5", "6"] {
+        sim.on("3g3ev@5", &["poll", "--seconds", seconds]).assert_done();
+        shown = sim.on("3g3ev@4", &["faults"]).assert_done().to_owned();
+        if shown.contains("has tripped") {
+            break;
+        }
+    }
+    assert!(shown.contains("3g3ev@4 has tripped"), "{shown}");
+
+    let untold = sim.on("3g3ev@4", &["reset"]);
+    untold.assert_refused(1, "by --option: fault-reset-function, saves");
+    let told = sim.on("3g3ev@4", &["reset", "--option", "fault-reset-function=3"]);
+    assert!(told.assert_done().starts_with("3g3ev@4 has no fault any more"), "{told:?}");
+
+    let foreign = sim.on("3g3ev@4", &["status", "--option", "authority=settings"]);
+    foreign.assert_refused(
+        2,
+        "3g3ev@4: option authority belongs to the atv21: the 3g3ev has fault-reset-function",
+    );
+}
+
+#[test]
+fn a_parameter_is_saved_to_eeprom_only_when_that_is_asked_for_and_it_was_changed() {
+    let sim = Sim::serve_with("save", &["atv312@1", "3g3ev@2"], &["--baud", "19200"]);
+    let line = format!("{},19200,8E1", sim.link());
+    let set = |drive: &str, arguments: &[&str]| {
+        run(&[&["param", "set", "--line", &line, "--drive", drive], arguments].concat())
+    };
+    let saved = set("3g3ev@2", &["n20", "4.5", "--save", "--option", "saves=120"]);
+    assert!(
+        saved.assert_done().contains("to EEPROM by ENTER, a write to 0900h; saves counted: 121"),
+        "{saved:?}"
+    );
+    let again = set("3g3ev@2", &["n20", "4.5", "--save"]);
+    assert!(again.assert_done().contains("nothing was saved"), "{again:?}");
+    let saved = set("atv312@1", &["ACC", "4.5", "--save"]);
+    assert!(saved.assert_done().contains("has saved its parameters to EEPROM by CMI bit 1"), "{saved:?}");
+    set("atv58@3", &["ACC", "4.5", "--save"]).assert_refused(2, "no command that saves its parameters");
+}

@@ -1,6 +1,7 @@
 //! The subcommands, one module each.
 
 pub(crate) mod demo;
+pub(crate) mod families;
 pub(crate) mod faults;
 pub(crate) mod param;
 pub(crate) mod plan;

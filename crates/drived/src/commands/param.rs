@@ -39,6 +39,9 @@ pub(crate) enum Command {
         /// A number in the register's unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
         #[arg(value_name = "VALUE", allow_hyphen_values = true)]
         value: String,
+        /// Then save the drive's parameters to its EEPROM, where a family has a command for it
+        #[arg(long)]
+        save: bool,
     },
     /// Read every register that can be read
     Dump {
@@ -49,9 +52,9 @@ pub(crate) enum Command {
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::List { family } => output::say(list(family)),
+        Command::List { family } => output::say_table(list(family)),
         Command::Get { one, registers } => get(&one, &registers).await,
-        Command::Set { one, register, value } => set(&one, &register, &value).await,
+        Command::Set { one, register, value, save } => set(&one, &register, &value, save).await,
         Command::Dump { one } => dump(&one).await,
     }
 }
@@ -86,13 +89,21 @@ async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
         let word = one.drive.read_parameter(row).await.map_err(|error| one.failure(&error))?;
         table.row(value_cells(row, row.show(word)));
     }
-    output::say(table)?;
+    output::say_table(table)?;
     one.close().await;
     Ok(())
 }
 
-async fn set(args: &OneDriveArgs, register: &str, value: &str) -> Result<(), Failure> {
-    let row = find(args.name()?.family, register)?;
+async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Result<(), Failure> {
+    let name = args.name()?;
+    let row = find(name.family, register)?;
+    let can_save = name.family.capabilities().persist;
+    if save && can_save.is_none() {
+        let family = name.family.capabilities().name;
+        return Err(Failure::Input(format!(
+            "{name}: a {family} has no command that saves its parameters: leave out --save"
+        )));
+    }
     let word = wanted(row, value)?;
     let mut one = args.open().await?;
     let written = one.drive.write_parameter(row, word).await.map_err(|error| one.failure(&error))?;
@@ -106,6 +117,16 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str) -> Result<(), Fai
         Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
     };
     output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, row.show(word)))?;
+    match can_save {
+        Some(by) if save && written.changed => {
+            let saves = one.drive.persist().await.map_err(|error| one.failure(&error))?;
+            output::say(format_args!(
+                "{name} has saved its parameters to EEPROM by {by}; saves counted: {saves}"
+            ))?;
+        }
+        _ if save => output::say("nothing was changed, so nothing was saved to EEPROM")?,
+        _ => {}
+    }
     one.close().await;
     Ok(())
 }
@@ -122,7 +143,7 @@ async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
         };
         table.row(value_cells(row, shown));
     }
-    output::say(table)?;
+    output::say_table(table)?;
     one.close().await;
     Ok(())
 }

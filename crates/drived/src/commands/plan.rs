@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             Err(problem) => remarks.push(format!("with {DEAD} dead it cannot work: {problem}")),
         }
     }
-    output::say(table)?;
+    output::say_table(table)?;
     remarks.into_iter().try_for_each(output::say)
 }
 

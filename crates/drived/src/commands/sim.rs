@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use drive_families::Options;
 use drive_sim::{SimLine, Wiring};
 
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
     line_spec::{self, CharacterSpec, SerialSpec},
     output,
     signals::Ending,
-    simulated,
+    simulated::{self, SetUp},
 };
 
 /// Serve simulated drives on a pty, with the line's character times, until Ctrl-C
@@ -29,6 +30,10 @@ pub(crate) struct Args {
     /// factory setting and Modbus RTU when they are not given
     #[arg(long, value_name = "FORMAT[,PROTOCOL]")]
     format: Option<CharacterSpec>,
+    /// Serve drives in their factory setting instead of drives set up for the bus (atv21: its blocks of registers;
+    /// atv312: access level L3, commands from Modbus; 3g3ev: a function that resets faults)
+    #[arg(long)]
+    factory: bool,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
@@ -39,8 +44,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let settings = settings.map_err(|error| input(&error))?;
     let mut ending = Ending::listen()?;
     let line = SimLine::new(Wiring { protocol: simulated::protocol(protocol), ..Wiring::rtu(settings) });
+    let set_up = if args.factory { SetUp::Factory } else { SetUp::ForTheBus };
     for name in &drives {
-        let model = simulated::model(name.family);
+        let model = simulated::model(name.family, set_up);
         line.add_boxed(name.slave.number(), model).map_err(|error| input(&error))?;
     }
     let served = line.serve_pty(&args.pty);
@@ -48,7 +54,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 
     output::say(format_args!("serving {settings} {protocol} on {} (Ctrl-C ends it)", args.pty.display()))?;
     for name in &drives {
-        output::say(describe(name))?;
+        output::say(describe(name, set_up))?;
     }
     tokio::select! {
         () = ending.asked() => {}
@@ -61,6 +67,11 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     ))
 }
 
-fn describe(name: &DriveName) -> String {
-    format!("  {name:<12} {}", name.family.capabilities().name)
+/// The drive, and with what it has to be told of to whoever opens it.
+fn describe(name: &DriveName, set_up: SetUp) -> String {
+    let options =
+        if set_up == SetUp::ForTheBus { simulated::options().of(name.family) } else { Options::default() };
+    let reset =
+        options.fault_reset_function.map(|number| format!(" (--option fault-reset-function={number})"));
+    format!("  {name:<12} {}{}", name.family.capabilities().name, reset.unwrap_or_default())
 }

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// How often a stop is sent before it is given up with an alarm.
-const ATTEMPTS: u32 = 10;
+const ATTEMPTS: u32 = 5;
 
 /// Stop the motor of one drive, again and again until the drive confirms it
 #[derive(Debug, clap::Args)]
@@ -82,8 +82,6 @@ async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
         tracing::info!(drive = %one.name, attempt, %error, "stop not confirmed");
         match error.kind() {
             ErrorKind::Unsupported | ErrorKind::Refused => return Err(alarm(one, &error)),
-            // The line takes the slave for dead and does not ask it now. What happened before says more.
-            ErrorKind::NotSent => return Err(alarm(one, why.as_ref().unwrap_or(&error))),
             _ => why = Some(error),
         }
     }

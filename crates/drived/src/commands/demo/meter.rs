@@ -7,10 +7,7 @@ use std::{
 
 use drive_bus::stats::{SlaveStats, Stats};
 
-use super::{
-    plant::{Plant, PlantLine},
-    unit::Unit,
-};
+use super::plant::{Plant, PlantLine};
 use crate::output;
 
 /// Over how many samples the numbers are taken.
@@ -22,13 +19,23 @@ const EVERY: Duration = Duration::from_millis(500);
 struct Sample {
     at: Instant,
     busy: Duration,
-    /// Polls of the drive that was polled least among those of this line that answer.
-    sweeps: u64,
+    /// Status polls of its drives that were answered.
+    polls: u64,
 }
 
 /// What [`Meter::cells`] are.
 pub(super) const HEADS: [&str; 8] =
-    ["line", "used", "sweeps/s", "silences", "shortest", "t3.5", "timeouts", "CRC errors"];
+    ["line", "used", "polls/s", "silences", "shortest", "t3.5", "timeouts", "CRC errors"];
+
+/// The line's numbers on one line of text, for what is no table.
+pub(super) fn sentence(
+    [line, used, polls, silences, shortest, t3_5, timeouts, damaged]: [String; 8],
+) -> String {
+    format!(
+        "{line}: {used} used, {polls} polls/s, {timeouts} timeouts, {damaged} CRC errors,\n          \
+         {silences} silences, the shortest {shortest} (t3.5 is {t3_5})"
+    )
+}
 
 /// Watches one line.
 pub(super) struct Meter {
@@ -48,25 +55,23 @@ impl Meter {
         }
         self.stats = line.line.stats();
         let units = plant.units.get(line.units.clone()).unwrap_or_default();
-        let views = units.iter().map(Unit::view);
-        let answering = views.filter(|view| view.status.is_some()).map(|view| view.polls);
-        let sweeps = answering.min().unwrap_or_default();
+        let polls = units.iter().map(|unit| unit.view().polls).sum();
         if self.samples.len() == SAMPLES {
             self.samples.pop_front();
         }
-        self.samples.push_back(Sample { at: now, busy: self.stats.busy, sweeps });
+        self.samples.push_back(Sample { at: now, busy: self.stats.busy, polls });
     }
 
-    /// Share of the time in which the line was needed, and sweeps in it, over the last seconds.
-    pub(super) fn rates(&self) -> Option<Rates> {
+    /// Share of the time in which the line was needed, and polls in it, over the last seconds.
+    fn rates(&self) -> Option<Rates> {
         let (first, last) = (self.samples.front()?, self.samples.back()?);
         let elapsed = last.at.duration_since(first.at);
         let busy = last.busy.saturating_sub(first.busy);
         let utilisation = (busy.as_nanos() * 1_000_000).checked_div(elapsed.as_nanos())?;
-        let sweeps = u128::from(last.sweeps.saturating_sub(first.sweeps)) * 10_000_000_000;
+        let polls = u128::from(last.polls.saturating_sub(first.polls)) * 10_000_000_000;
         Some(Rates {
             utilisation_ppm: u64::try_from(utilisation).unwrap_or(u64::MAX),
-            decisweeps_per_second: u64::try_from(sweeps / elapsed.as_nanos().max(1)).unwrap_or(u64::MAX),
+            decipolls_per_second: u64::try_from(polls / elapsed.as_nanos().max(1)).unwrap_or(u64::MAX),
         })
     }
 
@@ -81,7 +86,7 @@ impl Meter {
                 rates.as_ref().map(|rates| output::percent(rates.utilisation_ppm.min(1_000_000))),
             ),
             output::or_dash(rates.as_ref().map(|rates| {
-                format!("{}.{}", rates.decisweeps_per_second / 10, rates.decisweeps_per_second % 10)
+                format!("{}.{}", rates.decipolls_per_second / 10, rates.decipolls_per_second % 10)
             })),
             self.stats.silence.count().to_string(),
             output::milliseconds(self.stats.silence.min()),
@@ -93,7 +98,7 @@ impl Meter {
 }
 
 /// See [`Meter::rates`].
-pub(super) struct Rates {
-    pub(super) utilisation_ppm: u64,
-    pub(super) decisweeps_per_second: u64,
+struct Rates {
+    utilisation_ppm: u64,
+    decipolls_per_second: u64,
 }

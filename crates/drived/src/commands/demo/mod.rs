@@ -20,10 +20,15 @@ use self::{
     plant::Plant,
     unit::{Event, Unit},
 };
-use crate::{failure::Failure, output, signals::Ending};
+use crate::{
+    failure::Failure,
+    output::{self, Table},
+    signals::Ending,
+};
 
-/// How long the motors may take to come to a stop at the end.
-const STOPPING: Duration = Duration::from_secs(20);
+/// How long the motors may take to come to a stop at the end: the longest ramp of a simulated drive is 10 s, and one
+/// that restarts after a reset is mute before it.
+const STOPPING: Duration = Duration::from_secs(30);
 
 /// Events that may wait for a slow terminal; the drives do not wait for it, later ones are left out.
 const WAITING: usize = 1_024;
@@ -107,20 +112,31 @@ impl Act {
     }
 }
 
+/// The drives that do not stand yet, with their frequency where they tell one.
+fn waited_for(plant: &Plant) -> String {
+    let turning = plant.units.iter().filter(|unit| !unit.stands());
+    let named = turning.map(|unit| match unit.view().status.and_then(|status| status.output_frequency) {
+        Some(frequency) => format!("{} {frequency}", unit.name),
+        None => format!("{} no status", unit.name),
+    });
+    named.collect::<Vec<_>>().join(", ")
+}
+
 /// Says how each motor was left.
 fn farewell(plant: &Plant, why: Why) -> Result<(), Failure> {
     output::say(format_args!("{}: the motors were asked to stop", why.text()))?;
     let mut turning = Vec::new();
+    let mut table = Table::texts();
     for unit in &plant.units {
         let view = unit.view();
         let status = view.status.map_or_else(|| "no status".to_owned(), |status| status.to_string());
-        if unit.stands() {
-            output::say(format_args!("  {:<12} stands still: {status}", unit.name))?;
-        } else {
+        let verdict = if unit.stands() { "stands still" } else { "NOT CONFIRMED" };
+        if !unit.stands() {
             turning.push(unit.name.to_string());
-            output::say(format_args!("  {:<12} NOT CONFIRMED: {status}", unit.name))?;
         }
+        table.row([format!("  {}", unit.name), verdict.to_owned(), status]);
     }
+    output::say_table(table)?;
     if turning.is_empty() {
         return Ok(());
     }

@@ -5,8 +5,10 @@ use std::time::{Duration, Instant};
 use tokio::time;
 
 use super::{
-    Act, Show, Why,
-    meter::{HEADS, Meter},
+    Act, STOPPING, Show, Why,
+    meter::{self, Meter},
+    plant::Plant,
+    waited_for,
 };
 use crate::{failure::Failure, output};
 
@@ -31,7 +33,7 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
                 output::say(format_args!("{:>3}.{:03} {:<12} {}", at / 1_000, at % 1_000, event.name, event.text))?;
             }
             () = ending.asked() => match act {
-                Act::Playing => act = Act::stop(plant, Why::Asked),
+                Act::Playing => act = stop(plant, Why::Asked)?,
                 Act::Stopping(why, _) => return Ok(why),
             },
             _ = looks.tick() => {
@@ -39,18 +41,26 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
                     meter.look(plant, line, Instant::now());
                 }
                 if act == Act::Playing && until.is_some_and(|until| time::Instant::now() >= until) {
-                    act = Act::stop(plant, Why::TimeIsUp);
+                    act = stop(plant, Why::TimeIsUp)?;
                 }
                 if let Some(why) = act.over(plant) {
                     return Ok(why);
                 }
             }
             _ = reports.tick() => {
+                if act != Act::Playing {
+                    output::say(format_args!("        waiting for {}", waited_for(plant)))?;
+                    continue;
+                }
                 for (meter, line) in meters.iter().zip(&plant.lines) {
-                    let cells = HEADS.iter().zip(meter.cells(line)).map(|(head, cell)| format!("{head} {cell}"));
-                    output::say(format_args!("        {}", cells.collect::<Vec<_>>().join(", ")))?;
+                    output::say(format_args!("        {}", meter::sentence(meter.cells(line))))?;
                 }
             }
         }
     }
+}
+
+fn stop(plant: &Plant, why: Why) -> Result<Act, Failure> {
+    output::say(format_args!("        {}: stopping the motors, waiting {STOPPING:?} at most", why.text()))?;
+    Ok(Act::stop(plant, why))
 }

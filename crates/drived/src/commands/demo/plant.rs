@@ -3,19 +3,24 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{SerialSettings, SlaveAddress, StopMode, serial::CharacterFormat};
+use drive_core::{SerialSettings, SlaveAddress, serial::CharacterFormat};
 use drive_families::Family;
 use drive_sim::{SimLine, Wiring};
 use tokio::{
-    sync::mpsc,
+    sync::{mpsc, watch},
     task::{AbortHandle, JoinSet},
 };
 
 use super::{
     story,
-    unit::{Event, Order, Unit},
+    unit::{Event, Unit},
 };
-use crate::{drive_spec::DriveName, failure::Failure, line_spec, simulated};
+use crate::{
+    drive_spec::DriveName,
+    failure::Failure,
+    line_spec, one_drive,
+    simulated::{self, SetUp},
+};
 
 /// Drives of each family.
 const EACH: u8 = 2;
@@ -27,6 +32,7 @@ pub(super) struct Plant {
     pub(super) lines: Vec<PlantLine>,
     pub(super) units: Vec<Unit>,
     story: AbortHandle,
+    ending: watch::Sender<bool>,
     /// The drives' tasks and the story; they end with the plant.
     _tasks: JoinSet<()>,
 }
@@ -42,6 +48,7 @@ impl Plant {
     /// Builds the plant and sets it going.
     pub(super) fn start(events: &mpsc::Sender<Event>) -> Result<Self, Failure> {
         let mut tasks = JoinSet::new();
+        let ending = watch::Sender::new(false);
         let mut lines = Vec::new();
         let mut units: Vec<Unit> = Vec::new();
         for (settings, names) in layout() {
@@ -53,27 +60,26 @@ impl Plant {
             };
             let mut machines = Vec::new();
             for name in &names {
-                let machine = simulated.add_boxed(name.slave.number(), simulated::model(name.family));
+                let machine =
+                    simulated.add_boxed(name.slave.number(), simulated::model(name.family, SetUp::ForTheBus));
                 machines.push(machine.map_err(|error| Failure::Input(error.to_string()))?);
             }
             let line = Line::over(simulated.in_memory_precise(), line_spec::with_turnarounds(config, &names));
             let first = units.len();
             for (name, machine) in names.into_iter().zip(machines) {
-                let drive = name.family.open(line.slave(name.slave.number()), name.slave);
-                units.push(Unit::start(name, machine, drive, events.clone(), &mut tasks));
+                let drive = one_drive::open_drive(&line, name, &simulated::options())?;
+                units.push(Unit::start(name, machine, drive, events.clone(), ending.subscribe(), &mut tasks));
             }
             lines.push(PlantLine { settings, line, units: first..units.len() });
         }
         let story = tasks.spawn(story::tell(units.clone()));
-        Ok(Self { lines, units, story, _tasks: tasks })
+        Ok(Self { lines, units, story, ending, _tasks: tasks })
     }
 
-    /// Ends the story and sends a stop to every motor.
+    /// Ends the story and stops every motor, whatever its drive was told before.
     pub(super) fn stop(&self) {
         self.story.abort();
-        for unit in &self.units {
-            unit.order(Order::Stop(StopMode::Ramp));
-        }
+        self.ending.send_replace(true);
     }
 }
 

@@ -10,7 +10,7 @@ use crossterm::event::{self, Event as Input, KeyCode, KeyModifiers};
 use ratatui::DefaultTerminal;
 use tokio::time;
 
-use super::{Act, Show, Why, meter::Meter, table};
+use super::{Act, Show, Why, meter::Meter, table, waited_for};
 use crate::failure::Failure;
 
 /// Between two drawings.
@@ -53,7 +53,7 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
         }
         let picture = table::Picture {
             began,
-            stopping: act != Act::Playing,
+            waited_for: (act != Act::Playing).then(|| waited_for(plant)),
             units: plant.units.iter().map(|unit| (unit.name, unit.view())).collect(),
             lines: plant.lines.iter().zip(&meters).map(|(line, meter)| meter.cells(line)).collect(),
             events: &events,

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{Direction, Frequency, StopMode};
+use drive_families::Family;
 use drive_sim::Panel;
 use tokio::time::{self, Instant};
 
@@ -28,11 +29,10 @@ struct Scene {
 
 /// Tells the story again and again.
 pub(super) async fn tell(units: Vec<Unit>) {
-    let stop_modes: Vec<&[StopMode]> =
-        units.iter().map(|unit| unit.name.family.capabilities().stop_modes).collect();
+    let families: Vec<Family> = units.iter().map(|unit| unit.name.family).collect();
     loop {
         let began = Instant::now();
-        for scene in scenes(&stop_modes) {
+        for scene in scenes(&families) {
             time::sleep_until(began + scene.at).await;
             let Some(unit) = units.get(scene.unit) else { continue };
             match scene.deed {
@@ -45,33 +45,40 @@ pub(super) async fn tell(units: Vec<Unit>) {
     }
 }
 
-/// The scenes in their order, for drives with these stop modes.
-fn scenes(stop_modes: &[&[StopMode]]) -> Vec<Scene> {
+/// The scenes in their order, for drives of these families.
+fn scenes(families: &[Family]) -> Vec<Scene> {
     let mut scenes = Vec::new();
     let mut scene = |at_ms: usize, unit: usize, deed: Deed| {
         scenes.push(Scene { at: Duration::from_millis(at_ms as u64), unit, deed });
     };
-    for (unit, modes) in stop_modes.iter().enumerate() {
-        let hertz = |base: u16| Order::Setpoint(Frequency::from_hertz(base + unit as u16 % 5 * 5));
+    let mut tripped = Vec::new();
+    for (unit, family) in families.iter().enumerate() {
+        let hertz =
+            |base: u16| Deed::Order(Order::Setpoint(Frequency::from_hertz(base + unit as u16 % 5 * 5)));
+        let start = |direction| Deed::Order(Order::Start(direction));
         let direction = if unit % 3 == 2 { Direction::Reverse } else { Direction::Forward };
-        scene(500 + 100 * unit, unit, Deed::Order(hertz(20)));
-        scene(1_500 + 300 * unit, unit, Deed::Order(Order::Start(direction)));
-        scene(8_500 + 100 * unit, unit, Deed::Order(hertz(30)));
-        if unit % 3 == 1 {
-            scene(12_000, unit, Deed::Order(Order::Start(Direction::Reverse)));
+        scene(500 + 100 * unit, unit, hertz(20));
+        scene(1_500 + 300 * unit, unit, start(direction));
+        // The first drive of each family trips; one that restarts by its reset has lost its setpoint.
+        if !tripped.contains(family) {
+            let at = 5_500 + 1_200 * tripped.len();
+            tripped.push(*family);
+            scene(at, unit, Deed::Trip);
+            scene(at + 2_000, unit, Deed::Order(Order::Reset));
+            scene(at + 5_000, unit, hertz(30));
+            scene(at + 5_500, unit, start(direction));
+        } else {
+            scene(8_500 + 100 * unit, unit, hertz(30));
+            if unit % 3 == 1 {
+                scene(12_000, unit, start(Direction::Reverse));
+            }
         }
+        let modes = family.capabilities().stop_modes;
         let mode = modes.get(unit % modes.len().max(1)).copied().unwrap_or(StopMode::Ramp);
         scene(22_000 + 300 * unit, unit, Deed::Order(Order::Stop(mode)));
     }
-    let last = stop_modes.len().saturating_sub(1);
-    scene(5_500, 0, Deed::Trip);
-    scene(8_000, 0, Deed::Order(Order::Reset));
-    scene(12_500, 0, Deed::Order(Order::Start(Direction::Forward)));
-    scene(13_000, last, Deed::Trip);
-    scene(16_000, last, Deed::Order(Order::Reset));
-    scene(17_500, last, Deed::Order(Order::Start(Direction::Forward)));
     // While somebody at the panel has control, a start is refused and a drive says who commands it.
-    let middle = last / 2;
+    let middle = families.len() / 2;
     scene(25_500, middle, Deed::Panel(Panel::TakeControl));
     scene(27_000, middle, Deed::Order(Order::Start(Direction::Forward)));
     scene(28_500, middle, Deed::Panel(Panel::ReleaseControl));
@@ -83,32 +90,37 @@ fn scenes(stop_modes: &[&[StopMode]]) -> Vec<Scene> {
 mod tests {
     use super::*;
 
+    impl Scene {
+        fn order(&self) -> Option<Order> {
+            match self.deed {
+                Deed::Order(order) => Some(order),
+                Deed::Trip | Deed::Panel(_) => None,
+            }
+        }
+    }
+
     #[test]
     fn every_drive_is_started_and_stopped_by_a_mode_that_it_has_before_the_story_begins_anew() {
-        let modes: [&[StopMode]; 4] =
-            [&StopMode::ALL, &[StopMode::Ramp], &[StopMode::Ramp, StopMode::Freewheel], &StopMode::ALL];
-        let scenes = scenes(&modes);
+        let families: Vec<Family> = Family::ALL.iter().flat_map(|&family| [family, family]).collect();
+        let scenes = scenes(&families);
         assert!(scenes.iter().all(|scene| scene.at < LENGTH));
-        for (unit, modes) in modes.iter().enumerate() {
-            let orders =
-                scenes.iter().filter(|scene| scene.unit == unit).filter_map(|scene| match scene.deed {
-                    Deed::Order(order) => Some(order),
-                    Deed::Trip | Deed::Panel(_) => None,
-                });
-            let orders: Vec<Order> = orders.collect();
+        for (unit, family) in families.iter().enumerate() {
+            let modes = family.capabilities().stop_modes;
+            let of_unit = scenes.iter().filter(|scene| scene.unit == unit);
+            let orders: Vec<Order> = of_unit.filter_map(Scene::order).collect();
             assert!(orders.iter().any(|order| matches!(order, Order::Start(_))));
             assert!(orders.iter().any(|order| matches!(order, Order::Stop(mode) if modes.contains(mode))));
         }
     }
 
     #[test]
-    fn a_trip_is_followed_by_its_reset() {
-        let scenes = scenes(&[&StopMode::ALL[..]; 3]);
-        for (index, scene) in scenes.iter().enumerate().filter(|(_, scene)| scene.deed == Deed::Trip) {
-            let later = &scenes[index..];
-            assert!(
-                later.iter().any(|next| next.unit == scene.unit && next.deed == Deed::Order(Order::Reset))
-            );
+    fn a_drive_of_every_family_trips_and_is_reset_and_started_again() {
+        let scenes = scenes(&Family::ALL);
+        for unit in 0..Family::ALL.len() {
+            let mut of_unit = scenes.iter().filter(|scene| scene.unit == unit);
+            assert!(of_unit.any(|scene| scene.deed == Deed::Trip));
+            assert_eq!(of_unit.next().and_then(Scene::order), Some(Order::Reset));
+            assert!(of_unit.any(|scene| matches!(scene.order(), Some(Order::Start(_)))));
         }
     }
 }

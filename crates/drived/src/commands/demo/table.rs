@@ -8,7 +8,7 @@ use ratatui::{
     layout::{Constraint, Layout, Rect},
     style::{Color, Modifier, Style, Stylize},
     text::{Line, Span},
-    widgets::{Block, Borders, Cell, Paragraph, Row, Table, Wrap},
+    widgets::{Block, Borders, Cell, Paragraph, Row, Table},
 };
 
 use super::{
@@ -20,12 +20,16 @@ use crate::{drive_spec::DriveName, output};
 /// The right end of the frequency bars.
 const FULL_SCALE: Frequency = Frequency::from_hertz(50);
 
+/// Before the text of an event: its time and its drive.
+const EVENT_INDENT: usize = 20;
+
 /// From this width on there is room for whole sentences.
 const WIDE: u16 = 110;
 
 pub(super) struct Picture<'a> {
     pub(super) began: Instant,
-    pub(super) stopping: bool,
+    /// The drives that are still waited for, once the motors are being stopped.
+    pub(super) waited_for: Option<String>,
     pub(super) units: Vec<(DriveName, View)>,
     /// The cells of each line, under [`HEADS`].
     pub(super) lines: Vec<[String; 8]>,
@@ -50,14 +54,23 @@ impl Picture<'_> {
     }
 
     fn title(&self, width: u16) -> Line<'_> {
-        let (left, right) = match self.stopping {
-            true => (" drived demo  stopping the motors ", "Ctrl-C again: leave now "),
-            false => (" drived demo  simulated drives, nothing real moves ", "Ctrl-C: stop the motors "),
+        let (left, right, colour) = match &self.waited_for {
+            Some(drives) => {
+                (format!(" stopping, waiting for {drives}"), " Ctrl-C: leave now ", Color::Yellow)
+            }
+            None => (
+                " drived demo  simulated drives, nothing real moves".to_owned(),
+                " Ctrl-C: stop the motors ",
+                Color::Cyan,
+            ),
         };
-        let space = usize::from(width).saturating_sub(left.len() + right.len());
-        let colour = if self.stopping { Color::Yellow } else { Color::Cyan };
+        let room = usize::from(width).saturating_sub(right.len());
+        let left = match left.chars().count() > room {
+            true => left.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
+            false => left,
+        };
         Line::styled(
-            format!("{left}{:space$}{right}", ""),
+            format!("{left:room$}{right}"),
             Style::new().fg(Color::Black).bg(colour).add_modifier(Modifier::BOLD),
         )
     }
@@ -93,16 +106,22 @@ impl Picture<'_> {
     }
 
     fn events(&self, area: Rect) -> Paragraph<'_> {
-        let lines = self.events.iter().take(usize::from(area.height)).map(|event| {
+        let room = usize::from(area.width).saturating_sub(EVENT_INDENT).max(1);
+        let lines = self.events.iter().take(usize::from(area.height)).flat_map(|event| {
             let at = event.at.saturating_duration_since(self.began).as_millis();
+            let at = format!(" {:>4}.{:01} s ", at / 1_000, at % 1_000 / 100);
             let style = if event.alarm { Style::new().fg(Color::Red) } else { Style::new() };
-            Line::from(vec![
-                Span::raw(format!(" {:>4}.{:01} s ", at / 1_000, at % 1_000 / 100)).dim(),
-                Span::styled(format!("{:<9} {}", event.name.to_string(), event.text), style),
-            ])
+            output::wrapped(&event.text, room).into_iter().enumerate().map(move |(line, text)| {
+                let (at, name) =
+                    if line == 0 { (at.clone(), event.name.to_string()) } else { <_>::default() };
+                Line::from(vec![
+                    Span::raw(format!("{at:10}")).dim(),
+                    Span::styled(format!("{name:<9} {text}"), style),
+                ])
+            })
         });
         let block = Block::new().borders(Borders::TOP).title(" events ");
-        Paragraph::new(lines.collect::<Vec<_>>()).block(block).wrap(Wrap { trim: false })
+        Paragraph::new(lines.collect::<Vec<_>>()).block(block)
     }
 }
 
@@ -110,9 +129,9 @@ fn row(name: &DriveName, view: &View, bar_width: u16, wide: bool) -> Row<'static
     let Some(status) = &view.status else {
         return Row::new([name.to_string(), "no answer".to_owned()]).style(Style::new().fg(Color::Red));
     };
-    let colour = colour(status);
     let output = status.output_frequency.unwrap_or_default();
     let setpoint = view.setpoint.unwrap_or_default();
+    let colour = colour(status, output == setpoint);
     Row::new([
         Cell::from(name.to_string()).bold(),
         Cell::from(status.state.to_string()).fg(colour),
@@ -130,8 +149,10 @@ fn row(name: &DriveName, view: &View, bar_width: u16, wide: bool) -> Row<'static
     ])
 }
 
-fn colour(status: &Status) -> Color {
-    match (status.state, status.at_reference) {
+/// Running is green at the reference. A drive that does not tell whether it is there is there when its output is as the
+/// setpoint.
+fn colour(status: &Status, as_setpoint: bool) -> Color {
+    match (status.state, status.at_reference.or(Some(as_setpoint))) {
         (State::Fault | State::FaultReaction | State::Unknown, _) => Color::Red,
         (State::Running, Some(true)) => Color::Green,
         (State::Running, _) => Color::Cyan,
@@ -243,7 +264,7 @@ mod tests {
         }]);
         let picture = Picture {
             began: Instant::now(),
-            stopping: false,
+            waited_for: None,
             units: vec![(name("atv312@1"), view), (name("atv21@2"), View::default())],
             lines: vec![
                 ["19200 8E1", "97.00 %", "7.1", "900", "2.01 ms", "2.00 ms", "0", "0"].map(str::to_owned),

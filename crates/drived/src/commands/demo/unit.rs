@@ -16,7 +16,7 @@ use tokio::{
 use crate::{commands::reset::reset, drive_spec::DriveName};
 
 /// Between the answer of a poll and the next poll of the same drive.
-const POLL_PAUSE: Duration = Duration::from_millis(200);
+const POLL_PAUSE: Duration = Duration::from_millis(300);
 
 /// Orders that may wait for one drive.
 const WAITING: usize = 16;
@@ -67,6 +67,8 @@ pub(super) struct View {
     pub(super) last: Option<Done>,
     /// Status polls that were answered.
     pub(super) polls: u64,
+    /// Whether the status was read after the stop at the end of the demo.
+    pub(super) ended: bool,
 }
 
 /// Something worth a line.
@@ -85,11 +87,12 @@ impl Unit {
         machine: SimSlave,
         drive: Box<dyn Drive>,
         events: mpsc::Sender<Event>,
+        ending: watch::Receiver<bool>,
         tasks: &mut JoinSet<()>,
     ) -> Self {
         let (orders, waiting) = mpsc::channel(WAITING);
         let (shown, view) = watch::channel(View::default());
-        tasks.spawn(Task { name, drive, shown, events }.run(waiting));
+        tasks.spawn(Task { name, drive, shown, events }.run(waiting, ending));
         Self { name, machine, orders, view }
     }
 
@@ -102,9 +105,10 @@ impl Unit {
         self.view.borrow().clone()
     }
 
-    /// Whether the drive itself says that its motor is not driven.
+    /// Whether the drive itself has said, after the stop at the end, that its motor is not driven.
     pub(super) fn stands(&self) -> bool {
-        self.view.borrow().status.as_ref().is_some_and(Status::is_standstill)
+        let view = self.view.borrow();
+        view.ended && view.status.as_ref().is_some_and(Status::is_standstill)
     }
 }
 
@@ -116,7 +120,24 @@ struct Task {
 }
 
 impl Task {
-    async fn run(mut self, mut orders: mpsc::Receiver<Order>) {
+    /// Carries out orders until the demo ends; then stops the motor and watches it.
+    async fn run(mut self, orders: mpsc::Receiver<Order>, mut ending: watch::Receiver<bool>) {
+        // What was ordered before is dropped, also when it is under way: its exchange ends by itself, unseen.
+        tokio::select! {
+            biased;
+            () = asked(&mut ending) => {}
+            () = self.obey(orders) => return,
+        }
+        self.carry_out(Order::Stop(StopMode::Ramp)).await;
+        loop {
+            self.poll().await;
+            self.shown.send_modify(|view| view.ended = true);
+            time::sleep(POLL_PAUSE).await;
+        }
+    }
+
+    /// Carries out orders and polls between them.
+    async fn obey(&mut self, mut orders: mpsc::Receiver<Order>) {
         loop {
             tokio::select! {
                 biased;
@@ -216,6 +237,11 @@ impl Task {
         // A terminal that is too slow misses lines; the drives do not wait for it.
         let _ = self.events.try_send(Event { at: Instant::now(), name: self.name, text, alarm });
     }
+}
+
+async fn asked(ending: &mut watch::Receiver<bool>) {
+    // The plant that could ask is gone: the demo ends.
+    let _ = ending.wait_for(|&ending| ending).await;
 }
 
 fn is_worth_repeating(error: &Error) -> bool {

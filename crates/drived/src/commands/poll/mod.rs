@@ -13,6 +13,7 @@ use tokio::{sync::mpsc, task::JoinSet, time};
 
 use self::summary::Summary;
 use crate::{
+    drive_options::OptionArgs,
     drive_spec::{self, DriveName, DriveSpec},
     duration::Time,
     failure::Failure,
@@ -39,6 +40,8 @@ pub(crate) struct Args {
     /// Drives, such as atv312@1-10,12; may be given several times
     #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", required = true)]
     drives: Vec<DriveSpec>,
+    #[command(flatten)]
+    options: OptionArgs,
     /// Time between two polls of one drive; 0: as fast as the line allows
     #[arg(long, value_name = "TIME", default_value = "1s")]
     period: Time,
@@ -59,6 +62,7 @@ struct Reading {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let names = drive_spec::on_one_line(&args.drives).map_err(|error| Failure::Input(error.to_string()))?;
+    let options = args.options.of(&names)?;
     let config = args.line.config(&names).map_err(|error| Failure::Input(error.to_string()))?;
     let settings = config.serial;
     let mut ending = Ending::listen()?;
@@ -67,7 +71,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let (readings, mut incoming) = mpsc::channel(WAITING);
     let mut polls = JoinSet::new();
     for &name in &names {
-        let drive = name.family.open(line.slave(name.slave.number()), name.slave);
+        let drive = one_drive::open_drive(&line, name, &options)?;
         polls.spawn(poll(name, drive, args.period.0, readings.clone()));
     }
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));

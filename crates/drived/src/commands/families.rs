@@ -1,0 +1,79 @@
+//! `drived families`: the families of drives, and what their owner can say of one.
+
+use drive_core::Capabilities;
+use drive_families::{Family, OPTIONS};
+
+use crate::{
+    failure::Failure,
+    output::{self, Table},
+};
+
+/// List the families of drives; for one of them, what it can do and its options
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// One family, such as 3g3ev
+    #[arg(value_name = "FAMILY")]
+    family: Option<Family>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    match args.family {
+        Some(family) => one(family),
+        None => all(),
+    }
+}
+
+fn all() -> Result<(), Failure> {
+    let mut table = Table::new(["family", "drive", "addresses", "speeds", "protocols"]);
+    for family in Family::ALL {
+        let Capabilities { name, highest_address, speeds, .. } = family.capabilities();
+        table.row([
+            family.to_string(),
+            (*name).to_owned(),
+            format!("1-{highest_address}"),
+            list(speeds),
+            list(family.protocols()),
+        ]);
+    }
+    output::say_table(table)
+}
+
+fn one(family: Family) -> Result<(), Failure> {
+    let capabilities = family.capabilities();
+    output::say(format_args!("{family}: {}", capabilities.name))?;
+    let mut facts = Table::texts();
+    let mut fact = |label: &str, value: String| facts.row([format!("  {label}"), value]);
+    fact("addresses", format!("1 to {}", capabilities.highest_address));
+    fact("speeds", list(capabilities.speeds));
+    fact("formats", list(capabilities.formats));
+    fact("protocols", list(family.protocols()));
+    fact("factory setting", capabilities.factory.to_string());
+    fact("stop modes", list(capabilities.stop_modes));
+    fact("fault reset", capabilities.fault_reset.to_owned());
+    fact("watchdog", watchdog(capabilities));
+    fact("identification", capabilities.identification.unwrap_or("none").to_owned());
+    fact("save to EEPROM", capabilities.persist.unwrap_or("no command").to_owned());
+    output::say_table(facts)?;
+    let mut options = Table::new(["  --option", "what it says", "value"]);
+    for option in OPTIONS.iter().filter(|option| option.family == family) {
+        options.row([format!("  {}", option.name), option.meaning.to_owned(), option.value.to_owned()]);
+    }
+    if options.is_empty() { output::say("  no options") } else { output::say_table(options) }
+}
+
+fn watchdog(capabilities: &Capabilities) -> String {
+    let Some(watchdog) = capabilities.watchdog else { return "none that the bus can read or set".to_owned() };
+    let time = match watchdog.min == watchdog.max {
+        true => format!("{:?}", watchdog.min),
+        false => format!("{:?} to {:?}", watchdog.min, watchdog.max),
+    };
+    let by = if watchdog.settable { "set over the bus" } else { "not settable over the bus" };
+    match watchdog.reactions {
+        [] => format!("{time}, {by}"),
+        reactions => format!("{time}, {by}; {}", list(reactions)),
+    }
+}
+
+fn list<T: ToString>(values: &[T]) -> String {
+    values.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
