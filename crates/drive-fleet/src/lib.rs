@@ -63,7 +63,7 @@ pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{Order, Outcome, Refused, Unconfirmed, Until};
-pub use plan::{Demand, LineBudget, LinePlan, PlanProblem, plan};
+pub use plan::{Demand, Feed, LineBudget, LinePlan, PlanProblem, Reckoning, plan, reckon};
 pub use settings::{
     Alarms, Commanders, DriveSettings, OnExit, OnFault, OnLoss, Periods, Times, WatchdogContract,
 };

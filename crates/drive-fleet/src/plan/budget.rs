@@ -1,0 +1,102 @@
+//! What a line gives and what a drive wants of it.
+
+use std::time::Duration;
+
+use drive_bus::{Endpoint, LineConfig, Protocol};
+use drive_core::{Capabilities, SerialSettings};
+
+use crate::{
+    settings::{Periods, WatchdogContract},
+    supervisor::checks::fixed_watchdog,
+};
+
+/// Words that an exchange of a status or of measurements is reckoned with.
+const WORDS: usize = 8;
+/// Bytes of a request without what its protocol puts round it, and of an answer besides its words.
+const REQUEST: usize = 5;
+const ANSWER: usize = 2;
+
+/// What a line gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LineBudget {
+    /// Speed and format; `None` for Modbus TCP, which takes no time for characters and keeps no silences.
+    pub serial: Option<SerialSettings>,
+    /// What is spoken with these characters.
+    pub protocol: Protocol,
+    /// The usual time from a request to its answer.
+    pub response: Duration,
+    /// How long the line waits for an answer that does not come.
+    pub response_timeout: Duration,
+    /// The silence after a broadcast.
+    pub broadcast_turnaround: Duration,
+    /// The extra silence before a request to another slave than the last.
+    pub slave_change_gap: Duration,
+    /// After how many unanswered requests the line counts a slave as off-line.
+    pub offline_after: u32,
+}
+
+impl LineBudget {
+    /// What a line of this configuration gives when its slaves answer within 10 ms.
+    #[must_use]
+    pub const fn of(config: &LineConfig) -> Self {
+        Self {
+            serial: match config.endpoint {
+                Endpoint::ModbusTcp(_) => None,
+                _ => Some(config.serial),
+            },
+            protocol: config.protocol,
+            response: Duration::from_millis(10),
+            response_timeout: config.response_timeout,
+            broadcast_turnaround: config.broadcast_turnaround,
+            slave_change_gap: config.slave_change_gap,
+            offline_after: config.offline_after,
+        }
+    }
+
+    /// One exchange that reads eight words, with the silences that belong to it; what one poll is reckoned with.
+    #[must_use]
+    pub fn read_slot(&self) -> Duration {
+        self.serial.map_or(self.response, |serial| {
+            let wire = self.protocol.exchange_time(serial, REQUEST, ANSWER + 2 * WORDS);
+            wire + self.response * self.protocol.turns() + self.slave_change_gap
+        })
+    }
+
+    /// An exchange that brings no answer.
+    #[must_use]
+    pub fn lost_slot(&self) -> Duration {
+        let wire = self.serial.map_or(Duration::ZERO, |serial| {
+            self.protocol.request_time(serial, REQUEST) + self.slave_change_gap
+        });
+        wire + self.response_timeout
+    }
+
+    /// What a drive's own pause after its answers adds to each exchange when there is no other drive to serve in it.
+    pub(super) fn idle_pause(&self, capabilities: &Capabilities) -> Duration {
+        self.serial.map_or(Duration::ZERO, |serial| {
+            capabilities.turnaround.saturating_sub(self.protocol.silence(serial))
+        })
+    }
+}
+
+/// What a drive wants of its line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Demand {
+    /// Its name.
+    pub drive: String,
+    /// What its family can do.
+    pub capabilities: &'static Capabilities,
+    /// How often it is asked.
+    pub periods: Periods,
+    /// Its watchdog, where the settings have a contract for it. A watchdog that the bus cannot set has to be fed in any
+    /// case.
+    pub watchdog: Option<WatchdogContract>,
+}
+
+impl Demand {
+    /// The time of the watchdog that has to be fed: that of the settings, or the one that the drive has anyway.
+    #[must_use]
+    pub fn watchdog_timeout(&self) -> Option<Duration> {
+        self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.capabilities))
+    }
+}

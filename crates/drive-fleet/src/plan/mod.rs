@@ -1,0 +1,269 @@
+//! The arithmetic of a line: whether its drives can be asked as often as their settings say, how old their values
+//! become, whether their watchdogs are fed, and how long a stop of all takes. Pure: it follows from the settings alone.
+
+mod budget;
+mod problem;
+
+use std::time::Duration;
+
+pub use self::{
+    budget::{Demand, LineBudget},
+    problem::PlanProblem,
+};
+use crate::supervisor::checks::FEED_PART;
+
+/// Exchanges of a stop besides its status: the ways down the state chart.
+const STOP_EXCHANGES: u32 = 3;
+/// A whole line, in millionths.
+const WHOLE_PPM: u64 = 1_000_000;
+/// What the line gives to the probes of dead drives at the most, in millionths.
+const PROBES_PPM: u64 = 50_000;
+/// What the line gives to its lowest class, to which the measurements belong, even when there is no room: every
+/// twentieth turn, in millionths.
+const BACKGROUND_PPM: u64 = 50_000;
+
+/// What a line will be like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinePlan {
+    /// One status of every living drive, one after the other, and what the probes of dead ones take meanwhile.
+    pub sweep: Duration,
+    /// The share of the line that the polls and the watchdogs take while every drive runs, and the probes of dead ones,
+    /// in millionths. It is more than a million where they want more than the line has.
+    pub utilisation_ppm: u64,
+    /// From the last frame that the drive with the shortest watchdog heard to the next, at the latest. `None` without
+    /// watchdogs.
+    pub feed_gap: Option<Duration>,
+    budget: LineBudget,
+    drives: u32,
+    dead: u32,
+    watched: u32,
+    status_exchanges: u32,
+    /// The measurements of every drive, one after the other.
+    slow_sweep: Duration,
+    /// What the measurements leave of the line, in millionths.
+    slow_ppm: u64,
+}
+
+impl LinePlan {
+    /// The share of the line that is left for commands, in millionths.
+    #[must_use]
+    pub const fn left_ppm(&self) -> u64 {
+        WHOLE_PPM.saturating_sub(self.utilisation_ppm)
+    }
+
+    /// How old a status that is asked for at this period is at the most when the next one comes. Commands go first and
+    /// come on top.
+    #[must_use]
+    pub fn status_age(&self, period: Duration) -> Duration {
+        period + self.status_wait()
+    }
+
+    /// What a status waits for the others: all of them come first, and what the line gives to the measurements.
+    fn status_wait(&self) -> Duration {
+        let background = if self.slow_sweep.is_zero() { 0 } else { BACKGROUND_PPM };
+        stretched(self.sweep, WHOLE_PPM - background)
+    }
+
+    /// How old measurements that are asked for at this period are at the most when the next come: those of all the other
+    /// drives come first, with what the statuses leave of the line.
+    #[must_use]
+    pub fn measurements_age(&self, period: Duration) -> Duration {
+        let left = self.left_ppm().saturating_add(self.slow_ppm).max(BACKGROUND_PPM);
+        period + stretched(self.slow_sweep, left.min(WHOLE_PPM))
+    }
+
+    /// How a drive whose watchdog has this time is fed.
+    #[must_use]
+    pub fn feed(&self, timeout: Duration) -> Feed {
+        // Each dead drive may cost an answer while the line has not yet found out that it is dead.
+        let lost_answers = self.dead.max(1);
+        Feed {
+            timeout,
+            after: timeout / FEED_PART,
+            lost_answers,
+            lost: self.budget.lost_slot().saturating_mul(lost_answers),
+            frames: self.budget.read_slot().saturating_mul(self.watched),
+            watched: self.watched,
+        }
+    }
+
+    /// How long it takes at the most until every living drive of the line has confirmed a stop that all were given,
+    /// with so many mute drives among them; the motors then still need their ramps.
+    #[must_use]
+    pub fn stop_all(&self, mute: u32) -> Duration {
+        let exchanges = self.drives.saturating_mul(STOP_EXCHANGES).saturating_add(self.status_exchanges);
+        let lost = mute.saturating_mul(self.budget.offline_after.max(1));
+        self.budget.lost_slot()
+            + self.budget.broadcast_turnaround
+            + self.budget.read_slot().saturating_mul(exchanges)
+            + self.budget.lost_slot().saturating_mul(lost)
+    }
+}
+
+/// How a watchdog is fed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Feed {
+    /// The watchdog's time.
+    pub timeout: Duration,
+    /// The part of it after which the drive is given a frame of its own.
+    pub after: Duration,
+    /// How many answers of other drives may fail to come just then.
+    pub lost_answers: u32,
+    /// The time that they take.
+    pub lost: Duration,
+    /// A frame for every watched drive.
+    pub frames: Duration,
+    /// How many watched drives.
+    pub watched: u32,
+}
+
+impl Feed {
+    /// From the last frame that the drive heard to the next, at the latest.
+    #[must_use]
+    pub fn heard_within(&self) -> Duration {
+        self.after + self.lost + self.frames
+    }
+
+    /// Whether the drive hears something before its watchdog runs out.
+    #[must_use]
+    pub fn is_in_time(&self) -> bool {
+        self.heard_within() <= self.timeout
+    }
+}
+
+/// Reckons a line with its drives.
+///
+/// # Errors
+/// [`PlanProblem`] when it cannot work.
+pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProblem> {
+    let Reckoning { plan, problem } = reckon(budget, drives, 0);
+    problem.map_or(Ok(plan), Err)
+}
+
+/// What a line would be like, and why it would not work, if it would not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reckoning {
+    /// The figures, also of a line that cannot work.
+    pub plan: LinePlan,
+    /// Why it cannot work.
+    pub problem: Option<PlanProblem>,
+}
+
+/// Reckons a line on which so many of the drives are dead. Those that ask least of the line are taken for dead: whoever
+/// dies leaves it with no more to do.
+#[must_use]
+pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
+    let alone = drives.len() == 1;
+    let mut living: Vec<(&Demand, Load)> =
+        drives.iter().map(|demand| (demand, Load::of(budget, demand, alone))).collect();
+    living.sort_by_key(|(_, load)| load.status_ppm.saturating_add(load.slow_ppm));
+    living.drain(..dead.min(living.len()));
+
+    let probes = if dead > 0 { PROBES_PPM } else { 0 };
+    let sum =
+        |of: fn(&Load) -> u64| living.iter().fold(probes, |sum, (_, load)| sum.saturating_add(of(load)));
+    let slow_ppm = sum(|load| load.slow_ppm) - probes;
+    let exchanges = living.iter().map(|(demand, _)| u32::from(demand.capabilities.status_exchanges));
+    let plan = LinePlan {
+        sweep: stretched(living.iter().map(|(_, load)| load.status).sum(), WHOLE_PPM - probes),
+        utilisation_ppm: sum(|load| load.status_ppm).saturating_add(slow_ppm),
+        feed_gap: None,
+        budget,
+        drives: count(living.len()),
+        dead: count(dead),
+        watched: count(living.iter().filter(|(demand, _)| demand.watchdog_timeout().is_some()).count()),
+        status_exchanges: exchanges.fold(0, u32::saturating_add),
+        slow_sweep: living.iter().map(|(_, load)| load.slow).sum(),
+        slow_ppm,
+    };
+    let shortest = living
+        .iter()
+        .filter_map(|(demand, _)| Some((demand.watchdog_timeout()?, *demand)))
+        .min_by_key(|(timeout, _)| *timeout);
+    let feed = shortest.map(|(timeout, demand)| (plan.feed(timeout), demand));
+    let plan = LinePlan { feed_gap: feed.map(|(feed, _)| feed.heard_within()), ..plan };
+    let starved = feed
+        .filter(|(feed, _)| !feed.is_in_time())
+        .map(|(feed, demand)| PlanProblem::Starved { drive: demand.drive.clone(), feed });
+    let problem = starved.or_else(|| overloaded(&plan)).or_else(|| {
+        // In the order in which they were given.
+        let is_living = |demand: &&Demand| living.iter().any(|(living, _)| std::ptr::eq(*living, *demand));
+        drives.iter().filter(is_living).find_map(|demand| stale(&plan, demand))
+    });
+    Reckoning { plan, problem }
+}
+
+fn overloaded(plan: &LinePlan) -> Option<PlanProblem> {
+    (plan.utilisation_ppm > WHOLE_PPM).then_some(PlanProblem::Overloaded {
+        sweep: plan.sweep,
+        drives: plan.drives as usize,
+        utilisation_ppm: plan.utilisation_ppm,
+    })
+}
+
+fn stale(plan: &LinePlan, demand: &Demand) -> Option<PlanProblem> {
+    let (period, max_age) = (demand.periods.running.max(demand.periods.rest), demand.periods.max_age);
+    (plan.status_age(period) > max_age).then(|| PlanProblem::Stale {
+        drive: demand.drive.clone(),
+        period,
+        wait: plan.status_wait(),
+        max_age,
+    })
+}
+
+/// What one drive takes of its line.
+#[derive(Debug, Clone, Copy)]
+struct Load {
+    /// One status.
+    status: Duration,
+    /// One slow set; nothing where it is never asked for.
+    slow: Duration,
+    /// The share of the statuses and of the frames for the watchdog, in millionths.
+    status_ppm: u64,
+    /// The share of the slow set, in millionths.
+    slow_ppm: u64,
+}
+
+impl Load {
+    fn of(budget: LineBudget, demand: &Demand, alone: bool) -> Self {
+        let pause = if alone { budget.idle_pause(demand.capabilities) } else { Duration::ZERO };
+        let read = budget.read_slot() + pause;
+        let status = read * u32::from(demand.capabilities.status_exchanges.max(1));
+        let fast = |period: Duration| {
+            // A watchdog that wants to hear more often than it is polled gets frames of its own between two polls.
+            let fed = demand.watchdog_timeout().map(|timeout| timeout / FEED_PART);
+            let frames = fed.and_then(|fed| period.as_nanos().div_ceil(fed.as_nanos().max(1)).checked_sub(1));
+            let frames = frames.and_then(|frames| u32::try_from(frames).ok()).unwrap_or_default();
+            share(status.saturating_add(read.saturating_mul(frames)), period)
+        };
+        let slow = match demand.periods.slow.is_zero() {
+            true => Duration::ZERO,
+            false => read * u32::from(demand.capabilities.measurement_exchanges.max(1)),
+        };
+        Self {
+            status,
+            slow,
+            status_ppm: fast(demand.periods.running).max(fast(demand.periods.rest)),
+            slow_ppm: if slow.is_zero() { 0 } else { share(slow, demand.periods.slow) },
+        }
+    }
+}
+
+/// The part of a period that something takes, in millionths.
+fn share(time: Duration, period: Duration) -> u64 {
+    let ppm = (time.as_nanos() * u128::from(WHOLE_PPM)).checked_div(period.as_nanos()).unwrap_or(u128::MAX);
+    u64::try_from(ppm).unwrap_or(u64::MAX)
+}
+
+/// What something takes that gets so many millionths of the line; not none.
+fn stretched(time: Duration, ppm: u64) -> Duration {
+    let nanos = (time.as_nanos() * u128::from(WHOLE_PPM)).checked_div(u128::from(ppm)).unwrap_or(u128::MAX);
+    Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+}
+
+fn count(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! The figures of lines, each from the line's own arithmetic.
+
+use drive_bus::LineConfig;
+use drive_core::{Capabilities, Reaction, SerialSettings};
+
+use super::*;
+use crate::{
+    settings::{Periods, WatchdogContract},
+    testing::CAPABILITIES,
+};
+
+const MS: Duration = Duration::from_millis(1);
+/// One exchange at 19200 8E1: 8 + 21 characters of 11 bits, t3.5, and the 10 ms of the slave.
+const READ: Duration = Duration::from_nanos(28 * 1_000_000 + 620_167);
+
+fn budget() -> LineBudget {
+    LineBudget::of(&LineConfig::stream(SerialSettings::MODBUS_DEFAULT))
+}
+
+fn drives(number: usize, running: Duration, watchdog: Option<Duration>) -> Vec<Demand> {
+    let watchdog = watchdog.map(|timeout| WatchdogContract { timeout, reaction: Reaction::Ramp });
+    let periods =
+        Periods { running, rest: 2 * running, max_age: 3 * running + 3_000 * MS, ..Periods::default() };
+    let demand = |number: usize| Demand {
+        drive: format!("pump {number}"),
+        capabilities: &CAPABILITIES,
+        periods,
+        watchdog,
+    };
+    (1..=number).map(demand).collect()
+}
+
+fn without_measurements(mut drives: Vec<Demand>) -> Vec<Demand> {
+    drives.iter_mut().for_each(|demand| demand.periods.slow = Duration::ZERO);
+    drives
+}
+
+#[test]
+fn a_line_that_cannot_keep_its_periods_is_refused_with_the_arithmetic() {
+    assert!(plan(budget(), &drives(31, 1_000 * MS, None)).is_ok());
+    let problem = plan(budget(), &drives(31, 500 * MS, None)).unwrap_err();
+    assert!(problem.to_string().starts_with("one status of 31 drives takes 888ms"), "{problem}");
+}
+
+#[test]
+fn a_sweep_is_one_exchange_of_every_drive_and_the_rest_of_the_period_is_left() {
+    let plan = plan(budget(), &without_measurements(drives(31, 1_000 * MS, None))).unwrap();
+    let sweep = READ * 31;
+    assert!(plan.sweep.abs_diff(sweep) < MS / 10, "{plan:?}");
+    let used = u64::try_from(sweep.as_micros()).unwrap();
+    assert!(plan.utilisation_ppm.abs_diff(used) < 100, "{plan:?}");
+    assert_eq!(plan.left_ppm(), 1_000_000 - plan.utilisation_ppm);
+    assert_eq!(plan.status_age(1_000 * MS), 1_000 * MS + plan.sweep);
+}
+
+#[test]
+fn measurements_take_a_twentieth_of_what_the_statuses_wait_and_wait_themselves_for_what_is_left() {
+    let every = drives(31, 1_500 * MS, None);
+    let plan = plan(budget(), &every).unwrap();
+    assert_eq!(plan.status_age(1_500 * MS), 1_500 * MS + stretched(plan.sweep, 950_000));
+    let exchanges = 31 * u32::from(CAPABILITIES.measurement_exchanges.max(1));
+    let all = budget().read_slot() * exchanges;
+    // The statuses take the sweep out of each 1.5 s, the rest is for these.
+    let alone = all.as_secs_f64() / (1.0 - plan.sweep.as_secs_f64() / 1.5);
+    let wait = (plan.measurements_age(60_000 * MS) - 60_000 * MS).as_secs_f64();
+    assert!((wait - alone).abs() < 0.001, "{wait} {alone}");
+}
+
+#[test]
+fn a_watchdog_that_cannot_be_fed_is_refused_and_the_time_that_it_names_is_taken() {
+    let problem = plan(budget(), &drives(31, 1_000 * MS, Some(1_000 * MS))).unwrap_err();
+    let PlanProblem::Starved { feed, .. } = &problem else { panic!("{problem}") };
+    assert!(problem.to_string().contains("the watchdog of pump 1 is 1s"), "{problem}");
+    let named = (feed.lost + feed.frames) * 2;
+    assert!(plan(budget(), &drives(31, 1_000 * MS, Some(named))).is_ok());
+    assert!(plan(budget(), &drives(31, 1_000 * MS, Some(named - MS))).is_err());
+}
+
+#[test]
+fn a_status_that_would_be_too_old_before_the_next_comes_is_refused() {
+    let mut every = without_measurements(drives(31, 1_000 * MS, None));
+    let sweep = plan(budget(), &every).unwrap().sweep;
+    every[7].periods.max_age = 2_000 * MS + sweep;
+    assert!(plan(budget(), &every).is_ok());
+    every[7].periods.max_age = 2_000 * MS + sweep - MS;
+    let problem = plan(budget(), &every).unwrap_err();
+    assert!(matches!(&problem, PlanProblem::Stale { drive, .. } if drive == "pump 8"), "{problem}");
+}
+
+#[test]
+fn mute_drives_lengthen_the_stop_of_all_by_their_lost_answers_only() {
+    let plan = plan(budget(), &drives(31, 1_000 * MS, None)).unwrap();
+    let lost = plan.stop_all(3) - plan.stop_all(0);
+    assert_eq!(lost, budget().lost_slot() * 9);
+}
+
+#[test]
+fn dead_drives_leave_their_polls_and_take_their_probes() {
+    let every = without_measurements(drives(31, 1_000 * MS, Some(10_000 * MS)));
+    let Reckoning { plan: whole, .. } = reckon(budget(), &every, 0);
+    let Reckoning { plan: dead, problem } = reckon(budget(), &every, 3);
+    assert_eq!(problem, None);
+    assert_eq!(dead.sweep, stretched(budget().read_slot() * 28, 950_000));
+    assert_eq!(dead.utilisation_ppm, 50_000 + 28 * whole.utilisation_ppm / 31);
+    let (fed, starving) = (whole.feed(10_000 * MS), dead.feed(10_000 * MS));
+    assert_eq!(starving.lost, 3 * fed.lost, "each costs an answer until the line knows");
+    assert_eq!(fed.frames - starving.frames, 3 * budget().read_slot(), "and wants no frame");
+}
+
+#[test]
+fn a_gap_at_each_change_of_slave_is_part_of_every_exchange() {
+    let gap = LineBudget { slave_change_gap: 10 * MS, ..budget() };
+    let every = drives(10, 1_000 * MS, None);
+    let (with, without) = (plan(gap, &every).unwrap(), plan(budget(), &every).unwrap());
+    assert_eq!(with.sweep - without.sweep, 100 * MS);
+}
+
+#[test]
+fn a_pause_that_a_drive_needs_counts_only_when_there_is_no_other_to_serve_in_it() {
+    static SLOW: Capabilities = Capabilities { turnaround: Duration::from_millis(12), ..CAPABILITIES };
+    let of = |number| {
+        let mut every = drives(number, 1_000 * MS, None);
+        every.iter_mut().for_each(|demand| demand.capabilities = &SLOW);
+        plan(budget(), &every).unwrap().sweep
+    };
+    let pause = 12 * MS - SerialSettings::MODBUS_DEFAULT.t3_5();
+    assert_eq!(of(1), budget().read_slot() + pause);
+    assert_eq!(of(2), budget().read_slot() * 2);
+}
