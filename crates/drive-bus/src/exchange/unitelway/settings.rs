@@ -1,0 +1,84 @@
+//! What a UNI-TELWAY line can be set to, and how long its frames and exchanges are.
+
+use std::time::Duration;
+
+use drive_core::serial::SerialSettings;
+
+use super::{
+    frame,
+    network::{NetworkHeader, STANDARD_LEN},
+};
+
+/// How many leftovers of a slave are taken before its next request.
+pub(super) const LEFTOVERS: u32 = 2;
+/// Characters of a poll.
+pub(super) const POLL_LEN: usize = 3;
+/// The highest category of a request.
+const CATEGORIES: u8 = 7;
+
+/// What a UNI-TELWAY line can be set to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct UniTelwaySettings {
+    /// The network header. Which form the card VW3-A58303 needs is not printed.
+    pub header: NetworkHeader,
+    /// The category in each request, 0 to 7. The manual's sample has 7 (p. 12/36).
+    pub category: u8,
+    /// The silence before each of our transmissions inside an exchange, in bits.
+    pub turnaround_bits: u32,
+    /// How long a slave may take to begin its acknowledgement, or what it answers to a poll.
+    pub link_timeout: Duration,
+    /// From "nothing to say" to the next poll for the same reply.
+    pub poll_pause: Duration,
+    /// How often a refused request is sent again, and a damaged reply refused.
+    pub repeats: u32,
+}
+
+impl Default for UniTelwaySettings {
+    /// The standard header, category 7, 10 bits, 100 ms, 5 ms, 1.
+    fn default() -> Self {
+        Self {
+            header: NetworkHeader::default(),
+            category: CATEGORIES,
+            turnaround_bits: 10,
+            link_timeout: Duration::from_millis(100),
+            poll_pause: Duration::from_millis(5),
+            repeats: 1,
+        }
+    }
+}
+
+impl UniTelwaySettings {
+    /// Whether the category is one.
+    pub(crate) const fn is_category(&self) -> bool {
+        self.category <= CATEGORIES
+    }
+}
+
+/// How long an exchange may go on beyond its request and the time of its reply, when everything goes wrong that the
+/// settings still put up with. Request and replies have so many characters at the most.
+#[must_use]
+pub fn overtime(
+    serial: SerialSettings,
+    settings: UniTelwaySettings,
+    chunk_gap: Duration,
+    request: usize,
+    reply: usize,
+) -> Duration {
+    let said = |characters| serial.bits(settings.turnaround_bits) + serial.characters(characters);
+    // A request that is refused; a poll with a damaged reply or a leftover, and our word to it.
+    let refused = said(request) + settings.link_timeout + serial.characters(1);
+    let polled = said(POLL_LEN) + settings.link_timeout + serial.characters(reply) + chunk_gap + said(1);
+    let polls = settings.repeats.saturating_add(LEFTOVERS).saturating_add(1);
+    refused.saturating_mul(settings.repeats) + polled.saturating_mul(polls)
+}
+
+/// How many characters the data frame has that carries a Modbus PDU of this length, without doubled bytes.
+pub(crate) const fn request_len(pdu: usize) -> usize {
+    frame::len(pdu + STANDARD_LEN + 4)
+}
+
+/// How many characters come and go from the end of a request to the end of its exchange: two acknowledgements, a poll and
+/// the reply.
+pub(crate) const fn reply_len(pdu: usize) -> usize {
+    2 + POLL_LEN + frame::len(pdu + STANDARD_LEN)
+}
