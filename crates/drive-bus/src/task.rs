@@ -168,14 +168,14 @@ impl Task {
     fn lose(&mut self, reason: &str) {
         let now = Instant::now();
         self.shared.master().handle_lost(now, reason);
-        // The first attempt is made at once: a plug that was pulled and put back, a server that started anew.
-        self.port = match self.connector.connect() {
-            Some(opening) if self.backoff == REOPEN_BACKOFF.0 => Port::Opening(opening),
-            Some(_) => Port::Waiting(now + self.backoff),
-            None => {
-                self.shared.master().handle_down(reason);
-                Port::Gone
-            }
+        self.port = if self.backoff > REOPEN_BACKOFF.0 {
+            Port::Waiting(now + self.backoff)
+        } else if let Some(opening) = self.connector.connect() {
+            // The first attempt is made at once: a plug that was pulled and put back, a server that started anew.
+            Port::Opening(opening)
+        } else {
+            self.shared.master().handle_down(reason);
+            Port::Gone
         };
         self.lengthen_backoff();
     }

@@ -154,21 +154,30 @@ async fn one_bad_frame_never_closes_the_port() {
     assert_eq!(line.stats().opened, 1);
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_port_that_opens_and_ends_at_once_is_tried_ever_less_often() {
+    let (openings, mut opened) = mpsc::unbounded_channel();
+    let open = move || {
+        openings.send(Instant::now()).unwrap();
+        // The far end is gone already.
+        async { Ok(tokio::io::duplex(512).0) }
+    };
+    let _line = Line::over_reopened(open, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+    let mut times = Vec::new();
+    while times.len() < 9 {
+        times.push(opened.recv().await.unwrap());
+    }
+    let pauses: Vec<_> = times.windows(2).map(|pair| (pair[1] - pair[0]).as_millis()).collect();
+    // At once after the first loss, then from 0.2 s to 2 s.
+    assert_eq!(pauses, [0, 200, 400, 800, 1_600, 2_000, 2_000, 2_000]);
+}
+
 #[tokio::test]
 async fn a_missing_port_is_named() {
     let path = "/dev/no-such-port";
     let error = Line::open(LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT)).await.unwrap_err();
     assert_eq!(error, OpenError::NotFound { path: path.into() });
     assert_eq!(error.to_string(), "there is no serial port /dev/no-such-port");
-}
-
-#[tokio::test]
-async fn a_server_that_refuses_is_named() {
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let address = listener.local_addr().unwrap().to_string();
-    drop(listener);
-    let error = Line::open(LineConfig::modbus_tcp(address.clone())).await.unwrap_err();
-    assert!(matches!(error, OpenError::Connect { address: named, .. } if named == address));
 }
 
 #[cfg(unix)]
@@ -214,38 +223,4 @@ async fn a_port_without_an_rs485_mode_says_so() {
     let error = Line::open(config).await.unwrap_err();
     assert!(matches!(error, OpenError::Rs485 { .. }), "{error}");
     assert_eq!(drive_bus::adapter_latency(path.as_ref()), None);
-}
-
-#[tokio::test]
-async fn modbus_tcp_ignores_a_late_answer_by_its_number_and_a_foreign_unit_by_its_address() {
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let config = LineConfig {
-        response_timeout: 50 * MS,
-        retries: 0,
-        ..LineConfig::modbus_tcp(listener.local_addr().unwrap().to_string())
-    };
-    let line = Line::open(config).await.unwrap();
-    let (mut server, _) = listener.accept().await.unwrap();
-    let call = |line: &Line, address| {
-        let mut slave = line.slave(1);
-        tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(address, 1)).await })
-    };
-    let first = call(&line, 7);
-    let mut request = [0; 12];
-    server.read_exact(&mut request).await.unwrap();
-    assert_eq!(request, [0, 1, 0, 0, 0, 6, 1, 3, 0, 7, 0, 1]);
-    let error = PortError::from_modbus(first.await.unwrap().unwrap_err());
-    assert!(matches!(error, PortError::Timeout { .. }), "{error:?}");
-
-    let second = call(&line, 8);
-    server.read_exact(&mut request).await.unwrap();
-    assert_eq!(request[..2], [0, 2]);
-    let late = [0, 1, 0, 0, 0, 5, 1, 3, 2, 0xAA, 0xAA];
-    let other_unit = [0, 2, 0, 0, 0, 5, 9, 3, 2, 0xBB, 0xBB];
-    let right = [0, 2, 0, 0, 0, 5, 1, 3, 2, 0, 8];
-    for byte in [&late[..], &other_unit, &right].concat() {
-        server.write_all(&[byte]).await.unwrap();
-    }
-    let answer = second.await.unwrap().unwrap();
-    assert_eq!(answer, Ok(tokio_modbus::Response::ReadHoldingRegisters(vec![8])));
 }

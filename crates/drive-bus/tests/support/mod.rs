@@ -4,6 +4,7 @@
 
 pub(crate) mod rig;
 pub(crate) mod script;
+pub(crate) mod server;
 
 use std::time::Duration;
 
