@@ -7,7 +7,7 @@ use drive_bus::Line;
 use crate::{
     Error,
     masters::{by_hand, in_turn, stock},
-    report::{Goal, Report, Unit, micros},
+    report::{Goal, Report, Unit, micros, quantile},
     rig::{DRIVES, Rig, runtime},
     simulator::Plant,
     usage::processor_time,
@@ -15,27 +15,37 @@ use crate::{
 
 const SECTION: &str = "cpu";
 
-/// How often each master is measured, in turn with the others.
-const ROUNDS: u32 = 5;
+/// How often each master is measured, in turn with the others. How soon an answer is there depends on whether the
+/// simulator's processor has fallen asleep, and with it how often a master has to wait for it: single rounds differ by
+/// a third, so that their median counts.
+const ROUNDS: u32 = 21;
 
 pub(crate) fn measure(report: &mut Report, time: Duration) -> Result<(), Error> {
     let rig = Rig::start(Plant { lines: 1, drives: DRIVES, unpaced: true })?;
     let (config, port) = (rig.config()?, rig.port()?.clone());
     let each = time / (3 * ROUNDS);
-    let (mut ours, mut hand, mut others) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut ours, mut hand, mut others, mut ratios) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
         let config = config.clone();
-        ours.push(one(async move { in_turn(Line::open(config).await?, DRIVES, each).await })?);
-        hand.push(one(by_hand(port.clone(), DRIVES, each))?);
+        let our = one(async move { in_turn(Line::open(config).await?, DRIVES, each).await })?;
+        let by_hand = one(by_hand(port.clone(), DRIVES, each))?;
+        ratios.push(our.as_secs_f64() / by_hand.as_secs_f64());
+        ours.push(our);
+        hand.push(by_hand);
         others.push(one(stock(port.clone(), DRIVES, each, false))?);
     }
-    // The least of each: everything else on the machine only adds.
-    let [ours, hand, others] = [ours, hand, others].map(|times| times.into_iter().min().unwrap_or_default());
-    report.note(SECTION, "processor time per transaction, this line", Unit::Micros, micros(ours));
-    report.note(SECTION, "processor time per transaction, loop by hand", Unit::Micros, micros(hand));
-    report.note(SECTION, "processor time per transaction, stock tokio-modbus", Unit::Micros, micros(others));
-    let ratio = ours.as_secs_f64() / hand.as_secs_f64();
-    report.row(SECTION, "this line by the loop by hand", Unit::Times, ratio, Goal::AtMost(1.15));
+    for (name, mut times) in [("this line", ours), ("loop by hand", hand), ("stock tokio-modbus", others)] {
+        let what = format!("processor time per transaction, {name}");
+        report.note(SECTION, what, Unit::Micros, micros(quantile(&mut times, 500)));
+    }
+    ratios.sort_unstable_by(f64::total_cmp);
+    let ratio = |per_mille: usize| {
+        ratios.get((ratios.len() - 1) * per_mille / 1_000).copied().ok_or("nothing was measured")
+    };
+    let what = "this line by the loop by hand, median of the rounds";
+    report.row(SECTION, what, Unit::Times, ratio(500)?, Goal::AtMost(1.15));
+    report.note(SECTION, "… in a tenth of the rounds at most", Unit::Times, ratio(100)?);
+    report.note(SECTION, "… in nine tenths of the rounds at most", Unit::Times, ratio(900)?);
     Ok(())
 }
 

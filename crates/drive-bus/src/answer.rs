@@ -141,7 +141,7 @@ const fn at_least(len: usize) -> Extent {
 ///
 /// # Errors
 /// What does not fit, in words.
-pub fn check(request: &Request<'_>, pdu: &Bytes) -> Result<Result<Response, ExceptionCode>, String> {
+pub fn check(request: &Request<'_>, pdu: Bytes) -> Result<Result<Response, ExceptionCode>, String> {
     let function = request.function_code().value();
     match pdu.as_ref() {
         [first, code] if *first == function | 0x80 => return Ok(Err(ExceptionCode::new(*code))),
@@ -151,9 +151,9 @@ pub fn check(request: &Request<'_>, pdu: &Bytes) -> Result<Result<Response, Exce
         [] => return Err("it is empty".to_owned()),
     }
     if let Request::Custom(_, sent) = request {
-        return check_custom(function, sent, pdu).map(Ok);
+        return check_custom(function, sent, &pdu).map(Ok);
     }
-    let response = Response::try_from(pdu.clone()).map_err(|error| error.to_string())?;
+    let response = Response::try_from(pdu).map_err(|error| error.to_string())?;
     check_response(request, response).map(Ok)
 }
 
@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn an_answer_that_fits_is_decoded() {
         for (request, pdu) in golden() {
-            let response = check(&request, &Bytes::from(pdu)).unwrap().unwrap();
+            let response = check(&request, Bytes::from(pdu)).unwrap().unwrap();
             assert_eq!(response.function_code().value(), request.function_code().value());
         }
     }
@@ -304,7 +304,7 @@ mod tests {
             (vec![0x06, 0x21, 0x35, 0x00, 0x04], "value 4 instead of 3"),
             (vec![0x03, 0x02, 0x00, 0x04], "function 03h instead of 06h"),
         ] {
-            assert_eq!(check(&request, &Bytes::from(wrong)), Err(why.to_owned()));
+            assert_eq!(check(&request, Bytes::from(wrong)), Err(why.to_owned()));
         }
     }
 
@@ -313,7 +313,7 @@ mod tests {
         let request = Request::ReadHoldingRegisters(0, 2);
         assert_eq!(extent(&request, &[0x03, 0x02]), Extent::Never);
         let short = Bytes::from_static(&[0x03, 0x02, 0x00, 0x01]);
-        assert_eq!(check(&request, &short), Err("1 values instead of 2".to_owned()));
+        assert_eq!(check(&request, short), Err("1 values instead of 2".to_owned()));
     }
 
     #[test]
@@ -321,17 +321,17 @@ mod tests {
         let request = Request::ReadDeviceIdentification(ReadCode::Basic, 9);
         // ATV21: the ordinary form.
         assert_eq!(extent(&request, &[0xAB, 0x02]), Extent::Exactly(2));
-        let ordinary = check(&request, &Bytes::from_static(&[0xAB, 0x02]));
+        let ordinary = check(&request, Bytes::from_static(&[0xAB, 0x02]));
         assert_eq!(ordinary, Ok(Err(ExceptionCode::IllegalDataAddress)));
         // ATV312: with the MEI type before the code.
         assert_eq!(extent(&request, &[0xAB, 0x0E]), Extent::Either(2, 3));
-        let with_mei = check(&request, &Bytes::from_static(&[0xAB, 0x0E, 0x02]));
+        let with_mei = check(&request, Bytes::from_static(&[0xAB, 0x0E, 0x02]));
         assert_eq!(with_mei, Ok(Err(ExceptionCode::IllegalDataAddress)));
     }
 
     #[test]
     fn coils_come_in_the_number_that_was_asked_for() {
-        let answer = check(&Request::ReadCoils(0, 3), &Bytes::from_static(&[0x01, 0x01, 0xFF]));
+        let answer = check(&Request::ReadCoils(0, 3), Bytes::from_static(&[0x01, 0x01, 0xFF]));
         assert_eq!(answer, Ok(Ok(Response::ReadCoils(vec![true; 3]))));
     }
 }

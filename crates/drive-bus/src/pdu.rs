@@ -43,7 +43,8 @@ pub fn encode(request: &Request<'_>) -> Result<Bytes, EncodeError> {
             Err(EncodeError::Quantity { function, quantity, most })
         }
     };
-    let mut pdu = BytesMut::with_capacity(16);
+    // What most requests have; a vector without room to spare becomes `Bytes` without another allocation.
+    let mut pdu = BytesMut::with_capacity(5);
     pdu.put_u8(function);
     match request {
         Request::ReadCoils(address, quantity) | Request::ReadDiscreteInputs(address, quantity) => {

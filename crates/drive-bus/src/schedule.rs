@@ -244,6 +244,10 @@ impl<T> Schedule<T> {
     }
 
     fn best(&self, now: Instant) -> Option<Best> {
+        // One caller who asks for one thing after another: nothing to choose from.
+        if let [only] = self.readiness.as_slice() {
+            return Some(if only.at <= now { Best::Now(0) } else { Best::At(only.at) });
+        }
         let all = || self.queued.iter().zip(&self.readiness).enumerate();
         let first = |class: Class| {
             all()

@@ -110,13 +110,13 @@ impl Ascii {
     }
 
     /// A frame whose LRC fits.
-    fn heard(&mut self, slave: u8, pdu: &Bytes) -> Step {
+    fn heard(&mut self, slave: u8, pdu: Bytes) -> Step {
         let stray = Stray::Frame { slave, function: pdu.first().copied().unwrap_or_default() };
         let Some(current) = self.current.as_mut().filter(|current| current.slave == slave) else {
             self.strays.push(stray);
             return Step::More;
         };
-        if *pdu == current.pdu && !current.echo_taken {
+        if pdu == current.pdu && !current.echo_taken {
             // Nobody answers a broadcast, so that what equals it is an echo.
             let sure = self.echo == EchoState::Present || slave == 0;
             if sure || !answer::equals_its_request(&current.request) {
@@ -164,7 +164,7 @@ impl Ascii {
 
     fn act(&mut self, heard: Heard) -> Step {
         match heard {
-            Heard::Frame { slave, pdu } => self.heard(slave, &pdu),
+            Heard::Frame { slave, pdu } => self.heard(slave, pdu),
             Heard::Garbled { head, len, why } => self.garbled(head, len, why),
         }
     }

@@ -62,7 +62,7 @@ impl Mbap {
         frame
     }
 
-    fn fits(&mut self, transaction: u16, unit: u8, pdu: &Bytes) -> Option<Answer> {
+    fn fits(&mut self, transaction: u16, unit: u8, pdu: Bytes) -> Option<Answer> {
         let stray = Stray::Frame { slave: unit, function: pdu.first().copied().unwrap_or_default() };
         let Some(current) = self.current.as_mut().filter(|_| transaction == self.transaction) else {
             self.strays.push(stray);
@@ -99,7 +99,7 @@ impl Exchange for Mbap {
     fn handle_bytes(&mut self, _now: Instant, bytes: &[u8]) -> Step {
         self.received.extend_from_slice(bytes);
         while let Some((transaction, unit, pdu)) = self.next_frame() {
-            if let Some(answer) = self.fits(transaction, unit, &pdu) {
+            if let Some(answer) = self.fits(transaction, unit, pdu) {
                 self.current = None;
                 return Step::Done(Ok(answer));
             }

@@ -82,6 +82,8 @@ pub struct Rtu {
     echo: EchoState,
     configured: Echo,
     current: Option<Current>,
+    /// What opened the exchange.
+    sent: Vec<u8>,
     /// What has come and is not yet part of anything.
     received: Vec<u8>,
     last_byte: Option<Instant>,
@@ -92,7 +94,6 @@ pub struct Rtu {
 struct Current {
     slave: u8,
     request: Arc<Request<'static>>,
-    sent: Bytes,
     answer_by: Option<Instant>,
     /// The echo of this request has been taken away.
     echo_taken: bool,
@@ -125,6 +126,7 @@ impl Rtu {
             echo: echo.into(),
             configured: echo,
             current: None,
+            sent: Vec::with_capacity(MAX_FRAME),
             received: Vec::with_capacity(MAX_FRAME),
             last_byte: None,
             strays: Vec::new(),
@@ -158,7 +160,7 @@ impl Rtu {
     fn accept(&mut self, len: usize, from_the_start: bool) -> Option<Step> {
         let current = self.current.as_mut()?;
         let frame = self.received.get(..len)?;
-        let equals = *frame == current.sent;
+        let equals = *frame == self.sent;
         let pdu = Bytes::copy_from_slice(frame.get(1..len.saturating_sub(2))?);
         self.received.drain(..len);
         if equals && self.echo == EchoState::Present && !current.echo_taken {
@@ -170,7 +172,7 @@ impl Rtu {
             current.misfit = Some("an echo could not be told from it".to_owned());
             return None;
         }
-        match answer::check(&current.request, &pdu) {
+        match answer::check(&current.request, pdu) {
             Ok(answer) => {
                 if self.echo == EchoState::Unknown && from_the_start && !equals {
                     self.echo = EchoState::Absent;
@@ -189,7 +191,7 @@ impl Rtu {
     /// Takes our own request away where it stands at the beginning of what was received. True: look again.
     fn take_echo(&mut self) -> bool {
         let Some(current) = &mut self.current else { return false };
-        if current.echo_taken || !self.received.starts_with(&current.sent) {
+        if current.echo_taken || !self.received.starts_with(&self.sent) {
             return false;
         }
         // Of a request that its answer may equal, only an adapter that is known to echo gives an echo. Nobody answers a
@@ -202,13 +204,16 @@ impl Rtu {
         }
         current.echo_taken = true;
         self.echo = EchoState::Present;
-        self.received.drain(..current.sent.len());
+        self.received.drain(..self.sent.len());
         self.strays.push(Stray::Echo);
         true
     }
 
     /// Drops the first `len` bytes of what was received and says what they were. True: some were garbled.
     fn judge(&mut self, len: usize) -> bool {
+        if len == 0 {
+            return false;
+        }
         let dropped: Vec<u8> = self.received.drain(..len.min(self.received.len())).collect();
         let mut rest = dropped.as_slice();
         let mut garbled = 0;
@@ -313,10 +318,11 @@ impl Exchange for Rtu {
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
         self.judge(self.received.len());
         let sent = frame(slave, pdu);
+        self.sent.clear();
+        self.sent.extend_from_slice(&sent);
         self.current = Some(Current {
             slave,
             request,
-            sent: sent.clone(),
             answer_by: None,
             echo_taken: false,
             received: 0,

@@ -62,6 +62,7 @@ impl<C> Master<C> {
             Err(_) => station.stats.outcomes.exceptions += 1,
         }
         if station.answered(now) {
+            self.offline.remove(&flight.slave);
             tracing::info!(slave = flight.slave, "slave answers again");
         }
     }
@@ -89,6 +90,7 @@ impl<C> Master<C> {
 
     fn go_offline(&mut self, now: Instant, slave: u8) {
         tracing::warn!(slave, "slave off-line");
+        self.offline.insert(slave);
         let at = self.station(slave).probe_at().unwrap_or(now);
         let retry_in = at.saturating_duration_since(now);
         let waiting =

@@ -3,11 +3,12 @@
 //! Inputs are named `handle_…`, `submit`, `withdraw`; outputs `poll_…`. The task feeds it and acts.
 
 mod finish;
+mod link;
+mod send;
 mod station;
 
 use std::{
-    collections::{BTreeMap, VecDeque},
-    mem,
+    collections::{BTreeMap, BTreeSet, VecDeque},
     sync::Arc,
     time::Duration,
 };
@@ -23,10 +24,11 @@ use crate::{
     exchange::{Answer, Exchange, Step, Stray, ascii::Ascii, mbap::Mbap, rtu::Rtu, unitelway::UniTelway},
     pdu,
     protocol::Protocol,
-    schedule::{Choice, Entry, Readiness, Rules, Schedule, Ticket},
+    schedule::{Entry, Rules, Schedule, Ticket},
     stats::Stats,
 };
 
+use link::Link;
 use station::Station;
 
 /// How a call ends.
@@ -44,6 +46,8 @@ pub struct Master<C> {
     exchange: Box<dyn Exchange>,
     schedule: Schedule<Job<C>>,
     stations: BTreeMap<u8, Station>,
+    /// Those that do not answer: they are probed.
+    offline: BTreeSet<u8>,
     flight: Option<Flight<C>>,
     to_send: Option<Bytes>,
     outcomes: VecDeque<(C, Outcome)>,
@@ -104,15 +108,6 @@ enum Purpose<C> {
     Settle,
 }
 
-enum Link {
-    /// The port is open.
-    Up,
-    /// It was lost a moment ago, or is being opened for the first time: what waits goes on waiting.
-    Opening,
-    /// It cannot be opened: nothing is accepted.
-    Down(String),
-}
-
 impl<C> Master<C> {
     /// A line whose port is not open yet.
     #[must_use]
@@ -131,6 +126,7 @@ impl<C> Master<C> {
             exchange,
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
+            offline: BTreeSet::new(),
             flight: None,
             to_send: None,
             outcomes: VecDeque::new(),
@@ -258,145 +254,6 @@ impl<C> Master<C> {
         }
     }
 
-    /// What is to be written now, if anything. [`handle_sent`](Self::handle_sent) **must** follow when it is.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<Bytes> {
-        if let Some(bytes) = self.to_send.take() {
-            return Some(bytes);
-        }
-        self.choose_at = None;
-        if self.flight.is_some() || !matches!(self.link, Link::Up) || self.closing {
-            return None;
-        }
-        let free_at = self.free_at();
-        let probe = self.next_probe().filter(|_| !self.schedule.has_stop());
-        if now < free_at {
-            self.choose_at = (!self.schedule.is_empty() || probe.is_some()).then_some(free_at);
-            return None;
-        }
-        if let Some((slave, at)) = probe {
-            if at <= now {
-                self.station(slave).stats.probes += 1;
-                return self.begin_read(now, slave, Purpose::Probe);
-            }
-            self.choose_at = Some(at);
-        }
-        match self.choose(now, free_at) {
-            Choice::Send(entry) => self.begin(now, entry),
-            Choice::Wait(at) => {
-                self.choose_at = Some(self.choose_at.map_or(at, |probe| probe.min(at)));
-                None
-            }
-            Choice::Idle => None,
-        }
-    }
-
-    fn choose(&mut self, now: Instant, free_at: Instant) -> Choice<Job<C>> {
-        let Self { schedule, stations, config, last_slave, exchange, .. } = self;
-        schedule.choose(now, |entry| {
-            let mut at = free_at;
-            if last_slave.is_some_and(|last| last != entry.slave) {
-                at += config.slave_change_gap;
-            }
-            let request = &entry.work.request;
-            let mut takes = config.response_timeout;
-            if let Some(station) = stations.get(&entry.slave) {
-                at = at.max(station.ready_at.unwrap_or(at));
-                if entry.terms.class != Class::Stop || !entry.work.is_write {
-                    let kind = exchange.kind_of_answer(request.function_code().value());
-                    at = at.max(station.late_until(kind).unwrap_or(at));
-                }
-                takes = station.timeout.typical();
-            }
-            let pdus = (entry.work.pdu.len(), answer::likely_len(request));
-            takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
-            Readiness { at, takes }
-        })
-    }
-
-    /// When the silence before any request is over.
-    fn free_at(&self) -> Instant {
-        self.quiet_from + self.config.silence()
-    }
-
-    fn next_probe(&self) -> Option<(u8, Instant)> {
-        let (slave, at) = self
-            .stations
-            .iter()
-            .filter_map(|(slave, station)| Some((*slave, station.wanted_probe_at()?)))
-            .min_by_key(|(_, at)| *at)?;
-        Some((slave, self.probe_free_at.map_or(at, |free| free.max(at))))
-    }
-
-    fn begin(&mut self, now: Instant, mut entry: Entry<Job<C>>) -> Option<Bytes> {
-        let slave = entry.slave;
-        let ambiguous = slave != 0 && answer::equals_its_request(&entry.work.request);
-        if ambiguous && self.exchange.echo_is_unknown() && !mem::replace(&mut entry.work.settled, true) {
-            self.schedule.put_back(entry);
-            return self.begin_read(now, slave, Purpose::Settle);
-        }
-        if entry.work.attempts == 0 {
-            let class = self.stats.class_mut(entry.terms.class);
-            class.sent += 1;
-            class.wait.record(now.saturating_duration_since(entry.arrived));
-        } else {
-            self.station(slave).stats.retries += 1;
-        }
-        let arrived = entry.arrived;
-        let (request, pdu) = (Arc::clone(&entry.work.request), entry.work.pdu.clone());
-        Some(self.fly(now, slave, Purpose::Call(Some(entry)), arrived, request, &pdu))
-    }
-
-    fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
-        let request = self.station(slave).harmless_read();
-        let pdu = pdu::encode(&request).ok()?;
-        Some(self.fly(now, slave, purpose, now, request, &pdu))
-    }
-
-    fn fly(
-        &mut self,
-        now: Instant,
-        slave: u8,
-        purpose: Purpose<C>,
-        since: Instant,
-        request: Arc<Request<'static>>,
-        pdu: &Bytes,
-    ) -> Bytes {
-        let allowed = self.free_at().max(since).max(self.station(slave).ready_at.unwrap_or(since));
-        self.stats.lag.record(now.saturating_duration_since(allowed));
-        self.stats.silence.record(now.saturating_duration_since(self.quiet_from));
-        let bytes = self.exchange.start(slave, Arc::clone(&request), pdu);
-        self.flight =
-            Some(Flight { purpose, slave, request, sending: bytes.len(), started: now, sent: None });
-        bytes
-    }
-
-    /// What [`poll_transmit`](Self::poll_transmit) gave has been handed to the port.
-    pub fn handle_sent(&mut self, now: Instant) {
-        let Some(flight) = &mut self.flight else { return };
-        let end = now + self.config.characters(flight.sending);
-        self.quiet_from = end;
-        if let Some(sent) = flight.sent {
-            self.exchange.handle_sent(end, sent.answer_by);
-            return;
-        }
-        let unanswered = flight.slave == 0 || pdu::is_unanswered(&flight.request);
-        let station = self.stations.entry(flight.slave).or_insert_with(|| {
-            Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
-        });
-        station.stats.sent += 1;
-        let timeout = station.timeout.current();
-        let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
-        let answer_by = end + timeout + characters;
-        flight.sent = Some(Sent {
-            end,
-            timeout,
-            answer_by,
-            unanswered_until: unanswered.then(|| end + self.config.broadcast_turnaround),
-        });
-        self.exchange.handle_sent(end, answer_by);
-        self.last_slave = (flight.slave != 0).then_some(flight.slave);
-    }
-
     /// Bytes came in.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.quiet_from = self.quiet_from.max(now);
@@ -471,49 +328,6 @@ impl<C> Master<C> {
     /// The next call that has ended.
     pub fn poll_outcome(&mut self) -> Option<(C, Outcome)> {
         self.outcomes.pop_front()
-    }
-
-    /// The port is open.
-    pub fn handle_up(&mut self, now: Instant) {
-        tracing::info!(endpoint = ?self.config.endpoint, "line up");
-        self.link = Link::Up;
-        self.exchange.reset();
-        self.quiet_from = now;
-        self.stats.opened += 1;
-        self.opened_at.get_or_insert(now);
-    }
-
-    /// The port is lost. What waits goes on waiting.
-    pub fn handle_lost(&mut self, now: Instant, reason: &str) {
-        tracing::warn!(endpoint = ?self.config.endpoint, reason, "line lost");
-        self.link = Link::Opening;
-        self.stats.lost += 1;
-        self.exchange.reset();
-        self.fail_flight(now, reason);
-    }
-
-    /// The port cannot be opened. What waits without a lifetime ends; what has one expires.
-    pub fn handle_down(&mut self, reason: &str) {
-        if let Link::Opening = mem::replace(&mut self.link, Link::Down(reason.to_owned())) {
-            tracing::warn!(endpoint = ?self.config.endpoint, reason, "line down");
-        }
-        for entry in self.schedule.withdraw_all(|entry| entry.terms.lifetime.is_none()) {
-            self.drop_unsent(entry, PortError::LineDown(reason.to_owned()));
-        }
-    }
-
-    /// The line is to be closed.
-    pub fn handle_close(&mut self) {
-        self.closing = true;
-        for entry in self.schedule.withdraw_all(|_| true) {
-            self.drop_unsent(entry, PortError::Closed);
-        }
-    }
-
-    /// Whether the line is closed and nothing is under way any more.
-    #[must_use]
-    pub const fn is_finished(&self) -> bool {
-        self.closing && self.flight.is_none()
     }
 
     /// What was counted so far, at `now`.

@@ -1,0 +1,63 @@
+//! The port comes and goes, and the line is closed.
+
+use std::mem;
+
+use drive_core::PortError;
+use tokio::time::Instant;
+
+use super::Master;
+
+/// The state of the port.
+pub(super) enum Link {
+    /// The port is open.
+    Up,
+    /// It was lost a moment ago, or is being opened for the first time: what waits goes on waiting.
+    Opening,
+    /// It cannot be opened: nothing is accepted.
+    Down(String),
+}
+
+impl<C> Master<C> {
+    /// The port is open.
+    pub fn handle_up(&mut self, now: Instant) {
+        tracing::info!(endpoint = ?self.config.endpoint, "line up");
+        self.link = Link::Up;
+        self.exchange.reset();
+        self.quiet_from = now;
+        self.stats.opened += 1;
+        self.opened_at.get_or_insert(now);
+    }
+
+    /// The port is lost. What waits goes on waiting.
+    pub fn handle_lost(&mut self, now: Instant, reason: &str) {
+        tracing::warn!(endpoint = ?self.config.endpoint, reason, "line lost");
+        self.link = Link::Opening;
+        self.stats.lost += 1;
+        self.exchange.reset();
+        self.fail_flight(now, reason);
+    }
+
+    /// The port cannot be opened. What waits without a lifetime ends; what has one expires.
+    pub fn handle_down(&mut self, reason: &str) {
+        if let Link::Opening = mem::replace(&mut self.link, Link::Down(reason.to_owned())) {
+            tracing::warn!(endpoint = ?self.config.endpoint, reason, "line down");
+        }
+        for entry in self.schedule.withdraw_all(|entry| entry.terms.lifetime.is_none()) {
+            self.drop_unsent(entry, PortError::LineDown(reason.to_owned()));
+        }
+    }
+
+    /// The line is to be closed.
+    pub fn handle_close(&mut self) {
+        self.closing = true;
+        for entry in self.schedule.withdraw_all(|_| true) {
+            self.drop_unsent(entry, PortError::Closed);
+        }
+    }
+
+    /// Whether the line is closed and nothing is under way any more.
+    #[must_use]
+    pub const fn is_finished(&self) -> bool {
+        self.closing && self.flight.is_none()
+    }
+}

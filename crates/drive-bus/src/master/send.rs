@@ -1,0 +1,160 @@
+//! What is sent next, and what follows from its having been sent.
+
+use std::{mem, sync::Arc};
+
+use bytes::Bytes;
+use drive_core::Class;
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+use super::{Flight, Job, Master, Purpose, Sent, Station, link::Link};
+use crate::{
+    answer, pdu,
+    schedule::{Choice, Entry, Readiness},
+};
+
+impl<C> Master<C> {
+    /// What is to be written now, if anything. [`handle_sent`](Self::handle_sent) **must** follow when it is.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Bytes> {
+        if let Some(bytes) = self.to_send.take() {
+            return Some(bytes);
+        }
+        self.choose_at = None;
+        if self.flight.is_some() || !matches!(self.link, Link::Up) || self.closing {
+            return None;
+        }
+        let free_at = self.free_at();
+        let probe = self.next_probe().filter(|_| !self.schedule.has_stop());
+        if now < free_at {
+            self.choose_at = (!self.schedule.is_empty() || probe.is_some()).then_some(free_at);
+            return None;
+        }
+        if let Some((slave, at)) = probe {
+            if at <= now {
+                self.station(slave).stats.probes += 1;
+                return self.begin_read(now, slave, Purpose::Probe);
+            }
+            self.choose_at = Some(at);
+        }
+        match self.choose(now, free_at) {
+            Choice::Send(entry) => self.begin(now, entry),
+            Choice::Wait(at) => {
+                self.choose_at = Some(self.choose_at.map_or(at, |probe| probe.min(at)));
+                None
+            }
+            Choice::Idle => None,
+        }
+    }
+
+    fn choose(&mut self, now: Instant, free_at: Instant) -> Choice<Job<C>> {
+        let Self { schedule, stations, config, last_slave, exchange, .. } = self;
+        schedule.choose(now, |entry| {
+            let mut at = free_at;
+            if last_slave.is_some_and(|last| last != entry.slave) {
+                at += config.slave_change_gap;
+            }
+            let request = &entry.work.request;
+            let mut takes = config.response_timeout;
+            if let Some(station) = stations.get(&entry.slave) {
+                at = at.max(station.ready_at.unwrap_or(at));
+                if entry.terms.class != Class::Stop || !entry.work.is_write {
+                    let kind = exchange.kind_of_answer(request.function_code().value());
+                    at = at.max(station.late_until(kind).unwrap_or(at));
+                }
+                takes = station.timeout.typical();
+            }
+            let pdus = (entry.work.pdu.len(), answer::likely_len(request));
+            takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
+            Readiness { at, takes }
+        })
+    }
+
+    /// When the silence before any request is over.
+    fn free_at(&self) -> Instant {
+        self.quiet_from + self.config.silence()
+    }
+
+    fn next_probe(&self) -> Option<(u8, Instant)> {
+        let (slave, at) = self
+            .offline
+            .iter()
+            .filter_map(|slave| Some((*slave, self.stations.get(slave)?.wanted_probe_at()?)))
+            .min_by_key(|(_, at)| *at)?;
+        Some((slave, self.probe_free_at.map_or(at, |free| free.max(at))))
+    }
+
+    fn begin(&mut self, now: Instant, mut entry: Entry<Job<C>>) -> Option<Bytes> {
+        let slave = entry.slave;
+        let ambiguous = slave != 0 && answer::equals_its_request(&entry.work.request);
+        if ambiguous && self.exchange.echo_is_unknown() && !mem::replace(&mut entry.work.settled, true) {
+            self.schedule.put_back(entry);
+            return self.begin_read(now, slave, Purpose::Settle);
+        }
+        if entry.work.attempts == 0 {
+            let class = self.stats.class_mut(entry.terms.class);
+            class.sent += 1;
+            class.wait.record(now.saturating_duration_since(entry.arrived));
+        } else {
+            self.station(slave).stats.retries += 1;
+        }
+        self.note_start(now, slave, entry.arrived);
+        let request = Arc::clone(&entry.work.request);
+        let bytes = self.exchange.start(slave, Arc::clone(&request), &entry.work.pdu);
+        Some(self.fly(now, slave, Purpose::Call(Some(entry)), request, bytes))
+    }
+
+    fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
+        let request = self.station(slave).harmless_read();
+        let pdu = pdu::encode(&request).ok()?;
+        self.note_start(now, slave, now);
+        let bytes = self.exchange.start(slave, Arc::clone(&request), &pdu);
+        Some(self.fly(now, slave, purpose, request, bytes))
+    }
+
+    /// A request that could have been sent from `since` on is sent at `now`.
+    fn note_start(&mut self, now: Instant, slave: u8, since: Instant) {
+        let allowed = self.free_at().max(since).max(self.station(slave).ready_at.unwrap_or(since));
+        self.stats.lag.record(now.saturating_duration_since(allowed));
+        self.stats.silence.record(now.saturating_duration_since(self.quiet_from));
+    }
+
+    fn fly(
+        &mut self,
+        now: Instant,
+        slave: u8,
+        purpose: Purpose<C>,
+        request: Arc<Request<'static>>,
+        bytes: Bytes,
+    ) -> Bytes {
+        self.flight =
+            Some(Flight { purpose, slave, request, sending: bytes.len(), started: now, sent: None });
+        bytes
+    }
+
+    /// What [`poll_transmit`](Self::poll_transmit) gave has been handed to the port.
+    pub fn handle_sent(&mut self, now: Instant) {
+        let Some(flight) = &mut self.flight else { return };
+        let end = now + self.config.characters(flight.sending);
+        self.quiet_from = end;
+        if let Some(sent) = flight.sent {
+            self.exchange.handle_sent(end, sent.answer_by);
+            return;
+        }
+        let unanswered = flight.slave == 0 || pdu::is_unanswered(&flight.request);
+        let station = self.stations.entry(flight.slave).or_insert_with(|| {
+            Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
+        });
+        station.stats.sent += 1;
+        let timeout = station.timeout.current();
+        let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
+        let answer_by = end + timeout + characters;
+        flight.sent = Some(Sent {
+            end,
+            timeout,
+            answer_by,
+            unanswered_until: unanswered.then(|| end + self.config.broadcast_turnaround),
+        });
+        self.exchange.handle_sent(end, answer_by);
+        self.last_slave = (flight.slave != 0).then_some(flight.slave);
+    }
+}
