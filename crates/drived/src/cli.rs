@@ -6,18 +6,25 @@ use clap::{Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
 use crate::{
-    commands::{demo, families, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
+    commands::{check, demo, families, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
     failure::Failure,
     run,
 };
 
-/// What holds for all subcommands.
+/// A map of the subcommands, and what holds for all of them.
 const NOTES: &str = "\
-A line is PATH[,BAUD[,FORMAT]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; speed and format are the
-drives' factory setting when they are not given. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as
-atv312@1-10,12.
+To try it:          demo; or sim in one terminal and poll, status, start in another
+Before wiring:      families, plan
+One drive, read:    status, faults, param get, param dump
+One drive, write:   setpoint, start, stop, reset, param set
+One line, read:     poll
+The plant's drives: check, plan, run, each with --config FILE
 
-Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input.";
+A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
+tcp://HOST:PORT. Speed and format are the drives' factory setting when they are not given; PROTOCOL is rtu, ascii or \
+unitelway. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as atv312@1-10,12.
+
+Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input or a plan that cannot work.";
 
 /// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones
 #[derive(Debug, Parser)]
@@ -31,7 +38,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Demo(demo::Args),
     Run(run::Args),
-    Check(run::CheckArgs),
+    Check(check::Args),
     Sim(sim::Args),
     Plan(plan::Args),
     Poll(poll::Args),
@@ -62,7 +69,7 @@ impl Command {
         match self {
             Self::Demo(args) => demo::run(args).await,
             Self::Run(args) => run::run(args).await,
-            Self::Check(args) => run::check(&args),
+            Self::Check(args) => check::run(&args),
             Self::Sim(args) => sim::run(args).await,
             Self::Plan(args) => plan::run(&args),
             Self::Poll(args) => poll::run(args).await,

@@ -52,6 +52,43 @@ pub(crate) fn on_one_line(specs: &[DriveSpec]) -> Result<Vec<DriveName>, Address
     Ok(names)
 }
 
+/// Drives of one line as a person lists them, each with the name that its owner gave it:
+/// `atv312@1-10,12 (fan 1 … fan 12)`.
+pub(crate) fn listed(drives: &[(DriveName, String)]) -> String {
+    let mut text = String::new();
+    let mut last: Option<DriveName> = None;
+    let mut in_range = false;
+    let mut drives_after = drives.iter().skip(1);
+    for (name, _) in drives {
+        let follows = |last: DriveName, next: DriveName| {
+            last.family == next.family && last.slave.number().checked_add(1) == Some(next.slave.number())
+        };
+        let goes_on = drives_after.next().is_some_and(|(next, _)| follows(*name, *next));
+        match last {
+            Some(last) if follows(last, *name) && goes_on => in_range = true,
+            Some(last) if follows(last, *name) => {
+                text.push_str(&format!("{}{}", if in_range { '-' } else { ',' }, name.slave));
+                in_range = false;
+            }
+            Some(last) if last.family == name.family => text.push_str(&format!(",{}", name.slave)),
+            Some(_) => text.push_str(&format!(" {name}")),
+            None => text.push_str(&name.to_string()),
+        }
+        last = Some(*name);
+    }
+    let own = |drive: &(DriveName, String)| drive.1 != drive.0.to_string();
+    match (drives.first(), drives.last()) {
+        (Some(first), Some(end)) if own(first) && drives.len() == 2 => {
+            format!("{text} ({}, {})", first.1, end.1)
+        }
+        (Some(first), Some(end)) if own(first) && drives.len() > 1 => {
+            format!("{text} ({} … {})", first.1, end.1)
+        }
+        (Some(first), _) if own(first) => format!("{text} ({})", first.1),
+        _ => text,
+    }
+}
+
 /// Two drives at one address of one line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{first} and {second}: two drives cannot have one address on a line")]
@@ -131,6 +168,27 @@ mod tests {
     fn addresses_are_single_numbers_and_ranges() {
         assert_eq!(numbers("atv312@7"), [7]);
         assert_eq!(numbers("atv312@1-3,12,31"), [1, 2, 3, 12, 31]);
+    }
+
+    #[test]
+    fn drives_are_listed_as_they_could_be_written() {
+        for text in ["atv312@7", "atv312@1-31", "atv312@1,2", "atv312@1-3,5,6,9-11", "atv312@1-3 atv21@4,5,9"]
+        {
+            let drives: Vec<_> = text
+                .split(' ')
+                .flat_map(|spec| spec.parse::<DriveSpec>().unwrap().names().collect::<Vec<_>>())
+                .collect();
+            let plain: Vec<_> = drives.iter().map(|name| (*name, name.to_string())).collect();
+            assert_eq!(listed(&plain), text);
+        }
+        let fan = |number: u8| {
+            (
+                DriveName { family: Family::Atv312, slave: SlaveAddress::try_from(number).unwrap() },
+                format!("fan {number}"),
+            )
+        };
+        assert_eq!(listed(&[fan(1), fan(2), fan(3)]), "atv312@1-3 (fan 1 … fan 3)");
+        assert_eq!(listed(&[fan(9)]), "atv312@9 (fan 9)");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::{fmt, str::FromStr};
 
 use drive_bus::{
-    LineConfig, Protocol, SlaveSettings,
+    Endpoint, LineConfig, Protocol, SlaveSettings,
     protocol::{ProtocolError, ProtocolMismatch},
 };
 use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings};
@@ -54,11 +54,27 @@ impl LineSpec {
     }
 }
 
-impl LineSpec {
-    /// The same line at another speed; `None` for one without a speed.
-    pub(crate) fn at(&self, baud: u32) -> Option<Self> {
-        let target = self.target.clone();
-        (!matches!(target, Target::ModbusTcp(_))).then(|| Self { target, serial: self.serial.at(baud) })
+/// The same line at another speed, and why it cannot be set so where it cannot; `None` for one without a speed.
+pub(crate) fn at(
+    config: &LineConfig,
+    drives: &[DriveName],
+    baud: u32,
+) -> Option<(LineConfig, Option<LineSpecError>)> {
+    if matches!(config.endpoint, Endpoint::ModbusTcp(_)) {
+        return None;
+    }
+    let serial = SerialSettings::new(baud, config.serial.format()).ok()?;
+    let forbidden = check(serial, config.protocol, drives).err();
+    Some((LineConfig { serial, ..config.clone() }, forbidden))
+}
+
+/// What a line is, for a person.
+pub(crate) fn describe(config: &LineConfig) -> String {
+    match &config.endpoint {
+        Endpoint::Serial(path) => format!("{}, {} {}", path.display(), config.serial, config.protocol),
+        Endpoint::RtuOverTcp(address) => format!("rtu+tcp://{address}, {}", config.serial),
+        Endpoint::ModbusTcp(address) => format!("tcp://{address}"),
+        Endpoint::Stream => config.serial.to_string(),
     }
 }
 
@@ -71,11 +87,6 @@ pub(crate) fn with_turnarounds(config: LineConfig, drives: &[DriveName]) -> Line
 }
 
 impl SerialSpec {
-    /// What was said of the format, at another speed.
-    pub(crate) const fn at(self, baud: u32) -> Self {
-        Self { baud: Some(baud), ..self }
-    }
-
     /// Speed and format for these drives: what was said, else what all of them have from the factory, if every drive
     /// can be set to it.
     pub(crate) fn settings(self, drives: &[DriveName]) -> Result<SerialSettings, LineSpecError> {
@@ -89,18 +100,24 @@ impl SerialSpec {
             None => agreed(drives, |name| factory(name).format())?,
         };
         let settings = SerialSettings::new(baud, format)?;
-        for name in drives {
-            let spoken = name.family.protocols();
-            if !spoken.contains(&self.protocol.to_string().as_str()) {
-                let problem = format!("it speaks {} and not {}", spoken.join(", "), self.protocol);
-                return Err(LineSpecError::Drive(*name, problem));
-            }
-            let checked = name.family.capabilities().check_line(name.slave, settings);
-            checked.map_err(|mismatch| LineSpecError::Drive(*name, mismatch.to_string()))?;
-        }
-        self.protocol.check(settings)?;
+        check(settings, self.protocol, drives)?;
         Ok(settings)
     }
+}
+
+/// Whether every drive can be set to this.
+fn check(settings: SerialSettings, protocol: Protocol, drives: &[DriveName]) -> Result<(), LineSpecError> {
+    for name in drives {
+        let spoken = name.family.protocols();
+        if !spoken.contains(&protocol.to_string().as_str()) {
+            let problem = format!("it speaks {} and not {protocol}", spoken.join(", "));
+            return Err(LineSpecError::Drive(*name, problem));
+        }
+        let checked = name.family.capabilities().check_line(name.slave, settings);
+        checked.map_err(|mismatch| LineSpecError::Drive(*name, mismatch.to_string()))?;
+    }
+    protocol.check(settings)?;
+    Ok(())
 }
 
 /// The value that all drives have from the factory.
@@ -233,8 +250,6 @@ fn host_and_port(text: &str) -> Result<String, LineSpecError> {
 
 #[cfg(test)]
 mod tests {
-    use drive_bus::Endpoint;
-
     use super::*;
     use crate::drive_spec::{self, DriveSpec};
 

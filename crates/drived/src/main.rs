@@ -2,6 +2,7 @@
 
 mod cli;
 mod commands;
+mod config;
 mod drive_options;
 mod drive_spec;
 mod duration;

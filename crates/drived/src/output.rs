@@ -15,10 +15,20 @@ pub(crate) fn say(line: impl fmt::Display) -> Result<(), Failure> {
     writeln!(io::stdout().lock(), "{line}").map_err(|error| Failure::output(&error))
 }
 
+/// Prints a text, on a terminal in lines no wider than that.
+pub(crate) fn say_text(text: &str) -> Result<(), Failure> {
+    wrapped(text, terminal_width().unwrap_or(usize::MAX)).into_iter().try_for_each(say)
+}
+
 /// Prints a table, on a terminal no wider than that.
 pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
-    let width = io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten();
-    say(Table { available: width.map(|(columns, _)| usize::from(columns)), ..table })
+    say(Table { available: terminal_width(), ..table })
+}
+
+/// How many characters a line of the terminal has, if stdout is one.
+fn terminal_width() -> Option<usize> {
+    let size = io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten();
+    size.map(|(columns, _)| usize::from(columns))
 }
 
 /// Between two columns of a table.
@@ -57,7 +67,12 @@ impl Table {
     }
 
     pub(crate) fn row<const N: usize>(&mut self, cells: [String; N]) {
-        self.rows.push(cells.to_vec());
+        self.cells(cells);
+    }
+
+    /// A row of as many cells as there are.
+    pub(crate) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
     }
 
     /// Whether it has no row below its heads.
@@ -148,8 +163,21 @@ pub(crate) fn milliseconds(time: Duration) -> String {
     format!("{}.{:02} ms", micros / 1_000, micros % 1_000 / 10)
 }
 
+/// A time that nothing takes longer than, rounded up.
+pub(crate) fn bound(time: Duration) -> String {
+    let millis = time.as_nanos().div_ceil(1_000_000);
+    match millis {
+        0..1_000 => format!("{millis} ms"),
+        _ => {
+            let hundredths = millis.div_ceil(10);
+            format!("{}.{:02} s", hundredths / 100, hundredths % 100)
+        }
+    }
+}
+
 /// Millionths as a percentage.
 pub(crate) fn percent(ppm: u64) -> String {
+    let ppm = ppm.saturating_add(50);
     format!("{}.{:02} %", ppm / 10_000, ppm % 10_000 / 100)
 }
 
@@ -211,6 +239,21 @@ mod tests {
     #[test]
     fn shares_and_times_keep_two_decimals() {
         assert_eq!(percent(995_040), "99.50 %");
+        assert_eq!(percent(680_150), "68.02 %");
         assert_eq!(milliseconds(Duration::from_micros(5_678)), "5.67 ms");
+    }
+
+    #[test]
+    fn a_bound_is_never_shown_shorter_than_it_is() {
+        for (micros, shown) in [
+            (0, "0 ms"),
+            (1, "1 ms"),
+            (999_000, "999 ms"),
+            (999_001, "1.00 s"),
+            (1_000_001, "1.01 s"),
+            (61_230_000, "61.23 s"),
+        ] {
+            assert_eq!(bound(Duration::from_micros(micros)), shown);
+        }
     }
 }

@@ -3,30 +3,7 @@
 
 mod support;
 
-use std::fs;
-
-use support::{Running, Sim, run};
-
-/// A configuration of this test alone; removed when dropped.
-struct File(std::path::PathBuf);
-
-impl File {
-    fn new(name: &str, text: &str) -> Self {
-        let path = support::path(&format!("{name}.toml"));
-        fs::write(&path, text).expect("the directory can be written");
-        Self(path)
-    }
-
-    fn path(&self) -> &str {
-        self.0.to_str().expect("the path is text")
-    }
-}
-
-impl Drop for File {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.0);
-    }
-}
+use support::{File, Running, Sim, run};
 
 fn configuration(port: &str, drives: &str, defaults: &str) -> String {
     format!(
@@ -60,7 +37,13 @@ fn a_daemon_tells_events_and_snapshots_and_at_its_end_what_each_drive_did() {
 fn a_configuration_is_checked_without_a_port() {
     let file = File::new("check", &configuration("/dev/nowhere", "atv312@1-10", "control = true"));
     let checked = run(&["check", "--config", file.path()]);
-    assert!(checked.assert_done().starts_with("line bench: 10 drives, 10 under control"), "{checked:?}");
+    let out = checked.assert_done();
+    assert!(
+        out.starts_with("line bench: 10 drives, 10 under control, on /dev/nowhere, 19200 8E1 rtu\n"),
+        "{out}"
+    );
+    assert!(out.contains("atv312@1-10 (pump 1 … pump 10)\n    status        every 500ms running"), "{out}");
+    assert!(out.contains("at the exit   stopped if it was started here (ramp stop)"), "{out}");
     run(&["run", "--config", file.path()]).assert_refused(2, "/dev/nowhere");
 }
 

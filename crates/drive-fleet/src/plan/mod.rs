@@ -45,6 +45,12 @@ pub struct LinePlan {
 }
 
 impl LinePlan {
+    /// Whether the polls want more than the line has. Then they fall behind, and no age has a limit.
+    #[must_use]
+    pub const fn is_overloaded(&self) -> bool {
+        self.utilisation_ppm > WHOLE_PPM
+    }
+
     /// The share of the line that is left for commands, in millionths.
     #[must_use]
     pub const fn left_ppm(&self) -> u64 {
@@ -194,7 +200,7 @@ pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
 }
 
 fn overloaded(plan: &LinePlan) -> Option<PlanProblem> {
-    (plan.utilisation_ppm > WHOLE_PPM).then_some(PlanProblem::Overloaded {
+    plan.is_overloaded().then_some(PlanProblem::Overloaded {
         sweep: plan.sweep,
         drives: plan.drives as usize,
         utilisation_ppm: plan.utilisation_ppm,

@@ -51,7 +51,7 @@ impl fmt::Display for PlanProblem {
             Self::Starved { drive, feed } => write!(
                 f,
                 "the watchdog of {drive} is {}, and it might hear nothing for {}: {} until it gets a frame of its own, \
-                 {} for {} that do not come, {} for a frame to each of {} watched drives; set it to {} or more, \
+                 {} for {}, {} for a frame to each of {} watched drives; set it to {} or more, \
                  shorten the response timeout, or raise the speed",
                 Short(feed.timeout),
                 Short(feed.heard_within()),
@@ -88,14 +88,14 @@ impl fmt::Display for Short {
     }
 }
 
-/// How many answers.
+/// How many answers are lost.
 struct Answers(u32);
 
 impl fmt::Display for Answers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            1 => f.write_str("one answer"),
-            several => write!(f, "{several} answers"),
+            1 => f.write_str("one answer that does not come"),
+            several => write!(f, "{several} answers that do not come"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The subcommands, one module each.
 
+pub(crate) mod check;
 pub(crate) mod demo;
 pub(crate) mod families;
 pub(crate) mod faults;

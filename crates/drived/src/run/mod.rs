@@ -1,19 +1,15 @@
-//! `drived run` and `drived check`: the fleet as a daemon.
+//! `drived run`: the fleet as a daemon.
 
-mod config;
 mod json;
 mod output;
 
 use std::path::PathBuf;
 
 use drive_bus::Line;
-use drive_fleet::{Fleet, FleetBuilder, Periods};
+use drive_fleet::{Fleet, FleetBuilder};
 
-use self::{
-    config::{Config, LinePart},
-    output::JsonLines,
-};
-use crate::{failure::Failure, one_drive::open_line, output as console, signals::Ending};
+use self::output::JsonLines;
+use crate::{config::Config, failure::Failure, one_drive::open_line, signals::Ending};
 
 /// Watch and command the drives of a configuration
 ///
@@ -26,44 +22,8 @@ pub(crate) struct Args {
     config: PathBuf,
 }
 
-/// Validate a configuration without opening a port, and show what its lines will be like
-#[derive(Debug, clap::Args)]
-pub(crate) struct CheckArgs {
-    /// The configuration, in TOML
-    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
-    config: PathBuf,
-}
-
-pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
-    let config = load(&args.config)?;
-    for LinePart { name, plan, drives, .. } in &config.lines {
-        let controlled = drives.iter().filter(|(_, settings)| settings.control).count();
-        console::say(format_args!(
-            "line {name}: {} drives, {controlled} under control, a sweep takes {}, the polls take {} of the line",
-            drives.len(),
-            console::milliseconds(plan.sweep),
-            console::percent(plan.utilisation_ppm),
-        ))?;
-        let slowest =
-            drives.iter().map(|(_, settings)| settings.periods).max_by_key(|periods| periods.running);
-        if let Some(Periods { running, rest, slow, max_age }) = slowest {
-            console::say(format_args!(
-                "line {name}: status every {running:?} running, {rest:?} at rest, measurements every {slow:?}, a status \
-                 is fresh for {max_age:?}"
-            ))?;
-        }
-        if let Some(gap) = plan.feed_gap {
-            console::say(format_args!(
-                "line {name}: a watched drive hears something at the latest after {}",
-                console::milliseconds(gap)
-            ))?;
-        }
-    }
-    Ok(())
-}
-
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let config = load(&args.config)?;
+    let config = Config::load_workable(&args.config)?;
     let mut ending = Ending::listen()?;
     let lines = open_lines(&config).await?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
@@ -85,10 +45,6 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         line.close().await;
     }
     result
-}
-
-fn load(file: &std::path::Path) -> Result<Config, Failure> {
-    Config::load(file).map_err(|error| Failure::Input(error.to_string()))
 }
 
 async fn open_lines(config: &Config) -> Result<Vec<Line>, Failure> {

@@ -60,6 +60,27 @@ pub(crate) fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("drived-test-{}-{name}", std::process::id()))
 }
 
+/// A configuration of this test alone; removed when dropped.
+pub(crate) struct File(PathBuf);
+
+impl File {
+    pub(crate) fn new(name: &str, text: &str) -> Self {
+        let path = path(&format!("{name}.toml"));
+        std::fs::write(&path, text).expect("the directory can be written");
+        Self(path)
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        self.0.to_str().expect("the path is text")
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
 /// The program running beside the test; killed when dropped.
 pub(crate) struct Running {
     child: Child,

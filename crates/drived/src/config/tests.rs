@@ -53,7 +53,8 @@ drive = "atv312@1-31"
 "#;
 
 fn read(text: &str) -> Result<Config, String> {
-    Config::read(Path::new("drives.toml"), text).map_err(|error| error.to_string())
+    let config = Config::read(Path::new("drives.toml"), text);
+    config.and_then(Config::workable).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -86,7 +87,7 @@ fn thirty_one_equal_drives_are_three_lines() {
 #[test]
 fn periods_that_the_file_does_not_name_leave_room_on_the_line() {
     let line = &read(THIRTY_ONE).unwrap().lines[0];
-    assert!(line.plan.utilisation_ppm <= ROOM_PPM);
+    assert!(plan(line.budget, &line.demands()).unwrap().utilisation_ppm <= ROOM_PPM);
     let Periods { running, rest, slow, max_age } = line.drives[0].1.periods;
     let usual = Periods::default();
     assert!(running > usual.running);
@@ -192,6 +193,6 @@ fn a_file_without_drives_or_a_line_without_any_is_refused() {
 
 #[test]
 fn the_example_is_a_configuration_that_works() {
-    let config = read(include_str!("../../../../../examples/drives.toml")).unwrap();
+    let config = read(include_str!("../../../../examples/drives.toml")).unwrap();
     assert_eq!(config.lines.iter().map(|line| line.drives.len()).collect::<Vec<_>>(), [31, 3]);
 }

@@ -1,4 +1,4 @@
-//! The configuration of the daemon: lines, drives, periods, policies.
+//! The configuration file: lines, drives, periods, policies.
 //!
 //! Read in two steps: the keys one by one ([`raw`], [`values`]), then seen together, against the families and against the
 //! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
@@ -12,8 +12,8 @@ use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 use drive_bus::LineConfig;
 use drive_core::{Capabilities, StopMode};
 use drive_fleet::{
-    Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, LinePlan, OnExit, OnFault,
-    OnLoss, Periods, PlanProblem, WatchdogContract, check_settings, plan,
+    Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss,
+    Periods, WatchdogContract, check_settings, plan,
 };
 
 pub(crate) use self::place::ConfigError;
@@ -22,7 +22,7 @@ use self::{
     raw::{DriveEntry, File, LineEntry},
     values::Exit,
 };
-use crate::drive_spec::DriveName;
+use crate::{drive_spec::DriveName, failure::Failure};
 
 /// How often snapshots are printed unless the file says otherwise.
 const SNAPSHOTS: Duration = Duration::from_secs(5);
@@ -36,7 +36,7 @@ const ROOM_PPM: u64 = 800_000;
 /// Periods of more than half a minute are nobody's wish.
 const LONGEST_STRETCH: u32 = 60;
 
-/// A configuration that can work.
+/// A configuration whose fields are right. Whether its lines can work is another question: see [`Self::workable`].
 #[derive(Debug)]
 pub(crate) struct Config {
     /// How often a snapshot of every drive is printed; zero: never.
@@ -52,8 +52,16 @@ pub(crate) struct LinePart {
     pub(crate) name: String,
     pub(crate) config: LineConfig,
     pub(crate) budget: LineBudget,
-    pub(crate) plan: LinePlan,
     pub(crate) drives: Vec<(DriveName, DriveSettings)>,
+    /// Why the line cannot work, with the arithmetic.
+    pub(crate) problem: Option<ConfigError>,
+}
+
+impl LinePart {
+    /// What its drives want of it.
+    pub(crate) fn demands(&self) -> Vec<Demand> {
+        self.drives.iter().map(|(drive, settings)| demand(*drive, settings)).collect()
+    }
 }
 
 impl Config {
@@ -67,8 +75,13 @@ impl Config {
         }
     }
 
+    /// Reads a file whose lines can work.
+    pub(crate) fn load_workable(file: &Path) -> Result<Self, Failure> {
+        Self::load(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
+    }
+
     /// Reads the text of a file.
-    pub(crate) fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
+    fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let source = Source { file, text };
         let raw: File = toml::from_str(text).map_err(|error| match error.span() {
             Some(span) => source.error(span, error.message()),
@@ -84,6 +97,14 @@ impl Config {
             shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
             lines,
         })
+    }
+
+    /// The same, if every line can work.
+    fn workable(mut self) -> Result<Self, ConfigError> {
+        match self.lines.iter_mut().find_map(|line| line.problem.take()) {
+            Some(problem) => Err(problem),
+            None => Ok(self),
+        }
     }
 }
 
@@ -169,28 +190,31 @@ fn line_part(
     };
     let budget = LineBudget::of(&config);
     let budget = LineBudget { response: entry.response.map_or(budget.response, |time| time.0.0), ..budget };
-    let (plan, stretch) = fitting_plan(budget, group).map_err(|problem| source.error(span, problem))?;
-    let drives = group.iter().map(|member| (member.drive, member.settings_with(stretch))).collect();
-    Ok(LinePart { name: name.to_owned(), config, budget, plan, drives })
+    let stretch = fitting_stretch(budget, group);
+    let drives: Vec<_> = group.iter().map(|member| (member.drive, member.settings_with(stretch))).collect();
+    let demands: Vec<_> = drives.iter().map(|(drive, settings)| demand(*drive, settings)).collect();
+    let problem = plan(budget, &demands).err().map(|problem| source.error(span, problem));
+    Ok(LinePart { name: name.to_owned(), config, budget, drives, problem })
 }
 
-/// The plan of a line and by how much the periods that the file does not name are longer than usual: as little as leaves
-/// a fifth of the line for commands. Periods that the file names stay as they are, or there is no plan.
-fn fitting_plan(budget: LineBudget, group: &[Member]) -> Result<(LinePlan, u32), PlanProblem> {
-    let reckon = |stretch: u32| {
-        let demands: Vec<_> = group.iter().map(|member| member.demand(stretch)).collect();
-        plan(budget, &demands)
+/// By how much the periods that the file does not name are longer than usual: as little as leaves a fifth of the line for
+/// commands. Periods that the file names stay as they are.
+fn fitting_stretch(budget: LineBudget, group: &[Member]) -> u32 {
+    let fits = |stretch: &u32| {
+        let demand = |member: &Member| demand(member.drive, &member.settings_with(*stretch));
+        let demands: Vec<_> = group.iter().map(demand).collect();
+        plan(budget, &demands).is_ok_and(|plan| plan.utilisation_ppm <= ROOM_PPM)
     };
-    let usual = reckon(1);
-    if group.iter().all(|member| member.has_own_periods) {
-        return usual.map(|plan| (plan, 1));
-    }
-    let fits = |stretch| {
-        reckon(stretch).ok().filter(|plan| plan.utilisation_ppm <= ROOM_PPM).map(|plan| (plan, stretch))
-    };
-    match (1..=LONGEST_STRETCH).find_map(fits) {
-        Some(fitting) => Ok(fitting),
-        None => usual.map(|plan| (plan, 1)),
+    let longest = if group.iter().all(|member| member.has_own_periods) { 1 } else { LONGEST_STRETCH };
+    (1..=longest).find(fits).unwrap_or(1)
+}
+
+fn demand(drive: DriveName, settings: &DriveSettings) -> Demand {
+    Demand {
+        drive: settings.name.clone(),
+        capabilities: drive.family.capabilities(),
+        periods: settings.periods,
+        watchdog: settings.watchdog,
     }
 }
 
@@ -208,16 +232,6 @@ impl Member {
             };
         }
         settings
-    }
-
-    fn demand(&self, stretch: u32) -> Demand {
-        let settings = self.settings_with(stretch);
-        Demand {
-            drive: settings.name,
-            capabilities: self.drive.family.capabilities(),
-            periods: settings.periods,
-            watchdog: settings.watchdog,
-        }
     }
 }
 

@@ -1,0 +1,131 @@
+//! `drived check`: what a configuration means.
+
+use std::path::PathBuf;
+
+use drive_fleet::{Alarms, Commanders, DriveSettings, FrequencyLimits, OnExit, OnFault, OnLoss, Periods};
+
+use crate::{
+    config::{Config, LinePart},
+    drive_spec::{self, DriveName},
+    failure::Failure,
+    line_spec,
+    output::{self, Table},
+};
+
+/// Validate a configuration without opening a port, and show what it means for each drive
+///
+/// What its lines will be like is the answer of `drived plan --config FILE`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The configuration, in TOML
+    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
+    config: PathBuf,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let config = Config::load_workable(&args.config)?;
+    for LinePart { name, config, drives, .. } in &config.lines {
+        let controlled = drives.iter().filter(|(_, settings)| settings.control).count();
+        output::say(format_args!(
+            "line {name}: {} drives, {controlled} under control, on {}",
+            drives.len(),
+            line_spec::describe(config)
+        ))?;
+        for (names, settings) in alike(drives) {
+            output::say(format_args!("  {}", drive_spec::listed(&names)))?;
+            let mut table = Table::texts();
+            for (label, text) in meaning(&settings) {
+                table.row([format!("    {label}"), text]);
+            }
+            output::say_table(table)?;
+        }
+    }
+    output::say(format_args!(
+        "{} is a configuration that can work; drived plan --config {0} reckons its lines",
+        args.config.display()
+    ))
+}
+
+/// Drives with the same settings, and these.
+fn alike(drives: &[(DriveName, DriveSettings)]) -> Vec<(Vec<(DriveName, String)>, DriveSettings)> {
+    let mut all: Vec<(Vec<(DriveName, String)>, DriveSettings)> = Vec::new();
+    for (drive, settings) in drives {
+        let nameless = DriveSettings { name: String::new(), ..settings.clone() };
+        let member = (*drive, settings.name.clone());
+        match all.iter_mut().find(|(_, known)| *known == nameless) {
+            Some((names, _)) => names.push(member),
+            None => all.push((vec![member], nameless)),
+        }
+    }
+    all
+}
+
+/// What settings mean, each with its label.
+fn meaning(settings: &DriveSettings) -> Vec<(&'static str, String)> {
+    let Periods { running, rest, slow, max_age } = settings.periods;
+    let status = format!("every {running:?} running, {rest:?} at rest; lost without one for {max_age:?}");
+    let measurements = if slow.is_zero() { "never".to_owned() } else { format!("every {slow:?}") };
+    let watchdog =
+        settings.watchdog.map(|contract| format!("{:?}, then {}", contract.timeout, contract.reaction));
+    let mut lines = vec![("status", status), ("measurements", measurements)];
+    let mut line = |label, text: Option<String>| lines.extend(text.map(|text| (label, text)));
+    line("alarms", alarms(settings.alarms));
+    if !settings.control {
+        line("commands", Some("none: it is only read".to_owned()));
+        return lines;
+    }
+    let commanders = match &settings.commanders {
+        Commanders::Anyone => "by anyone".to_owned(),
+        Commanders::Only(names) => format!("by {}; a stop by anyone", names.join(", ")),
+    };
+    line("commands", Some(commanders));
+    line("setpoints", limits(&settings.limits));
+    line("watchdog", Some(watchdog.unwrap_or_else(|| "left as it is".to_owned())));
+    line("at the exit", Some(at_exit(settings.on_exit)));
+    line("when lost", Some(when_lost(settings.on_loss)));
+    let tripped = match settings.on_fault {
+        OnFault::Report => "reported",
+        OnFault::ResetWatchdogTrip => "reported; a trip of the watchdog is reset once the line is back",
+    };
+    line("when tripped", Some(tripped.to_owned()));
+    lines
+}
+
+fn alarms(alarms: Alarms) -> Option<String> {
+    let Alarms { current, drive_thermal, motor_thermal } = alarms;
+    let above = [
+        current.map(|value| format!("current above {value}")),
+        drive_thermal.map(|value| format!("drive thermal state above {value}")),
+        motor_thermal.map(|value| format!("motor thermal state above {value}")),
+    ];
+    let above: Vec<String> = above.into_iter().flatten().collect();
+    (!above.is_empty()).then(|| above.join(", "))
+}
+
+fn limits(limits: &FrequencyLimits) -> Option<String> {
+    let bounds = [
+        limits.low.map(|low| format!("from {low}")),
+        limits.high.map(|high| format!("to {high}")),
+        limits.change_per_second.map(|change| format!("changed by {change} a second at the most")),
+    ];
+    let bands = limits.forbidden.iter().map(|band| format!("not {} to {}", band.low, band.high));
+    let all: Vec<String> = bounds.into_iter().flatten().chain(bands).collect();
+    (!all.is_empty()).then(|| all.join(", "))
+}
+
+fn at_exit(policy: OnExit) -> String {
+    match policy {
+        OnExit::Stop(mode) => format!("stopped if it was started here ({mode} stop)"),
+        OnExit::Release(mode) => {
+            format!("stopped if it was started here ({mode} stop), control back to panel or terminals")
+        }
+        OnExit::Leave => "left as it is".to_owned(),
+    }
+}
+
+fn when_lost(policy: OnLoss) -> String {
+    match policy {
+        OnLoss::Report => "reported".to_owned(),
+        OnLoss::Stop(mode) => format!("reported, and stopped when it is there again ({mode} stop)"),
+    }
+}

@@ -1,0 +1,85 @@
+//! A line in the cases for which it is reckoned.
+
+use std::time::Duration;
+
+use drive_bus::{Echo, LineConfig};
+use drive_core::Capabilities;
+use drive_fleet::{Demand, LineBudget, Reckoning, reckon};
+
+use crate::{drive_spec::DriveName, line_spec};
+
+/// Bytes of a PDU around its words: function, address, quantity and count of a write; function and count of an answer.
+const AROUND_WRITE: usize = 6;
+const AROUND_ANSWER: usize = 2;
+
+/// How many dead drives are reckoned with.
+const DEAD: usize = 3;
+
+/// The speed for which a line is reckoned besides its own.
+const OTHER_SPEED: u32 = 38_400;
+
+/// A line to be reckoned, from the command line or from a file.
+#[derive(Debug)]
+pub(super) struct PlannedLine {
+    /// Its name, where the file gives it one.
+    pub(super) name: Option<String>,
+    pub(super) config: LineConfig,
+    pub(super) budget: LineBudget,
+    pub(super) drives: Vec<(DriveName, Demand)>,
+}
+
+/// What the line is like in one case.
+#[derive(Debug)]
+pub(super) struct Case {
+    pub(super) label: String,
+    pub(super) reckoning: Reckoning,
+    /// How long a stop waits until it is on the wire, at the most.
+    pub(super) stop_to_the_wire: Duration,
+    /// How many drives are dead.
+    pub(super) dead: u32,
+    /// Why the case cannot be, though it can be reckoned.
+    pub(super) hypothetical: Option<String>,
+}
+
+impl PlannedLine {
+    /// The line as it is planned, then at another speed, then with dead drives; each as far as there is such a case.
+    pub(super) fn cases(&self) -> Vec<Case> {
+        let mut cases = vec![self.case("as planned".to_owned(), &self.config, 0)];
+        if self.config.serial.baud() != OTHER_SPEED {
+            let names: Vec<DriveName> = self.drives.iter().map(|(name, _)| *name).collect();
+            cases.extend(line_spec::at(&self.config, &names, OTHER_SPEED).map(|(config, forbidden)| Case {
+                hypothetical: forbidden.map(|error| error.to_string()),
+                ..self.case(format!("at {OTHER_SPEED}"), &config, 0)
+            }));
+        }
+        if self.drives.len() > DEAD {
+            cases.push(self.case(format!("with {DEAD} dead"), &self.config, DEAD));
+        }
+        cases
+    }
+
+    fn case(&self, label: String, config: &LineConfig, dead: usize) -> Case {
+        let budget = LineBudget { response: self.budget.response, ..LineBudget::of(config) };
+        let demands: Vec<Demand> = self.drives.iter().map(|(_, demand)| demand.clone()).collect();
+        Case {
+            label,
+            reckoning: reckon(budget, &demands, dead),
+            stop_to_the_wire: self.stop_to_the_wire(config),
+            dead: u32::try_from(dead).unwrap_or(u32::MAX),
+            hypothetical: None,
+        }
+    }
+
+    /// The longest wait of a stop, once the line knows whether its adapter echoes.
+    fn stop_to_the_wire(&self, config: &LineConfig) -> Duration {
+        let config = LineConfig { echo: Echo::Off, ..config.clone() };
+        let bytes = |of: fn(&Capabilities) -> u16| {
+            let most = self.drives.iter().map(|(_, demand)| of(demand.capabilities)).max();
+            2 * usize::from(most.unwrap_or_default())
+        };
+        config.worst_case_stop(
+            AROUND_WRITE + bytes(|family| family.write_words),
+            AROUND_ANSWER + bytes(|family| family.read_words),
+        )
+    }
+}

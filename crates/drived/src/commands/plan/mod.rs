@@ -1,0 +1,127 @@
+//! `drived plan`: what lines will be like, reckoned before the cable is pulled.
+
+mod line;
+mod sheet;
+
+use std::{path::PathBuf, time::Duration};
+
+use clap::ArgGroup;
+use drive_core::Reaction;
+use drive_fleet::{Demand, LineBudget, Periods, WatchdogContract, plan};
+
+use self::{
+    line::{Case, PlannedLine},
+    sheet::Sheet,
+};
+use crate::{
+    config::{Config, LinePart},
+    drive_spec::{self, DriveName, DriveSpec},
+    duration::Time,
+    failure::Failure,
+    line_spec::{self, LineSpec},
+    output,
+};
+
+/// Reckon lines before the cable is pulled: cycle, age of values, load, worst stop, feeding of watchdogs
+///
+/// Of the lines of a configuration, or of one line that is described here. The same is reckoned at 38400 bit/s and with
+/// three of the drives dead. No port is opened. Exit code 2, with the arithmetic, for what cannot work.
+#[derive(Debug, clap::Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["config", "line"]))]
+pub(crate) struct Args {
+    /// The configuration of `drived run`, in TOML
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["drives", "period", "watchdog", "response"])]
+    config: Option<PathBuf>,
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "LINE", help = line_spec::HELP, requires = "drives")]
+    line: Option<LineSpec>,
+    /// Drives on it, such as atv312@1-10,12; may be given several times
+    #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", requires = "line")]
+    drives: Vec<DriveSpec>,
+    /// Time between two polls of one drive
+    #[arg(long, value_name = "TIME", default_value = "1s")]
+    period: Time,
+    /// Time of the drives' communication watchdogs that has to be fed; 0: none but those that a family always has
+    #[arg(long, value_name = "TIME", default_value = "0")]
+    watchdog: Time,
+    /// The usual time from the end of a request to its answer
+    #[arg(long, value_name = "TIME", default_value = "10ms")]
+    response: Time,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let (lines, problems) = match (&args.config, &args.line) {
+        (Some(file), _) => of_file(Config::load(file).map_err(|error| Failure::Input(error.to_string()))?),
+        (None, Some(line)) => args.described(line)?,
+        (None, None) => {
+            return Err(Failure::Input("expected --config FILE, or --line and --drive".to_owned()));
+        }
+    };
+    let reckoned: Vec<(&PlannedLine, Vec<Case>)> = lines.iter().map(|line| (line, line.cases())).collect();
+    for (line, cases) in &reckoned {
+        Sheet { line, cases }.say()?;
+        output::say("")?;
+    }
+    if reckoned.len() > 1 {
+        sheet::say_all_lines(&reckoned)?;
+        output::say("")?;
+    }
+    output::say_text(
+        "Ages and times are the longest there can be while no commands are given; a motor whose stop is confirmed \
+         still needs its ramp.",
+    )?;
+    let mut problems = problems.into_iter();
+    let first = problems.next();
+    problems.try_for_each(|problem| output::say_text(&problem))?;
+    first.map_or(Ok(()), |problem| Err(Failure::Input(problem)))
+}
+
+/// The lines of a file, and what is wrong with those that cannot work.
+fn of_file(config: Config) -> (Vec<PlannedLine>, Vec<String>) {
+    let problems = config.lines.iter().filter_map(|line| Some(line.problem.as_ref()?.to_string())).collect();
+    let planned = |line: LinePart| PlannedLine {
+        drives: line.drives.iter().map(|(drive, _)| *drive).zip(line.demands()).collect(),
+        name: Some(line.name),
+        config: line.config,
+        budget: line.budget,
+    };
+    (config.lines.into_iter().map(planned).collect(), problems)
+}
+
+impl Args {
+    /// The line that the command line describes, and why it cannot work.
+    fn described(&self, line: &LineSpec) -> Result<(Vec<PlannedLine>, Vec<String>), Failure> {
+        let names =
+            drive_spec::on_one_line(&self.drives).map_err(|error| Failure::Input(error.to_string()))?;
+        let config = line.config(&names).map_err(|error| Failure::Input(error.to_string()))?;
+        if self.period.0.is_zero() {
+            return Err(Failure::Input(
+                "--period 0: expected the time between two polls of one drive".to_owned(),
+            ));
+        }
+        let budget = LineBudget { response: self.response.0, ..LineBudget::of(&config) };
+        let drives: Vec<_> = names.into_iter().map(|name| (name, self.demand(name))).collect();
+        let demands: Vec<Demand> = drives.iter().map(|(_, demand)| demand.clone()).collect();
+        let problem = plan(budget, &demands).err().map(|problem| format!("it cannot work: {problem}"));
+        Ok((vec![PlannedLine { name: None, config, budget, drives }], problem.into_iter().collect()))
+    }
+
+    fn demand(&self, name: DriveName) -> Demand {
+        let capabilities = name.family.capabilities();
+        // A watchdog that the bus cannot set has its own time, whatever is wished here.
+        let fixed = capabilities.watchdog.is_some_and(|watchdog| !watchdog.settable);
+        let wished = !self.watchdog.0.is_zero() && !fixed;
+        Demand {
+            drive: name.to_string(),
+            capabilities,
+            periods: Periods {
+                running: self.period.0,
+                rest: self.period.0,
+                slow: Duration::ZERO,
+                max_age: Duration::MAX,
+            },
+            watchdog: wished
+                .then_some(WatchdogContract { timeout: self.watchdog.0, reaction: Reaction::Freewheel }),
+        }
+    }
+}
