@@ -1,7 +1,7 @@
 //! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
 //! and the settings that the drives on it share.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, time::Duration};
 
 use drive_bus::{
     Endpoint, LineConfig, Protocol, SlaveSettings,
@@ -76,6 +76,18 @@ pub(crate) fn describe(config: &LineConfig) -> String {
         Endpoint::ModbusTcp(address) => format!("tcp://{address}"),
         Endpoint::Stream => config.serial.to_string(),
     }
+}
+
+/// The silence that the line's protocol needs before each request, and how it is called; `None` where it needs none.
+pub(crate) fn needed_silence(config: &LineConfig) -> Option<(Duration, String)> {
+    let silence = config.silence();
+    let name = match config.protocol {
+        _ if silence.is_zero() => return None,
+        Protocol::Rtu => "t3.5 is".to_owned(),
+        Protocol::Ascii(_) => "a character in ASCII is".to_owned(),
+        Protocol::UniTelway(settings) => format!("UNI-TELWAY's {} bits are", settings.turnaround_bits),
+    };
+    Some((silence, name))
 }
 
 /// The configuration with the pause that each drive needs after its answers.
@@ -293,6 +305,17 @@ mod tests {
         assert!(spoken("COM3,9600,7E1").unwrap_err().to_string().contains("8 data bits"));
         assert!(spoken("COM3,9600,8E1,unitelway").unwrap_err().to_string().contains("8O1"));
         assert!("rtu+tcp://plant:4001,9600,7E1,ascii".parse::<LineSpec>().is_err());
+    }
+
+    #[test]
+    fn the_silence_that_a_line_needs_is_called_by_its_protocol() {
+        let needed = |line| needed_silence(&config(line, &["atv58@1"]).unwrap());
+        let is = |nanos, name: &str| Some((Duration::from_nanos(nanos), name.to_owned()));
+        // 3.5 characters of 11 bits; one of 10; 10 bits.
+        assert_eq!(needed("COM3,19200,8E1"), is(2_005_209, "t3.5 is"));
+        assert_eq!(needed("COM3,9600,7E1,ascii"), is(1_041_667, "a character in ASCII is"));
+        assert_eq!(needed("COM3,9600,8O1,unitelway"), is(1_041_667, "UNI-TELWAY's 10 bits are"));
+        assert_eq!(needed("tcp://plant:502"), None);
     }
 
     #[test]

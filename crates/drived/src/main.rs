@@ -1,5 +1,7 @@
 //! Variable-speed drives over Modbus from the command line: see [`cli`] for the subcommands.
 
+#![forbid(unsafe_code)]
+
 mod cli;
 mod commands;
 mod config;

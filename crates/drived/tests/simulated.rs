@@ -23,7 +23,11 @@ fn a_drive_is_started_watched_and_stopped_by_the_words_that_it_confirms() {
 
 #[test]
 fn an_altivar_58_is_started_and_stopped_on_each_protocol_of_its_card() {
-    for (baud, format) in [("19200", "8O1"), ("9600", "7E1,ascii"), ("19200", "8O1,unitelway")] {
+    for (baud, format, silence) in [
+        ("19200", "8O1", "(t3.5 is 2.00 ms)"),
+        ("9600", "7E1,ascii", "(a character in ASCII is 1.04 ms)"),
+        ("19200", "8O1,unitelway", "(UNI-TELWAY's 10 bits are 0.52 ms)"),
+    ] {
         let sim = Sim::serve_with("protocols", &["atv58@1-3"], &["--baud", baud, "--format", format]);
         let line = format!("{},{baud},{format}", sim.link());
         let on = |subcommand: &[&str]| run(&[subcommand, &["--line", &line, "--drive", "atv58@2"]].concat());
@@ -33,6 +37,8 @@ fn an_altivar_58_is_started_and_stopped_on_each_protocol_of_its_card() {
             "{format}"
         );
         assert!(on(&["stop"]).assert_done().contains("is stopping"), "{format}");
+        let polled = on(&["poll", "--period", "0", "--seconds", "1"]);
+        assert!(polled.assert_done().contains(silence), "{polled:?}");
     }
 }
 
@@ -77,7 +83,7 @@ fn polling_ends_with_a_summary_of_each_drive_and_of_the_line() {
     }
     let (code, rest) = running.interrupt();
     assert_eq!(code, Some(0), "{rest}");
-    assert!(rest.contains("CRC errors") && rest.contains("atv21@4") && rest.contains("sweeps/s"), "{rest}");
+    assert!(rest.contains("damaged") && rest.contains("atv21@4") && rest.contains("sweeps/s"), "{rest}");
 }
 
 #[test]
@@ -93,7 +99,7 @@ fn polling_for_programs_prints_objects() {
     assert_eq!(summary["kind"], "summary");
     assert_eq!(summary["drives"][0]["timeouts"], 0);
     assert!(
-        summary["line"]["shortest_silence_us"].as_u64() >= summary["line"]["t3_5_us"].as_u64(),
+        summary["line"]["shortest_silence_us"].as_u64() >= summary["line"]["needed_silence_us"].as_u64(),
         "{summary}"
     );
 }

@@ -57,7 +57,7 @@ struct DriveObject {
     drive: String,
     good: u64,
     timeouts: u64,
-    crc_errors: u64,
+    damaged: u64,
     exceptions: u64,
     response_p50_us: u64,
     response_p99_us: u64,
@@ -71,7 +71,7 @@ struct LineObject {
     utilisation_ppm: u32,
     silences: u64,
     shortest_silence_us: u64,
-    t3_5_us: u64,
+    needed_silence_us: u64,
 }
 
 pub(super) fn reading(reading: &Reading) -> String {
@@ -88,7 +88,7 @@ pub(super) fn summary(summary: &Summary) -> String {
         drive: name.to_string(),
         good: stats.outcomes.answered,
         timeouts: stats.outcomes.timeouts,
-        crc_errors: stats.outcomes.damaged,
+        damaged: stats.outcomes.damaged,
         exceptions: stats.outcomes.exceptions,
         response_p50_us: microseconds(stats.response.quantile(500)),
         response_p99_us: microseconds(stats.response.quantile(990)),
@@ -100,7 +100,7 @@ pub(super) fn summary(summary: &Summary) -> String {
         utilisation_ppm: summary.utilisation_ppm,
         silences: summary.silences,
         shortest_silence_us: microseconds(summary.shortest_silence),
-        t3_5_us: microseconds(summary.t3_5),
+        needed_silence_us: summary.needed.as_ref().map_or(0, |(silence, _)| microseconds(*silence)),
     };
     text(&Object::Summary(SummaryObject { drives: drives.collect(), line }))
 }

@@ -64,9 +64,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let names = drive_spec::on_one_line(&args.drives).map_err(|error| Failure::Input(error.to_string()))?;
     let options = args.options.of(&names)?;
     let config = args.line.config(&names).map_err(|error| Failure::Input(error.to_string()))?;
-    let settings = config.serial;
     let mut ending = Ending::listen()?;
-    let line = one_drive::open_line(config).await?;
+    let line = one_drive::open_line(config.clone()).await?;
 
     let (readings, mut incoming) = mpsc::channel(WAITING);
     let mut polls = JoinSet::new();
@@ -93,7 +92,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     polls.shutdown().await;
     let stats = line.stats();
     line.close().await;
-    let summary = Summary::new(&names, &book.answered, &stats, settings.t3_5());
+    let summary = Summary::new(&names, &book.answered, &stats, &config);
     output::say(if args.json { json::summary(&summary) } else { summary.to_string() })?;
     book.verdict(&names)
 }

@@ -2,10 +2,14 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use drive_bus::stats::{SlaveStats, Stats};
+use drive_bus::{
+    LineConfig,
+    stats::{SlaveStats, Stats},
+};
 
 use crate::{
     drive_spec::DriveName,
+    line_spec,
     output::{self, Table},
 };
 
@@ -17,7 +21,8 @@ pub(super) struct Summary {
     pub(super) utilisation_ppm: u32,
     pub(super) silences: u64,
     pub(super) shortest_silence: Duration,
-    pub(super) t3_5: Duration,
+    /// The silence that the protocol needs before each request, and how it is called; `None` where it needs none.
+    pub(super) needed: Option<(Duration, String)>,
 }
 
 impl Summary {
@@ -25,7 +30,7 @@ impl Summary {
         names: &[DriveName],
         answered: &BTreeMap<DriveName, u64>,
         stats: &Stats,
-        t3_5: Duration,
+        config: &LineConfig,
     ) -> Self {
         let of = |name: &DriveName| stats.slaves.get(&name.slave.number()).cloned().unwrap_or_default();
         Self {
@@ -35,7 +40,7 @@ impl Summary {
             utilisation_ppm: stats.utilisation_ppm(),
             silences: stats.silence.count(),
             shortest_silence: stats.silence.min(),
-            t3_5,
+            needed: line_spec::needed_silence(config),
         }
     }
 
@@ -49,7 +54,7 @@ impl Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let heads = ["drive", "good", "timeouts", "CRC errors", "exceptions", "p50", "p99"];
+        let heads = ["drive", "good", "timeouts", "damaged", "exceptions", "p50", "p99"];
         let mut table = Table::new(heads).with_numbers_from(1);
         for (name, stats) in &self.drives {
             let response = |per_mille| {
@@ -70,13 +75,20 @@ impl fmt::Display for Summary {
         writeln!(f, "{table}")?;
         write!(
             f,
-            "line: {}.{:03} sweeps/s, utilisation {}, {} silences kept, the shortest {} (t3.5 is {})",
+            "line: {}.{:03} sweeps/s, utilisation {}",
             rate / 1_000,
             rate % 1_000,
             output::percent(self.utilisation_ppm.into()),
-            self.silences,
-            output::milliseconds(self.shortest_silence),
-            output::milliseconds(self.t3_5)
-        )
+        )?;
+        match &self.needed {
+            Some((silence, name)) => write!(
+                f,
+                "; {} silences kept, the shortest {} ({name} {})",
+                self.silences,
+                output::milliseconds(self.shortest_silence),
+                output::milliseconds(*silence)
+            ),
+            None => Ok(()),
+        }
     }
 }
