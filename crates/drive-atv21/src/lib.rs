@@ -16,6 +16,8 @@
 //! # }
 //! ```
 
+#![forbid(unsafe_code)]
+
 pub mod blocks;
 mod command;
 mod faults;

@@ -1,6 +1,8 @@
 //! `drive-bench`: what a line costs and keeps, measured against simulated drives that pace like a real line and record
 //! every silence. See the README for what each row means.
 
+#![forbid(unsafe_code)]
+
 mod awake;
 mod cpu;
 mod dead;

@@ -94,9 +94,10 @@ pub struct LineConfig {
     pub echo: Echo,
     /// The kernel's RS-485 mode, where the port has it. `None`: left as it is.
     pub rs485: Option<Rs485>,
-    /// Ask a USB adapter to deliver at once: writes its latency timer (FTDI: 16 ms as delivered, which is longer than
-    /// most answers) where the user may do that. What it is can be read with
-    /// [`adapter_latency`](crate::adapter_latency).
+    /// Make a USB adapter deliver at once (FTDI: 16 ms as delivered, which is longer than most answers), as far as
+    /// the system lets us: the port's `low_latency` flag, and the driver's latency timer where the user may write it.
+    /// What came of it can be read with [`adapter_latency`](crate::adapter_latency); where the adapter goes on holding
+    /// answers back the log says so, once.
     pub low_latency: bool,
     /// How many requests may wait; more are refused with [`PortError::QueueFull`](drive_core::PortError::QueueFull).
     pub queue_limit: usize,

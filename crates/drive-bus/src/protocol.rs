@@ -16,9 +16,9 @@ pub enum Protocol {
     /// Modbus RTU.
     #[default]
     Rtu,
-    /// Modbus ASCII, see [`ascii`](crate::exchange::ascii).
+    /// Modbus ASCII, see [`ascii`].
     Ascii(AsciiSettings),
-    /// UNI-TELWAY, see [`unitelway`](crate::exchange::unitelway).
+    /// UNI-TELWAY, see [`unitelway`].
     UniTelway(UniTelwaySettings),
 }
 

@@ -7,6 +7,8 @@
 //! Both are **late, never early**: a silence that is kept too long costs throughput, one that is too short is a broken
 //! frame.
 
+#![forbid(unsafe_code)]
+
 use std::{
     fmt,
     future::poll_fn,

@@ -9,6 +9,8 @@
 //! [`registers!`](crate::registers!), reaches them through [`Registers`] and implements [`Drive`]. A crate that adds
 //! a line implements [`Port`].
 
+#![forbid(unsafe_code)]
+
 mod access;
 mod capabilities;
 mod drive;

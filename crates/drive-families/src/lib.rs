@@ -9,6 +9,8 @@
 //! # Ok::<(), drive_families::UnknownFamily>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 mod options;
 
 use std::{fmt, str::FromStr};

@@ -41,6 +41,8 @@
 //! One task for each drive owns the conversation with it. What it does next is decided by a supervisor that is a pure
 //! machine: no clock, no port.
 
+#![forbid(unsafe_code)]
+
 mod builder;
 mod event;
 mod fleet;

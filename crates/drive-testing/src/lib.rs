@@ -8,6 +8,8 @@
 //!
 //! This crate is for tests: its functions panic when what they check is not so.
 
+#![forbid(unsafe_code)]
+
 pub mod babble;
 pub mod bench;
 pub mod frames;

@@ -1,10 +1,17 @@
 //! Ways to the line: what can be opened, and what is read and written.
 
+mod low_latency;
 mod serial;
 
-pub use serial::adapter_latency;
+pub use low_latency::adapter_latency;
 
-use std::{io, path::PathBuf, pin::Pin, time::Duration};
+use std::{
+    io,
+    path::PathBuf,
+    pin::Pin,
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
 
 use tokio::{
     io::{AsyncRead, AsyncWrite},
@@ -84,7 +91,11 @@ pub enum OpenError {
 
 /// Opens the stream of a line, again and again.
 pub(crate) enum Connector {
-    Serial(Box<LineConfig>),
+    Serial {
+        config: Box<LineConfig>,
+        /// Whether it was said that the adapter holds answers back.
+        warned: Arc<AtomicBool>,
+    },
     Tcp(String),
     Given(Given),
     None,
@@ -96,7 +107,9 @@ impl Connector {
             config.protocol.check(config.serial)?;
         }
         match &config.endpoint {
-            Endpoint::Serial(_) => Ok(Self::Serial(Box::new(config.clone()))),
+            Endpoint::Serial(_) => {
+                Ok(Self::Serial { config: Box::new(config.clone()), warned: Arc::default() })
+            }
             Endpoint::RtuOverTcp(address) | Endpoint::ModbusTcp(address) => Ok(Self::Tcp(address.clone())),
             Endpoint::Stream => Err(OpenError::NoPort),
         }
@@ -105,9 +118,9 @@ impl Connector {
     /// Begins to open the stream; `None` when there is nothing to open.
     pub(crate) fn connect(&mut self) -> Option<Opening<OpenError>> {
         Some(match self {
-            Self::Serial(config) => {
-                let config = config.clone();
-                Box::pin(async move { serial::open(&config) })
+            Self::Serial { config, warned } => {
+                let (config, warned) = (config.clone(), Arc::clone(warned));
+                Box::pin(async move { serial::open(&config, &warned) })
             }
             Self::Tcp(address) => Box::pin(connect(address.clone())),
             Self::Given(open) => {

@@ -1,25 +1,26 @@
 //! A serial port.
 
-use std::{fs, io, path::Path, path::PathBuf, time::Duration};
+use std::{
+    io,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use drive_core::serial::Parity;
 use tokio_serial::{DataBits, ErrorKind, FlowControl, SerialPortBuilderExt, StopBits};
 
-use super::{BoxedStream, OpenError};
+use super::{BoxedStream, OpenError, low_latency};
 use crate::config::{Endpoint, LineConfig, Rs485};
 
-/// Opens the port exclusively.
+/// Opens the port exclusively. `warned`: it was said of this port before that its adapter holds answers back.
 ///
 /// Nothing here or later ever flushes it: `tcdrain` would block the runtime's thread for as long as the frame is on the
 /// line. The end of a transmission is computed instead.
-pub(super) fn open(config: &LineConfig) -> Result<BoxedStream, OpenError> {
+pub(super) fn open(config: &LineConfig, warned: &AtomicBool) -> Result<BoxedStream, OpenError> {
     let Endpoint::Serial(path) = &config.endpoint else { return Err(OpenError::NoPort) };
     if let Some(rs485) = config.rs485 {
         // Before the port is opened for good: the mode stays with the port, and afterwards it is ours alone.
         set_rs485(path, rs485).map_err(|reason| OpenError::Rs485 { path: path.clone(), reason })?;
-    }
-    if config.low_latency {
-        lower_latency(path);
     }
     let format = config.serial.format();
     let builder = tokio_serial::new(path.to_string_lossy(), config.serial.baud())
@@ -32,6 +33,16 @@ pub(super) fn open(config: &LineConfig) -> Result<BoxedStream, OpenError> {
         .stop_bits(if format.stop_bits() == 2 { StopBits::Two } else { StopBits::One })
         .flow_control(FlowControl::None);
     let stream = builder.open_native_async().map_err(|error| describe(path, &error))?;
+    if config.low_latency
+        && let Some(latency) = low_latency::lower(&stream, path)
+        && !warned.swap(true, Ordering::Relaxed)
+    {
+        tracing::warn!(
+            port = %path.display(),
+            ?latency,
+            "the adapter holds answers back and its latency cannot be lowered"
+        );
+    }
     Ok(Box::new(stream))
 }
 
@@ -51,35 +62,6 @@ fn set_rs485(path: &Path, rs485: Rs485) -> Result<(), String> {
 #[cfg(not(target_os = "linux"))]
 fn set_rs485(_: &Path, _: Rs485) -> Result<(), String> {
     Err("this system has no such mode".to_owned())
-}
-
-/// Where Linux keeps the latency timer of a USB serial adapter, in milliseconds.
-fn latency_timer(path: &Path) -> Option<PathBuf> {
-    // The path may be a link of udev's, /dev/serial/by-id/….
-    let device = fs::canonicalize(path).ok()?;
-    Some(Path::new("/sys/class/tty").join(device.file_name()?).join("device/latency_timer"))
-}
-
-/// How long the USB adapter at `path` holds back what it has received, as its driver reports it (FTDI `latency_timer`).
-/// `None` where there is no such thing: no USB adapter, another driver, another system.
-#[must_use]
-pub fn adapter_latency(path: &Path) -> Option<Duration> {
-    let millis = fs::read_to_string(latency_timer(path)?).ok()?;
-    Some(Duration::from_millis(millis.trim().parse().ok()?))
-}
-
-/// Best effort: usually only root may write it, and a line works without, only slower.
-fn lower_latency(path: &Path) {
-    let is_long = |latency: &Duration| *latency > Duration::from_millis(1);
-    let Some(latency) = adapter_latency(path).filter(is_long) else { return };
-    let written = latency_timer(path).map(|timer| fs::write(timer, "1"));
-    if !matches!(written, Some(Ok(()))) {
-        tracing::warn!(
-            port = %path.display(),
-            ?latency,
-            "the adapter holds answers back, and its latency_timer cannot be written"
-        );
-    }
 }
 
 fn describe(path: &Path, error: &tokio_serial::Error) -> OpenError {
