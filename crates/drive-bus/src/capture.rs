@@ -4,6 +4,8 @@
 //! `mbtcp`. The direction is in the packet's flags: outbound is the master. Formats: the IETF draft
 //! draft-ietf-opsawg-pcapng, and `epan/exported_pdu.h` of Wireshark for the tags.
 
+mod pcapng;
+
 use std::{
     io::{self, Write},
     thread,
@@ -16,22 +18,12 @@ use tokio::{
     time::Instant,
 };
 
-use crate::{config::LineConfig, protocol::Protocol};
+pub use self::pcapng::{ReadError, Writer, read};
 
-const SECTION_HEADER: u32 = 0x0A0D_0D0A;
-const INTERFACE: u32 = 1;
-const ENHANCED_PACKET: u32 = 6;
-const BYTE_ORDER: u32 = 0x1A2B_3C4D;
-const UPPER_PDU: u16 = 252;
-const TAG_PROTOCOL: u16 = 12;
-const OPTION_RESOLUTION: u16 = 9;
-const OPTION_FLAGS: u16 = 2;
+use crate::{config::LineConfig, protocol::Protocol};
 
 /// How many frames may wait for a slow disk before the next are left out.
 const BACKLOG: usize = 4_096;
-
-/// The longest block that is read: more than any frame with its tags.
-const MAX_BLOCK: usize = 65_536;
 
 /// Who sent a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -80,149 +72,6 @@ impl Dissector {
             Self::Data => b"data",
         }
     }
-}
-
-/// Writes a capture.
-#[derive(Debug)]
-pub struct Writer<W> {
-    sink: W,
-    dissector: Dissector,
-}
-
-impl<W: Write> Writer<W> {
-    /// Begins a capture.
-    ///
-    /// # Errors
-    /// The sink's.
-    pub fn new(mut sink: W, dissector: Dissector) -> io::Result<Self> {
-        let mut section = BYTE_ORDER.to_le_bytes().to_vec();
-        section.extend([1, 0, 0, 0]); // version 1.0
-        section.extend([0xFF; 8]); // length unknown
-        write_block(&mut sink, SECTION_HEADER, &section)?;
-        let mut interface = u32::from(UPPER_PDU).to_le_bytes().to_vec();
-        interface.extend([0; 4]); // no limit of length
-        put_option(&mut interface, OPTION_RESOLUTION, &[9]); // nanoseconds
-        put_option(&mut interface, 0, &[]);
-        write_block(&mut sink, INTERFACE, &interface)?;
-        Ok(Self { sink, dissector })
-    }
-
-    /// Adds a frame.
-    ///
-    /// # Errors
-    /// The sink's.
-    pub fn write(&mut self, frame: &Captured) -> io::Result<()> {
-        let mut packet = Vec::with_capacity(frame.bytes.len() + 16);
-        put_tag(&mut packet, TAG_PROTOCOL, self.dissector.name());
-        put_tag(&mut packet, 0, &[]);
-        packet.extend_from_slice(&frame.bytes);
-
-        let nanos = u64::try_from(frame.at.as_nanos()).unwrap_or(u64::MAX);
-        let len = u32::try_from(packet.len()).map_err(io::Error::other)?;
-        let mut block = vec![0; 4]; // interface 0
-        block.extend(((nanos >> 32) as u32).to_le_bytes());
-        block.extend((nanos as u32).to_le_bytes());
-        block.extend(len.to_le_bytes());
-        block.extend(len.to_le_bytes());
-        block.extend_from_slice(&packet);
-        pad(&mut block);
-        let flags: u32 = if frame.direction == Direction::Received { 1 } else { 2 };
-        put_option(&mut block, OPTION_FLAGS, &flags.to_le_bytes());
-        put_option(&mut block, 0, &[]);
-        write_block(&mut self.sink, ENHANCED_PACKET, &block)
-    }
-
-    /// Writes out what the sink holds back.
-    ///
-    /// # Errors
-    /// The sink's.
-    pub fn flush(&mut self) -> io::Result<()> {
-        self.sink.flush()
-    }
-}
-
-fn write_block(sink: &mut impl Write, kind: u32, body: &[u8]) -> io::Result<()> {
-    let len = u32::try_from(body.len() + 12).map_err(io::Error::other)?.to_le_bytes();
-    let block = [&kind.to_le_bytes()[..], &len, body, &len].concat();
-    sink.write_all(&block)
-}
-
-fn put_option(block: &mut Vec<u8>, code: u16, value: &[u8]) {
-    block.extend(code.to_le_bytes());
-    block.extend((value.len() as u16).to_le_bytes());
-    block.extend_from_slice(value);
-    pad(block);
-}
-
-/// A tag of an exported PDU: big-endian, its value padded to four bytes with the padding counted.
-fn put_tag(packet: &mut Vec<u8>, tag: u16, value: &[u8]) {
-    let padded = value.len().next_multiple_of(4);
-    packet.extend(tag.to_be_bytes());
-    packet.extend((padded as u16).to_be_bytes());
-    packet.extend_from_slice(value);
-    packet.resize(packet.len() + padded - value.len(), 0);
-}
-
-fn pad(block: &mut Vec<u8>) {
-    block.resize(block.len().next_multiple_of(4), 0);
-}
-
-/// A file that is no capture of ours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum ReadError {
-    /// It does not begin as a pcapng file of this byte order does.
-    #[error("not a little-endian pcapng file")]
-    NotPcapng,
-    /// A block is cut off or its length makes no sense.
-    #[error("broken block at byte {0}")]
-    Broken(usize),
-}
-
-/// Reads a capture that [`Writer`] wrote. Blocks of other kinds are passed over.
-///
-/// # Errors
-/// [`ReadError`] when it is none.
-pub fn read(file: &[u8]) -> Result<Vec<Captured>, ReadError> {
-    let word = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?));
-    if word(0) != Some(SECTION_HEADER) || word(8) != Some(BYTE_ORDER) {
-        return Err(ReadError::NotPcapng);
-    }
-    let (mut frames, mut at) = (Vec::new(), 0);
-    while at < file.len() {
-        let broken = ReadError::Broken(at);
-        let (kind, len) = (word(at).ok_or(broken)?, word(at + 4).ok_or(broken)? as usize);
-        if !(12..=MAX_BLOCK).contains(&len) || len % 4 != 0 {
-            return Err(broken);
-        }
-        let body = file.get(at + 8..at + len - 4).ok_or(broken)?;
-        if kind == ENHANCED_PACKET {
-            frames.push(read_packet(body).ok_or(broken)?);
-        }
-        at += len;
-    }
-    Ok(frames)
-}
-
-fn read_packet(body: &[u8]) -> Option<Captured> {
-    let word = |at: usize| Some(u32::from_le_bytes(*body.get(at..)?.first_chunk()?));
-    let nanos = u64::from(word(4)?) << 32 | u64::from(word(8)?);
-    let len = word(12)? as usize;
-    let mut packet = body.get(20..20 + len)?;
-    loop {
-        let (tag, rest) = packet.split_first_chunk::<2>()?;
-        let (len, rest) = rest.split_first_chunk::<2>()?;
-        packet = rest.get(usize::from(u16::from_be_bytes(*len))..)?;
-        if u16::from_be_bytes(*tag) == 0 {
-            break;
-        }
-    }
-    let options = 20 + len.next_multiple_of(4);
-    let inbound = word(options)? == u32::from(OPTION_FLAGS) | 4 << 16 && word(options + 4)? & 3 == 1;
-    Some(Captured {
-        at: Duration::from_nanos(nanos),
-        direction: if inbound { Direction::Received } else { Direction::Sent },
-        bytes: Bytes::copy_from_slice(packet),
-    })
 }
 
 /// The end of a capture at the line's task.
@@ -299,52 +148,4 @@ fn write_all(writer: &mut Writer<impl Write>, mut captured: mpsc::Receiver<Captu
         }
     }
     writer.flush()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn frames() -> Vec<Captured> {
-        let frame = |millis, direction, bytes: &'static [u8]| Captured {
-            at: Duration::from_millis(millis),
-            direction,
-            bytes: Bytes::from_static(bytes),
-        };
-        vec![
-            frame(1_700_000_000_000, Direction::Sent, &[1, 3, 0, 0, 0, 1, 0x84, 0x0A]),
-            frame(1_700_000_000_020, Direction::Received, &[1, 3, 2, 0, 7, 0xF8, 0x46]),
-            frame(1_700_000_000_025, Direction::Received, &[]),
-        ]
-    }
-
-    fn file() -> Vec<u8> {
-        let mut file = Vec::new();
-        let mut writer = Writer::new(&mut file, Dissector::Rtu).unwrap();
-        for frame in frames() {
-            writer.write(&frame).unwrap();
-        }
-        file
-    }
-
-    #[test]
-    fn what_is_written_is_read_back() {
-        assert_eq!(read(&file()).unwrap(), frames());
-    }
-
-    #[test]
-    fn a_broken_file_is_an_error_and_never_a_panic() {
-        let file = file();
-        assert_eq!(read(&[]), Err(ReadError::NotPcapng));
-        for cut in 1..file.len() {
-            let _ = read(&file[..cut]);
-        }
-        for at in 0..file.len() {
-            for value in [0, 1, 0x7F, 0xFF] {
-                let mut broken = file.clone();
-                broken[at] = value;
-                let _ = read(&broken);
-            }
-        }
-    }
 }

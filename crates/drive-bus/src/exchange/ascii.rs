@@ -11,9 +11,10 @@
 //!   nothing any more, so that from the second unanswered request on the line tries the former one in turn.
 //! - The LRC is a sum of eight bits. Two damaged digits can cancel each other out in it; a format with parity finds them.
 
+mod delimiter;
 mod frame;
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_core::{Class, serial::SerialSettings};
@@ -22,15 +23,15 @@ use tokio_modbus::Request;
 
 pub use frame::{frame, len};
 
-use self::frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver};
-use super::{Answer, Exchange, Failure, Step, Stray, echo::EchoState};
+use self::{
+    delimiter::{Delimiters, new_delimiter},
+    frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver},
+};
+use super::{Exchange, Failure, Step, Stray, echo::EchoState};
 use crate::{answer, config::Echo};
 
 /// What may come in during one exchange before it is given up: somebody who never stops talking.
 const MAX_RECEIVED: usize = 4 * MAX_FRAME;
-
-/// After how many unanswered requests a slave may wait for another last character.
-const DOUBT_AFTER: u32 = 2;
 
 /// What a line in Modbus ASCII can be set to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,13 +58,12 @@ pub fn overtime(serial: SerialSettings, settings: AsciiSettings) -> Duration {
 /// The machine.
 #[derive(Debug)]
 pub struct Ascii {
-    settings: AsciiSettings,
+    character_gap: Duration,
     /// How long an answer that has begun may go on after its time is over.
     longest: Duration,
     echo: EchoState,
     configured: Echo,
-    /// The slaves whose last character may not be the usual one.
-    delimiters: BTreeMap<u8, Delimiter>,
+    delimiters: Delimiters,
     current: Option<Current>,
     receiver: Receiver,
     last_character: Option<Instant>,
@@ -84,24 +84,16 @@ struct Current {
     misfit: Option<String>,
 }
 
-/// Which last character a slave waits for.
-#[derive(Debug, Clone, Copy)]
-struct Delimiter {
-    likely: u8,
-    other: u8,
-    unanswered: u32,
-}
-
 impl Ascii {
     /// A machine for a line with these settings.
     #[must_use]
     pub fn new(serial: SerialSettings, settings: AsciiSettings, echo: Echo) -> Self {
         Self {
-            settings,
+            character_gap: settings.character_gap,
             longest: overtime(serial, settings),
             echo: echo.into(),
             configured: echo,
-            delimiters: BTreeMap::new(),
+            delimiters: Delimiters::new(settings.delimiter),
             current: None,
             receiver: Receiver::default(),
             last_character: None,
@@ -135,7 +127,8 @@ impl Ascii {
                 if self.echo == EchoState::Unknown {
                     self.echo = EchoState::Absent;
                 }
-                self.answered(&answer);
+                self.delimiters.answered(slave, &current.request, answer.is_ok());
+                self.current = None;
                 Step::Done(Ok(answer))
             }
             Err(why) => {
@@ -169,19 +162,6 @@ impl Ascii {
         }
     }
 
-    /// The exchange ends with this answer: the slave heard the end of its request, and may have another one from now on.
-    fn answered(&mut self, answer: &Answer) {
-        let Some(current) = self.current.take() else { return };
-        let usual = self.settings.delimiter;
-        let present = self.delimiters.get(&current.slave).map_or(usual, |delimiter| delimiter.likely);
-        if let (Some(new), Ok(_)) = (new_delimiter(&current.request), answer) {
-            let changed = Delimiter { likely: new, other: present, unanswered: 0 };
-            self.delimiters.insert(current.slave, changed);
-        } else if let Some(delimiter) = self.delimiters.get_mut(&current.slave) {
-            delimiter.unanswered = 0;
-        }
-    }
-
     /// The time for the answer is over.
     fn fail(&mut self) -> Step {
         let Some(current) = self.current.take() else { return Step::More };
@@ -191,38 +171,9 @@ impl Ascii {
             if self.echo == EchoState::Unknown && current.received == 0 {
                 self.echo = EchoState::Absent;
             }
-            self.doubt(current.slave, &current.request);
+            self.delimiters.unanswered(current.slave, &current.request);
         }
         Step::Done(Err(failure))
-    }
-
-    /// A request was not answered: perhaps its slave waited for another last character.
-    fn doubt(&mut self, slave: u8, request: &Request<'_>) {
-        if let Some(new) = new_delimiter(request) {
-            let usual = self.settings.delimiter;
-            let delimiter = self.delimiters.entry(slave).or_insert(Delimiter {
-                likely: usual,
-                other: usual,
-                unanswered: 0,
-            });
-            delimiter.other = new;
-        }
-        let Some(delimiter) = self.delimiters.get_mut(&slave) else { return };
-        delimiter.unanswered = delimiter.unanswered.saturating_add(1);
-        if delimiter.unanswered >= DOUBT_AFTER {
-            std::mem::swap(&mut delimiter.likely, &mut delimiter.other);
-        }
-    }
-}
-
-/// The last character that a request makes its slave wait for: function 08/03, `XX 00`.
-fn new_delimiter(request: &Request<'_>) -> Option<u8> {
-    match request {
-        Request::Custom(0x08, data) => match **data {
-            [0, 3, new, ..] => Some(new),
-            _ => None,
-        },
-        _ => None,
     }
 }
 
@@ -239,7 +190,6 @@ impl Exchange for Ascii {
         if let Some(Heard::Garbled { len, .. }) = self.receiver.give_up() {
             self.strays.push(Stray::Noise(len));
         }
-        let delimiter = self.delimiters.get(&slave).map_or(self.settings.delimiter, |known| known.likely);
         self.current = Some(Current {
             slave,
             request,
@@ -249,7 +199,7 @@ impl Exchange for Ascii {
             received: 0,
             misfit: None,
         });
-        frame(slave, pdu, delimiter)
+        frame(slave, pdu, self.delimiters.of(slave))
     }
 
     fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
@@ -300,7 +250,7 @@ impl Exchange for Ascii {
         let answer_by = self.current.as_ref().and_then(|current| current.answer_by);
         match self.last_character {
             Some(last) if self.receiver.is_open() => {
-                let pause = last + self.settings.character_gap;
+                let pause = last + self.character_gap;
                 Some(answer_by.map_or(pause, |by| pause.min(by + self.longest)))
             }
             _ => answer_by,
