@@ -10,7 +10,6 @@ use tokio_modbus::{Request, client::Client};
 
 use crate::{
     Error,
-    awake::Awake,
     masters::{READ, saturate},
     report::{Goal, Report, Unit, micros, millis, quantile},
     rig::{DRIVES, QUANTITY, Rig, exchange, runtime, virtual_runtime},
@@ -39,15 +38,12 @@ const ROUND: Duration = Duration::from_secs(4);
 const ANSWER: usize = 2 + 2 * QUANTITY as usize;
 
 pub(crate) fn measure(report: &mut Report, time: Duration, transactions: u64) -> Result<(), Error> {
-    healthy(report, "", time)?;
-    if let Some(_awake) = Awake::begin() {
-        healthy(report, ", processors kept awake", time)?;
-    }
+    healthy(report, time)?;
     sick(report, transactions)
 }
 
 /// Behind polls that are all answered.
-fn healthy(report: &mut Report, how: &str, time: Duration) -> Result<(), Error> {
+fn healthy(report: &mut Report, time: Duration) -> Result<(), Error> {
     let mut rig = Rig::start(Plant { lines: LINES, drives: DRIVES, unpaced: false })?;
     let bound = rig.config()?.worst_case_stop(5, ANSWER);
     let calls = runtime()?.block_on(async {
@@ -83,13 +79,13 @@ fn healthy(report: &mut Report, how: &str, time: Duration) -> Result<(), Error> 
     let count = waits.len();
     let mut wait = |per_mille| millis(quantile(&mut waits, per_mille));
     let goal = Goal::AtMost(millis(exchange(TURNAROUND) + SerialSettings::MODBUS_DEFAULT.t3_5() + HOST));
-    report.note(SECTION, format!("wait of {count} Stops{how}: p50"), Unit::Millis, wait(500));
-    report.note(SECTION, format!("wait of a Stop{how}: p99"), Unit::Millis, wait(990));
-    let what = format!("wait of a Stop{how}: p99.9, against one whole exchange + t3.5 + 0.2 ms");
+    report.note(SECTION, format!("wait of {count} Stops: p50"), Unit::Millis, wait(500));
+    report.note(SECTION, "wait of a Stop: p99", Unit::Millis, wait(990));
+    let what = "wait of a Stop: p99.9, against one whole exchange + t3.5 + 0.2 ms";
     report.row(SECTION, what, Unit::Millis, wait(999), goal);
-    let what = format!("wait of a Stop{how}: worst, against worst_case_stop()");
+    let what = "wait of a Stop: worst, against worst_case_stop()";
     report.row(SECTION, what, Unit::Millis, wait(1_000), Goal::AtMost(millis(bound)));
-    let name = format!("beyond the exchange in flight and t3.5{how}");
+    let name = "beyond the exchange in flight and t3.5";
     let mut beyond = |per_mille| micros(quantile(&mut added, per_mille));
     report.note(SECTION, format!("{name}: p50"), Unit::Micros, beyond(500));
     report.note(SECTION, format!("{name}: p99"), Unit::Micros, beyond(990));

@@ -26,9 +26,12 @@ const COARSE: Duration = Duration::from_millis(5);
 /// How much before a deadline the coarse timer must hand over, so that its own lateness never shows.
 const HANDOVER: Duration = Duration::from_millis(3);
 
-/// How much before the deadline the fine timer is aimed. Its usual lateness is a little more than this, so that the
-/// wait ends close behind the deadline; what is left when it was quicker is spent spinning, at most this long.
-const LEAD: Duration = Duration::from_micros(40);
+/// How much before the deadline the fine timer is aimed at the most, and with it how long a wait spins at the most. A
+/// processor that has fallen asleep needs 30 to 100 µs to wake up.
+const LONGEST_LEAD: Duration = Duration::from_micros(120);
+
+/// What the lead is more than the usual lateness, so that most waits end on their deadline.
+const MARGIN: Duration = Duration::from_micros(8);
 
 /// One timer, reused for every wait of its owner.
 pub struct Timer {
@@ -39,7 +42,30 @@ pub struct Timer {
 
 struct Fine {
     timer: async_io::Timer,
-    armed_for: Option<Instant>,
+    armed: Option<Armed>,
+    lead: Lead,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Armed {
+    deadline: Instant,
+    aimed_at: Instant,
+}
+
+/// How much before a deadline the timer is aimed: as late as it usually is, learned from each of its wake-ups. What is
+/// left when it was quicker is spent spinning.
+#[derive(Debug, Clone, Copy)]
+struct Lead(Duration);
+
+impl Lead {
+    const fn new() -> Self {
+        Self(Duration::from_micros(40))
+    }
+
+    /// The timer was this late behind the time at which it was aimed.
+    fn learn(&mut self, late: Duration) {
+        self.0 = (self.0 * 7 / 8 + (late + MARGIN) / 8).min(LONGEST_LEAD);
+    }
 }
 
 impl Timer {
@@ -50,7 +76,10 @@ impl Timer {
     /// Outside a tokio runtime with time enabled, as every tokio timer does.
     #[must_use]
     pub fn precise() -> Self {
-        Self { fine: Some(Fine { timer: async_io::Timer::never(), armed_for: None }), ..Self::tokio() }
+        Self {
+            fine: Some(Fine { timer: async_io::Timer::never(), armed: None, lead: Lead::new() }),
+            ..Self::tokio()
+        }
     }
 
     /// tokio's own timer: exact under a paused clock, otherwise late by up to 1.4 ms.
@@ -106,20 +135,30 @@ impl fmt::Debug for Timer {
 
 impl Fine {
     fn disarm(&mut self) {
-        if self.armed_for.take().is_some() {
+        if self.armed.take().is_some() {
             self.timer.clear();
         }
     }
 
+    /// When it will ring for this deadline.
+    fn arm(&mut self, deadline: Instant) -> Instant {
+        let aimed_at = deadline - self.lead.0;
+        self.timer.set_at(aimed_at.into_std());
+        self.armed = Some(Armed { deadline, aimed_at });
+        aimed_at
+    }
+
     fn poll(&mut self, context: &mut Context<'_>, deadline: Instant) -> Poll<()> {
-        if self.armed_for != Some(deadline) {
-            self.timer.set_at((deadline - LEAD).into_std());
-            self.armed_for = Some(deadline);
+        let armed = self.armed.filter(|armed| armed.deadline == deadline);
+        let near = deadline.saturating_duration_since(Instant::now()) <= self.lead.0;
+        if armed.is_some() || !near {
+            let aimed_at = armed.map_or_else(|| self.arm(deadline), |armed| armed.aimed_at);
+            if Pin::new(&mut self.timer).poll(context).is_pending() {
+                return Poll::Pending;
+            }
+            self.armed = None;
+            self.lead.learn(Instant::now().saturating_duration_since(aimed_at));
         }
-        if Pin::new(&mut self.timer).poll(context).is_pending() {
-            return Poll::Pending;
-        }
-        self.armed_for = None;
         while Instant::now() < deadline {
             std::hint::spin_loop();
         }
@@ -130,6 +169,18 @@ impl Fine {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_lead_becomes_the_usual_lateness_and_never_more_than_its_limit() {
+        let mut lead = Lead::new();
+        (0..100).for_each(|_| lead.learn(Duration::from_micros(70)));
+        assert!((70..=80).contains(&lead.0.as_micros()), "{lead:?}");
+        // A machine that stands still now and then.
+        (0..100).for_each(|_| lead.learn(Duration::from_millis(20)));
+        assert_eq!(lead.0, LONGEST_LEAD);
+        (0..100).for_each(|_| lead.learn(Duration::ZERO));
+        assert!(lead.0 <= 2 * MARGIN, "{lead:?}");
+    }
 
     #[tokio::test(start_paused = true)]
     async fn under_a_paused_clock_a_wait_is_exact() {
