@@ -8,12 +8,13 @@ pub(crate) mod server;
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig, exchange::rtu};
-use drive_core::serial::SerialSettings;
+use drive_bus::{Line, LineConfig, Slave, exchange::rtu};
+use drive_core::{PortError, serial::SerialSettings};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
     time::{Instant, sleep, sleep_until},
 };
+use tokio_modbus::{Request, Response, client::Client};
 
 pub(crate) const MS: Duration = Duration::from_millis(1);
 
@@ -74,6 +75,24 @@ impl Peer {
         let mut byte = [0];
         let heard = tokio::time::timeout(time, self.stream.read(&mut byte)).await;
         assert!(heard.is_err(), "the line sent {byte:02X?} too early");
+    }
+}
+
+/// FC03, `quantity` registers from `address`.
+pub(crate) async fn read(slave: &mut Slave, address: u16, quantity: u16) -> Result<Vec<u16>, PortError> {
+    match slave.call(Request::ReadHoldingRegisters(address, quantity)).await {
+        Ok(Ok(Response::ReadHoldingRegisters(words))) => Ok(words),
+        Ok(other) => panic!("{other:?}"),
+        Err(error) => Err(PortError::from_modbus(error)),
+    }
+}
+
+/// FC06, one register.
+pub(crate) async fn write(slave: &mut Slave, address: u16, word: u16) -> Result<(), PortError> {
+    match slave.call(Request::WriteSingleRegister(address, word)).await {
+        Ok(Ok(Response::WriteSingleRegister(got, value))) if (got, value) == (address, word) => Ok(()),
+        Ok(other) => panic!("{other:?}"),
+        Err(error) => Err(PortError::from_modbus(error)),
     }
 }
 
