@@ -156,7 +156,7 @@ pub enum LineMismatch {
         highest: u8,
     },
     /// The speed.
-    #[error("{baud} bit/s: a {family} has {speeds:?}")]
+    #[error("{baud} bit/s: a {family} has {}", speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
     Speed {
         /// The family's name.
         family: &'static str,

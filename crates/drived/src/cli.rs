@@ -8,7 +8,7 @@ use tracing::Level;
 use crate::{
     commands::{check, demo, families, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
     failure::Failure,
-    run,
+    output, run,
 };
 
 /// A map of the subcommands, and what holds for all of them.
@@ -90,7 +90,7 @@ pub(crate) fn run(command: Command) -> ExitCode {
     let runtime = match tokio::runtime::Runtime::new() {
         Ok(runtime) => runtime,
         Err(error) => {
-            eprintln!("drived: the system gives no threads or timers: {error}");
+            output::complain(format_args!("the system gives no threads or timers: {error}"));
             return ExitCode::FAILURE;
         }
     };
@@ -98,7 +98,7 @@ pub(crate) fn run(command: Command) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure != Failure::OutputClosed {
-                eprintln!("drived: {failure}");
+                output::complain(&failure);
             }
             failure.exit_code()
         }
@@ -116,7 +116,7 @@ pub(crate) fn refuse(error: &clap::Error) -> ExitCode {
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
         _ => {
-            eprintln!("drived: {}", one_line(&error.to_string()));
+            output::complain(one_line(&error.to_string()));
             ExitCode::from(2)
         }
     }

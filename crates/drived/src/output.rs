@@ -10,24 +10,39 @@ use drive_core::{Status, registers::Unit};
 
 use crate::failure::Failure;
 
-/// Prints a line. A reader who went away (`drived poll | head`) ends the program, without a panic.
+/// Prints a line, on a terminal broken between its words. A reader who went away (`drived poll | head`) ends the program,
+/// without a panic.
 pub(crate) fn say(line: impl fmt::Display) -> Result<(), Failure> {
-    writeln!(io::stdout().lock(), "{line}").map_err(|error| Failure::output(&error))
+    match terminal_width(&io::stdout()) {
+        Some(width) => {
+            line.to_string().split('\n').flat_map(|line| hanging(line, width)).try_for_each(say_as_it_is)
+        }
+        None => say_as_it_is(line),
+    }
 }
 
-/// Prints a text, on a terminal in lines no wider than that.
-pub(crate) fn say_text(text: &str) -> Result<(), Failure> {
-    wrapped(text, terminal_width().unwrap_or(usize::MAX)).into_iter().try_for_each(say)
+/// Prints a line for a program, unbroken.
+pub(crate) fn say_as_it_is(line: impl fmt::Display) -> Result<(), Failure> {
+    writeln!(io::stdout().lock(), "{line}").map_err(|error| Failure::output(&error))
 }
 
 /// Prints a table, on a terminal no wider than that.
 pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
-    say(Table { available: terminal_width(), ..table })
+    say_as_it_is(Table { available: terminal_width(&io::stdout()), ..table })
 }
 
-/// How many characters a line of the terminal has, if stdout is one.
-fn terminal_width() -> Option<usize> {
-    let size = io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten();
+/// Says on stderr why the program ends.
+pub(crate) fn complain(why: impl fmt::Display) {
+    let line = format!("drived: {why}");
+    match terminal_width(&io::stderr()) {
+        Some(width) => hanging(&line, width).iter().for_each(|line| eprintln!("{line}")),
+        None => eprintln!("{line}"),
+    }
+}
+
+/// How many characters a line of the terminal has, if this is one.
+fn terminal_width(stream: &impl IsTerminal) -> Option<usize> {
+    let size = stream.is_terminal().then(|| crossterm::terminal::size().ok()).flatten();
     size.map(|(columns, _)| usize::from(columns))
 }
 
@@ -128,19 +143,30 @@ impl fmt::Display for Table {
 
 /// A text in lines of at most this width, broken between words where it has some; its indentation is kept.
 pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
+    broken(text, width, 0)
+}
+
+/// The same, with the lines that go on set in by a little.
+fn hanging(text: &str, width: usize) -> Vec<String> {
+    broken(text, width, GAP)
+}
+
+fn broken(text: &str, width: usize, set_in: usize) -> Vec<String> {
     if text.chars().count() <= width {
         return vec![text.to_owned()];
     }
-    let indent: String = text.chars().take_while(|character| *character == ' ').collect();
+    let first: String = text.chars().take_while(|character| *character == ' ').collect();
+    let indent = format!("{first}{}", " ".repeat(set_in));
     let mut lines = Vec::new();
-    let mut line = indent.clone();
+    let mut line = first;
+    let mut is_empty = true;
     for word in text.split_whitespace() {
-        let taken = line.chars().count();
-        if taken > indent.len() && taken + 1 + word.chars().count() > width {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > width {
             lines.push(std::mem::replace(&mut line, indent.clone()));
-        } else if taken > indent.len() {
+        } else if !is_empty {
             line.push(' ');
         }
+        is_empty = false;
         for character in word.chars() {
             if line.chars().count() >= width.max(indent.len() + 1) {
                 lines.push(std::mem::replace(&mut line, indent.clone()));
@@ -227,6 +253,13 @@ mod tests {
     fn a_word_without_room_is_broken() {
         assert_eq!(wrapped("  abc defghij", 5), ["  abc", "  def", "  ghi", "  j"]);
         assert_eq!(wrapped("abc", 0), ["a", "b", "c"]);
+    }
+
+    #[test]
+    fn a_line_that_goes_on_is_set_in() {
+        assert_eq!(hanging("one two three", 20), ["one two three"]);
+        assert_eq!(hanging("one two three four", 9), ["one two", "  three", "  four"]);
+        assert_eq!(hanging("  ab cd", 5), ["  ab", "    c", "    d"]);
     }
 
     #[test]

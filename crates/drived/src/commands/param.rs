@@ -61,17 +61,15 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
 
 fn list(family: Family) -> Table {
     let mut table =
-        Table::new(["register", "mnemonic", "name", "access", "kept in", "factory", "source", "range"]);
+        Table::new(["register", "mnemonic", "name and range", "access, kept in", "factory", "source"]);
     for row in family.rows() {
         table.row([
             row.address.to_string(),
             row.code.to_owned(),
-            row.name.to_owned(),
-            row.access.to_string(),
-            row.storage.to_string(),
+            with_range(row),
+            format!("{} {}", row.access, row.storage),
             factory(row),
             row.source.to_owned(),
-            range(row),
         ]);
     }
     table
@@ -173,19 +171,25 @@ fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
 }
 
 fn value_table() -> Table {
-    Table::new(["register", "mnemonic", "value", "name", "access", "factory", "range"])
+    Table::new(["register", "mnemonic", "value", "name and range", "access", "factory"])
 }
 
-fn value_cells(row: &Row, value: String) -> [String; 7] {
+fn value_cells(row: &Row, value: String) -> [String; 6] {
     [
         row.address.to_string(),
         row.code.to_owned(),
         value,
-        row.name.to_owned(),
+        with_range(row),
         row.access.to_string(),
         factory(row),
-        range(row),
     ]
+}
+
+fn with_range(row: &Row) -> String {
+    match range(row) {
+        range if range.is_empty() => row.name.to_owned(),
+        range => format!("{}: {range}", row.name),
+    }
 }
 
 fn factory(row: &Row) -> String {
@@ -203,7 +207,7 @@ fn range(row: &Row) -> String {
         |low, high| format!("{} to {}", output::in_unit(row.unit, low), output::in_unit(row.unit, high));
     let listed = || {
         let codes = row.range.choices().iter().map(|choice| choice.code);
-        codes.collect::<Vec<_>>().join("|")
+        codes.collect::<Vec<_>>().join(", ")
     };
     match row.range {
         Range::Any => String::new(),
@@ -242,7 +246,7 @@ mod tests {
             (RAMP, "0", "0.0 s is not allowed, expected: 0.1 s to 999.9 s"),
             (RAMP, "fast", "\"fast\" is no value, expected: 0.1 s to 999.9 s"),
             (Row { access: Access::Read, ..RAMP }, "3", "can only be read"),
-            (Row { range: Range::OneOf(YES_NO), unit: Unit::CODE, ..RAMP }, "7", "expected: nO|YES"),
+            (Row { range: Range::OneOf(YES_NO), unit: Unit::CODE, ..RAMP }, "7", "expected: nO, YES"),
         ] {
             let Err(Failure::Input(message)) = wanted(&row, text) else { panic!("{text} was taken") };
             assert!(message.contains(reason), "{message}");
@@ -253,6 +257,6 @@ mod tests {
     fn a_row_shows_its_factory_setting_and_its_range() {
         assert_eq!((factory(&RAMP), range(&RAMP)), ("3.0 s".to_owned(), "0.1 s to 999.9 s".to_owned()));
         let list = Row { range: Range::OneOf(YES_NO), factory: Factory::Value(1), ..RAMP };
-        assert_eq!((factory(&list), range(&list)), ("YES".to_owned(), "nO|YES".to_owned()));
+        assert_eq!((factory(&list), range(&list)), ("YES".to_owned(), "nO, YES".to_owned()));
     }
 }

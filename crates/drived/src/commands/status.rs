@@ -2,7 +2,11 @@
 
 use drive_core::{Measurements, Status};
 
-use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{
+    failure::Failure,
+    one_drive::OneDriveArgs,
+    output::{self, Table},
+};
 
 /// Read the state of one drive; nothing is written
 #[derive(Debug, clap::Args)]
@@ -22,9 +26,11 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         false => None,
     };
     output::say(format_args!("{} {}", one.name, one.drive.capabilities().name))?;
+    let mut table = Table::texts();
     for (label, value) in lines(&status).into_iter().chain(measurements.iter().flat_map(slow_lines)) {
-        output::say(format_args!("  {label:<17} {value}"))?;
+        table.row([format!("  {label}"), value]);
     }
+    output::say_table(table)?;
     one.close().await;
     Ok(())
 }

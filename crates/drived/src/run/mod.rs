@@ -1,25 +1,29 @@
 //! `drived run`: the fleet as a daemon.
 
 mod json;
-mod output;
+mod report;
 
-use std::path::PathBuf;
+use std::{io::IsTerminal as _, path::PathBuf};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
 
-use self::output::JsonLines;
+use self::report::{Form, Report};
 use crate::{config::Config, failure::Failure, one_drive::open_line, signals::Ending};
 
 /// Watch and command the drives of a configuration
 ///
-/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. Ctrl-C and SIGTERM end it: each
-/// drive's policy acts, and what was done is told. A second Ctrl-C ends it at once.
+/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal, where the log tells
+/// the events, stdout has one line for each drive whose state has changed instead. Ctrl-C and SIGTERM end it: each drive's
+/// policy acts, and what was done is told. A second Ctrl-C ends it at once.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The configuration, in TOML
     #[arg(long, value_name = "FILE", default_value = "drives.toml")]
     config: PathBuf,
+    /// Print JSON objects on a terminal too
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
@@ -28,10 +32,11 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let lines = open_lines(&config).await?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
-    let mut json = JsonLines::start(fleet.clone(), fleet.events(), config.snapshots);
+    let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
+    let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let result = tokio::select! {
         () = ending.asked() => Ok(()),
-        result = json.ended() => result,
+        result = report.ended() => result,
     };
     tokio::select! {
         // Each drive's event tells what was done.
@@ -39,7 +44,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         () = ending.asked() => tracing::warn!("asked to end a second time: drives are left as they are"),
     }
     if result.is_ok() {
-        json.finish().await;
+        report.finish().await;
     }
     for line in lines {
         line.close().await;

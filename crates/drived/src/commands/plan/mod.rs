@@ -66,13 +66,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         sheet::say_all_lines(&reckoned)?;
         output::say("")?;
     }
-    output::say_text(
+    output::say(
         "Ages and times are the longest there can be while no commands are given; a motor whose stop is confirmed \
          still needs its ramp.",
     )?;
     let mut problems = problems.into_iter();
     let first = problems.next();
-    problems.try_for_each(|problem| output::say_text(&problem))?;
+    problems.try_for_each(output::say)?;
     first.map_or(Ok(()), |problem| Err(Failure::Input(problem)))
 }
 

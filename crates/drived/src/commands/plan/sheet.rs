@@ -43,13 +43,13 @@ impl Sheet<'_> {
         output::say_table(self.table())?;
         for case in self.cases {
             if let Some(forbidden) = &case.hypothetical {
-                output::say_text(&format!("{}: for comparison only, {forbidden}", case.label))?;
+                output::say(format_args!("{}: for comparison only, {forbidden}", case.label))?;
             }
         }
         // Why it cannot work as it is planned is what the command ends with.
         for case in self.cases.iter().skip(1) {
             if let Some(problem) = &case.reckoning.problem {
-                output::say_text(&format!("{} it cannot work: {problem}", case.label))?;
+                output::say(format_args!("{} it cannot work: {problem}", case.label))?;
             }
         }
         Ok(())

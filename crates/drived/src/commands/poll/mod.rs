@@ -81,7 +81,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             () = reached(until) => break,
             Some(reading) = incoming.recv() => {
                 if args.json {
-                    output::say(json::reading(&reading))?;
+                    output::say_as_it_is(json::reading(&reading))?;
                 } else if let Some(text) = book.news(&reading) {
                     output::say(format_args!("{:<12} {text}", reading.name))?;
                 }
@@ -93,7 +93,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let stats = line.stats();
     line.close().await;
     let summary = Summary::new(&names, &book.answered, &stats, &config);
-    output::say(if args.json { json::summary(&summary) } else { summary.to_string() })?;
+    if args.json {
+        output::say_as_it_is(json::summary(&summary))?;
+    } else {
+        output::say_table(summary.table())?;
+        output::say(summary.of_line())?;
+    }
     book.verdict(&names)
 }
 

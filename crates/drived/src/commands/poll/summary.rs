@@ -1,6 +1,6 @@
 //! How well a poll went: per drive, and for the line.
 
-use std::{collections::BTreeMap, fmt, time::Duration};
+use std::{collections::BTreeMap, time::Duration};
 
 use drive_bus::{
     LineConfig,
@@ -50,10 +50,9 @@ impl Summary {
         let per_1000_s = sweeps.checked_div(self.elapsed.as_micros()).unwrap_or_default();
         u64::try_from(per_1000_s).unwrap_or(u64::MAX)
     }
-}
 
-impl fmt::Display for Summary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// What each drive answered.
+    pub(super) fn table(&self) -> Table {
         let heads = ["drive", "good", "timeouts", "damaged", "exceptions", "p50", "p99"];
         let mut table = Table::new(heads).with_numbers_from(1);
         for (name, stats) in &self.drives {
@@ -71,24 +70,26 @@ impl fmt::Display for Summary {
                 response(990),
             ]);
         }
+        table
+    }
+
+    /// How well the line was used, and its silences.
+    pub(super) fn of_line(&self) -> String {
         let rate = self.sweeps_per_1000_s();
-        writeln!(f, "{table}")?;
-        write!(
-            f,
+        let used = format!(
             "line: {}.{:03} sweeps/s, utilisation {}",
             rate / 1_000,
             rate % 1_000,
             output::percent(self.utilisation_ppm.into()),
-        )?;
+        );
         match &self.needed {
-            Some((silence, name)) => write!(
-                f,
-                "; {} silences kept, the shortest {} ({name} {})",
+            Some((silence, name)) => format!(
+                "{used}; {} silences kept, the shortest {} ({name} {})",
                 self.silences,
                 output::milliseconds(self.shortest_silence),
                 output::milliseconds(*silence)
             ),
-            None => Ok(()),
+            None => used,
         }
     }
 }

@@ -1,0 +1,156 @@
+//! What stdout is told, as JSON lines or as text. Writing may block for as long as the reader likes, so it has a thread of
+//! its own: the fleet goes on meanwhile, and a reader that is slow is told how many events it missed.
+
+use std::{collections::BTreeMap, io::Write as _, sync::Arc, time::Duration};
+
+use drive_fleet::{Events, Fleet, Link, Received, Snapshot};
+use tokio::{
+    sync::{mpsc, oneshot},
+    task::JoinHandle,
+    time::{Instant, Interval, MissedTickBehavior, interval_at},
+};
+
+use super::json;
+use crate::failure::Failure;
+
+/// Lines that wait for the writer.
+const WAITING: usize = 64;
+/// How long the reader of stdout has for the last events.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
+/// What stdout is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// A program: every event and every snapshot.
+    Json,
+    /// A person, who reads the events in the log: what the drives show, where it has changed.
+    Text,
+}
+
+/// Events and snapshots on their way to stdout.
+pub(super) struct Report {
+    reader: JoinHandle<()>,
+    writer: oneshot::Receiver<Result<(), Failure>>,
+}
+
+impl Report {
+    /// Writes all events, and a snapshot of every drive each period; zero: no snapshots.
+    pub(super) fn start(fleet: Fleet, events: Events, snapshots: Duration, form: Form) -> Self {
+        let (lines, waiting) = mpsc::channel(WAITING);
+        let reader =
+            tokio::spawn(read(fleet, events, snapshots, Writer { form, lines, shown: BTreeMap::new() }));
+        let (ended, writer) = oneshot::channel();
+        // Not a thread of the runtime, which would wait at its end for a reader that never reads again.
+        std::thread::spawn(move || {
+            let _ = ended.send(write(waiting));
+        });
+        Self { reader, writer }
+    }
+
+    /// Waits until nobody reads stdout any more. Safe to drop.
+    pub(super) async fn ended(&mut self) -> Result<(), Failure> {
+        (&mut self.writer).await.unwrap_or(Err(Failure::OutputClosed))
+    }
+
+    /// Writes what is left of the events of a fleet that has ended, if they find a reader in time.
+    pub(super) async fn finish(self) {
+        let Self { reader, writer } = self;
+        let rest = async {
+            // Either may have ended before; the fleet does not depend on them.
+            let _ = reader.await;
+            let _ = writer.await;
+        };
+        if tokio::time::timeout(LAST_WORDS, rest).await.is_err() {
+            tracing::warn!("stdout is not read: the last events are lost");
+        }
+    }
+}
+
+/// Puts what is told into lines.
+struct Writer {
+    form: Form,
+    lines: mpsc::Sender<String>,
+    /// What the text said of each drive last.
+    shown: BTreeMap<Arc<str>, String>,
+}
+
+impl Writer {
+    fn of_received(&self, received: &Received) -> Option<String> {
+        match (received, self.form) {
+            (Received::Event(event), Form::Json) => Some(json::event(event)),
+            (Received::Missed(events), Form::Json) => Some(json::missed(*events)),
+            (Received::Event(_) | Received::Missed(_), Form::Text) | (Received::End, _) => None,
+        }
+    }
+
+    fn of_snapshot(&mut self, snapshot: &Snapshot) -> Option<String> {
+        if self.form == Form::Json {
+            return Some(json::snapshot(snapshot));
+        }
+        let text = text(snapshot);
+        let known = self.shown.insert(Arc::clone(&snapshot.name), text.clone());
+        (known.as_ref() != Some(&text)).then(|| format!("{:<16} {text}", snapshot.name))
+    }
+
+    /// Whether somebody still takes lines.
+    async fn write(&self, line: Option<String>) -> bool {
+        match line {
+            Some(line) => self.lines.send(line).await.is_ok(),
+            None => true,
+        }
+    }
+}
+
+/// What a person reads of a drive.
+fn text(snapshot: &Snapshot) -> String {
+    let status = snapshot.status.as_ref().map(|status| status.value.to_string());
+    let pending = if snapshot.stop.is_some() { "; stop pending" } else { "" };
+    match (snapshot.link, status) {
+        (Link::Connected, Some(status)) => format!("{status}{pending}"),
+        (Link::Lost, Some(status)) => format!("LOST, was {status}{pending}"),
+        (Link::Lost, None) => format!("LOST{pending}"),
+        (Link::Connecting, _) | (Link::Connected, None) => format!("no status yet{pending}"),
+    }
+}
+
+async fn read(fleet: Fleet, mut events: Events, snapshots: Duration, mut writer: Writer) {
+    let mut ticks = (!snapshots.is_zero()).then(|| {
+        let mut ticks = interval_at(Instant::now() + snapshots, snapshots);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        ticks
+    });
+    loop {
+        tokio::select! {
+            received = events.recv() => {
+                if received == Received::End || !writer.write(writer.of_received(&received)).await {
+                    return;
+                }
+            }
+            () = tick(&mut ticks) => {
+                for drive in fleet.drives() {
+                    let line = writer.of_snapshot(&drive.snapshot());
+                    if !writer.write(line).await {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+}
+
+async fn tick(ticks: &mut Option<Interval>) {
+    match ticks {
+        Some(ticks) => {
+            ticks.tick().await;
+        }
+        None => std::future::pending().await,
+    }
+}
+
+fn write(mut lines: mpsc::Receiver<String>) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout();
+    while let Some(line) = lines.blocking_recv() {
+        writeln!(stdout, "{line}").and_then(|()| stdout.flush()).map_err(|error| Failure::output(&error))?;
+    }
+    Ok(())
+}
