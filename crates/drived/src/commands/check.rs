@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use drive_fleet::{Alarms, Commanders, DriveSettings, FrequencyLimits, OnExit, OnFault, OnLoss, Periods};
 
 use crate::{
-    config::{Config, LinePart},
+    config::{Config, DrivePart, LinePart},
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
@@ -25,16 +25,16 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
     for LinePart { name, config, drives, .. } in &config.lines {
-        let controlled = drives.iter().filter(|(_, settings)| settings.control).count();
+        let controlled = drives.iter().filter(|drive| drive.settings.control).count();
         output::say(format_args!(
             "line {name}: {} drives, {controlled} under control, on {}",
             drives.len(),
             line_spec::describe(config)
         ))?;
-        for (names, settings) in alike(drives) {
+        for (names, first) in alike(drives) {
             output::say(format_args!("  {}", drive_spec::listed(&names)))?;
             let mut table = Table::texts();
-            for (label, text) in meaning(&settings) {
+            for (label, text) in meaning(&first.settings) {
                 table.row([format!("    {label}"), text]);
             }
             output::say_table(table)?;
@@ -46,18 +46,23 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     ))
 }
 
-/// Drives with the same settings, and these.
-fn alike(drives: &[(DriveName, DriveSettings)]) -> Vec<(Vec<(DriveName, String)>, DriveSettings)> {
-    let mut all: Vec<(Vec<(DriveName, String)>, DriveSettings)> = Vec::new();
-    for (drive, settings) in drives {
-        let nameless = DriveSettings { name: String::new(), ..settings.clone() };
-        let member = (*drive, settings.name.clone());
-        match all.iter_mut().find(|(_, known)| *known == nameless) {
+/// Drives with the same settings, and the first of them.
+fn alike(drives: &[DrivePart]) -> Vec<(Vec<(DriveName, String)>, &DrivePart)> {
+    let mut all: Vec<(Vec<(DriveName, String)>, &DrivePart)> = Vec::new();
+    for drive in drives {
+        let member = (drive.name, drive.settings.name.clone());
+        match all.iter_mut().find(|(_, first)| is_alike(first, drive)) {
             Some((names, _)) => names.push(member),
-            None => all.push((vec![member], nameless)),
+            None => all.push((vec![member], drive)),
         }
     }
     all
+}
+
+/// Whether two drives differ in their names and addresses only.
+fn is_alike(one: &DrivePart, other: &DrivePart) -> bool {
+    let renamed = DriveSettings { name: one.settings.name.clone(), ..other.settings.clone() };
+    one.name.family == other.name.family && one.options == other.options && one.settings == renamed
 }
 
 /// What settings mean, each with its label.

@@ -11,6 +11,7 @@ use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
 use drive_bus::LineConfig;
 use drive_core::{Capabilities, StopMode};
+use drive_families::Options;
 use drive_fleet::{
     Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss,
     Periods, WatchdogContract, check_settings, plan,
@@ -52,15 +53,23 @@ pub(crate) struct LinePart {
     pub(crate) name: String,
     pub(crate) config: LineConfig,
     pub(crate) budget: LineBudget,
-    pub(crate) drives: Vec<(DriveName, DriveSettings)>,
+    pub(crate) drives: Vec<DrivePart>,
     /// Why the line cannot work, with the arithmetic.
     pub(crate) problem: Option<ConfigError>,
+}
+
+/// A drive of a line.
+#[derive(Debug)]
+pub(crate) struct DrivePart {
+    pub(crate) name: DriveName,
+    pub(crate) settings: DriveSettings,
+    pub(crate) options: Options,
 }
 
 impl LinePart {
     /// What its drives want of it.
     pub(crate) fn demands(&self) -> Vec<Demand> {
-        self.drives.iter().map(|(drive, settings)| demand(*drive, settings)).collect()
+        self.drives.iter().map(|drive| demand(drive.name, &drive.settings)).collect()
     }
 }
 
@@ -115,6 +124,7 @@ struct Groups(BTreeMap<String, Vec<Member>>);
 struct Member {
     drive: DriveName,
     settings: DriveSettings,
+    options: Options,
     /// Whether the file says how often it is asked.
     has_own_periods: bool,
 }
@@ -162,7 +172,8 @@ impl Groups {
                     return Err(source.error(drive.span(), problem));
                 }
                 let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
-                group.push(Member { drive: *name, settings, has_own_periods });
+                let options = options(source, entry, defaults, *name)?;
+                group.push(Member { drive: *name, settings, options, has_own_periods });
             }
         }
         Ok(Self(groups))
@@ -191,10 +202,15 @@ fn line_part(
     let budget = LineBudget::of(&config);
     let budget = LineBudget { response: entry.response.map_or(budget.response, |time| time.0.0), ..budget };
     let stretch = fitting_stretch(budget, group);
-    let drives: Vec<_> = group.iter().map(|member| (member.drive, member.settings_with(stretch))).collect();
-    let demands: Vec<_> = drives.iter().map(|(drive, settings)| demand(*drive, settings)).collect();
-    let problem = plan(budget, &demands).err().map(|problem| source.error(span, problem));
-    Ok(LinePart { name: name.to_owned(), config, budget, drives, problem })
+    let part = |member: &Member| DrivePart {
+        name: member.drive,
+        settings: member.settings_with(stretch),
+        options: member.options,
+    };
+    let drives = group.iter().map(part).collect();
+    let line = LinePart { name: name.to_owned(), config, budget, drives, problem: None };
+    let problem = plan(budget, &line.demands()).err().map(|problem| source.error(span, problem));
+    Ok(LinePart { problem, ..line })
 }
 
 /// By how much the periods that the file does not name are longer than usual: as little as leaves a fifth of the line for
@@ -287,6 +303,28 @@ fn settings(
         source.error(place, format_args!("{}: {problem}", settings.name))
     })?;
     Ok(settings)
+}
+
+/// The options of one drive: what its entry says, else the defaults of its family.
+fn options(
+    source: Source<'_>,
+    entry: &DriveEntry,
+    defaults: &DriveEntry,
+    drive: DriveName,
+) -> Result<Options, ConfigError> {
+    let mut own = Options::default();
+    for (name, value) in &entry.options {
+        let set = own.set(name.get_ref(), &value.get_ref().0);
+        set.map_err(|error| source.error(value.span(), error))?;
+        let checked = own.check(drive.family);
+        checked.map_err(|error| source.error(name.span(), format_args!("{drive}: {error}")))?;
+    }
+    let mut options = Options::default();
+    for (name, value) in defaults.options.iter().chain(&entry.options) {
+        let set = options.set(name.get_ref(), &value.get_ref().0);
+        set.map_err(|error| source.error(value.span(), error))?;
+    }
+    Ok(options.of(drive.family))
 }
 
 /// Where a setting of a drive is written.

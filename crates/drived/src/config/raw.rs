@@ -6,8 +6,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::values::{
-    CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, Parsed, PercentValue,
-    ReactionValue,
+    CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue, Parsed,
+    PercentValue, ReactionValue,
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
 
@@ -59,6 +59,9 @@ pub(super) struct DriveEntry {
     pub(super) on_exit: Option<Parsed<ExitPolicy>>,
     pub(super) on_loss: Option<Parsed<LossPolicy>>,
     pub(super) on_fault: Option<Parsed<FaultPolicy>>,
+    /// As `--option` has them.
+    #[serde(default)]
+    pub(super) options: BTreeMap<Spanned<String>, Spanned<OptionValue>>,
 }
 
 impl DriveEntry {

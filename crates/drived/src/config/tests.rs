@@ -63,17 +63,17 @@ fn a_full_file_says_what_it_says() {
     assert_eq!(config.snapshots, Duration::from_secs(1));
     let [north, south] = &config.lines[..] else { panic!("{config:?}") };
     assert_eq!(north.drives.len(), 11);
-    let (name, fan) = &north.drives[6];
+    let DrivePart { name, settings: fan, .. } = &north.drives[6];
     assert_eq!((name.to_string().as_str(), fan.name.as_str()), ("atv312@7", "fan 7"));
     assert_eq!(fan.limits.high, Some(Frequency::from_centihertz(4_750)));
     assert_eq!(fan.limits.forbidden[0].high, Frequency::from_centihertz(2_250));
     assert_eq!(fan.commanders, Commanders::Only(vec!["operator".to_owned(), "scada".to_owned()]));
     let contract = WatchdogContract { timeout: Duration::from_secs(5), reaction: Reaction::Ramp };
     assert_eq!(fan.watchdog, Some(contract));
-    let (_, watched) = &north.drives[10];
+    let watched = &north.drives[10].settings;
     assert_eq!((watched.control, watched.on_exit, watched.watchdog), (false, OnExit::Leave, None));
     assert_eq!(watched.name, "north 20");
-    let (_, released) = &south.drives[0];
+    let released = &south.drives[0].settings;
     assert_eq!(released.on_exit, OnExit::Release(StopMode::Freewheel));
     assert_eq!(released.on_fault, OnFault::ResetWatchdogTrip);
     assert_eq!(south.config.response_timeout, Duration::from_millis(100));
@@ -88,7 +88,7 @@ fn thirty_one_equal_drives_are_three_lines() {
 fn periods_that_the_file_does_not_name_leave_room_on_the_line() {
     let line = &read(THIRTY_ONE).unwrap().lines[0];
     assert!(plan(line.budget, &line.demands()).unwrap().utilisation_ppm <= ROOM_PPM);
-    let Periods { running, rest, slow, max_age } = line.drives[0].1.periods;
+    let Periods { running, rest, slow, max_age } = line.drives[0].settings.periods;
     let usual = Periods::default();
     assert!(running > usual.running);
     assert_eq!(rest.as_millis() * usual.running.as_millis(), usual.rest.as_millis() * running.as_millis());
@@ -96,7 +96,7 @@ fn periods_that_the_file_does_not_name_leave_room_on_the_line() {
 
     let few = THIRTY_ONE.replace("1-31", "1-5");
     assert_eq!(
-        read(&few).unwrap().lines[0].drives[0].1.periods,
+        read(&few).unwrap().lines[0].drives[0].settings.periods,
         usual,
         "where they fit they are the usual ones"
     );
@@ -105,7 +105,7 @@ fn periods_that_the_file_does_not_name_leave_room_on_the_line() {
 #[test]
 fn periods_that_the_file_names_are_kept_or_refused() {
     let kept = format!("{THIRTY_ONE}running = \"1s\"\nslow = \"0s\"\n");
-    assert_eq!(read(&kept).unwrap().lines[0].drives[0].1.periods.running, Duration::from_secs(1));
+    assert_eq!(read(&kept).unwrap().lines[0].drives[0].settings.periods.running, Duration::from_secs(1));
     let refused = format!("{THIRTY_ONE}running = \"500ms\"\n");
     assert!(read(&refused).unwrap_err().contains("lengthen the periods"));
 }
@@ -181,6 +181,33 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
         let error = read(&text).expect_err(told);
         assert!(error.starts_with(told), "{error}\nexpected {told}");
         assert!(!error.contains('\n'), "{error}");
+    }
+}
+
+#[test]
+fn what_the_owner_knows_of_a_drive_is_an_option_of_its_entry_or_of_the_defaults() {
+    let text = |defaults: &str, own: &str| {
+        format!(
+            "[defaults]\noptions = {{ {defaults} }}\n[lines.a]\nport = \"/dev/ttyUSB0,9600,8N1\"\n\
+             [[drives]]\nline = \"a\"\ndrive = \"3g3ev@1-2\"\noptions = {{ {own} }}\n\
+             [[drives]]\nline = \"a\"\ndrive = \"atv312@3\"\n"
+        )
+    };
+    let config = read(&text("fault-reset-function = 5, saves = 3", "saves = \"120\"")).unwrap();
+    let [one, _, other] = &config.lines[0].drives[..] else { panic!("{config:?}") };
+    assert_eq!((one.options.fault_reset_function, one.options.saves), (Some(5), Some(120)));
+    assert_eq!(other.options, Options::default(), "it has none of these");
+    for (own, told) in [
+        ("saves = \"many\"", "drives.toml:8: saves: option saves: \"many\" is not a value of it"),
+        ("saves = 1.5", "drives.toml:8: saves: expected a text or a whole number"),
+        ("speed = 5", "drives.toml:8: speed: \"speed\" is not an option of a drive"),
+        (
+            "authority = \"settings\"",
+            "drives.toml:8: options: 3g3ev@1: option authority belongs to the atv21",
+        ),
+    ] {
+        let error = read(&text("", own)).expect_err(told);
+        assert!(error.starts_with(told), "{error}\nexpected {told}");
     }
 }
 

@@ -93,6 +93,25 @@ words! {
     "reset-watchdog-trip" => true
 }
 
+/// The value of a drive's option: a text or a whole number, read by the option itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct OptionValue(pub(super) String);
+
+impl<'de> Deserialize<'de> for OptionValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged, expecting = "expected a text or a whole number")]
+        enum Value {
+            Text(String),
+            Number(i64),
+        }
+        Ok(Self(match Value::deserialize(deserializer)? {
+            Value::Text(text) => text,
+            Value::Number(number) => number.to_string(),
+        }))
+    }
+}
+
 /// A number with at most so many decimals, as an integer of them.
 fn decimal<'de, D: Deserializer<'de>>(deserializer: D, decimals: u8) -> Result<u32, D::Error> {
     #[derive(Deserialize)]

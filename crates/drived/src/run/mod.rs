@@ -9,7 +9,12 @@ use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
 
 use self::report::{Form, Report};
-use crate::{config::Config, failure::Failure, one_drive::open_line, signals::Ending};
+use crate::{
+    config::{Config, DrivePart},
+    failure::Failure,
+    one_drive::{open_drive, open_line},
+    signals::Ending,
+};
 
 /// Watch and command the drives of a configuration
 ///
@@ -30,7 +35,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
     let mut ending = Ending::listen()?;
     let lines = open_lines(&config).await?;
-    let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
+    let fleet = build(&config, &lines)?.start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
@@ -60,12 +65,14 @@ async fn open_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     Ok(lines)
 }
 
-fn build(config: &Config, lines: &[Line]) -> FleetBuilder {
-    config.lines.iter().zip(lines).fold(Fleet::builder(), |builder, (part, line)| {
-        let builder = builder.line(part.name.as_str(), line.clone(), part.budget);
-        part.drives.iter().fold(builder, |builder, (drive, settings)| {
-            let port = line.slave(drive.slave.number());
-            builder.drive(part.name.as_str(), settings.clone(), drive.family.open(port, drive.slave))
-        })
-    })
+fn build(config: &Config, lines: &[Line]) -> Result<FleetBuilder, Failure> {
+    let mut builder = Fleet::builder();
+    for (part, line) in config.lines.iter().zip(lines) {
+        builder = builder.line(part.name.as_str(), line.clone(), part.budget);
+        for DrivePart { name, settings, options } in &part.drives {
+            let drive = open_drive(line, *name, options)?;
+            builder = builder.drive(part.name.as_str(), settings.clone(), drive);
+        }
+    }
+    Ok(builder)
 }

@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn of_file(config: Config) -> (Vec<PlannedLine>, Vec<String>) {
     let problems = config.lines.iter().filter_map(|line| Some(line.problem.as_ref()?.to_string())).collect();
     let planned = |line: LinePart| PlannedLine {
-        drives: line.drives.iter().map(|(drive, _)| *drive).zip(line.demands()).collect(),
+        drives: line.drives.iter().map(|drive| drive.name).zip(line.demands()).collect(),
         name: Some(line.name),
         config: line.config,
         budget: line.budget,
