@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod ascii;
 mod bank;
 mod fault;
 mod framing;
@@ -11,12 +10,10 @@ pub mod models;
 mod motor;
 mod pdu;
 mod record;
-mod rtu;
 mod serve;
 mod slave;
 mod state;
 mod unite;
-mod unitelway;
 mod watchdog;
 mod wire;
 

@@ -1,6 +1,6 @@
 //! The line as a test or a program holds it: [`SimLine`], and [`SimSlave`] for one of its drives.
 
-mod slave;
+mod handle;
 
 use std::{
     fmt,
@@ -11,18 +11,15 @@ use std::{
 use drive_core::SerialSettings;
 use tokio::{sync::watch, time::Instant};
 
-pub use slave::SimSlave;
+pub use handle::SimSlave;
 
 use crate::{
-    ascii::Ascii,
     fault::{Fault, Faults, PerMillion},
-    framing::Framing,
+    framing::{Ascii, Framing, Rtu, UniTelway},
     model::{Model, Protocol},
     record::{LineStats, Violation},
-    rtu::Rtu,
     slave::Slave,
     state::{BROADCAST, State},
-    unitelway::UniTelway,
     wire::{Delivery, Pacing, Wire},
 };
 

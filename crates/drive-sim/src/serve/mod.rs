@@ -133,7 +133,9 @@ impl SimLine {
         Ok(Serving::new(tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire))))
     }
 
-    /// Serves masters that speak the line's protocol over TCP, one connection after another: a line has one master.
+    /// Serves masters that speak the line's protocol over TCP, as a serial server does: one connection at a time,
+    /// because a line has one master. The next one waits until it has ended. The service itself ends only with its
+    /// listener.
     #[must_use]
     pub fn serve_rtu_tcp(&self, listener: TcpListener) -> Serving {
         Serving::new(tokio::spawn(tcp::serve_rtu(self.clone(), listener)))
@@ -141,7 +143,7 @@ impl SimLine {
 
     /// Serves Modbus TCP, several connections at once; the unit identifier is the slave's address, 0 is a broadcast.
     /// Answers come after the slave's turnaround; of the faults, [`Fault::Lost`](crate::Fault::Lost) and
-    /// [`Fault::Late`](crate::Fault::Late) act, because TCP itself delivers intact.
+    /// [`Fault::Late`](crate::Fault::Late) act, because TCP itself delivers intact. A client that does not speak Modbus TCP is disconnected.
     #[must_use]
     pub fn serve_modbus_tcp(&self, listener: TcpListener) -> Serving {
         Serving::new(tokio::spawn(tcp::serve_modbus(self.clone(), listener)))

@@ -10,7 +10,12 @@ use tokio::{
     time::Instant,
 };
 
-use crate::{fault::Fault, framing::Content, framing::Speech, line::SimLine, serve::wired};
+use super::wired;
+use crate::{
+    fault::Fault,
+    framing::{Content, Speech},
+    line::SimLine,
+};
 
 /// Transaction, protocol, length, unit.
 const HEADER: usize = 7;
@@ -20,7 +25,7 @@ const LONGEST: usize = 253;
 pub(super) async fn serve_rtu(line: SimLine, listener: TcpListener) -> io::Result<()> {
     loop {
         let (stream, _) = listener.accept().await?;
-        stream.set_nodelay(true)?;
+        hurry(&stream);
         let wire = line.wiring().wire(false);
         // A broken connection ends that master's service, not the line's.
         if let Err(error) = wired::serve(line.shared().clone(), stream, Timer::precise(), wire).await {
@@ -35,7 +40,7 @@ pub(super) async fn serve_modbus(line: SimLine, listener: TcpListener) -> io::Re
         tokio::select! {
             accepted = listener.accept() => {
                 let (stream, _) = accepted?;
-                stream.set_nodelay(true)?;
+                hurry(&stream);
                 connections.spawn(connection(line.clone(), stream));
             }
             Some(ended) = connections.join_next() => {
@@ -44,6 +49,14 @@ pub(super) async fn serve_modbus(line: SimLine, listener: TcpListener) -> io::Re
                 }
             }
         }
+    }
+}
+
+/// A frame is one small write and must not wait for the next. A connection that refuses is gone, and its service shows
+/// it; the endpoint goes on.
+fn hurry(stream: &TcpStream) {
+    if let Err(error) = stream.set_nodelay(true) {
+        tracing::debug!(%error, "connection not hurried");
     }
 }
 

@@ -3,7 +3,7 @@
 use drive_core::serial::CharacterFormat;
 
 use super::*;
-use crate::{models::atv312::Atv312, rtu, slave::Slave};
+use crate::{framing::rtu, models::atv312::Atv312, slave::Slave};
 
 const TURNAROUND: Duration = Duration::from_millis(5);
 

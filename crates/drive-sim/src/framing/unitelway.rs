@@ -13,11 +13,8 @@ use std::{collections::BTreeMap, time::Duration};
 
 use tokio::time::Instant;
 
-use crate::{
-    framing::{Content, Framing, Speech},
-    state::State,
-    unite::LinkCounters,
-};
+use super::{Content, Framing, Speech};
+use crate::{state::State, unite::LinkCounters};
 
 const DLE: u8 = 0x10;
 const STX: u8 = 0x02;

@@ -5,11 +5,8 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::{
-    framing::{Framing, Speech},
-    slave::LINE_FEED,
-    state::State,
-};
+use super::{Framing, Speech};
+use crate::{slave::LINE_FEED, state::State};
 
 const BEGIN: u8 = b':';
 const CARRIAGE_RETURN: u8 = b'\r';

@@ -1,8 +1,14 @@
 //! What a protocol does with the characters of a line, seen from its slaves.
 
+mod ascii;
+pub(crate) mod rtu;
+mod unitelway;
+
 use std::time::Duration;
 
 use tokio::time::Instant;
+
+pub(crate) use self::{ascii::Ascii, rtu::Rtu, unitelway::UniTelway};
 
 use crate::state::State;
 

@@ -12,6 +12,7 @@ use crate::{
 
 /// How often a waiting observer looks. The time of a model passes only while somebody looks at it.
 const LOOK: Duration = Duration::from_millis(1);
+
 /// One drive of a [`SimLine`], as somebody beside the machine reaches it: a handle that is cheap to clone.
 #[derive(Debug, Clone)]
 pub struct SimSlave {
