@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     output::say(format_args!(
-        "{} is a configuration that can work; drived plan --config {0} reckons its lines",
+        "{} is a configuration that can work; drived plan --config {0} calculates its lines",
         args.config.display()
     ))
 }

@@ -22,9 +22,9 @@ use crate::{
     output,
 };
 
-/// Reckon lines before the cable is pulled: cycle, age of values, load, worst stop, feeding of watchdogs
+/// Calculate lines before the cable is pulled: cycle, age of values, load, worst stop, watchdogs
 ///
-/// Of the lines of a configuration, or of one line that is described here. The same is reckoned at 38400 bit/s and with
+/// Of the lines of a configuration, or of one line that is described here. The same is calculated at 38400 bit/s and with
 /// three of the drives dead. No port is opened. Exit code 2, with the arithmetic, for what cannot work.
 #[derive(Debug, clap::Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["config", "line"]))]
