@@ -3,8 +3,8 @@
 use drive_core::{Control, Current, Direction, RawWord, State, Status};
 
 use crate::{
+    blocks::Words,
     frequency::FrequencyUnit,
-    reading::Words,
     registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, SIGNALS, STATE},
     words::{Command, DriveState, Errors, Signals},
 };

@@ -65,6 +65,7 @@ pub mod master;
 pub mod pdu;
 pub mod protocol;
 pub mod schedule;
+mod shared;
 mod slave;
 pub mod stats;
 mod task;

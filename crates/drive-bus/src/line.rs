@@ -1,23 +1,20 @@
 //! [`Line`]: opening, sharing and closing one line.
 
-use std::{
-    fmt, io,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::{fmt, io, sync::Arc, time::Duration};
 
 use tokio::{
     io::{AsyncRead, AsyncWrite},
-    sync::{Notify, watch},
+    sync::watch,
     time::Instant,
 };
 
 use crate::{
-    capture::{self, Dissector, Tap, Writing},
+    capture::{self, Dissector, Writing},
     config::{LineConfig, SlaveSettings},
     master::Master,
     pdu::MAX_PDU,
-    slave::{Caller, Slave},
+    shared::{Handle, Shared},
+    slave::Slave,
     stats::Stats,
     task::Task,
     transport::{BoxedStream, Connector, Given, OpenError},
@@ -77,17 +74,13 @@ impl Line {
 
     fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>) -> Self {
         let (finished, when_finished) = watch::channel(false);
-        let shared = Arc::new(Shared {
-            master: Mutex::new(Master::new(config.clone())),
-            tap: Mutex::new(None),
-            wake: Notify::new(),
-        });
+        let shared = Arc::new(Shared::new(Master::new(config.clone())));
         let task = Task::new(&config, Arc::clone(&shared), connector, stream);
         tokio::spawn(async move {
             task.run().await;
             let _ = finished.send(true);
         });
-        Self { handle: Arc::new(Handle { shared, when_finished }) }
+        Self { handle: Arc::new(Handle::new(shared, when_finished)) }
     }
 
     /// One slave of this line, 1 to 247. Address 0 is [`broadcast`](Self::broadcast).
@@ -138,53 +131,12 @@ impl Line {
     /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is
     /// under way finishes, the port is closed. Returns when it is.
     pub async fn close(&self) {
-        self.handle.shared.close();
-        let mut when_finished = self.handle.when_finished.clone();
-        // An error means that the task is gone with its runtime, and the port with it.
-        let _ = when_finished.wait_for(|finished| *finished).await;
+        self.handle.close().await;
     }
 }
 
 impl fmt::Debug for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Line").field("endpoint", &self.handle.shared.master().config().endpoint).finish()
-    }
-}
-
-/// What every handle of a line shares; its end closes the line.
-pub(crate) struct Handle {
-    pub(crate) shared: Arc<Shared>,
-    when_finished: watch::Receiver<bool>,
-}
-
-impl Drop for Handle {
-    fn drop(&mut self) {
-        self.shared.close();
-    }
-}
-
-/// What the handles and the task share.
-pub(crate) struct Shared {
-    master: Mutex<Master<Caller>>,
-    tap: Mutex<Option<Tap>>,
-    /// Tells the task that the master has something new to do.
-    pub(crate) wake: Notify,
-}
-
-impl Shared {
-    /// The master, locked for the moment of one decision; never across an await.
-    pub(crate) fn master(&self) -> MutexGuard<'_, Master<Caller>> {
-        // A panic elsewhere must not keep a stop from being sent.
-        self.master.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The capture, if there is one.
-    pub(crate) fn tap(&self) -> MutexGuard<'_, Option<Tap>> {
-        self.tap.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn close(&self) {
-        self.master().handle_close();
-        self.wake.notify_one();
     }
 }

@@ -4,14 +4,18 @@ use std::{fmt, io, sync::Arc};
 
 use async_trait::async_trait;
 use drive_core::{Port, PortError, Terms};
-use tokio::{sync::oneshot, time::Instant};
+use tokio::time::Instant;
 use tokio_modbus::{
-    ExceptionCode, Request, Response,
+    Request, Response,
     client::{Client, Context},
     slave::SlaveContext,
 };
 
-use crate::{line::Handle, master::Outcome, protocol::Protocol, schedule::Ticket, unite::UniTe};
+use crate::{
+    protocol::Protocol,
+    schedule::Ticket,
+    shared::{Caller, Handle},
+};
 
 /// One slave of a [`Line`](crate::Line): a tokio-modbus [`Client`] and a drive's [`Port`]. Cheap to clone; each clone has
 /// its own [`Terms`].
@@ -39,12 +43,6 @@ impl Slave {
     #[must_use]
     pub const fn address(&self) -> u8 {
         self.address
-    }
-
-    /// Its UNI-TE requests beyond reading and writing, on a line that speaks UNI-TELWAY, under the same terms.
-    #[must_use]
-    pub fn unite(&self) -> UniTe {
-        UniTe::new(self.clone())
     }
 
     pub(crate) const fn terms(&self) -> Terms {
@@ -75,13 +73,13 @@ impl fmt::Debug for Slave {
 #[async_trait]
 impl Client for Slave {
     async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
-        let (caller, outcome) = oneshot::channel();
+        let (caller, outcome) = Caller::new();
         let submitted = self.handle.shared.master().submit(
             Instant::now(),
             self.address,
             request.into_owned(),
             self.terms,
-            Caller(caller),
+            caller,
         );
         let waiting = match submitted {
             Ok(ticket) => Waiting { handle: &self.handle, ticket: Some(ticket) },
@@ -115,16 +113,6 @@ impl From<Slave> for Context {
     fn from(slave: Slave) -> Self {
         let client: Box<dyn Client> = Box::new(slave);
         Self::from(client)
-    }
-}
-
-/// Who waits for an answer.
-pub(crate) struct Caller(oneshot::Sender<Result<Result<Response, ExceptionCode>, PortError>>);
-
-impl Caller {
-    pub(crate) fn answer(self, outcome: Outcome) {
-        // Whoever dropped the call does not want the answer.
-        let _ = self.0.send(outcome);
     }
 }
 

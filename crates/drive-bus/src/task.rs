@@ -10,9 +10,8 @@ use tokio::{
 
 use crate::{
     config::{Endpoint, LineConfig},
-    line::Shared,
     master::Outcome,
-    slave::Caller,
+    shared::{Caller, Shared},
     transport::{BoxedStream, Connector, OpenError, Opening},
 };
 

@@ -15,6 +15,14 @@ use crate::{
 /// How long a command may wait until it is sent, where its caller has not said so: as in every family.
 const COMMAND_LIFETIME: Duration = Duration::from_secs(1);
 
+impl Slave {
+    /// Its UNI-TE requests beyond reading and writing, on a line that speaks UNI-TELWAY, under the same terms.
+    #[must_use]
+    pub fn unite(&self) -> UniTe {
+        UniTe::new(self.clone())
+    }
+}
+
 /// UNI-TE requests to one slave, under its [`Terms`]. From [`Slave::unite`].
 ///
 /// # Cancellation

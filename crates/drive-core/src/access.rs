@@ -7,11 +7,11 @@ use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 
 use crate::{
     capabilities::Capabilities,
-    drive::{Identity, Written},
     error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
+    identity::Identity,
     port::{Class, Effect, Port, PortError, Terms},
     registers::{
-        Register, Row,
+        Register, Row, Written,
         access::{Readable, Writable},
     },
     setpoint::Command,

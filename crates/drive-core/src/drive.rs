@@ -9,32 +9,11 @@ use crate::{
     capabilities::{Capabilities, Reaction, Watchdog},
     error::{Error, Result, SlaveAddress},
     faults::Faults,
-    registers::{Row, Storage},
+    identity::Identity,
+    registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
-    status::{Measurements, RawWord, Status},
+    status::{Measurements, Status},
 };
-
-/// What a drive says it is. Two drives that differ in any part are different drives.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
-pub struct Identity {
-    /// The vendor's name.
-    pub vendor: Option<String>,
-    /// The model or reference.
-    pub model: Option<String>,
-    /// The version of its firmware, as it writes it.
-    pub version: Option<String>,
-    /// Words that tell one model from another, where the family has registers for it.
-    pub codes: Vec<RawWord>,
-}
-
-/// What became of a written parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Written {
-    /// Whether the drive held another value before; an equal value is not written again.
-    pub changed: bool,
-    /// Where the value lives now.
-    pub storage: Storage,
-}
 
 /// A write to all slaves at once: no slave answers, so nothing is confirmed by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

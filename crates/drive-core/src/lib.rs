@@ -17,6 +17,7 @@ mod drive;
 pub mod drivecom;
 mod error;
 mod faults;
+mod identity;
 pub mod port;
 pub mod registers;
 pub mod serial;
@@ -26,14 +27,15 @@ mod units;
 
 pub use access::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
-pub use drive::{BroadcastWrite, Drive, Identity, Written};
+pub use drive::{BroadcastWrite, Drive};
 pub use error::{
     Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SetpointProblem, SlaveAddress,
     SlaveAddressError,
 };
 pub use faults::{Fault, FaultEntry, Faults};
+pub use identity::Identity;
 pub use port::{Class, Effect, Port, PortError, Terms};
-pub use registers::Row;
+pub use registers::{Row, Written};
 pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
 pub use status::{Control, Measurements, RawWord, State, Status};

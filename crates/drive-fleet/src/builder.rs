@@ -102,6 +102,13 @@ pub struct FleetBuilder {
     events: usize,
 }
 
+impl Fleet {
+    /// Begins a fleet.
+    pub const fn builder() -> FleetBuilder {
+        FleetBuilder::new()
+    }
+}
+
 impl FleetBuilder {
     pub(crate) const fn new() -> Self {
         Self { lines: Vec::new(), members: Vec::new(), events: EVENTS }

@@ -7,14 +7,11 @@ use std::{
 };
 
 use drive_bus::Line;
-use drive_core::StopMode;
 use futures_util::future::join_all;
 use tokio::sync::broadcast::{self, error::RecvError};
 
 use crate::{
-    builder::FleetBuilder,
     event::{Event, ExitAction},
-    group::{Group, NoSuchDrive, StopReport},
     handle::{DriveHandle, Entry},
     plan::LinePlan,
     task::Urgent,
@@ -53,11 +50,6 @@ impl fmt::Debug for Fleet {
 }
 
 impl Fleet {
-    /// Begins a fleet.
-    pub const fn builder() -> FleetBuilder {
-        FleetBuilder::new()
-    }
-
     pub(crate) fn new(
         lines: Vec<LineEntry>,
         entries: Vec<Arc<Entry>>,
@@ -92,27 +84,6 @@ impl Fleet {
     #[must_use]
     pub fn plan(&self, line: &str) -> Option<LinePlan> {
         self.inner.lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan)
-    }
-
-    /// All drives as one group.
-    #[must_use]
-    pub fn all(&self) -> Group {
-        Group::new(self.clone(), self.drives())
-    }
-
-    /// Some drives as one group.
-    ///
-    /// # Errors
-    /// [`NoSuchDrive`] for a name that no drive has.
-    pub fn group<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Group, NoSuchDrive> {
-        let members =
-            names.into_iter().map(|name| self.drive(name).ok_or_else(|| NoSuchDrive(name.to_owned())));
-        Ok(Group::new(self.clone(), members.collect::<Result<_, _>>()?))
-    }
-
-    /// Stops every drive: see [`Group::stop`].
-    pub async fn stop_all(&self, mode: StopMode) -> StopReport {
-        self.all().stop(mode).await
     }
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;

@@ -29,6 +29,29 @@ const MUTE: u32 = 3;
 #[error("the fleet has no drive {0:?}")]
 pub struct NoSuchDrive(pub String);
 
+impl Fleet {
+    /// All drives as one group.
+    #[must_use]
+    pub fn all(&self) -> Group {
+        Group::new(self.clone(), self.drives())
+    }
+
+    /// Some drives as one group.
+    ///
+    /// # Errors
+    /// [`NoSuchDrive`] for a name that no drive has.
+    pub fn group<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Group, NoSuchDrive> {
+        let members =
+            names.into_iter().map(|name| self.drive(name).ok_or_else(|| NoSuchDrive(name.to_owned())));
+        Ok(Group::new(self.clone(), members.collect::<Result<_, _>>()?))
+    }
+
+    /// Stops every drive: see [`Group::stop`].
+    pub async fn stop_all(&self, mode: StopMode) -> StopReport {
+        self.all().stop(mode).await
+    }
+}
+
 /// What became of a stop of several drives.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StopReport {

@@ -56,7 +56,7 @@ mod unit;
 use std::{fmt, marker::PhantomData};
 
 pub use access::Access;
-pub use row::{Choice, Confidence, Factory, Range, Row, Storage};
+pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};
 pub use unit::{Form, Unit};
 
 /// A register with its access in its type.

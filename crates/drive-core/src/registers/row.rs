@@ -28,6 +28,15 @@ impl fmt::Display for Storage {
     }
 }
 
+/// What became of a written parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Written {
+    /// Whether the drive held another value before; an equal value is not written again.
+    pub changed: bool,
+    /// Where the value lives now.
+    pub storage: Storage,
+}
+
 /// One value of a list-type register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Choice {

@@ -8,8 +8,6 @@ use tokio::time::Instant;
 use super::{Asker, Job, Supervisor, permission::Blocked};
 use crate::outcome::{Order, Outcome, Refused, Unconfirmed};
 
-/// How many orders of one drive may wait.
-pub(super) const QUEUE: usize = 16;
 /// An order that waits.
 #[derive(Debug)]
 pub(super) struct Queued {

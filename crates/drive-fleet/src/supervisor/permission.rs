@@ -3,12 +3,15 @@
 use drive_core::{Direction, Result, Setpoint, State, Status};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor, orders::QUEUE};
+use super::{Asker, Job, Supervisor};
 use crate::{
     limits::LimitProblem,
     outcome::{Order, Refused, Until},
     snapshot::{IdentityCheck, Link, WatchdogCheck},
 };
+
+/// How many orders of one drive may wait.
+pub(super) const QUEUE: usize = 16;
 
 /// Why an order cannot be sent now.
 pub(super) enum Blocked {

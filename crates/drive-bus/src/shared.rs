@@ -1,0 +1,82 @@
+//! What the handles of a line and its task share.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::{Notify, oneshot, watch};
+
+use crate::{
+    capture::Tap,
+    master::{Master, Outcome},
+};
+
+/// What every handle of a line shares; its end closes the line.
+pub(crate) struct Handle {
+    pub(crate) shared: Arc<Shared>,
+    when_finished: watch::Receiver<bool>,
+}
+
+impl Handle {
+    /// The handle of a line whose task says through `when_finished` that it has ended.
+    pub(crate) const fn new(shared: Arc<Shared>, when_finished: watch::Receiver<bool>) -> Self {
+        Self { shared, when_finished }
+    }
+
+    /// Closes the line and returns when its task has ended.
+    pub(crate) async fn close(&self) {
+        self.shared.close();
+        let mut when_finished = self.when_finished.clone();
+        // An error means that the task is gone with its runtime, and the port with it.
+        let _ = when_finished.wait_for(|finished| *finished).await;
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.shared.close();
+    }
+}
+
+/// What the handles and the task share.
+pub(crate) struct Shared {
+    master: Mutex<Master<Caller>>,
+    tap: Mutex<Option<Tap>>,
+    /// Tells the task that the master has something new to do.
+    pub(crate) wake: Notify,
+}
+
+impl Shared {
+    pub(crate) fn new(master: Master<Caller>) -> Self {
+        Self { master: Mutex::new(master), tap: Mutex::new(None), wake: Notify::new() }
+    }
+
+    /// The master, locked for the moment of one decision; never across an await.
+    pub(crate) fn master(&self) -> MutexGuard<'_, Master<Caller>> {
+        // A panic elsewhere must not keep a stop from being sent.
+        self.master.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The capture, if there is one.
+    pub(crate) fn tap(&self) -> MutexGuard<'_, Option<Tap>> {
+        self.tap.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn close(&self) {
+        self.master().handle_close();
+        self.wake.notify_one();
+    }
+}
+
+/// Who waits for an answer.
+pub(crate) struct Caller(oneshot::Sender<Outcome>);
+
+impl Caller {
+    pub(crate) fn new() -> (Self, oneshot::Receiver<Outcome>) {
+        let (caller, outcome) = oneshot::channel();
+        (Self(caller), outcome)
+    }
+
+    pub(crate) fn answer(self, outcome: Outcome) {
+        // Whoever dropped the call does not want the answer.
+        let _ = self.0.send(outcome);
+    }
+}
