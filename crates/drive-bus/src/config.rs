@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
+pub use crate::exchange::echo::Echo;
 use crate::{
     exchange::{ascii, rtu, unitelway},
     protocol::Protocol,
@@ -20,20 +21,6 @@ pub enum Endpoint {
     ModbusTcp(String),
     /// A stream that the caller brings, see [`Line::over`](crate::Line::over).
     Stream,
-}
-
-/// Whether the adapter gives back what we send (two-wire adapters whose receiver stays on while they transmit).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Echo {
-    /// It does not.
-    #[default]
-    Off,
-    /// It does: what we send comes back first and is taken away. An answer that equals its request (functions 05, 06,
-    /// 08, 16h) counts only when it comes a second time.
-    On,
-    /// Found out by the line. Where the first request after opening would have an answer equal to itself, the line
-    /// reads one register of that slave first, because only the echo of a read can be told from its answer.
-    Auto,
 }
 
 /// The kernel's RS-485 mode: it switches the transmitter with RTS (Linux `TIOCSRS485`). For UARTs whose driver has it;

@@ -27,8 +27,11 @@ use self::{
     delimiter::{Delimiters, new_delimiter},
     frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver},
 };
-use super::{Exchange, Failure, Step, Stray, echo::EchoState};
-use crate::{answer, config::Echo};
+use super::{
+    Exchange, Failure, Step, Stray,
+    echo::{Echo, EchoState},
+};
+use crate::answer;
 
 /// What may come in during one exchange before it is given up: somebody who never stops talking.
 const MAX_RECEIVED: usize = 4 * MAX_FRAME;

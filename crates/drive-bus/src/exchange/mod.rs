@@ -3,7 +3,7 @@
 //! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
 
 pub mod ascii;
-mod echo;
+pub(crate) mod echo;
 pub mod mbap;
 pub mod rtu;
 pub mod unitelway;

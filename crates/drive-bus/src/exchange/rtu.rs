@@ -17,8 +17,10 @@ use tokio_modbus::Request;
 pub use self::frame::{frame, is_frame};
 
 use self::frame::MAX_FRAME;
-use super::{Exchange, Failure, Step, Stray, echo::EchoState};
-use crate::config::Echo;
+use super::{
+    Exchange, Failure, Step, Stray,
+    echo::{Echo, EchoState},
+};
 
 /// What may come in during one exchange before it is given up: somebody who never stops talking.
 const MAX_RECEIVED: usize = 4 * MAX_FRAME;
