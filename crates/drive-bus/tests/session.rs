@@ -224,3 +224,32 @@ async fn a_port_without_an_rs485_mode_says_so() {
     assert!(matches!(error, OpenError::Rs485 { .. }), "{error}");
     assert_eq!(drive_bus::adapter_latency(path.as_ref()), None);
 }
+
+#[tokio::test(start_paused = true)]
+async fn an_answer_that_was_on_its_way_when_the_port_was_lost_is_never_taken_for_the_next() {
+    let (line, mut opened, _plugged) = pluggable();
+    let call = |address| {
+        let mut slave = line.slave(1);
+        tokio::spawn(async move {
+            let answer = slave.call(Request::ReadHoldingRegisters(address, 1)).await;
+            answer.map_err(PortError::from_modbus)
+        })
+    };
+    let first = call(7);
+    let mut port = opened.recv().await.unwrap();
+    let mut bytes = [0; 64];
+    assert!(port.read(&mut bytes).await.unwrap() > 0);
+    // Its caller has lost patience: nothing is asked again.
+    first.abort();
+    drop(port);
+    let mut port = opened.recv().await.unwrap();
+    let second = call(8);
+    // What a serial server still has of the line it gives to the next connection.
+    let late = rtu::frame(1, &[3, 2, 0xAA, 0xAA]);
+    tokio::time::sleep(10 * MS).await;
+    port.write_all(&late).await.unwrap();
+    serve_one(&mut port).await;
+    let answer = second.await.unwrap().unwrap();
+    assert_eq!(answer, Ok(tokio_modbus::Response::ReadHoldingRegisters(vec![1])));
+    assert_eq!(line.stats().slaves[&1].late, 1);
+}

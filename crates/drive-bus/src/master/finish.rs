@@ -68,7 +68,6 @@ impl<C> Master<C> {
     }
 
     fn note_failure(&mut self, now: Instant, flight: &Flight<C>, failure: &Failure) {
-        let confuses = self.exchange.confuses_late_answers();
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
             Failure::Damaged(_) | Failure::Refused(_) => {
@@ -78,14 +77,23 @@ impl<C> Master<C> {
             Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
             Failure::Timeout => station.stats.outcomes.timeouts += 1,
         }
-        if confuses {
-            let sent = flight.sent.map_or(now, |sent| sent.end);
-            let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
-            station.expect_late(kind, sent + self.config.late_window);
-        }
-        if *failure == Failure::Timeout && station.missed(now, &self.config) {
+        let goes_offline = *failure == Failure::Timeout && station.missed(now, &self.config);
+        self.fear_late_answer(now, flight);
+        if goes_offline {
             self.go_offline(now, flight.slave);
         }
+    }
+
+    /// The exchange has ended without its answer, which may still come: also over the next connection, from a serial
+    /// server that has kept it.
+    fn fear_late_answer(&mut self, now: Instant, flight: &Flight<C>) {
+        if flight.slave == 0 || !self.exchange.confuses_late_answers() {
+            return;
+        }
+        let sent = flight.sent.map_or(now, |sent| sent.end);
+        let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
+        let until = sent + self.config.late_window;
+        self.station(flight.slave).expect_late(kind, until);
     }
 
     fn go_offline(&mut self, now: Instant, slave: u8) {
@@ -158,6 +166,7 @@ impl<C> Master<C> {
     pub(super) fn fail_flight(&mut self, now: Instant, reason: &str) {
         self.to_send = None;
         let Some(flight) = self.flight.take() else { return };
+        self.fear_late_answer(now, &flight);
         let Purpose::Call(Some(mut entry)) = flight.purpose else { return };
         if entry.work.is_write {
             self.outcomes.push_back((entry.work.caller, Err(PortError::OutcomeUnknown("the line was lost"))));
