@@ -6,7 +6,9 @@ use clap::{Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
 use crate::{
-    commands::{check, demo, families, faults, param, plan, poll, reset, setpoint, sim, start, status, stop},
+    commands::{
+        check, demo, families, faults, param, plan, poll, reset, scan, setpoint, sim, start, status, stop,
+    },
     failure::Failure,
     output, run,
 };
@@ -17,7 +19,7 @@ To try it:          demo; or sim in one terminal and poll, status, start in anot
 Before wiring:      families, plan
 One drive, read:    status, faults, param get, param dump
 One drive, write:   setpoint, start, stop, reset, param set
-One line, read:     poll
+One line, read:     scan, poll
 The plant's drives: check, plan, run, each with --config FILE
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
@@ -41,6 +43,7 @@ pub(crate) enum Command {
     Check(check::Args),
     Sim(sim::Args),
     Plan(plan::Args),
+    Scan(scan::Args),
     Poll(poll::Args),
     Status(status::Args),
     Start(start::Args),
@@ -72,6 +75,7 @@ impl Command {
             Self::Check(args) => check::run(&args),
             Self::Sim(args) => sim::run(args).await,
             Self::Plan(args) => plan::run(&args),
+            Self::Scan(args) => scan::run(args).await,
             Self::Poll(args) => poll::run(args).await,
             Self::Status(args) => status::run(args).await,
             Self::Start(args) => start::run(args).await,

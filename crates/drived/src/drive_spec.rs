@@ -55,37 +55,19 @@ pub(crate) fn on_one_line(specs: &[DriveSpec]) -> Result<Vec<DriveName>, Address
 /// Drives of one line as a person lists them, each with the name that its owner gave it:
 /// `atv312@1-10,12 (fan 1 … fan 12)`.
 pub(crate) fn listed(drives: &[(DriveName, String)]) -> String {
-    let mut text = String::new();
-    let mut last: Option<DriveName> = None;
-    let mut in_range = false;
-    let mut drives_after = drives.iter().skip(1);
-    for (name, _) in drives {
-        let follows = |last: DriveName, next: DriveName| {
-            last.family == next.family && last.slave.number().checked_add(1) == Some(next.slave.number())
-        };
-        let goes_on = drives_after.next().is_some_and(|(next, _)| follows(*name, *next));
-        match last {
-            Some(last) if follows(last, *name) && goes_on => in_range = true,
-            Some(last) if follows(last, *name) => {
-                text.push_str(&format!("{}{}", if in_range { '-' } else { ',' }, name.slave));
-                in_range = false;
-            }
-            Some(last) if last.family == name.family => text.push_str(&format!(",{}", name.slave)),
-            Some(_) => text.push_str(&format!(" {name}")),
-            None => text.push_str(&name.to_string()),
-        }
-        last = Some(*name);
-    }
-    let own = |drive: &(DriveName, String)| drive.1 != drive.0.to_string();
-    match (drives.first(), drives.last()) {
-        (Some(first), Some(end)) if own(first) && drives.len() == 2 => {
-            format!("{text} ({}, {})", first.1, end.1)
-        }
-        (Some(first), Some(end)) if own(first) && drives.len() > 1 => {
-            format!("{text} ({} … {})", first.1, end.1)
-        }
-        (Some(first), _) if own(first) => format!("{text} ({})", first.1),
-        _ => text,
+    let of_family = |drives: &[(DriveName, String)]| {
+        let slaves = Addresses(drives.iter().map(|(name, _)| name.slave).collect());
+        drives.first().map(|(name, _)| format!("{}@{slaves}", name.family))
+    };
+    let families: Vec<String> =
+        drives.chunk_by(|(one, _), (next, _)| one.family == next.family).filter_map(of_family).collect();
+    let text = families.join(" ");
+    match drives {
+        [(name, own), ..] if *own == name.to_string() => text,
+        [(_, only)] => format!("{text} ({only})"),
+        [(_, first), (_, second)] => format!("{text} ({first}, {second})"),
+        [(_, first), .., (_, last)] => format!("{text} ({first} … {last})"),
+        [] => text,
     }
 }
 
@@ -122,10 +104,31 @@ impl FromStr for DriveSpec {
     fn from_str(text: &str) -> Result<Self, DriveSpecError> {
         let (family, addresses) = text.split_once('@').ok_or(DriveSpecError::Form)?;
         let family: Family = family.parse()?;
+        let Addresses(slaves) = addresses.parse()?;
+        let capabilities = family.capabilities();
+        match slaves.iter().find(|slave| slave.number() > capabilities.highest_address) {
+            Some(&slave) => Err(DriveSpecError::TooHigh {
+                slave,
+                family: capabilities.name,
+                highest: capabilities.highest_address,
+            }),
+            None => Ok(Self { family, slaves }),
+        }
+    }
+}
+
+/// Addresses in the order in which they were named, each at most once: `1-10,12`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Addresses(pub(crate) Vec<SlaveAddress>);
+
+impl FromStr for Addresses {
+    type Err = DriveSpecError;
+
+    fn from_str(text: &str) -> Result<Self, DriveSpecError> {
         let mut slaves = Vec::new();
-        for part in addresses.split(',') {
+        for part in text.split(',') {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
-            let (first, last) = (address(family, first)?, address(family, last)?);
+            let (first, last) = (address(first)?, address(last)?);
             if first > last {
                 return Err(DriveSpecError::Backwards(part.to_owned()));
             }
@@ -137,22 +140,30 @@ impl FromStr for DriveSpec {
                 slaves.push(slave);
             }
         }
-        Ok(Self { family, slaves })
+        Ok(Self(slaves))
     }
 }
 
-fn address(family: Family, text: &str) -> Result<SlaveAddress, DriveSpecError> {
-    let number: u8 = text.parse().map_err(|_| DriveSpecError::Number(text.to_owned()))?;
-    let slave = SlaveAddress::try_from(number)?;
-    let capabilities = family.capabilities();
-    if slave.number() > capabilities.highest_address {
-        return Err(DriveSpecError::TooHigh {
-            slave,
-            family: capabilities.name,
-            highest: capabilities.highest_address,
-        });
+/// It prints as it can be written, ranges of three and more as such.
+impl fmt::Display for Addresses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let follows =
+            |one: &SlaveAddress, next: &SlaveAddress| one.number().checked_add(1) == Some(next.number());
+        for (index, range) in self.0.chunk_by(follows).enumerate() {
+            let comma = if index > 0 { "," } else { "" };
+            match range {
+                [first, .., last] if range.len() > 2 => write!(f, "{comma}{first}-{last}")?,
+                [first, last] => write!(f, "{comma}{first},{last}")?,
+                _ => range.iter().try_for_each(|slave| write!(f, "{comma}{slave}"))?,
+            }
+        }
+        Ok(())
     }
-    Ok(slave)
+}
+
+fn address(text: &str) -> Result<SlaveAddress, DriveSpecError> {
+    let number: u8 = text.parse().map_err(|_| DriveSpecError::Number(text.to_owned()))?;
+    Ok(SlaveAddress::try_from(number)?)
 }
 
 #[cfg(test)]

@@ -64,8 +64,9 @@ pub(crate) fn at(
         return None;
     }
     let serial = SerialSettings::new(baud, config.serial.format()).ok()?;
-    let forbidden = check(serial, config.protocol, drives).err();
-    Some((LineConfig { serial, ..config.clone() }, forbidden))
+    let config = LineConfig { serial, ..config.clone() };
+    let forbidden = check(&config, drives).err();
+    Some((config, forbidden))
 }
 
 /// What a line is, for a person.
@@ -75,6 +76,18 @@ pub(crate) fn describe(config: &LineConfig) -> String {
         Endpoint::RtuOverTcp(address) => format!("rtu+tcp://{address}, {}", config.serial),
         Endpoint::ModbusTcp(address) => format!("tcp://{address}"),
         Endpoint::Stream => config.serial.to_string(),
+    }
+}
+
+/// A line as `--line` takes it.
+pub(crate) fn written(config: &LineConfig) -> String {
+    let (baud, format) = (config.serial.baud(), config.serial.format());
+    match (&config.endpoint, config.protocol) {
+        (Endpoint::Serial(path), Protocol::Rtu) => format!("{},{baud},{format}", path.display()),
+        (Endpoint::Serial(path), protocol) => format!("{},{baud},{format},{protocol}", path.display()),
+        (Endpoint::RtuOverTcp(address), _) => format!("rtu+tcp://{address},{baud},{format}"),
+        (Endpoint::ModbusTcp(address), _) => format!("tcp://{address}"),
+        (Endpoint::Stream, _) => format!("{baud},{format}"),
     }
 }
 
@@ -112,13 +125,25 @@ impl SerialSpec {
             None => agreed(drives, |name| factory(name).format())?,
         };
         let settings = SerialSettings::new(baud, format)?;
-        check(settings, self.protocol, drives)?;
+        check_serial(settings, self.protocol, drives)?;
         Ok(settings)
     }
 }
 
+/// Whether every drive can live on a line; Modbus TCP has nothing that could not be.
+pub(crate) fn check(config: &LineConfig, drives: &[DriveName]) -> Result<(), LineSpecError> {
+    match config.endpoint {
+        Endpoint::ModbusTcp(_) => Ok(()),
+        _ => check_serial(config.serial, config.protocol, drives),
+    }
+}
+
 /// Whether every drive can be set to this.
-fn check(settings: SerialSettings, protocol: Protocol, drives: &[DriveName]) -> Result<(), LineSpecError> {
+fn check_serial(
+    settings: SerialSettings,
+    protocol: Protocol,
+    drives: &[DriveName],
+) -> Result<(), LineSpecError> {
     for name in drives {
         let spoken = name.family.protocols();
         if !spoken.contains(&protocol.to_string().as_str()) {
@@ -171,7 +196,7 @@ pub(crate) enum LineSpecError {
     TcpProtocol,
     #[error("Modbus TCP has no speed and no format: expected tcp://HOST:PORT")]
     TcpSettings,
-    #[error("no drive is named")]
+    #[error("say which speed and format the line has, such as 19200,8E1")]
     NoDrive,
     #[error("{0}: say which speed and format the line has, such as 19200,8E1")]
     FactorySettings(String),
@@ -292,6 +317,19 @@ mod tests {
             config("tcp://plant:502", &["atv312@1"]).unwrap().endpoint,
             Endpoint::ModbusTcp("plant:502".into())
         );
+    }
+
+    #[test]
+    fn a_line_is_written_as_it_was_read() {
+        for line in [
+            "COM3,9600,8N1",
+            "COM3,9600,7E1,ascii",
+            "COM3,19200,8O1,unitelway",
+            "rtu+tcp://plant:4001,9600,8N1",
+            "tcp://plant:502",
+        ] {
+            assert_eq!(written(&config(line, &["atv58@1"]).unwrap()), line);
+        }
     }
 
     #[test]

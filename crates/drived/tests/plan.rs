@@ -278,10 +278,17 @@ fn modbus_tcp_has_no_speed_to_reckon_with() {
 }
 
 #[test]
-fn the_example_of_the_repository_can_work() {
+fn the_example_of_the_repository_can_work_and_the_manual_shows_what_is_printed_of_it() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/drives.toml");
-    let ended = run(&["plan", "--config", example]);
-    let out = ended.assert_done();
+    let manual = include_str!("../README.md");
+    let planned = run(&["plan", "--config", example]);
+    let out = planned.assert_done();
     assert!(out.contains("line north: 31 drives") && out.contains("all 2 lines: 34 drives"), "{out}");
     assert!(!out.contains("NO"), "{out}");
+    assert!(manual.contains(out), "{out}");
+    let checked = run(&["check", "--config", example]);
+    let (first_line, _) = checked.assert_done().split_once("line south").expect("two lines");
+    assert!(manual.contains(first_line), "{first_line}");
+    let families = run(&["families"]);
+    assert!(manual.contains(families.assert_done()), "{families:?}");
 }

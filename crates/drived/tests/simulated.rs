@@ -192,3 +192,23 @@ fn a_parameter_is_saved_to_eeprom_only_when_that_is_asked_for_and_it_was_changed
     assert!(saved.assert_done().contains("has saved its parameters to EEPROM by CMI bit 1"), "{saved:?}");
     set("atv58@3", &["ACC", "4.5", "--save"]).assert_refused(2, "no command that saves its parameters");
 }
+
+#[test]
+fn a_scan_says_how_long_it_takes_then_names_who_answers_and_how_to_go_on() {
+    let sim = Sim::serve_with("scan", &["atv312@1-2", "3g3ev@5"], &["--baud", "19200", "--format", "8E1"]);
+    let line = format!("{},19200,8E1", sim.link());
+    let scan = run(&["scan", "--line", &line, "--addresses", "1-6"]);
+    let out = scan.assert_done();
+    // Six requests of 8 characters, t3.5 and the 100 ms of the wait: 639.5 ms.
+    assert!(out.starts_with("asking 6 addresses on ") && out.contains(": 640 ms if none answers"), "{out}");
+    assert!(out.contains("    2  atv312 (TELEMECANIQUE ATV312HU15N4 0102), by its own words\n"), "{out}");
+    assert!(out.contains("    5  likely 3g3ev, by its registers\n"), "{out}");
+    assert!(out.contains("3 of 6 addresses answer\n"), "{out}");
+    let next = format!("drived poll --line {line} --drive atv312@1,2 --drive 3g3ev@5");
+    assert!(out.contains(&next), "{out}");
+
+    run(&["scan", "--line", &line, "--addresses", "7-8"]).assert_refused(1, "none of 2 addresses answers");
+    run(&["scan", "--line", sim.link()]).assert_refused(2, "say which speed and format the line has");
+    run(&["scan", "--line", &line, "--addresses", "0-8"]).assert_refused(2, "0 is not a slave address");
+    run(&["scan", "--line", &line, "--wait", "0"]).assert_refused(2, "how long to wait");
+}

@@ -8,6 +8,7 @@ pub(crate) mod param;
 pub(crate) mod plan;
 pub(crate) mod poll;
 pub(crate) mod reset;
+pub(crate) mod scan;
 pub(crate) mod setpoint;
 pub(crate) mod sim;
 pub(crate) mod start;
