@@ -57,7 +57,12 @@ fn a_drive_that_does_not_answer_is_named_and_the_exit_code_is_1() {
     for subcommand in [&["status"][..], &["start"], &["reset"]] {
         sim.on("atv312@2", subcommand).assert_refused(1, "atv312@2 does not answer");
     }
-    sim.on("atv312@2", &["stop"]).assert_refused(1, "STOP NOT CONFIRMED");
+    let stop = sim.on("atv312@2", &["stop"]);
+    stop.assert_refused(1, "STOP NOT CONFIRMED");
+    assert!(
+        stop.out.starts_with("atv312@2 has not confirmed the stop (1 of 5), it is sent again\n"),
+        "{stop:?}"
+    );
     let poll =
         run(&["poll", "--line", sim.link(), "--drive", "atv312@1-2", "--period", "0", "--seconds", "3"]);
     assert_eq!(poll.code, Some(1), "{poll:?}");

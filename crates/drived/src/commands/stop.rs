@@ -84,6 +84,13 @@ async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
             ErrorKind::Unsupported | ErrorKind::Refused => return Err(alarm(one, &error)),
             _ => why = Some(error),
         }
+        if attempt < ATTEMPTS {
+            // Whoever waits for it has to know at once that the motor may turn. A reader who went away ends no stop.
+            let _ = output::say(format_args!(
+                "{} has not confirmed the stop ({attempt} of {ATTEMPTS}), it is sent again",
+                one.name
+            ));
+        }
     }
     Err(why.map_or_else(
         || Failure::Drive(format!("{} was not asked to stop", one.name)),
