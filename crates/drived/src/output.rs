@@ -178,6 +178,11 @@ fn broken(text: &str, width: usize, set_in: usize) -> Vec<String> {
     lines
 }
 
+/// A number of things: `1 drive`, `31 drives`.
+pub(crate) fn counted(number: usize, one: &str, several: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { several })
+}
+
 /// A value, or a dash where there is none.
 pub(crate) fn or_dash(value: Option<impl fmt::Display>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| value.to_string())

@@ -110,14 +110,12 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
         // It is given up after a frame's longest babble and an adapter's longest pause.
         let babble = characters(baud, 256) + 20 * MS;
         let pause = family.turnaround.as_nanos();
-        assert_eq!(
-            cell("a stop is on the wire"),
-            shown(longest + timeout + answered + babble + t3_5(baud) + pause)
-        );
+        let wire = longest + timeout + answered + babble + t3_5(baud) + pause;
+        assert_eq!(cell("a stop is on the wire"), shown(wire));
 
-        // One exchange is under way, a broadcast goes out, then three writes and a status of each, and each mute
+        // When it is on the wire, a broadcast goes out, then three writes and a status of each, and each mute
         // drive costs three answers until the line takes it for off-line.
-        let stop = answer + 100 * MS + 4 * living * read(baud) + 3 * dead * answer;
+        let stop = wire + 100 * MS + 4 * living * read(baud) + 3 * dead * answer;
         assert_eq!(cell("all have confirmed"), shown(stop));
     }
 }

@@ -212,7 +212,7 @@ fn a_scan_says_how_long_it_takes_then_names_who_answers_and_how_to_go_on() {
     let next = format!("drived poll --line {line} --drive atv312@1,2 --drive 3g3ev@5");
     assert!(out.contains(&next), "{out}");
 
-    run(&["scan", "--line", &line, "--addresses", "7-8"]).assert_refused(1, "none of 2 addresses answers");
+    run(&["scan", "--line", &line, "--addresses", "7-8"]).assert_refused(1, "nobody answers at 2 addresses");
     run(&["scan", "--line", sim.link()]).assert_refused(2, "say which speed and format the line has");
     run(&["scan", "--line", &line, "--addresses", "0-8"]).assert_refused(2, "0 is not a slave address");
     run(&["scan", "--line", &line, "--wait", "0"]).assert_refused(2, "how long to wait");

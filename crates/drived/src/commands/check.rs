@@ -27,8 +27,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     for LinePart { name, config, drives, .. } in &config.lines {
         let controlled = drives.iter().filter(|drive| drive.settings.control).count();
         output::say(format_args!(
-            "line {name}: {} drives, {controlled} under control, on {}",
-            drives.len(),
+            "line {name}: {}, {controlled} under control, on {}",
+            output::counted(drives.len(), "drive", "drives"),
             line_spec::describe(config)
         ))?;
         for (names, first) in alike(drives) {

@@ -79,7 +79,8 @@ fn announce(config: &LineConfig, addresses: usize) -> Result<(), Failure> {
     let silent = budget.lost_slot().saturating_mul(number);
     let look = budget.read_slot().max(Duration::from_millis(1)) * LOOKS;
     output::say(format_args!(
-        "asking {addresses} addresses on {}: {} if none answers, up to about {} more for each that does; only reads",
+        "asking {} on {}: {} if none answers, up to about {} more for each that does; only reads",
+        output::counted(addresses, "address", "addresses"),
         line_spec::describe(config),
         output::bound(silent),
         output::bound(look)
@@ -182,11 +183,15 @@ impl Found {
         let Self { answered, damaged, known } = self;
         if answered + damaged == 0 {
             return Err(Failure::Drive(format!(
-                "none of {addresses} addresses answers: see that the drives are switched on and wired, and try the other \
-                 speeds and formats that they can be set to (drived families)"
+                "nobody answers at {}: see that the drives are switched on and wired, and try the other \
+                 speeds and formats that they can be set to (drived families)",
+                output::counted(addresses, "address", "addresses")
             )));
         }
-        output::say(format_args!("{answered} of {addresses} addresses answer"))?;
+        output::say(format_args!(
+            "{answered} of {} answer",
+            output::counted(addresses, "address", "addresses")
+        ))?;
         if !known.is_empty() {
             let drives = known
                 .iter()

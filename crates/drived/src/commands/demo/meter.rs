@@ -25,14 +25,14 @@ struct Sample {
 
 /// What [`Meter::cells`] are.
 pub(super) const HEADS: [&str; 8] =
-    ["line", "used", "polls/s", "silences", "shortest", "t3.5", "timeouts", "CRC errors"];
+    ["line", "used", "polls/s", "silences", "shortest", "t3.5", "timeouts", "damaged"];
 
 /// The line's numbers on one line of text, for what is no table.
 pub(super) fn sentence(
     [line, used, polls, silences, shortest, t3_5, timeouts, damaged]: [String; 8],
 ) -> String {
     format!(
-        "{line}: {used} used, {polls} polls/s, {timeouts} timeouts, {damaged} CRC errors,\n          \
+        "{line}: {used} used, {polls} polls/s, {timeouts} timeouts, {damaged} damaged,\n          \
          {silences} silences, the shortest {shortest} (t3.5 is {t3_5})"
     )
 }

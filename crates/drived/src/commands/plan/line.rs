@@ -35,8 +35,8 @@ pub(super) struct Case {
     pub(super) reckoning: Reckoning,
     /// How long a stop waits until it is on the wire, at the most.
     pub(super) stop_to_the_wire: Duration,
-    /// How many drives are dead.
-    pub(super) dead: u32,
+    /// How long it takes at the most until all living drives have confirmed a stop.
+    pub(super) all_stopped: Duration,
     /// Why the case cannot be, though it can be reckoned.
     pub(super) hypothetical: Option<String>,
 }
@@ -61,13 +61,12 @@ impl PlannedLine {
     fn case(&self, label: String, config: &LineConfig, dead: usize) -> Case {
         let budget = LineBudget { response: self.budget.response, ..LineBudget::of(config) };
         let demands: Vec<Demand> = self.drives.iter().map(|(_, demand)| demand.clone()).collect();
-        Case {
-            label,
-            reckoning: reckon(budget, &demands, dead),
-            stop_to_the_wire: self.stop_to_the_wire(config),
-            dead: u32::try_from(dead).unwrap_or(u32::MAX),
-            hypothetical: None,
-        }
+        let reckoning = reckon(budget, &demands, dead);
+        let stop_to_the_wire = self.stop_to_the_wire(config);
+        let stop_all = reckoning.plan.stop_all(u32::try_from(dead).unwrap_or(u32::MAX));
+        // It begins with an exchange of the usual length that is under way, and here the longest is reckoned with.
+        let all_stopped = stop_all.saturating_sub(budget.lost_slot()) + stop_to_the_wire;
+        Case { label, reckoning, stop_to_the_wire, all_stopped, hypothetical: None }
     }
 
     /// The longest wait of a stop, once the line knows whether its adapter echoes.

@@ -34,8 +34,8 @@ impl Sheet<'_> {
     pub(super) fn say(self) -> Result<(), Failure> {
         let name = self.line.name.as_ref().map_or_else(|| "line".to_owned(), |name| format!("line {name}"));
         output::say(format_args!(
-            "{name}: {} drives on {}; answers after {:?}, given up after {:?}",
-            self.line.drives.len(),
+            "{name}: {} on {}; answers after {:?}, given up after {:?}",
+            output::counted(self.line.drives.len(), "drive", "drives"),
             line_spec::describe(&self.line.config),
             self.line.budget.response,
             self.line.budget.response_timeout,
@@ -66,7 +66,7 @@ impl Sheet<'_> {
         row("used by polls and watchdogs", &|case| output::percent(case.reckoning.plan.utilisation_ppm));
         row("left for commands", &|case| output::percent(case.reckoning.plan.left_ppm()));
         row(ON_THE_WIRE, &|case| output::bound(case.stop_to_the_wire));
-        row(ALL_STOPPED, &|case| output::bound(case.reckoning.plan.stop_all(case.dead)));
+        row(ALL_STOPPED, &|case| output::bound(case.all_stopped));
         for alike in self.alike() {
             row(&drive_spec::listed(&alike.names), &|_| String::new());
             let periods = alike.periods;
@@ -157,6 +157,6 @@ pub(super) fn say_all_lines(lines: &[(&PlannedLine, Vec<Case>)]) -> Result<(), F
         table.cells([label.to_owned()].into_iter().chain(labels.iter().map(slowest)));
     };
     row(ON_THE_WIRE, &|case| case.stop_to_the_wire);
-    row(ALL_STOPPED, &|case| case.reckoning.plan.stop_all(case.dead));
+    row(ALL_STOPPED, &|case| case.all_stopped);
     output::say_table(table)
 }
