@@ -12,6 +12,7 @@ mod pdu;
 mod record;
 mod serve;
 mod slave;
+mod speech;
 mod state;
 mod unite;
 mod watchdog;

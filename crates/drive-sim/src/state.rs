@@ -7,10 +7,10 @@ use tokio::time::Instant;
 
 use crate::{
     fault::Faults,
-    framing::{Content, Speech},
     model::Cast,
     record::{Breach, KEPT, LineStats, Violation},
     slave::{LineCounters, Slave},
+    speech::{Content, Speech},
 };
 
 /// The address that every slave hears and none answers.

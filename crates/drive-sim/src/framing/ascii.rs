@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use super::{Framing, Speech};
-use crate::{slave::LINE_FEED, state::State};
+use super::Framing;
+use crate::{slave::LINE_FEED, speech::Speech, state::State};
 
 const BEGIN: u8 = b':';
 const CARRIAGE_RETURN: u8 = b'\r';

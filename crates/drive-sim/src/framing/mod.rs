@@ -10,26 +10,10 @@ use tokio::time::Instant;
 
 pub(crate) use self::{ascii::Ascii, rtu::Rtu, unitelway::UniTelway};
 
-use crate::state::State;
-
-/// Something that a slave is about to say.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Speech {
-    pub(crate) slave: u8,
-    pub(crate) content: Content,
-    /// When the last bit of what it answers was on the wire, and how long the slave waits after it.
-    pub(crate) heard: Instant,
-    pub(crate) turnaround: Duration,
-}
-
-/// What is said.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Content {
-    /// A message, still to be put into a frame.
-    Message(Vec<u8>),
-    /// Characters of the protocol itself, such as an acknowledgement.
-    Signal(Vec<u8>),
-}
+use crate::{
+    speech::{Content, Speech},
+    state::State,
+};
 
 /// The slaves' side of a protocol. It has no clock: it is told when each character ended, and when a
 /// silence has ended a frame.

@@ -6,8 +6,8 @@ use std::time::Duration;
 use crc::{CRC_16_MODBUS, Crc};
 use tokio::time::Instant;
 
-use super::{Framing, Speech};
-use crate::state::State;
+use super::Framing;
+use crate::{speech::Speech, state::State};
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 /// The longest frame (MODBUS over Serial Line V1.02 p. 13).

@@ -13,8 +13,12 @@ use std::{collections::BTreeMap, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{Content, Framing, Speech};
-use crate::{state::State, unite::LinkCounters};
+use super::Framing;
+use crate::{
+    speech::{Content, Speech},
+    state::State,
+    unite::LinkCounters,
+};
 
 const DLE: u8 = 0x10;
 const STX: u8 = 0x02;

@@ -13,8 +13,8 @@ use tokio::{
 use super::wired;
 use crate::{
     fault::Fault,
-    framing::{Content, Speech},
     line::SimLine,
+    speech::{Content, Speech},
 };
 
 /// Transaction, protocol, length, unit.

@@ -12,8 +12,9 @@ use tokio::time::Instant;
 use self::transmission::{Overlap, Transmission};
 use crate::{
     fault::{Fault, flip},
-    framing::{Framing, Speech},
+    framing::Framing,
     record::Breach,
+    speech::Speech,
     state::State,
 };
 

@@ -11,8 +11,8 @@ use super::{
 };
 use crate::{
     fault::{Fault, flip},
-    framing::{Content, Speech},
     pdu::is_confirmation,
+    speech::{Content, Speech},
     state::State,
 };
 
