@@ -66,19 +66,6 @@ impl ChartState {
     }
 }
 
-/// What to do next on the way to operation enabled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Step {
-    /// Write this to the low byte of the control word, then read the status again.
-    Write(u16),
-    /// Read the status again: the drive leaves this state by itself.
-    Wait,
-    /// Run commands act.
-    Reached,
-    /// A fault stands in the way; only a reset leads on, and nobody resets unasked.
-    Faulted,
-}
-
 /// CMD 0000h: disable voltage; a running motor coasts.
 pub const DISABLE_VOLTAGE: u16 = 0x0000;
 /// CMD 0002h: quick stop.
@@ -92,34 +79,9 @@ pub const ENABLE_OPERATION: u16 = 0x000F;
 /// CMD 0080h: fault reset on its rising edge.
 pub const FAULT_RESET: u16 = 0x0080;
 
-/// The next step from a state to operation enabled.
-#[must_use]
-pub const fn next_step(state: ChartState) -> Step {
-    match state {
-        ChartState::Fault | ChartState::FaultReactionActive => Step::Faulted,
-        ChartState::NotReadyToSwitchOn => Step::Wait,
-        ChartState::QuickStopActive => Step::Write(DISABLE_VOLTAGE),
-        ChartState::SwitchOnDisabled => Step::Write(SHUTDOWN),
-        ChartState::ReadyToSwitchOn => Step::Write(SWITCH_ON),
-        ChartState::SwitchedOn => Step::Write(ENABLE_OPERATION),
-        ChartState::OperationEnabled => Step::Reached,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const STATES: [ChartState; 8] = [
-        ChartState::NotReadyToSwitchOn,
-        ChartState::SwitchOnDisabled,
-        ChartState::ReadyToSwitchOn,
-        ChartState::SwitchedOn,
-        ChartState::OperationEnabled,
-        ChartState::QuickStopActive,
-        ChartState::FaultReactionActive,
-        ChartState::Fault,
-    ];
 
     #[test]
     fn every_status_word_has_the_state_that_the_table_of_page_10_gives_or_none() {
@@ -140,45 +102,6 @@ mod tests {
         // The examples of page 21: steady forward and reverse, accelerating forward and reverse.
         for eta in [0x0627, 0x8627, 0x0227, 0x8227] {
             assert_eq!(ChartState::of(eta), Some(ChartState::OperationEnabled));
-        }
-    }
-
-    #[test]
-    fn only_the_control_words_of_the_manual_are_ever_written() {
-        for state in STATES {
-            if let Step::Write(word) = next_step(state) {
-                assert!([DISABLE_VOLTAGE, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION].contains(&word));
-            }
-        }
-    }
-
-    #[test]
-    fn nothing_leads_out_of_a_fault() {
-        for state in STATES {
-            assert_eq!(next_step(state) == Step::Faulted, state.is_fault(), "{state:?}");
-        }
-    }
-
-    #[test]
-    fn the_ladder_reaches_operation_enabled_from_every_state_without_a_fault() {
-        // The drive's side of the table on page 12, for the words that the ladder writes.
-        let follow = |state, word| match (state, word) {
-            (_, DISABLE_VOLTAGE) => ChartState::SwitchOnDisabled,
-            (ChartState::SwitchOnDisabled, SHUTDOWN) => ChartState::ReadyToSwitchOn,
-            (ChartState::ReadyToSwitchOn, SWITCH_ON) => ChartState::SwitchedOn,
-            (ChartState::SwitchedOn, ENABLE_OPERATION) => ChartState::OperationEnabled,
-            (state, word) => panic!("{word:04X}h does nothing in {state:?}"),
-        };
-        for start in STATES {
-            let mut state = start;
-            for _ in 0..5 {
-                match next_step(state) {
-                    Step::Write(word) => state = follow(state, word),
-                    Step::Wait => state = ChartState::SwitchOnDisabled,
-                    Step::Reached | Step::Faulted => break,
-                }
-            }
-            assert!(matches!(next_step(state), Step::Reached | Step::Faulted), "{start:?}");
         }
     }
 }

@@ -2,12 +2,16 @@
 
 use async_trait::async_trait;
 
-use super::chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, Step, next_step};
+use super::{
+    chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET},
+    climb::{Climb, Next},
+};
 use crate::{
     error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
     port::{Class, Effect},
     setpoint::{Command, Direction, StopMode},
     status::{State, Status},
+    units::Frequency,
 };
 
 /// How often the status is read for a command to show before it counts as not confirmed. There is no clock here: the
@@ -40,7 +44,8 @@ pub trait Drivecom: Send {
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()>;
 
     /// Why this drive is not to be started, from a fresh status: local control, a forbidden direction, settings. That
-    /// it has not tripped and is in a known state is checked apart. May read more of the drive.
+    /// it has not tripped, is in a known state and shows no output in a quick stop is checked apart. May read more of the
+    /// drive.
     async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>>;
 
     /// Whether the drive shows that it took the run command `word`, in the state operation enabled. May read more of
@@ -56,9 +61,13 @@ fn chart_of(eta: u16, status: &Status) -> Option<ChartState> {
 /// Climbs to operation enabled and gives the run command `word`, which must hold the bits of
 /// [`ENABLE_OPERATION`]; the direction and the family's other bits stand above them.
 ///
+/// Every word is written once, and a drive that lags behind is waited for. A drive that falls back was stopped by
+/// somebody, at its panel or from another master: the start ends there and does not climb again.
+///
 /// # Errors
 /// [`Error::Refused`] before anything is written, or when a fault appears on the way;
-/// [`Error::NotConfirmed`] when the drive does not show the run command within [`CONFIRMING_READS`] reads.
+/// [`Error::NotConfirmed`] when the drive falls back, or does not show the run command within [`CONFIRMING_READS`]
+/// reads.
 pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) -> Result<Status> {
     let command = Command::Start(direction);
     let slave = drive.address();
@@ -67,34 +76,34 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
 
     let mut status = drive.read_status(Class::Command).await?;
     // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
-    match chart_of(eta, &status) {
+    let mut climb = match chart_of(eta, &status) {
         None => return Err(refused(Refusal::State(State::Unknown))),
-        Some(state) if state.is_fault() => {
-            return Err(refused(tripped(&status)));
-        }
-        Some(_) => {}
-    }
+        Some(state) if state.is_fault() => return Err(refused(tripped(&status))),
+        Some(state) => Climb::from(state).ok_or_else(|| refused(Refusal::State(State::NotReady)))?,
+    };
     if let Some(reason) = drive.refuses_start(direction, &status).await? {
         return Err(refused(reason));
     }
-    let mut given = false;
+    // The way out of a quick stop disables the voltage: a motor that still turns, or of which nothing says that it does
+    // not, would coast out of its fastest stop.
+    let quick_stop = chart_of(eta, &status) == Some(ChartState::QuickStopActive);
+    if quick_stop && status.output_frequency != Some(Frequency::ZERO) {
+        return Err(refused(Refusal::State(State::QuickStop)));
+    }
     for _ in 0..CONFIRMING_READS {
-        let state = chart_of(eta, &status).ok_or_else(|| refused(Refusal::State(State::Unknown)))?;
-        match next_step(state) {
-            Step::Faulted => return Err(refused(tripped(&status))),
-            Step::Wait => {}
-            Step::Reached if given => {
+        match chart_of(eta, &status).map(|state| climb.next(state)) {
+            Some(Next::Write(ENABLE_OPERATION)) => {
+                drive.write_control(Class::Command, word, Effect::Level).await?;
+            }
+            Some(Next::Write(step)) => drive.write_control(Class::Command, step, Effect::Level).await?,
+            Some(Next::Wait) => {}
+            Some(Next::Arrived) => {
                 if drive.shows_run(word, &mut status).await? {
                     return Ok(status);
                 }
             }
-            // Operation enabled is also the state of a stopped drive that keeps its voltage, or of one whose terminals
-            // command it: the run command is given there like on the last rung.
-            Step::Reached | Step::Write(ENABLE_OPERATION) => {
-                drive.write_control(Class::Command, word, Effect::Level).await?;
-                given = true;
-            }
-            Step::Write(step) => drive.write_control(Class::Command, step, Effect::Level).await?,
+            Some(Next::Faulted) => return Err(refused(tripped(&status))),
+            Some(Next::Fallen) | None => break,
         }
         status = drive.read_status(Class::Command).await?;
     }
@@ -183,11 +192,24 @@ mod tests {
         refuses: Option<Refusal>,
         deaf: bool,
         loses_edge: bool,
+        output_frequency: Option<Frequency>,
+        /// The status word that somebody else's stop leaves, and at which reading of the status it comes.
+        stopped: Option<(usize, u16)>,
+        reads: usize,
     }
 
     impl Chart {
         fn at(eta: u16) -> Self {
-            Self { eta, written: Vec::new(), refuses: None, deaf: false, loses_edge: false }
+            Self {
+                eta,
+                written: Vec::new(),
+                refuses: None,
+                deaf: false,
+                loses_edge: false,
+                output_frequency: Some(Frequency::ZERO),
+                stopped: None,
+                reads: 0,
+            }
         }
     }
 
@@ -200,8 +222,12 @@ mod tests {
         }
 
         async fn read_status(&mut self, _: Class) -> Result<Status> {
+            self.reads += 1;
+            if let Some((_, eta)) = self.stopped.filter(|&(read, _)| read == self.reads) {
+                self.eta = eta;
+            }
             let raw = vec![RawWord { address: ETA, code: "ETA", value: self.eta }];
-            Ok(Status { raw, ..Status::default() })
+            Ok(Status { raw, output_frequency: self.output_frequency, ..Status::default() })
         }
 
         async fn write_control(&mut self, _: Class, word: u16, effect: Effect) -> Result<()> {
@@ -235,7 +261,8 @@ mod tests {
         }
 
         async fn shows_run(&mut self, word: u16, _: &mut Status) -> Result<bool> {
-            Ok(self.written.last() == Some(&word))
+            let stopping = self.stopped.is_some();
+            Ok(self.written.last() == Some(&word) && !stopping)
         }
     }
 
@@ -258,6 +285,7 @@ mod tests {
         for (eta, refuses, reason) in [
             (0x0008, None, Refusal::Tripped),
             (0x0001, None, Refusal::State(State::Unknown)),
+            (0x0020, None, Refusal::State(State::NotReady)),
             (0x0040, Some(Refusal::DirectionForbidden), Refusal::DirectionForbidden),
         ] {
             let mut drive = Chart { refuses, ..Chart::at(eta) };
@@ -272,7 +300,37 @@ mod tests {
         let mut drive = Chart { deaf: true, ..Chart::at(0x0040) };
         let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
         assert_eq!(error.kind(), ErrorKind::NotConfirmed);
-        assert!(drive.written.iter().all(|&word| word == SHUTDOWN), "{:04X?}", drive.written);
+        assert_eq!(drive.written, [SHUTDOWN], "told once, and waited for");
+    }
+
+    #[tokio::test]
+    async fn a_stop_by_somebody_else_is_never_undone_by_a_start_that_waits_for_its_confirmation() {
+        let ladder = [SHUTDOWN, SWITCH_ON, ENABLE_OPERATION];
+        // At the STOP key, by a quick stop, by another master's 0006h and 0007h, at power-off, and by a fault.
+        for left in [0x0040, 0x0007, 0x0021, 0x0023, 0x0020, 0x0001, 0x0008] {
+            for (read, written) in [(3, 2), (4, 3), (5, 3), (8, 3)] {
+                let before_switched_on = read == 3 && [0x0021, 0x0023].contains(&left);
+                if before_switched_on {
+                    continue;
+                }
+                let mut drive = Chart { stopped: Some((read, left)), ..Chart::at(0x0040) };
+                let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+                let kind = if left == 0x0008 { ErrorKind::Refused } else { ErrorKind::NotConfirmed };
+                assert_eq!(error.kind(), kind, "{left:04X}h at the {read}th reading");
+                assert_eq!(drive.written, ladder[..written], "{left:04X}h at the {read}th reading");
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn a_motor_in_its_quick_stop_is_not_let_coast_by_a_start() {
+        for output_frequency in [Some(Frequency::from_hertz(3)), None] {
+            let mut drive = Chart { output_frequency, ..Chart::at(0x0007) };
+            let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+            let reason = Refusal::State(State::QuickStop);
+            assert!(matches!(error, Error::Refused { reason: told, .. } if told == reason), "{error}");
+            assert!(drive.written.is_empty());
+        }
     }
 
     #[tokio::test]
