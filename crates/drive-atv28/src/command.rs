@@ -63,8 +63,8 @@ impl<P: Port> Drivecom for Atv28<P> {
         if forced_local || taken {
             return Ok(Some(Refusal::NotInControl(words.control())));
         }
-        // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
-        if turning && words.chart() == Some(ChartState::QuickStopActive) {
+        // A motor that direct current brakes shows no output frequency, and would coast without voltage.
+        if words.is_driving() && words.chart() == Some(ChartState::QuickStopActive) {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
         // A sign that somebody else left would turn the direction round.
@@ -76,13 +76,13 @@ impl<P: Port> Drivecom for Atv28<P> {
     }
 
     /// "Operation enabled" is also the state of a drive that its terminals have just powered up in, so the drive must
-    /// hold the control word too.
+    /// hold the control word too, and name the bus as its source of commands.
     async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
         let held = self.registers.at(Class::Command).read(CMD).await?;
         self.command = Some(ControlWord::from_bits_retain(held));
         *status = FastWords::of_raw(&status.raw).status(self.command);
         status.raw.push(raw_command(held));
-        Ok(held == word)
+        Ok(held == word && status.control == Some(Control::Bus))
     }
 }
 

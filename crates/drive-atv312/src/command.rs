@@ -149,8 +149,8 @@ impl<P: Port> Drivecom for Atv312<P> {
         if let Some(reason) = Self::refuses_control(words, settings.level) {
             return Ok(Some(reason));
         }
-        if words.chart() == Some(ChartState::QuickStopActive) && words.is_turning() {
-            // The way out of a quick stop disables the voltage, and a motor that still turns would coast.
+        // A motor that direct current brakes shows no output frequency, and would coast without voltage.
+        if words.chart() == Some(ChartState::QuickStopActive) && words.is_driving() {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
         if direction == Direction::Reverse

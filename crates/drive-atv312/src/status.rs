@@ -101,11 +101,13 @@ impl FastWords {
 
     /// Why a setting cannot be changed now.
     pub(crate) fn refuses_settings(&self) -> Option<Refusal> {
-        let eti = self.state_words().eti;
-        if eti.intersects(ExtendedStatus::MOTOR_RUNNING.union(ExtendedStatus::DC_INJECTION)) {
+        let words = self.state_words();
+        if words.is_driving() {
             return Some(Refusal::MotorRunning);
         }
-        eti.contains(ExtendedStatus::EEPROM_BUSY)
+        words
+            .eti
+            .contains(ExtendedStatus::EEPROM_BUSY)
             .then_some(Refusal::Settings("ETI bit 0: the drive is saving its parameters to EEPROM"))
     }
 

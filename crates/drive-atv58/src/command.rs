@@ -3,7 +3,7 @@
 use async_trait::async_trait;
 use drive_core::{
     Class, Direction, Effect, Error, Frequency, Port, RawWord, Refusal, Result, Setpoint, SetpointProblem,
-    SlaveAddress, State, Status, StopMode,
+    SlaveAddress, Status, StopMode,
     drivecom::{self, ChartState, Drivecom},
 };
 
@@ -129,11 +129,6 @@ impl<P: Port> Drivecom for Atv58<P> {
         if let Some(control) = status.control {
             return Ok(Some(Refusal::NotInControl(control)));
         }
-        // To leave a quick stop the voltage must go, and the motor would coast out of its fastest stop.
-        let turning = status.output_frequency.is_some_and(|frequency| frequency > Frequency::ZERO);
-        if turning && status.state == State::QuickStop {
-            return Ok(Some(Refusal::State(State::QuickStop)));
-        }
         // A sign that somebody else left would turn the direction round.
         let negative = self.registers.at(Class::Command).read(W401).await?.cast_signed() < 0;
         Ok(negative.then_some(Refusal::Settings("the reference W401 is negative: give a setpoint first")))
@@ -147,14 +142,34 @@ impl<P: Port> Drivecom for Atv58<P> {
     }
 }
 
-/// Whether the drive itself shows that no run command is in force.
+/// Whether the drive itself shows that no run command is in force. In forced local mode the control word that it holds
+/// does not act, and tells nothing.
 fn shows_stop(map: &Atv58Map, status: &Status, mode: StopMode) -> bool {
     match status.raw(map.status).and_then(ChartState::of) {
-        None => false,
+        None | Some(ChartState::NotReadyToSwitchOn) => false,
         Some(ChartState::OperationEnabled) => {
-            mode == StopMode::Ramp && status.raw(CMD.address()) == map.ramp_stop
+            mode == StopMode::Ramp && status.control.is_none() && status.raw(CMD.address()) == map.ramp_stop
         }
         Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
         Some(_) => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_held_control_word_shows_no_stop_while_local_control_is_forced() {
+        let map = Atv58Map::default();
+        let stopping = |eta, control| {
+            let raw = |address, value| RawWord { address, code: "", value };
+            let raw = vec![raw(map.status, eta), raw(CMD.address(), drivecom::SWITCH_ON)];
+            shows_stop(&map, &Status { control, raw, ..Status::default() }, StopMode::Ramp)
+        };
+        assert!(stopping(0x0227, None));
+        assert!(!stopping(0x0027, Some(drive_core::Control::Local)));
+        assert!(!stopping(0x0200, None), "initialising");
+        assert!(stopping(0x0223, None));
     }
 }

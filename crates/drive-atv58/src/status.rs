@@ -117,10 +117,11 @@ impl Words {
         self.chart(map).map_or(State::Unknown, |chart| chart.state(self.is_turning(map), enabled))
     }
 
-    /// In the state "operation enabled" a run command is in force, unless the control word was read with these words and
-    /// is the ramp stop.
+    /// In the state "operation enabled" a run command is in force, unless the control word was read with these words, is
+    /// the ramp stop, and acts: in forced local mode it does not.
     fn enabled(&self, map: &Atv58Map) -> State {
-        let stop = self.at(Some(CMD.address())).filter(|command| Some(*command) == map.ramp_stop);
+        let command = self.at(Some(CMD.address())).filter(|_| self.control(map).is_none());
+        let stop = command.filter(|command| Some(*command) == map.ramp_stop);
         match stop {
             Some(_) if self.is_turning(map) => State::Stopping,
             Some(_) => State::Ready,

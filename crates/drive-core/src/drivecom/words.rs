@@ -199,6 +199,13 @@ impl StatusWords {
         self.eti.contains(ExtendedStatus::MOTOR_RUNNING)
     }
 
+    /// Whether the drive turns the motor or brakes it with direct current: only without either has it "come to a complete
+    /// stop" (p. 20).
+    #[must_use]
+    pub const fn is_driving(self) -> bool {
+        self.eti.intersects(ExtendedStatus::MOTOR_RUNNING.union(ExtendedStatus::DC_INJECTION))
+    }
+
     /// Who commands: ETA says whether local control is forced, ETI who it is otherwise.
     #[must_use]
     pub const fn control(self) -> Control {
@@ -227,8 +234,9 @@ impl StatusWords {
     }
 
     /// Whether the drive itself shows that no run command acts after the stop `word`: it has left "operation enabled",
-    /// or there, where the word keeps it, the motor stands, slows down or is braked. A quick stop still drives the
-    /// motor, so it does not show a stop without voltage.
+    /// or there, where the word keeps it, the motor stands, or the bus commands and the motor slows down or is braked:
+    /// one that somebody else has running obeys no word of ours, and slows down for reasons of his. A quick stop still
+    /// drives the motor, so it does not show a stop without voltage.
     #[must_use]
     pub fn shows_stop(self, word: ControlWord) -> bool {
         const BRAKES: ExtendedStatus =
@@ -237,7 +245,7 @@ impl StatusWords {
             None | Some(ChartState::NotReadyToSwitchOn) => false,
             Some(ChartState::OperationEnabled) => {
                 word.contains(ControlWord::ENABLE_OPERATION)
-                    && (!self.is_turning() || self.eti.intersects(BRAKES))
+                    && (!self.is_turning() || self.control() == Control::Bus && self.eti.intersects(BRAKES))
             }
             Some(ChartState::QuickStopActive) => word.contains(ControlWord::ENABLE_VOLTAGE),
             Some(_) => true,
@@ -260,6 +268,8 @@ impl StatusWords {
 
 #[cfg(test)]
 mod tests {
+    use crate::drivecom::{DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON};
+
     use super::*;
 
     #[test]
@@ -293,6 +303,26 @@ mod tests {
     }
 
     #[test]
+    fn a_stop_never_shows_in_a_motor_that_is_called_running() {
+        let stops = StopMode::ALL
+            .iter()
+            .filter_map(|&mode| ControlWord::enabled_stop(mode))
+            .chain([QUICK_STOP, SHUTDOWN, SWITCH_ON, DISABLE_VOLTAGE].map(ControlWord::from_bits_retain));
+        for stop in stops {
+            for eta in 0..=u16::MAX {
+                // Every source of commands, with the motor at rest, turning, accelerating, slowing down, braked.
+                for source in [0x0000, 0x2000, 0x4000, 0x6000] {
+                    for motion in [0x0000, 0x0010, 0x0210, 0x0410, 0x0020, 0x0030, 0x1010, 0x1410, 0x9FFF] {
+                        let words = StatusWords::new(eta, source | motion);
+                        let running = words.state(Some(stop)) == State::Running;
+                        assert!(!(running && words.shows_stop(stop)), "{words:?} after {stop:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_stop_shows_where_no_run_command_acts() {
         let [ramp, quick, freewheel] = [0x100F, 0x0002, 0x0000].map(ControlWord::from_bits_retain);
         let running = StatusWords::new(0x0627, 0x4010);
@@ -304,6 +334,12 @@ mod tests {
         assert_eq!(shown(slowing), [true, false, false]);
         assert_eq!(shown(quick_stop), [true, true, false]);
         assert_eq!(shown(disabled), [true; 3]);
+        let by_terminals = StatusWords::new(0x0227, 0x0410);
+        assert_eq!(shown(by_terminals), [false; 3], "the terminals slow it down to another speed");
+        let forced_local = StatusWords::new(0x0027, 0x4410);
+        assert_eq!(shown(forced_local), [false; 3]);
+        let standing = StatusWords::new(0x0227, 0x0000);
+        assert_eq!(shown(standing), [true, false, false]);
         assert_eq!(shown(StatusWords::new(0x0200, 0)), [false; 3], "initialising");
         assert_eq!(shown(StatusWords::new(0x0201, 0)), [false; 3], "a pattern that the table does not have");
     }
