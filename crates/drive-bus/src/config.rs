@@ -7,6 +7,7 @@ use drive_core::serial::SerialSettings;
 pub use crate::exchange::echo::Echo;
 use crate::{
     exchange::{ascii, rtu, unitelway},
+    pdu::MAX_PDU,
     protocol::Protocol,
 };
 
@@ -160,8 +161,9 @@ impl LineConfig {
     }
 
     /// The longest time from the call of a Stop to its first bit on the line, when no other Stop waits and requests and
-    /// answers are no longer than these PDUs (253 at most): the longest exchange that may be under way, whole, and the
-    /// silences after it. What the host itself adds, some tenths of a millisecond, comes on top.
+    /// answers are no longer than these PDUs (253 at most): the longest exchange that may be under way, whole, the
+    /// silences after it, and one foreign frame or as much noise. What the host itself adds, some tenths of a
+    /// millisecond, comes on top; so does a port that takes no bytes, which counts as lost after a second.
     ///
     /// With [`Echo::Auto`] it includes the one read that finds out about the echo, though that happens only before the
     /// first write after opening.
@@ -169,13 +171,11 @@ impl LineConfig {
     pub fn worst_case_stop(&self, longest_request: usize, longest_answer: usize) -> Duration {
         let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
         let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
-        if !self.is_paced() {
-            return timeout.max(self.broadcast_turnaround);
-        }
-        let characters = |count| self.serial.characters(count);
+        let characters = |count| self.characters(count);
         let exchange = |request, answer| {
             let (request, answer) = (self.request_len(request), self.answer_len(answer));
             let overtime = match self.protocol {
+                _ if self.is_mbap() => Duration::ZERO,
                 Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
                 Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
                 Protocol::UniTelway(settings) => {
@@ -188,9 +188,19 @@ impl LineConfig {
         let under_way = exchange(longest_request, longest_answer).max(broadcast);
         let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
         let silence = self.silence() + pauses.max(self.slave_change_gap);
-        let settles = self.echo == Echo::Auto && !matches!(self.protocol, Protocol::UniTelway(_));
+        let settles =
+            self.echo == Echo::Auto && !self.is_mbap() && !matches!(self.protocol, Protocol::UniTelway(_));
         let settling = if settles { exchange(5, longest_answer) + silence } else { Duration::ZERO };
-        under_way + silence + settling
+        under_way + silence + settling + self.longest_stray()
+    }
+
+    /// How long what belongs to no exchange, the frame of a foreign master or noise, may hold a Stop up.
+    pub(crate) fn longest_stray(&self) -> Duration {
+        if self.is_paced() {
+            self.characters(self.request_len(MAX_PDU)) + self.chunk_gap
+        } else {
+            Duration::ZERO
+        }
     }
 
     /// How many characters the frame of a request with a PDU of this length has.

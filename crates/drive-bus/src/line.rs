@@ -83,7 +83,9 @@ impl Line {
         Self { handle: Arc::new(Handle::new(shared, when_finished)) }
     }
 
-    /// One slave of this line, 1 to 247. Address 0 is [`broadcast`](Self::broadcast).
+    /// One slave of this line, 1 to 247. Address 0 is [`broadcast`](Self::broadcast). On Modbus TCP also 248 to 255, which
+    /// gateways use for themselves; elsewhere a call to them ends with
+    /// [`PortError::NotCarried`](drive_core::PortError::NotCarried).
     #[must_use]
     pub fn slave(&self, address: u8) -> Slave {
         Slave::new(Arc::clone(&self.handle), address)

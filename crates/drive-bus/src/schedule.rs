@@ -140,10 +140,10 @@ impl<T> Schedule<T> {
         self.queued.iter().any(which)
     }
 
-    /// Whether a Stop waits.
+    /// Since when a Stop waits, if one does.
     #[must_use]
-    pub fn has_stop(&self) -> bool {
-        self.any(|entry| entry.terms.class == Class::Stop)
+    pub fn first_stop(&self) -> Option<Instant> {
+        self.queued.iter().filter(|entry| entry.terms.class == Class::Stop).map(|entry| entry.arrived).min()
     }
 
     /// Queues a request. Gives its ticket and what it replaces.
@@ -199,8 +199,15 @@ impl<T> Schedule<T> {
         (turn, now.checked_add(deadline).unwrap_or(now), ticket)
     }
 
-    /// Puts back what [`choose`](Self::choose) gave, at its old place.
+    /// Puts back what [`choose`](Self::choose) gave and was not sent after all, at its old place.
     pub fn put_back(&mut self, entry: Entry<T>) {
+        self.queued.push(entry);
+    }
+
+    /// Queues once more what was sent in vain: behind the first attempts of the other slaves in its class, so that one
+    /// that is dead delays nobody's stop by being asked twice.
+    pub fn queue_again(&mut self, mut entry: Entry<T>) {
+        entry.rank = self.rank(entry.arrived, entry.slave, entry.terms, entry.ticket);
         self.queued.push(entry);
     }
 

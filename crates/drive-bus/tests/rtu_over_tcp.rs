@@ -31,6 +31,12 @@ fn to(address: impl Into<String>) -> LineConfig {
     }
 }
 
+/// The same for a connection that is lost: what was asked over it is not asked again before its answer can no longer come.
+fn to_one_that_is_lost(address: impl Into<String>) -> LineConfig {
+    let soon = 2_000 * MS;
+    LineConfig { response_timeout: soon, timeout_floor: soon, ..to(address) }
+}
+
 /// The same, asking once, and giving up slave 1 soon.
 fn impatient_with_the_first(address: impl Into<String>) -> LineConfig {
     let first = SlaveSettings { response_timeout: Some(50 * MS), ..SlaveSettings::default() };
@@ -128,7 +134,7 @@ async fn a_late_answer_and_the_right_one_in_one_segment_are_told_apart() {
 #[tokio::test]
 async fn a_read_cut_off_in_the_middle_of_its_answer_is_asked_again_on_the_next_connection() {
     let server = Server::bind().await;
-    let (line, mut far) = server.serve(to(server.address())).await;
+    let (line, mut far) = server.serve(to_one_that_is_lost(server.address())).await;
     let read = call(&line, 1, Terms::default(), READ);
     let request = far.request::<8>().await;
     far.send(&rtu::frame(1, &[3, 2, 0xAA, 0xAA])[..5]).await;
@@ -144,7 +150,8 @@ async fn a_read_cut_off_in_the_middle_of_its_answer_is_asked_again_on_the_next_c
 #[tokio::test]
 async fn a_read_that_may_not_be_asked_again_says_that_the_line_was_down() {
     let server = Server::bind().await;
-    let (line, mut far) = server.serve(LineConfig { retries: 0, ..to(server.address()) }).await;
+    let (line, mut far) =
+        server.serve(LineConfig { retries: 0, ..to_one_that_is_lost(server.address()) }).await;
     let read = call(&line, 1, Terms::default(), READ);
     far.request::<8>().await;
     far.send(&[1, 3]).await;
@@ -161,7 +168,7 @@ async fn a_read_that_may_not_be_asked_again_says_that_the_line_was_down() {
 #[tokio::test]
 async fn a_write_cut_off_in_the_middle_of_its_answer_has_an_unknown_outcome_and_is_never_sent_again() {
     let server = Server::bind().await;
-    let (line, mut far) = server.serve(to(server.address())).await;
+    let (line, mut far) = server.serve(to_one_that_is_lost(server.address())).await;
     for terms in [Terms::of(Class::Command).edge(), Terms::of(Class::Command)] {
         let write = call(&line, 1, terms, WRITE);
         let request = far.request::<8>().await;

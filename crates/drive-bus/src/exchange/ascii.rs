@@ -29,7 +29,7 @@ use self::{
 };
 use super::{
     Exchange, Failure, Step, Stray,
-    echo::{Echo, EchoState},
+    echo::{Echo, EchoState, MAYBE_ECHO},
 };
 use crate::answer;
 
@@ -81,6 +81,8 @@ struct Current {
     answer_by: Option<Instant>,
     /// The echo of this request has been taken away.
     echo_taken: bool,
+    /// Something came that was not understood. It may have been the echo.
+    disturbed: bool,
     /// Characters received since the request.
     received: usize,
     /// An intact frame came that did not fit.
@@ -127,7 +129,7 @@ impl Ascii {
         }
         match answer::check(&current.request, pdu) {
             Ok(answer) => {
-                if self.echo == EchoState::Unknown {
+                if self.echo == EchoState::Unknown && !current.disturbed {
                     self.echo = EchoState::Absent;
                 }
                 self.delimiters.answered(slave, &current.request, answer.is_ok());
@@ -146,16 +148,32 @@ impl Ascii {
     /// anything else may be somebody else's, with the answer still to come.
     fn garbled(&mut self, head: Option<(u8, u8)>, len: usize, why: &'static str) -> Step {
         self.strays.push(Stray::Noise(len));
-        let resembles = self.current.as_ref().is_some_and(|current| {
-            head.is_some_and(|(slave, function)| {
-                slave == current.slave && function & 0x7F == current.request.function_code().value()
-            })
+        let Some(current) = &mut self.current else { return Step::More };
+        current.disturbed = true;
+        let resembles = head.is_some_and(|(slave, function)| {
+            slave == current.slave && function & 0x7F == current.request.function_code().value()
         });
         if !resembles {
             return Step::More;
         }
+        if self.echo != EchoState::Absent && !current.echo_taken {
+            // To ask again behind an echo that was damaged would leave the answer to this request for the next one.
+            current.misfit.get_or_insert_with(|| MAYBE_ECHO.to_owned());
+            return Step::More;
+        }
         self.current = None;
         Step::Done(Err(Failure::Damaged(why)))
+    }
+
+    /// Characters outside any frame.
+    fn count_noise(&mut self) {
+        let noise = self.receiver.take_noise();
+        if noise > 0 {
+            self.strays.push(Stray::Noise(noise));
+            if let Some(current) = &mut self.current {
+                current.disturbed = true;
+            }
+        }
     }
 
     fn act(&mut self, heard: Heard) -> Step {
@@ -199,6 +217,7 @@ impl Exchange for Ascii {
             pdu: pdu.clone(),
             answer_by: None,
             echo_taken: false,
+            disturbed: false,
             received: 0,
             misfit: None,
         });
@@ -216,15 +235,13 @@ impl Exchange for Ascii {
         let mut step = Step::More;
         for &character in bytes {
             if let Some(heard) = self.receiver.hear(character) {
+                self.count_noise();
                 // After the answer nothing more is expected: what follows it is stray.
                 let next = self.act(heard);
                 step = if step == Step::More { next } else { step };
             }
         }
-        let noise = self.receiver.take_noise();
-        if noise > 0 {
-            self.strays.push(Stray::Noise(noise));
-        }
+        self.count_noise();
         if let Some(current) = &mut self.current {
             current.received += bytes.len();
             if current.received > MAX_RECEIVED {

@@ -14,6 +14,9 @@ pub enum Echo {
     Auto,
 }
 
+/// Why an exchange without an answer failed, when what came could have been the answer or the echo, damaged.
+pub(super) const MAYBE_ECHO: &str = "a damaged frame that may have been the echo";
+
 /// What is known of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum EchoState {

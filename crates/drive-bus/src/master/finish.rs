@@ -12,11 +12,15 @@ use crate::{
     schedule::Entry,
 };
 
+/// The length of an exception: its function code and its number.
+const EXCEPTION: usize = 2;
+
 impl<C> Master<C> {
     /// The exchange that is under way ends with `result`.
     pub(super) fn finish(&mut self, now: Instant, result: Result<Answer, Failure>) {
         let Some(flight) = self.flight.take() else { return };
         self.to_send = None;
+        self.exchange_end = now;
         let slave = flight.slave;
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
@@ -49,7 +53,7 @@ impl<C> Master<C> {
     }
 
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
-        let expected = answer::likely_len(&flight.request);
+        let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
         let characters = self.config.characters(self.config.answer_len(expected));
         let station = self.station(flight.slave);
         if let Some(sent) = flight.sent {
@@ -86,14 +90,17 @@ impl<C> Master<C> {
 
     /// The exchange has ended without its answer, which may still come: also over the next connection, from a serial
     /// server that has kept it.
-    fn fear_late_answer(&mut self, now: Instant, flight: &Flight<C>) {
+    pub(super) fn fear_late_answer(&mut self, now: Instant, flight: &Flight<C>) {
         if flight.slave == 0 || !self.exchange.confuses_late_answers() {
             return;
         }
-        let sent = flight.sent.map_or(now, |sent| sent.end);
         let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
-        let until = sent + self.config.late_window;
-        self.station(flight.slave).expect_late(kind, until);
+        let station = self.station(flight.slave);
+        let timeout = flight.sent.map_or(station.timeout.current(), |sent| sent.timeout);
+        // A slave that may take longer than the window to answer in time may take longer still to be late.
+        let window = self.config.late_window.max(timeout * 3 / 2);
+        let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
+        self.station(flight.slave).expect_late(kind, sent + window);
     }
 
     fn go_offline(&mut self, now: Instant, slave: u8) {
@@ -123,7 +130,7 @@ impl<C> Master<C> {
         if self.may_retry(now, &entry) {
             entry.work.attempts += 1;
             entry.work.last = Some(error);
-            self.schedule.put_back(entry);
+            self.schedule.queue_again(entry);
         } else {
             self.outcomes.push_back((entry.work.caller, Err(error)));
         }
@@ -151,6 +158,7 @@ impl<C> Master<C> {
     /// The time of a request that nobody answers is over.
     pub(super) fn finish_unanswered(&mut self, now: Instant) {
         let Some(flight) = self.flight.take() else { return };
+        self.exchange_end = now;
         self.exchange.abandon();
         self.stats.broadcasts += u64::from(flight.slave == 0);
         self.stats.busy += now.saturating_duration_since(flight.started);
@@ -173,7 +181,7 @@ impl<C> Master<C> {
         } else if self.may_retry(now, &entry) {
             entry.work.attempts += 1;
             entry.work.last = Some(PortError::LineDown(reason.to_owned()));
-            self.schedule.put_back(entry);
+            self.schedule.queue_again(entry);
         } else {
             self.outcomes.push_back((entry.work.caller, Err(PortError::LineDown(reason.to_owned()))));
         }

@@ -24,6 +24,7 @@ impl<C> Master<C> {
         self.link = Link::Up;
         self.exchange.reset();
         self.quiet_from = now;
+        self.exchange_end = now;
         self.stats.opened += 1;
         self.opened_at.get_or_insert(now);
     }
@@ -35,6 +36,7 @@ impl<C> Master<C> {
         self.stats.lost += 1;
         self.exchange.reset();
         self.fail_flight(now, reason);
+        self.sending = None;
     }
 
     /// The port cannot be opened. What waits without a lifetime ends; what has one expires.

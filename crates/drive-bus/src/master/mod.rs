@@ -34,6 +34,9 @@ use station::Station;
 /// How a call ends.
 pub type Outcome = Result<Answer, PortError>;
 
+/// The last address a slave on a line can have; the rest is reserved (MODBUS over Serial Line V1.02 p. 7).
+const LAST_SLAVE: u8 = 247;
+
 /// How long a request waits before it may take an aged turn.
 const AGING: Duration = Duration::from_secs(1);
 
@@ -50,11 +53,15 @@ pub struct Master<C> {
     offline: BTreeSet<u8>,
     flight: Option<Flight<C>>,
     to_send: Option<Bytes>,
+    /// How many characters the port was given whose sending is not confirmed yet.
+    sending: Option<usize>,
     outcomes: VecDeque<(C, Outcome)>,
     link: Link,
     closing: bool,
     /// End of the last activity on the line: computed for what we sent, observed for what we received.
     quiet_from: Instant,
+    /// End of our own last exchange.
+    exchange_end: Instant,
     last_slave: Option<u8>,
     /// No probe before this.
     probe_free_at: Option<Instant>,
@@ -82,8 +89,6 @@ struct Flight<C> {
     purpose: Purpose<C>,
     slave: u8,
     request: Arc<Request<'static>>,
-    /// How many characters are being sent.
-    sending: usize,
     started: Instant,
     sent: Option<Sent>,
 }
@@ -129,10 +134,12 @@ impl<C> Master<C> {
             offline: BTreeSet::new(),
             flight: None,
             to_send: None,
+            sending: None,
             outcomes: VecDeque::new(),
             link: Link::Opening,
             closing: false,
             quiet_from: Instant::now(),
+            exchange_end: Instant::now(),
             last_slave: None,
             probe_free_at: None,
             choose_at: None,
@@ -207,6 +214,11 @@ impl<C> Master<C> {
                 "nobody answers a broadcast, so that it cannot read".to_owned(),
             ));
         }
+        if slave > LAST_SLAVE && !self.config.is_mbap() {
+            return Err(PortError::NotCarried(format!(
+                "{slave} is no address of a slave on a line: 1 to {LAST_SLAVE}"
+            )));
+        }
         self.exchange.carries(slave, request, terms.class).map_err(PortError::NotCarried)?;
         if let Link::Down(reason) = &self.link {
             return Err(PortError::LineDown(reason.clone()));
@@ -235,12 +247,10 @@ impl<C> Master<C> {
         };
         self.exchange.abandon();
         self.to_send = None;
-        let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
-        let until = flight.sent.map_or(now, |sent| sent.end) + self.config.late_window;
-        let station = self.station(flight.slave);
-        station.expect_late(kind, until);
-        station.probe_again(until);
-        self.quiet_from = self.quiet_from.max(now);
+        self.fear_late_answer(now, &flight);
+        self.station(flight.slave).probe_again(now);
+        self.quiet_from = self.quiet_from.max(self.end_of_sending(now));
+        self.exchange_end = self.quiet_from;
     }
 
     /// The caller of a request is gone.
@@ -301,8 +311,7 @@ impl<C> Master<C> {
         match step {
             Step::More => {}
             Step::Send(bytes) => {
-                if let Some(flight) = &mut self.flight {
-                    flight.sending = bytes.len();
+                if self.flight.is_some() {
                     self.to_send = Some(bytes);
                 }
             }

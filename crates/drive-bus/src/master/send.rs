@@ -7,7 +7,7 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Flight, Job, Master, Purpose, Sent, Station, link::Link};
+use super::{AGING, Flight, Job, Master, Purpose, Sent, Station, link::Link};
 use crate::{
     answer, pdu,
     schedule::{Choice, Entry, Readiness},
@@ -16,17 +16,25 @@ use crate::{
 impl<C> Master<C> {
     /// What is to be written now, if anything. [`handle_sent`](Self::handle_sent) **must** follow when it is.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Bytes> {
-        if let Some(bytes) = self.to_send.take() {
-            return Some(bytes);
-        }
+        let bytes = match self.to_send.take() {
+            Some(bytes) => bytes,
+            None => self.next_exchange(now)?,
+        };
+        self.sending = Some(bytes.len());
+        Some(bytes)
+    }
+
+    fn next_exchange(&mut self, now: Instant) -> Option<Bytes> {
         self.choose_at = None;
         if self.flight.is_some() || !matches!(self.link, Link::Up) || self.closing {
             return None;
         }
         let free_at = self.free_at();
-        let probe = self.next_probe().filter(|_| !self.schedule.has_stop());
-        if now < free_at {
-            self.choose_at = (!self.schedule.is_empty() || probe.is_some()).then_some(free_at);
+        let stop_at = self.schedule.first_stop().map(|since| self.stop_free_at(since));
+        let probe = self.next_probe().filter(|_| stop_at.is_none());
+        let soonest = stop_at.unwrap_or(free_at);
+        if now < soonest {
+            self.choose_at = (!self.schedule.is_empty() || probe.is_some()).then_some(soonest);
             return None;
         }
         if let Some((slave, at)) = probe {
@@ -36,7 +44,7 @@ impl<C> Master<C> {
             }
             self.choose_at = Some(at);
         }
-        match self.choose(now, free_at) {
+        match self.choose(now, free_at, soonest) {
             Choice::Send(entry) => self.begin(now, entry),
             Choice::Wait(at) => {
                 self.choose_at = Some(self.choose_at.map_or(at, |probe| probe.min(at)));
@@ -46,10 +54,10 @@ impl<C> Master<C> {
         }
     }
 
-    fn choose(&mut self, now: Instant, free_at: Instant) -> Choice<Job<C>> {
+    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Instant) -> Choice<Job<C>> {
         let Self { schedule, stations, config, last_slave, exchange, .. } = self;
         schedule.choose(now, |entry| {
-            let mut at = free_at;
+            let mut at = if entry.terms.class == Class::Stop { stop_at } else { free_at };
             if last_slave.is_some_and(|last| last != entry.slave) {
                 at += config.slave_change_gap;
             }
@@ -74,7 +82,22 @@ impl<C> Master<C> {
         self.quiet_from + self.config.silence()
     }
 
+    /// When a Stop that waits since `arrived` is sent at the latest, whatever is heard on the line: bytes that belong to
+    /// no exchange of ours hold it up for one frame, not for as long as somebody babbles.
+    fn stop_free_at(&self, arrived: Instant) -> Instant {
+        let heard_out = arrived.max(self.exchange_end) + self.config.silence() + self.config.longest_stray();
+        self.free_at().min(heard_out)
+    }
+
+    /// The next probe that is worth the line's time. What commands or feeds a watchdog goes first, for as long as
+    /// anything may wait before it has aged: on a full line a drive that is back would never be noticed.
     fn next_probe(&self) -> Option<(u8, Instant)> {
+        let (slave, at) = self.due_probe()?;
+        let urgent = self.schedule.any(|entry| entry.terms.class >= Class::KeepAlive);
+        Some((slave, if urgent { at + AGING } else { at }))
+    }
+
+    fn due_probe(&self) -> Option<(u8, Instant)> {
         let (slave, at) = self
             .offline
             .iter()
@@ -126,16 +149,25 @@ impl<C> Master<C> {
         request: Arc<Request<'static>>,
         bytes: Bytes,
     ) -> Bytes {
-        self.flight =
-            Some(Flight { purpose, slave, request, sending: bytes.len(), started: now, sent: None });
+        self.flight = Some(Flight { purpose, slave, request, started: now, sent: None });
         bytes
+    }
+
+    /// When the last bit of what the port was given is off the line, if it is sent from `now` on.
+    pub(super) fn end_of_sending(&self, now: Instant) -> Instant {
+        now + self.config.characters(self.sending.unwrap_or_default())
     }
 
     /// What [`poll_transmit`](Self::poll_transmit) gave has been handed to the port.
     pub fn handle_sent(&mut self, now: Instant) {
-        let Some(flight) = &mut self.flight else { return };
-        let end = now + self.config.characters(flight.sending);
+        let end = self.end_of_sending(now);
+        self.sending = None;
         self.quiet_from = end;
+        let Some(flight) = &mut self.flight else {
+            // Given up while it was written, for a Stop: that waits until this is off the line.
+            self.exchange_end = end;
+            return;
+        };
         if let Some(sent) = flight.sent {
             self.exchange.handle_sent(end, sent.answer_by);
             return;

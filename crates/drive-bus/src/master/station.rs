@@ -6,6 +6,7 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use crate::{
+    answer,
     config::{LineConfig, SlaveSettings},
     stats::SlaveStats,
     timeout::LearnedTimeout,
@@ -64,12 +65,12 @@ impl Station {
     /// Somebody asks for it.
     pub(super) fn ask(&mut self, now: Instant, request: &Arc<Request<'static>>, is_write: bool) {
         self.asked = Some(now);
-        if !is_write {
+        if !is_write && !answer::equals_its_request(request) {
             self.last_read = Some(Arc::clone(request));
         }
     }
 
-    /// A read that does no harm: the last that was asked, or one register.
+    /// A read that does no harm and whose answer no echo can be taken for: the last that was asked, or one register.
     pub(super) fn harmless_read(&self) -> Arc<Request<'static>> {
         self.last_read.clone().unwrap_or_else(|| Arc::new(Request::ReadHoldingRegisters(0, 1)))
     }

@@ -215,7 +215,7 @@ proptest! {
                     pushed += 1;
                 }
                 Event::Choose => {
-                    let stops = schedule.has_stop();
+                    let stops = schedule.first_stop().is_some();
                     let background = schedule.any(|entry| entry.terms.class == Class::Background);
                     let oldest_of = |schedule: &Schedule<u32>, slave, class| {
                         let mut least = None;

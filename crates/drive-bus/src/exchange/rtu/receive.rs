@@ -9,7 +9,10 @@ use super::{
 };
 use crate::{
     answer::{self, Extent},
-    exchange::{Failure, Step, Stray, echo::EchoState},
+    exchange::{
+        Failure, Step, Stray,
+        echo::{EchoState, MAYBE_ECHO},
+    },
 };
 
 /// What stands at one place of what was received.
@@ -37,17 +40,18 @@ impl Rtu {
                 }
             });
             let Some((offset, len)) = found else { return Step::More };
-            let from_the_start = offset == 0;
             self.judge(offset);
-            if let Some(step) = self.accept(len, from_the_start) {
+            if let Some(step) = self.accept(len) {
                 return step;
             }
         }
     }
 
     /// What was received begins with a frame of this length that has the form of the answer.
-    fn accept(&mut self, len: usize, from_the_start: bool) -> Option<Step> {
+    fn accept(&mut self, len: usize) -> Option<Step> {
         let current = self.current.as_mut()?;
+        // An echo would have come first. Where something came first and was not understood, that may have been it.
+        let came_first = current.received == self.received.len();
         let frame = self.received.get(..len)?;
         let equals = *frame == self.sent;
         let pdu = Bytes::copy_from_slice(frame.get(1..len.saturating_sub(2))?);
@@ -63,7 +67,7 @@ impl Rtu {
         }
         match answer::check(&current.request, pdu) {
             Ok(answer) => {
-                if self.echo == EchoState::Unknown && from_the_start && !equals {
+                if self.echo == EchoState::Unknown && came_first && !equals {
                     self.echo = EchoState::Absent;
                 }
                 self.judge(self.received.len());
@@ -139,17 +143,21 @@ impl Rtu {
             });
             if let Some(offset) = whole {
                 self.judge(offset);
-                if let Some(step) = self.accept(self.received.len(), offset == 0) {
+                if let Some(step) = self.accept(self.received.len()) {
                     return step;
                 }
             }
         }
         let resembled = self.current.as_ref().is_some_and(|current| current.resembles(&self.received));
         let garbled = self.judge(self.received.len());
-        let Some(current) = &self.current else { return Step::More };
+        let Some(current) = &mut self.current else { return Step::More };
         if garbled && resembled {
-            self.current = None;
-            return Step::Done(Err(Failure::Damaged("CRC")));
+            if self.echo == EchoState::Absent || current.echo_taken {
+                self.current = None;
+                return Step::Done(Err(Failure::Damaged("CRC")));
+            }
+            // To ask again behind an echo that was damaged would leave the answer to this request for the next one.
+            current.misfit.get_or_insert_with(|| MAYBE_ECHO.to_owned());
         }
         if current.answer_by.is_some_and(|by| now >= by) { self.fail() } else { Step::More }
     }

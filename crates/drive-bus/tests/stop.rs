@@ -1,0 +1,212 @@
+//! A stop is never late: not for a dead drive, not for noise, not for a probe, and never later than the line says.
+
+mod support;
+
+use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};
+use drive_core::{Class, PortError, Terms, serial::SerialSettings};
+use support::{MS, by_hand::ByHand};
+use tokio_modbus::Request;
+
+const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
+const READ: Request<'static> = Request::ReadHoldingRegisters(3201, 1);
+const STOP: Request<'static> = Request::WriteSingleRegister(8501, 0);
+
+fn config() -> LineConfig {
+    LineConfig::stream(SERIAL)
+}
+
+fn stop() -> Terms {
+    Terms::of(Class::Stop)
+}
+
+/// A line on which these slaves have answered before, so that their timeouts are learned.
+fn acquainted(config: LineConfig, slaves: &[u8]) -> ByHand {
+    let mut line = ByHand::new(config);
+    for &slave in slaves {
+        line.ask(0, slave, READ, Terms::default());
+        let request = line.sent();
+        line.answers(&request, &[3, 2, 0, 1]);
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+    }
+    line
+}
+
+#[test]
+fn the_second_attempt_to_stop_a_dead_drive_waits_for_the_first_of_every_other() {
+    let mut line = acquainted(config(), &[1, 2, 3]);
+    for slave in 1..=3 {
+        line.ask(u32::from(slave), slave, STOP, stop());
+    }
+    // Drives 1 and 2 are dead.
+    let stopped: Vec<u8> = (0..5)
+        .map(|_| {
+            let request = line.sent();
+            if request[0] == 3 {
+                line.answers(&request, &request[1..6]);
+            }
+            request[0]
+        })
+        .collect();
+    assert_eq!(stopped, [1, 2, 3, 1, 2]);
+}
+
+#[test]
+fn noise_holds_a_stop_up_for_one_frame_and_everything_else_as_long_as_it_lasts() {
+    let mut line = acquainted(config(), &[1]);
+    let bound = config().worst_case_stop(8, 8);
+    line.ask(1, 1, Request::WriteSingleRegister(8502, 1), Terms::of(Class::Command));
+    let babble = |line: &mut ByHand| {
+        line.master.handle_bytes(line.now, &[0x55]);
+        let until = line.now + MS;
+        let sent = line.next_sent(until);
+        line.now = until;
+        sent
+    };
+    for _ in 0..2_000 {
+        assert_eq!(babble(&mut line), None);
+    }
+    line.ask(2, 1, STOP, stop());
+    let called = line.now;
+    let mut attempts = 0;
+    // The stop is sent into the noise, and again as often as any level is.
+    for _ in 0..10_000 {
+        if let Some(request) = babble(&mut line) {
+            assert_eq!(request, rtu::frame(1, &[6, 0x21, 0x35, 0, 0]));
+            attempts += 1;
+            assert!(
+                line.now - called <= bound * attempts,
+                "attempt {attempts} after {:?}",
+                line.now - called
+            );
+        }
+    }
+    assert_eq!(attempts, 1 + config().retries);
+}
+
+#[test]
+fn a_stop_called_while_a_probe_is_being_written_waits_until_that_is_off_the_line() {
+    let mut line = ByHand::new(config());
+    line.ask(1, 1, READ, Terms::default());
+    for _ in 0..=config().retries {
+        line.sent();
+    }
+    let until = line.now + 5_000 * MS;
+    let probe = line.next_written(until).expect("a probe");
+    assert!(line.master.stats(line.now).slaves[&1].offline);
+    let written = line.now;
+    line.ask(2, 2, STOP, stop());
+    line.master.handle_sent(written);
+    assert_eq!(line.sent()[0], 2);
+    let frame = SERIAL.characters(probe.len());
+    assert_eq!(line.now - written, frame + config().silence());
+}
+
+#[test]
+fn a_command_goes_before_a_probe_and_a_stream_of_them_delays_it_by_a_second_at_most() {
+    let mut line = acquainted(config(), &[2]);
+    line.ask(1, 1, READ, Terms::default());
+    for _ in 0..=config().retries {
+        line.sent();
+    }
+    let command = |line: &mut ByHand| {
+        line.ask(2, 2, Request::WriteSingleRegister(8502, 1), Terms::of(Class::Command));
+    };
+    command(&mut line);
+    let start = line.now;
+    loop {
+        let request = line.sent();
+        if request[0] == 1 {
+            break;
+        }
+        line.answers(&request, &request[1..6]);
+        command(&mut line);
+    }
+    let first = line.now - start;
+    // Due after half a second, aged after another.
+    assert!(first > 1_500 * MS && first < 2_500 * MS, "{first:?}");
+}
+
+#[test]
+fn the_bound_of_a_stop_holds_on_modbus_tcp_with_a_slaves_own_pause() {
+    let pause = SlaveSettings { turnaround: 200 * MS, ..SlaveSettings::default() };
+    let config = LineConfig {
+        response_timeout: 50 * MS,
+        broadcast_turnaround: 50 * MS,
+        ..LineConfig::modbus_tcp("gateway:502")
+    }
+    .slave(1, pause);
+    let bound = config.worst_case_stop(5, 5);
+    let mut line = ByHand::new(config);
+    line.ask(1, 1, READ, Terms::default());
+    let request = line.sent();
+    line.hears(20 * MS, &[request[0], request[1], 0, 0, 0, 5, 1, 3, 2, 0, 1]);
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+    let called = line.now;
+    line.ask(2, 1, STOP, stop());
+    line.sent();
+    assert_eq!(line.now - called, 200 * MS);
+    assert!(line.now - called <= bound, "{bound:?}");
+}
+
+#[test]
+fn the_bound_of_a_stop_holds_on_an_unpaced_stream_whose_slave_dribbles() {
+    let config =
+        LineConfig { response_timeout: 50 * MS, broadcast_turnaround: 50 * MS, unpaced: true, ..config() };
+    let bound = config.worst_case_stop(5, 5);
+    let mut line = ByHand::new(config);
+    line.ask(1, 1, READ, Terms::default());
+    line.sent();
+    let called = line.now;
+    line.ask(2, 1, STOP, stop());
+    let tenth = MS / 10;
+    while line.next_sent(line.now + tenth).is_none() {
+        line.now += tenth;
+        line.master.handle_bytes(line.now, &[1]);
+        assert!(line.now - called <= bound + tenth, "{bound:?}");
+    }
+}
+
+#[test]
+fn a_late_answer_of_a_slow_slave_is_waited_for_longer_than_its_timeout() {
+    let slow = SlaveSettings { response_timeout: Some(2_000 * MS), ..SlaveSettings::default() };
+    let mut line = ByHand::new(config().slave(1, slow));
+    line.ask(1, 1, READ, Terms::default());
+    let first = line.sent();
+    let asked = line.now;
+    // The answer comes half a second after it was due, and is not the answer to the same question, asked again.
+    line.hears(2_500 * MS, &rtu::frame(1, &[3, 2, 0, 1]));
+    assert!(line.ended().is_none());
+    assert_eq!(line.sent(), first);
+    assert!(line.now - asked > 2_500 * MS);
+    line.answers(&first, &[3, 2, 0, 2]);
+    assert!(
+        matches!(line.ended(), Some((1, Ok(Ok(tokio_modbus::Response::ReadHoldingRegisters(words))))) if words == [2])
+    );
+}
+
+#[test]
+fn exceptions_teach_the_same_timeout_as_answers() {
+    let learned = |pdu: &'static [u8]| {
+        let mut line = ByHand::new(LineConfig { timeout_floor: MS, ..config() });
+        for _ in 0..100 {
+            line.ask(1, 1, Request::ReadHoldingRegisters(0, 1), Terms::default());
+            let request = line.sent();
+            line.answers(&request, pdu);
+            assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+        }
+        line.master.stats(line.now).slaves[&1].response_timeout
+    };
+    assert_eq!(learned(&[3, 2, 0, 1]), learned(&[0x83, 2]));
+}
+
+#[test]
+fn an_address_that_no_slave_of_a_line_has_is_refused_except_on_modbus_tcp() {
+    let mut line = ByHand::new(config());
+    for slave in [248, 255] {
+        let refused = line.submit(1, slave, READ, Terms::default());
+        assert!(matches!(refused, Err(PortError::NotCarried(_))), "{slave}: {refused:?}");
+    }
+    assert_eq!(line.submit(1, 247, READ, Terms::default()), Ok(()));
+    let mut gateway = ByHand::new(LineConfig::modbus_tcp("gateway:502"));
+    assert_eq!(gateway.submit(1, 255, READ, Terms::default()), Ok(()));
+}
