@@ -6,7 +6,7 @@ use drive_core::{
 
 use crate::{
     Atv28,
-    registers::{CMD, CMDD, HSP, LFR, LFRD, SMIL_LOW},
+    registers::{CMD, CMDD, CMI, HSP, LFR, LFRD, SMIL_LOW},
 };
 
 /// The drive's own limits, read when the first setpoint needs them.
@@ -69,10 +69,12 @@ impl<P: Port> Atv28<P> {
     }
 
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        if [CMD.address(), CMDD.address()].contains(&row.address) {
+        let commands = [CMD.address(), CMDD.address(), LFR.address(), LFRD.address()];
+        drivecom::refuse_commands(row, &commands)?;
+        if row.address == CMI.address() {
             return Err(Error::Unsupported {
-                what: "writing a control word as a parameter",
-                reason: "start, stop and fault reset check the drive first; use them",
+                what: "writing CMI as a parameter",
+                reason: "its bits are not confirmed; on the Altivar 312 they recall factory settings and write the EEPROM",
             });
         }
         // HSP, LSP, nominal values: limits that were read once may change with it.

@@ -146,7 +146,7 @@ async fn nobody_starts_a_drive_that_is_in_forced_local_control() {
 #[tokio::test(start_paused = true)]
 async fn a_negative_reference_that_somebody_left_refuses_the_start() {
     let (mut drive, machine, _line) = rig();
-    drive.write_parameter(row("LFr"), (-200_i16).cast_unsigned()).await.unwrap();
+    assert!(machine.poke(row("LFr").address, (-200_i16).cast_unsigned()));
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
     assert!(commands(&machine).is_empty());
@@ -246,10 +246,20 @@ async fn a_parameter_is_read_back_and_an_equal_value_is_not_written() {
     assert_eq!(drive.read_parameter(row("AC2")).await.unwrap(), 70);
     assert!(!drive.write_parameter(row("AC2"), 70).await.unwrap().changed);
     assert_eq!((machine.requests(0x06), machine.observe().eeprom_writes), (1, 1));
-    for (code, word) in [("rFr", 0), ("UFt", 4), ("Add", 32), ("CMD", 15), ("CMDD", 15)] {
+    for (code, word) in [("rFr", 0), ("UFt", 4), ("Add", 32)] {
         assert!(drive.write_parameter(row(code), word).await.is_err(), "{code}");
     }
     assert_eq!(machine.requests(0x06), 1, "what is refused is not sent");
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_commands_the_drive_is_no_parameter() {
+    let (mut drive, machine, _line) = rig();
+    for (code, word) in [("CMD", 15), ("CMDD", 15), ("LFr", 200), ("LFRD", 600), ("CMI", 1), ("CMI", 2)] {
+        let error = drive.write_parameter(row(code), word).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported, "{code}");
+    }
+    assert_eq!(machine.all_requests(), 0);
 }
 
 #[tokio::test(start_paused = true)]

@@ -5,13 +5,13 @@ use std::time::Duration;
 use drive_core::{
     Class, Command, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog, WatchdogCapability,
     Written,
-    drivecom::CONFIRMING_READS,
+    drivecom::{self, CONFIRMING_READS},
     registers::{Access, Storage},
 };
 
 use crate::{
     Atv312,
-    registers::{CMI, ETI, SLL, TTO},
+    registers::{CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, SCS, SLL, TTO, TUN},
     settings::Known,
     words::{ExtendedControl, ExtendedStatus},
 };
@@ -20,6 +20,8 @@ use crate::{
 const EEPROM_LIFE: u32 = 1_000_000;
 /// Saving goes on while nothing else is read, so it is waited for longer than a state of the chart.
 const SAVING_READS: usize = 10 * CONFIRMING_READS;
+/// `tUn` = YES: auto-tuning "as soon as possible" (p. 30).
+const TUNE_NOW: u16 = 112;
 /// One count of `ttO`.
 const STEP: Duration = Duration::from_millis(100);
 
@@ -34,9 +36,11 @@ pub(crate) const WATCHDOG: WatchdogCapability = WatchdogCapability {
 };
 
 impl<P: Port> Atv312<P> {
-    /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs.
+    /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs, and so is
+    /// `CMI`, whose bits give the held reference another unit and a stopped drive its lock.
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        if row.access == Access::WriteStopped {
+        refuse_orders(row, word)?;
+        if row.access == Access::WriteStopped || row.address == CMI.address() {
             self.check_standing(Command::WriteParameter(row.address)).await?;
         }
         let written = self.registers.at(Class::Background).change_row(row, word).await?;
@@ -141,6 +145,37 @@ impl<P: Port> Atv312<P> {
             _ => Err(Error::WatchdogTime { slave: self.registers.slave(), timeout, min, max, step }),
         }
     }
+}
+
+/// Refuses what acts as soon as it is written, and so is no parameter: commands, and orders to the drive (p. 16, 19, 20,
+/// 30–32, 56).
+fn refuse_orders(row: &Row, word: u16) -> Result<()> {
+    const RECALL: (&str, &str) = (
+        "a return to factory settings by a parameter",
+        "it gives control back to the terminals and changes what they do; do it at the drive",
+    );
+    const SAVE: (&str, &str) = (
+        "saving to EEPROM by a parameter",
+        "a save to EEPROM is counted and refused when nothing changed; use it",
+    );
+    drivecom::refuse_commands(row, &[CMD.address(), CMDD.address(), LFR.address(), LFRD.address()])?;
+    let is = |register: u16| row.address == register;
+    let cmi = ExtendedControl::from_bits_retain(if is(CMI.address()) { word } else { 0 });
+    let (what, reason) = if cmi.contains(ExtendedControl::FACTORY_SETTINGS)
+        || is(FCS.address())
+        || is(CFG.address())
+    {
+        RECALL
+    } else if cmi.contains(ExtendedControl::SAVE) || is(SCS.address()) {
+        SAVE
+    } else if is(RP.address()) {
+        ("a fault reset by a parameter", "the fault reset checks the drive first; use it")
+    } else if is(TUN.address()) && word == TUNE_NOW {
+        ("auto-tuning by a parameter", "the motor takes its nominal current at once; tune it at the drive")
+    } else {
+        return Ok(());
+    };
+    Err(Error::Unsupported { what, reason })
 }
 
 const fn reaction(sll: u16) -> Reaction {

@@ -21,7 +21,7 @@ use drive_core::{
 
 pub use crate::{diagnostics::Counters, map::Atv58Map, registers::ROWS};
 use crate::{
-    registers::{CMD, W463, W483},
+    registers::{CMD, W401, W402, W463, W483},
     status::Words,
     words::FaultRegister,
 };
@@ -208,10 +208,11 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        if row.address == CMD.address() {
+        drivecom::refuse_commands(row, &[CMD.address(), W401.address()])?;
+        if row.address == W402.address() {
             return Err(Error::Unsupported {
-                what: "writing the control word as a parameter",
-                reason: "start, stop and fault reset check the drive first; use them",
+                what: "writing W402 as a parameter",
+                reason: "it is suspected to be CMI, whose bits recall factory settings and write the EEPROM",
             });
         }
         // The limits that were read once may change with it.

@@ -155,7 +155,7 @@ async fn nobody_starts_a_drive_that_is_in_forced_local_control() {
 #[tokio::test(start_paused = true)]
 async fn a_negative_reference_that_somebody_left_refuses_the_start() {
     let (mut drive, machine, _line) = rig();
-    drive.write_parameter(row("W401"), (-200_i16).cast_unsigned()).await.unwrap();
+    assert!(machine.poke(row("W401").address, (-200_i16).cast_unsigned()));
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
     assert!(commands(&machine).is_empty());
@@ -214,10 +214,20 @@ async fn a_parameter_is_read_back_and_an_equal_value_is_not_written() {
     assert!(drive.write_parameter(row("ACC"), 789).await.unwrap().changed);
     assert!(!drive.write_parameter(row("ACC"), 789).await.unwrap().changed);
     assert_eq!((machine.requests(0x06), machine.peek(252)), (1, Some(789)));
-    for (code, word) in [("W483", 0), ("W458", 0), ("CMD", 15)] {
+    for (code, word) in [("W483", 0), ("W458", 0)] {
         assert!(drive.write_parameter(row(code), word).await.is_err(), "{code}");
     }
     assert_eq!(machine.requests(0x06), 1, "what is refused is not sent");
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_commands_the_drive_is_no_parameter() {
+    let (mut drive, machine, _line) = rig();
+    for (code, word) in [("CMD", 15), ("W401", 200), ("W402", 1)] {
+        let error = drive.write_parameter(row(code), word).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported, "{code}");
+    }
+    assert_eq!(machine.all_requests(), 0);
 }
 
 #[tokio::test(start_paused = true)]

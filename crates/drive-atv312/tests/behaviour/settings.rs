@@ -136,6 +136,39 @@ async fn a_save_that_the_drive_refuses_is_not_confirmed_and_not_left_pending() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn what_commands_the_drive_or_acts_at_once_is_no_parameter() {
+    let (mut drive, machine, _line) = rig();
+    for (code, word) in [
+        ("CMD", 0x000F),
+        ("CMDD", 0x000F),
+        ("LFr", 200),
+        ("LFRD", 600),
+        // The recall of factory settings, the save, and both beside a bit that may be written.
+        ("CMI", 1),
+        ("CMI", 2),
+        ("CMI", 0x4003),
+        ("FCS", 64),
+        ("CFG", 0),
+        ("SCS", 2),
+        ("rP", 1),
+        ("tUn", 112),
+    ] {
+        let error = drive.write_parameter(row(code), word).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported, "{code}");
+    }
+    assert_eq!(machine.all_requests(), 0);
+    drive.write_parameter(row("tUn"), 114).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_unit_of_the_reference_does_not_change_under_a_motor_that_runs() {
+    let (mut drive, machine, _line) = running().await;
+    let error = drive.write_parameter(row("CMI"), 1 << 9).await.unwrap_err();
+    assert_eq!(refusal(&error), Some(Refusal::MotorRunning));
+    assert_eq!(machine.peek(8504), Some(0));
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_parameter_is_refused_before_it_is_sent_by_access_range_and_state() {
     let (mut drive, machine, _line) = running().await;
     let before = writes(&machine);
