@@ -175,8 +175,16 @@ proptest! {
         flipped in 0_u64..20,
         noise in 0_u64..20,
         late in 0_u64..20,
+        echo in prop::option::of(0_u64..20),
+        known in any::<bool>(),
     ) {
-        let mut rig = Rig::new(seed, LineConfig { queue_limit: 40, ..config() });
+        let setting = match echo {
+            None if known => Echo::Off,
+            Some(_) if known => Echo::On,
+            _ => Echo::Auto,
+        };
+        let mut rig = Rig::new(seed, LineConfig { queue_limit: 40, echo: setting, ..config() });
+        rig.echo = echo;
         rig.faults = Faults { lost, flipped, truncated: flipped, noise, late, foreign: noise };
         for _ in 0..300 {
             let slave = (rig.random.below(6) + 1) as u8;

@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_bus::{
-    LineConfig,
+    Echo, LineConfig,
     exchange::rtu,
     master::{Master, Outcome},
     schedule::Ticket,
@@ -58,6 +58,8 @@ pub(crate) struct Rig {
     pub(crate) random: Random,
     pub(crate) faults: Faults,
     pub(crate) dead: BTreeSet<u8>,
+    /// The adapter gives back what is sent; one in so many echoes is damaged.
+    pub(crate) echo: Option<u64>,
     config: LineConfig,
     /// What will come to the master: time, order, bytes.
     wire: BinaryHeap<Reverse<(Instant, u64, Vec<u8>)>>,
@@ -86,6 +88,7 @@ struct Asked {
     at: Instant,
     ticket: Ticket,
     sent: bool,
+    settled: bool,
 }
 
 /// The word that a slave has in a register that nobody wrote.
@@ -105,6 +108,7 @@ impl Rig {
             random: Random::new(seed),
             faults: Faults::default(),
             dead: BTreeSet::new(),
+            echo: None,
             config,
             wire: BinaryHeap::new(),
             order: 0,
@@ -140,7 +144,8 @@ impl Rig {
         let call = self.next_call;
         self.next_call += 1;
         let ticket = self.master.submit(self.now, slave, request.clone(), terms, call)?;
-        let asked = Asked { slave, request, class: terms.class, at: self.now, ticket, sent: false };
+        let asked =
+            Asked { slave, request, class: terms.class, at: self.now, ticket, sent: false, settled: false };
         self.asked.insert(call, asked);
         Ok(call)
     }
@@ -205,18 +210,28 @@ impl Rig {
         self.stop_is_not_overtaken(slave, pdu);
         let end = self.now + self.config.serial.characters(frame.len());
         self.quiet_from = end;
+        if let Some(damaged) = self.echo {
+            let mut echo = frame.to_vec();
+            if self.random.one_in(damaged) {
+                self.flip(&mut echo);
+            }
+            if self.random.one_in(damaged) {
+                self.truncate(&mut echo);
+            }
+            self.deliver(end, echo);
+        }
         if slave != 0 && !self.dead.contains(&slave) {
             self.answer(slave, pdu, end);
         }
     }
 
-    /// While a Stop waits, only a Stop may be sent.
+    /// While a Stop waits, only a Stop may be sent, or what finds out about the echo on its behalf, once.
     fn stop_is_not_overtaken(&mut self, slave: u8, pdu: &[u8]) {
         let sent =
             |asked: &Asked| asked.slave == slave && drive_bus::pdu::encode(&asked.request).unwrap() == pdu;
         let stops = || self.asked.values().filter(|asked| asked.class == Class::Stop);
-        if stops().any(|stop| !stop.sent) {
-            assert!(stops().any(sent), "{pdu:02X?} to {slave} overtakes a stop");
+        if stops().any(|stop| !stop.sent) && !stops().any(sent) {
+            assert!(self.settles(slave, pdu), "{pdu:02X?} to {slave} overtakes a stop");
         }
         for asked in self.asked.values_mut().filter(|asked| asked.class == Class::Stop) {
             if !asked.sent && sent(asked) {
@@ -226,6 +241,16 @@ impl Rig {
                 break;
             }
         }
+    }
+
+    /// Whether this read finds out about the echo for a Stop that waits.
+    fn settles(&mut self, slave: u8, pdu: &[u8]) -> bool {
+        let unsettled = |asked: &&mut Asked| {
+            asked.class == Class::Stop && asked.slave == slave && !asked.sent && !asked.settled
+        };
+        self.config.echo == Echo::Auto
+            && pdu[0] == 3
+            && self.asked.values_mut().find(unsettled).map(|asked| asked.settled = true).is_some()
     }
 
     fn answer(&mut self, slave: u8, pdu: &[u8], end: Instant) {
@@ -251,13 +276,10 @@ impl Rig {
             return;
         }
         if self.random.one_in(flipped) {
-            for _ in 0..=self.random.below(3) {
-                let bit = self.random.below(bytes.len() as u64 * 8);
-                bytes[bit as usize / 8] ^= 1 << (bit % 8);
-            }
+            self.flip(&mut bytes);
         }
         if self.random.one_in(truncated) {
-            bytes.truncate(1 + self.random.below(bytes.len() as u64 - 1) as usize);
+            self.truncate(&mut bytes);
         }
         if self.random.one_in(noise) {
             bytes.insert(0, self.random.below(256) as u8);
@@ -273,6 +295,18 @@ impl Rig {
         }
         let length = self.config.serial.characters(bytes.len());
         self.deliver(end + turnaround + length, bytes);
+    }
+
+    /// One to three bits change.
+    fn flip(&mut self, bytes: &mut [u8]) {
+        for _ in 0..=self.random.below(3) {
+            let bit = self.random.below(bytes.len() as u64 * 8);
+            bytes[bit as usize / 8] ^= 1 << (bit % 8);
+        }
+    }
+
+    fn truncate(&mut self, bytes: &mut Vec<u8>) {
+        bytes.truncate(1 + self.random.below(bytes.len() as u64 - 1) as usize);
     }
 
     fn deliver(&mut self, at: Instant, bytes: Vec<u8>) {
