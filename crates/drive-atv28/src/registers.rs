@@ -45,8 +45,8 @@ registers! {
     ACC: ReadWrite(252, "ACC", "acceleration time, in counts: 0.1 s on the twin, not confirmed for the Altivar 28", Unknown, Unit::COUNT, Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9001, p. 39");
     DEC: ReadWrite(253, "dEC", "deceleration time, in counts: 0.1 s on the twin, not confirmed for the Altivar 28", Unknown, Unit::COUNT, Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9002, p. 39");
     ITH: ReadWrite(258, "ItH", "motor thermal current", Unknown, Unit::scaled("A", 1), Range::Described(0, 32_767, "0.2 to 1.5 In of the drive"), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9622, p. 27");
-    AC2: ReadWrite(260, "AC2", "second acceleration time", Unknown, Unit::scaled("s", 1), Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9012, p. 39");
-    DE2: ReadWrite(261, "dE2", "second deceleration time", Unknown, Unit::scaled("s", 1), Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9013, p. 39");
+    AC2: ReadWrite(260, "AC2", "second acceleration time, in counts: 0.1 s on the twin, not confirmed for the Altivar 28", Unknown, Unit::COUNT, Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9012, p. 39");
+    DE2: ReadWrite(261, "dE2", "second deceleration time, in counts: 0.1 s on the twin, not confirmed for the Altivar 28", Unknown, Unit::COUNT, Range::Described(1, 32_760, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W9013, p. 39");
     JGF: ReadWrite(262, "JGF", "jog frequency", Unknown, Unit::scaled("Hz", 1), Range::Described(0, 100, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W11111, p. 45");
     SP2: ReadWrite(264, "SP2", "preset speed 2", Unknown, Unit::scaled("Hz", 1), Range::Described(0, 5000, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W11410, p. 44");
     SP3: ReadWrite(265, "SP3", "preset speed 3", Unknown, Unit::scaled("Hz", 1), Range::Described(0, 5000, TWIN), Factory::None, Elsewhere, "BBV51701 p. 57; twin W11411, p. 44");

@@ -16,6 +16,8 @@ const AMPERE: registers::Unit = registers::Unit::scaled("A", 1);
 const PERCENT: registers::Unit = registers::Unit::scaled("%", 0);
 const RPM: registers::Unit = registers::Unit::scaled("rpm", 0);
 const SECOND: registers::Unit = registers::Unit::scaled("s", 1);
+/// The manual prints 0.1 s, which is the factory's `Inr` (p. 38, 39); a count is whatever `Inr` says.
+const RAMP: registers::Unit = registers::Unit::scaled("× Inr", 0);
 
 registers! {
     /// Every register of an Altivar 312.
@@ -23,10 +25,10 @@ registers! {
 
     // IEC 61800-7 variables (p. 16–18).
     CMDD: ReadWrite(8601, "CMDD", "IEC 61800-7 control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 16");
-    LFRD: ReadWrite(8602, "LFRD", "speed reference via the bus (signed value)", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 16");
+    LFRD: ReadWrite(8602, "LFRD", "speed reference via the bus (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 16");
     ETAD: Read(8603, "ETAD", "IEC 61800-7 status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 17");
     FRHD: Read(8605, "FRHD", "speed reference (signed ramp input)", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 17");
-    RFRD: Read(8604, "RFRD", "output speed (signed value)", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 17");
+    RFRD: Read(8604, "RFRD", "output speed (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 17");
     ERRD: Read(8606, "ERRD", "fault code", Volatile, Unit::BITS, Range::OneOf(CIA_402_ERRORS), Factory::None, Elsewhere, "BBV51701 p. 17");
     SMIL: ReadWrite(8607, "SMIL", "min. speed", RamUntilSaved, RPM, Range::Described(0, 65_535, "0 to HSP in rpm"), Factory::None, Elsewhere, "BBV51701 p. 18");
     SMIL_HIGH: ReadWrite(8608, "SMIL high", "min. speed, high word", RamUntilSaved, RPM, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 18");
@@ -41,7 +43,7 @@ registers! {
 
     // Control variables (p. 19–20).
     CMD: ReadWrite(8501, "CMD", "control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 19");
-    LFR: ReadWrite(8502, "LFr", "frequency reference via the bus (signed value)", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 19");
+    LFR: ReadWrite(8502, "LFr", "frequency reference via the bus (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 19");
     PISP: ReadWrite(8503, "PISP", "PI regulator reference via the bus", Volatile, Unit::scaled("%", 1), Range::Within(0, 1000), Factory::None, Elsewhere, "BBV51701 p. 19");
     CMI: ReadWrite(8504, "CMI", "extended control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 20");
     IOLR: ReadWrite(5240, "IOLR", "value of logic I/O", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 20 and 23");
@@ -49,7 +51,7 @@ registers! {
 
     // Monitoring variables (p. 21–26).
     ETA: Read(3201, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
-    RFR: Read(3202, "rFr", "output frequency applied to the motor (signed value)", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
+    RFR: Read(3202, "rFr", "output frequency applied to the motor (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     FRH: Read(3203, "FrH", "frequency reference before ramp (absolute value)", Volatile, HZ, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     LCR: Read(3204, "LCr", "current in the motor", Volatile, AMPERE, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     OTR: Read(3205, "Otr", "motor torque", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
@@ -158,12 +160,12 @@ registers! {
     TA3: ReadWrite(9007, "tA3", "start of CUS-type deceleration ramp rounded", RamUntilSaved, PERCENT, Range::Within(0, 100), Factory::Value(10), Elsewhere, "BBV51701 p. 38");
     TA4: ReadWrite(9008, "tA4", "end of CUS-type deceleration ramp rounded", RamUntilSaved, PERCENT, Range::Described(0, 100, "0 to 100 - tA3"), Factory::Value(10), Elsewhere, "BBV51701 p. 38");
     INR: WriteStopped(9020, "Inr", "ramp increment", RamUntilSaved, Unit::CODE, Range::OneOf(RAMP_INCREMENTS), Factory::Value(1), Elsewhere, "BBV51701 p. 38");
-    ACC: ReadWrite(9001, "ACC", "acceleration ramp time", RamUntilSaved, SECOND, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(30), Manual, "BBV52816 p. 12 and BBV51701 p. 39");
-    DEC: ReadWrite(9002, "dEC", "deceleration ramp time", RamUntilSaved, SECOND, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(30), Manual, "BBV52816 p. 12 and BBV51701 p. 39");
+    ACC: ReadWrite(9001, "ACC", "acceleration ramp time in steps of Inr (0.01, 0.1 or 1 s)", RamUntilSaved, RAMP, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(30), Manual, "BBV52816 p. 12 and BBV51701 p. 39");
+    DEC: ReadWrite(9002, "dEC", "deceleration ramp time in steps of Inr (0.01, 0.1 or 1 s)", RamUntilSaved, RAMP, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(30), Manual, "BBV52816 p. 12 and BBV51701 p. 39");
     RPS: WriteStopped(9010, "rPS", "ramp switching", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 39");
     FRT: WriteStopped(9011, "Frt", "ramp switching threshold", RamUntilSaved, HZ, Range::Within(0, 5000), Factory::Value(0), Elsewhere, "BBV51701 p. 39");
-    AC2: ReadWrite(9012, "AC2", "2nd acceleration ramp time", RamUntilSaved, SECOND, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(50), Elsewhere, "BBV51701 p. 39");
-    DE2: ReadWrite(9013, "dE2", "2nd deceleration ramp time", RamUntilSaved, SECOND, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(50), Elsewhere, "BBV51701 p. 39");
+    AC2: ReadWrite(9012, "AC2", "2nd acceleration ramp time in steps of Inr (0.01, 0.1 or 1 s)", RamUntilSaved, RAMP, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(50), Elsewhere, "BBV51701 p. 39");
+    DE2: ReadWrite(9013, "dE2", "2nd deceleration ramp time in steps of Inr (0.01, 0.1 or 1 s)", RamUntilSaved, RAMP, Range::Described(1, 32_760, "with Inr = 0.01: 5 to 32760"), Factory::Value(50), Elsewhere, "BBV51701 p. 39");
     BRA: WriteStopped(9003, "brA", "deceleration ramp adaptation", RamUntilSaved, Unit::CODE, Range::OneOf(NO_YES), Factory::Value(1), Elsewhere, "BBV51701 p. 39");
     STT: WriteStopped(11201, "Stt", "normal stop mode", RamUntilSaved, Unit::CODE, Range::OneOf(STOP_TYPES), Factory::Value(0), Elsewhere, "BBV51701 p. 40");
     FST: WriteStopped(11204, "FSt", "fast stop via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 40");

@@ -93,6 +93,8 @@ fn each_row_has_the_unit_that_is_printed() {
         let unit = row(line.address).unit;
         let (symbol, decimals) = match line.unit {
             "-" => continue,
+            // Printed for the factory's Inr; with another "ramps of 0.05 to 327.6 s" or "1 to 32760 s" (p. 38, 39).
+            "0.1 s" if ["ACC", "dEC", "AC2", "dE2"].contains(&line.code) => ("× Inr", 0),
             "1" => ("", 0),
             "%" | "1%" => ("%", 0),
             "0.1%" => ("%", 1),
@@ -108,6 +110,15 @@ fn each_row_has_the_unit_that_is_printed() {
     // "Signed value", and the two inputs and references that go below 0.
     let signed: Vec<u16> = ROWS.iter().filter(|row| row.unit.signed).map(|row| row.address).collect();
     assert_eq!(signed, [8602, 8605, 8604, 8502, 3202, 5243, 8521, 8522, 8631, 8632]);
+}
+
+#[test]
+fn a_ramp_is_shown_in_steps_of_inr_because_only_inr_tells_how_long_a_step_is() {
+    for address in [9001, 9002, 9012, 9013] {
+        assert_eq!(row(address).show(30), "30 × Inr", "W{address}");
+        assert_eq!(row(address).read("3.0 s"), None, "W{address}");
+        assert_eq!(row(address).read("30"), Some(30), "W{address}");
+    }
 }
 
 #[test]

@@ -11,11 +11,11 @@
 //!     pub const ROWS;
 //!
 //!     ETA: Read(3201, "ETA", "status word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
-//!     ACC: ReadWrite(9001, "ACC", "acceleration", RamUntilSaved, Unit::scaled("s", 1), Range::Within(1, 32_760), Factory::Value(30), Elsewhere, "BBV51701 p. 38");
+//!     TLS: ReadWrite(11701, "tLS", "low speed operating time", RamUntilSaved, Unit::scaled("s", 1), Range::Within(0, 9999), Factory::Value(0), Elsewhere, "BBV51701 p. 28");
 //! }
 //!
 //! assert_eq!(ROWS.len(), 2);
-//! assert_eq!(ACC.row().unit.show(30), "3.0 s");
+//! assert_eq!(TLS.row().unit.show(30), "3.0 s");
 //! ```
 //!
 //! Two rows with one address do not compile:
