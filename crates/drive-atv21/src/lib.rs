@@ -288,7 +288,11 @@ impl<P: Port> Drive for Atv21<P> {
         self.registers.at(Class::Background).read_row(row).await
     }
 
+    /// # Errors
+    /// Also [`Unsupported`](drive_core::Error::Unsupported) for FA00, FA20, FA01 and FA13, which have methods of their
+    /// own.
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        settings::check_parameter(row)?;
         self.change_parameter(row, word, Command::WriteParameter(row.address)).await
     }
 

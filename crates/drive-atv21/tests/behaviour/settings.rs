@@ -3,13 +3,17 @@
 use std::time::Duration;
 
 use drive_atv21::{
-    StallLevel,
+    ROWS, StallLevel,
     blocks::{BlockSetUp, Blocks, ReadSlot},
     registers as map,
 };
-use drive_core::{Direction, Drive, Error, ErrorKind, Reaction, Refusal, State, Watchdog};
+use drive_core::{Direction, Drive, Error, ErrorKind, Reaction, Refusal, Row, State, Watchdog};
 
 use crate::support::{HALF_SPEED, Rig, SECOND, refusal};
+
+fn row(code: &str) -> &'static Row {
+    Row::find(ROWS, code).unwrap()
+}
 
 #[tokio::test(start_paused = true)]
 async fn setting_up_the_blocks_writes_only_what_differs_and_is_used_after_the_reset() {
@@ -98,4 +102,16 @@ async fn parameters_are_checked_written_once_and_read_back() {
     assert!(matches!(read_only, Err(Error::AccessForbidden { .. })));
     assert_eq!(rig.count(), before);
     assert_eq!(drive.persist().await.unwrap_err().kind(), ErrorKind::Unsupported);
+}
+
+#[tokio::test(start_paused = true)]
+async fn no_command_and_no_reference_is_written_as_a_parameter() {
+    let (rig, mut drive) = Rig::factory();
+    for (code, word) in [("FA00", 0xC400), ("FA00", 0x2000), ("FA20", 2), ("FA01", 2_500), ("FA13", 1_500)] {
+        let error = drive.write_parameter(row(code), word).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported, "{code}: {error}");
+    }
+    assert_eq!((rig.count(), rig.machine.observe().running), (0, false));
+    // The outputs move no motor.
+    assert!(drive.write_parameter(row("FA50"), 1).await.unwrap().changed);
 }
