@@ -105,18 +105,16 @@ impl<P: Port> Atv312<P> {
 
     /// Writes a setting that differs, and remembers that it is not saved.
     pub(crate) async fn change(&mut self, register: Register<WriteStopped>, value: u16) -> Result<bool> {
-        let written = self.registers.at(Class::Background).change_row(register.row(), value).await?;
-        self.note(written);
-        Ok(written.changed)
+        Ok(self.write_row(register.row(), value).await?.changed)
     }
 
     async fn until_control(&mut self, command: Command, reached: fn(Control) -> bool) -> Result<Status> {
-        let mut status = self.fast_status(Class::Command).await?;
+        let mut status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
         for _ in 1..CONFIRMING_READS {
             if status.control.is_some_and(reached) {
                 return Ok(status);
             }
-            status = self.fast_status(Class::Command).await?;
+            status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
         }
         if status.control.is_some_and(reached) {
             Ok(status)

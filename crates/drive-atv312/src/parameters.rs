@@ -43,18 +43,25 @@ impl<P: Port> Atv312<P> {
         if row.access == Access::WriteStopped || row.address == CMI.address() {
             self.check_standing(Command::WriteParameter(row.address)).await?;
         }
-        let written = self.registers.at(Class::Background).change_row(row, word).await?;
-        self.note(written);
-        Ok(written)
+        self.write_row(row, word).await
     }
 
-    /// What was read once may be otherwise now, and a parameter in RAM is worth saving.
-    pub(crate) fn note(&mut self, written: Written) {
-        if written.changed {
+    /// Writes a row that differs. What was read once may be otherwise then, also when it is not known whether the write
+    /// arrived, and a parameter in RAM is worth saving.
+    pub(crate) async fn write_row(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        let outcome = self.registers.at(Class::Background).change_row(row, word).await;
+        let may_have_changed = match &outcome {
+            Ok(written) => written.changed,
+            Err(error) => {
+                !matches!(error.kind(), ErrorKind::Refused | ErrorKind::Exception | ErrorKind::NotSent)
+            }
+        };
+        if may_have_changed {
             self.known = Known::default();
             self.command = None;
-            self.unsaved |= matches!(written.storage, Storage::RamUntilSaved | Storage::Unknown);
+            self.unsaved |= matches!(row.storage, Storage::RamUntilSaved | Storage::Unknown);
         }
+        outcome
     }
 
     /// CMI bit 1, once: it clears itself when the drive begins, and ETI bit 0 tells when it has done.
@@ -65,7 +72,7 @@ impl<P: Port> Atv312<P> {
         if self.saves >= EEPROM_LIFE {
             return Err(self.refused(Command::Persist, Refusal::EepromLife));
         }
-        let cmi = ExtendedControl::from_bits_retain(self.registers.at(Class::Background).read(CMI).await?);
+        let cmi = self.held_cmi().await?;
         let save = (cmi | ExtendedControl::SAVE).bits();
         let edge = self.registers.at(Class::Background).edge().write(CMI, save).await;
         match &edge {
@@ -75,10 +82,10 @@ impl<P: Port> Atv312<P> {
         let mut seen = edge.is_ok();
         for _ in 0..SAVING_READS {
             let mut calls = self.registers.at(Class::Background);
-            let pending =
-                ExtendedControl::from_bits_retain(calls.read(CMI).await?).contains(ExtendedControl::SAVE);
-            let busy = ExtendedStatus::from_bits_retain(calls.read(ETI).await?)
-                .contains(ExtendedStatus::EEPROM_BUSY);
+            let cmi = calls.read(CMI).await.map_err(Error::after_write)?;
+            let eti = calls.read(ETI).await.map_err(Error::after_write)?;
+            let pending = ExtendedControl::from_bits_retain(cmi).contains(ExtendedControl::SAVE);
+            let busy = ExtendedStatus::from_bits_retain(eti).contains(ExtendedStatus::EEPROM_BUSY);
             seen |= pending || busy;
             if !pending && !busy {
                 // An order whose answer was lost and of which nothing showed may never have arrived.
@@ -89,9 +96,16 @@ impl<P: Port> Atv312<P> {
             }
         }
         // Refused by the drive, as with too low a supply: the order must not stay and act later.
-        self.registers.at(Class::Background).write(CMI, (cmi - ExtendedControl::SAVE).bits()).await?;
+        let withdrawn = self.registers.at(Class::Background).write(CMI, cmi.bits()).await;
+        withdrawn.map_err(Error::after_write)?;
         let status = self.fast_status(Class::Background).await?;
         Err(self.not_confirmed(Command::Persist, status))
+    }
+
+    /// What `CMI` holds, without the two orders: one that still waits there is not given again with what is written back.
+    async fn held_cmi(&mut self) -> Result<ExtendedControl> {
+        let cmi = ExtendedControl::from_bits_retain(self.registers.at(Class::Background).read(CMI).await?);
+        Ok(cmi - ExtendedControl::FACTORY_SETTINGS - ExtendedControl::SAVE)
     }
 
     /// `ttO`, `SLL` and the NTO bit of `CMI`.
@@ -123,10 +137,10 @@ impl<P: Port> Atv312<P> {
         self.check_standing(Command::ArmWatchdog).await?;
         self.change(TTO, tto).await?;
         self.change(SLL, sll).await?;
-        let mut calls = self.registers.at(Class::Background);
-        let cmi = ExtendedControl::from_bits_retain(calls.read(CMI).await?);
+        let cmi = self.held_cmi().await?;
         if cmi.contains(ExtendedControl::NO_TIMEOUT) {
-            calls.write(CMI, (cmi - ExtendedControl::NO_TIMEOUT).bits()).await?;
+            let watched = (cmi - ExtendedControl::NO_TIMEOUT).bits();
+            self.registers.at(Class::Background).write(CMI, watched).await?;
         }
         let armed = self.read_watchdog().await?;
         if armed == wanted {

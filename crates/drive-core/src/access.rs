@@ -187,7 +187,8 @@ impl<P: Port> Calls<'_, P> {
                 if readable && self.terms.effect == Effect::Level =>
             {
                 let problem = problem.clone();
-                if self.read_word(register.address()).await? == value {
+                // A reading that fails, or is not even sent any more, leaves the outcome unknown.
+                if self.read_word(register.address()).await == Ok(value) {
                     return Ok(());
                 }
                 Err(self.port_error(Self::writing(register.address(), self.single_write()), problem))
@@ -267,7 +268,7 @@ impl<P: Port> Calls<'_, P> {
         {
             return Err(error);
         }
-        let value = self.read_row(row).await?;
+        let value = self.read_row(row).await.map_err(Error::after_write)?;
         if value == word {
             return Ok(written);
         }

@@ -344,6 +344,21 @@ pub enum ErrorKind {
 }
 
 impl Error {
+    /// The same failure, of an exchange that was to show what an earlier write has done. Whether it was not sent, not
+    /// answered or refused says nothing of that write: its outcome is unknown.
+    #[must_use]
+    pub fn after_write(self) -> Self {
+        match self {
+            Self::Port { slave, exchange, .. }
+            | Self::Exception { slave, exchange, .. }
+            | Self::Answer { slave, exchange, .. } => {
+                let problem = PortError::OutcomeUnknown("what it has done could not be read");
+                Self::Port { slave, exchange, problem }
+            }
+            error => error,
+        }
+    }
+
     /// Its kind.
     #[must_use]
     pub const fn kind(&self) -> ErrorKind {
@@ -375,6 +390,21 @@ mod tests {
         assert!(SlaveAddress::try_from(1).is_ok());
         assert!(SlaveAddress::try_from(247).is_ok());
         assert!(SlaveAddress::try_from(248).is_err());
+    }
+
+    #[test]
+    fn an_exchange_that_fails_after_a_write_never_says_that_nothing_was_sent() {
+        let slave = SlaveAddress::try_from(7).unwrap();
+        let exchange = Exchange { function: 3, register: Some(3201) };
+        let (code, meaning) = (4, ExceptionMeaning::Failed);
+        for error in [
+            Error::Port { slave, exchange, problem: PortError::Expired },
+            Error::Port { slave, exchange, problem: PortError::Damaged("CRC") },
+            Error::Exception { slave, exchange, code, meaning },
+            Error::Answer { slave, exchange, reason: "the answer is of another function" },
+        ] {
+            assert_eq!(error.after_write().kind(), ErrorKind::OutcomeUnknown);
+        }
     }
 
     #[test]

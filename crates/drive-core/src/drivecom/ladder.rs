@@ -90,22 +90,26 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     if quick_stop && status.output_frequency != Some(Frequency::ZERO) {
         return Err(refused(Refusal::State(State::QuickStop)));
     }
+    let mut given = false;
+    // Once the run command was written, a reading that fails says nothing of the motor.
+    let failed = |error: Error, given| if given { error.after_write() } else { error };
     for _ in 0..CONFIRMING_READS {
         match chart_of(eta, &status).map(|state| climb.next(state)) {
             Some(Next::Write(ENABLE_OPERATION)) => {
                 drive.write_control(Class::Command, word, Effect::Level).await?;
+                given = true;
             }
             Some(Next::Write(step)) => drive.write_control(Class::Command, step, Effect::Level).await?,
             Some(Next::Wait) => {}
             Some(Next::Arrived) => {
-                if drive.shows_run(word, &mut status).await? {
+                if drive.shows_run(word, &mut status).await.map_err(Error::after_write)? {
                     return Ok(status);
                 }
             }
             Some(Next::Faulted) => return Err(refused(tripped(&status))),
             Some(Next::Fallen) | None => break,
         }
-        status = drive.read_status(Class::Command).await?;
+        status = drive.read_status(Class::Command).await.map_err(|error| failed(error, given))?;
     }
     Err(Error::NotConfirmed { slave, command, status: Box::new(status) })
 }
@@ -121,12 +125,12 @@ pub async fn stop<D: Drivecom>(
     shows: impl Fn(&Status) -> bool + Send,
 ) -> Result<Status> {
     drive.write_control(Class::Stop, word, Effect::Level).await?;
-    let mut status = drive.read_status(Class::Stop).await?;
+    let mut status = drive.read_status(Class::Stop).await.map_err(Error::after_write)?;
     for _ in 1..CONFIRMING_READS {
         if shows(&status) {
             return Ok(status);
         }
-        status = drive.read_status(Class::Stop).await?;
+        status = drive.read_status(Class::Stop).await.map_err(Error::after_write)?;
     }
     if shows(&status) {
         return Ok(status);
@@ -136,16 +140,24 @@ pub async fn stop<D: Drivecom>(
 }
 
 /// One rising edge of the fault reset, cleared at once. A drive without a fault is left alone. Both words disable the
-/// voltage, so nothing starts by a reset.
+/// voltage, so nothing starts by a reset; and so none is sent to a drive that may still drive its motor.
 ///
 /// # Errors
+/// [`Error::Refused`] while the drive still does what the fault asks, and in a state that its manual does not explain;
 /// [`Error::NotConfirmed`] when the drive still shows a fault after [`CONFIRMING_READS`] reads.
 pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     let eta = drive.status_register();
     let healthy = |status: &Status| chart_of(eta, status).is_some_and(|state| !state.is_fault());
+    let command = Command::ResetFaults;
     let mut status = drive.read_status(Class::Command).await?;
-    if healthy(&status) {
-        return Ok(status);
+    let state = match chart_of(eta, &status) {
+        Some(ChartState::Fault) => None,
+        Some(ChartState::FaultReactionActive) => Some(State::FaultReaction),
+        Some(_) => return Ok(status),
+        None => Some(State::Unknown),
+    };
+    if let Some(state) = state {
+        return Err(Error::Refused { slave: drive.address(), command, reason: Refusal::State(state) });
     }
     let edge = drive.write_control(Class::Command, FAULT_RESET, Effect::Edge).await;
     // An edge that may have arrived is cleared as well, so that the next one rises; the status tells the outcome.
@@ -154,14 +166,13 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     {
         return Err(error);
     }
-    drive.write_control(Class::Command, DISABLE_VOLTAGE, Effect::Level).await?;
+    drive.write_control(Class::Command, DISABLE_VOLTAGE, Effect::Level).await.map_err(Error::after_write)?;
     for _ in 0..CONFIRMING_READS {
-        status = drive.read_status(Class::Command).await?;
+        status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
         if healthy(&status) {
             return Ok(status);
         }
     }
-    let command = Command::ResetFaults;
     Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status) })
 }
 
@@ -196,6 +207,8 @@ mod tests {
         /// The status word that somebody else's stop leaves, and at which reading of the status it comes.
         stopped: Option<(usize, u16)>,
         reads: usize,
+        /// The first reading that the line does not carry any more.
+        mute_from: usize,
     }
 
     impl Chart {
@@ -209,6 +222,7 @@ mod tests {
                 output_frequency: Some(Frequency::ZERO),
                 stopped: None,
                 reads: 0,
+                mute_from: usize::MAX,
             }
         }
     }
@@ -223,6 +237,13 @@ mod tests {
 
         async fn read_status(&mut self, _: Class) -> Result<Status> {
             self.reads += 1;
+            if self.reads >= self.mute_from {
+                return Err(Error::Port {
+                    slave: self.address(),
+                    exchange: crate::Exchange { function: 3, register: Some(ETA) },
+                    problem: PortError::Expired,
+                });
+            }
             if let Some((_, eta)) = self.stopped.filter(|&(read, _)| read == self.reads) {
                 self.eta = eta;
             }
@@ -356,5 +377,30 @@ mod tests {
         let mut healthy = Chart::at(0x0023);
         reset_fault(&mut healthy).await.unwrap();
         assert!(healthy.written.is_empty(), "a drive without a fault is left alone");
+    }
+
+    #[tokio::test]
+    async fn no_reset_takes_the_voltage_from_a_motor_that_may_still_be_driven() {
+        for (eta, state) in [(0x002F, State::FaultReaction), (0x0001, State::Unknown)] {
+            let mut drive = Chart::at(eta);
+            let error = reset_fault(&mut drive).await.unwrap_err();
+            let reason = Refusal::State(state);
+            assert!(matches!(error, Error::Refused { reason: told, .. } if told == reason), "{error}");
+            assert!(drive.written.is_empty());
+        }
+    }
+
+    #[tokio::test]
+    async fn a_start_whose_confirmation_cannot_be_read_is_unknown_and_never_called_not_sent() {
+        for (mute_from, kind) in
+            [(2, ErrorKind::NotSent), (3, ErrorKind::NotSent), (4, ErrorKind::OutcomeUnknown)]
+        {
+            let mut drive = Chart { mute_from, ..Chart::at(0x0040) };
+            let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+            assert_eq!(error.kind(), kind, "{:04X?}", drive.written);
+        }
+        let mut drive = Chart { mute_from: 1, ..Chart::at(0x0027) };
+        let error = stop(&mut drive, StopMode::Fast, QUICK_STOP, |_| true).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown);
     }
 }
