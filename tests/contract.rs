@@ -288,6 +288,10 @@ async fn a_drive_that_is_set_up_for_the_fewest_exchanges_takes_as_many_as_are_cl
             rig.machine.power_cycle();
             rig.poll_for(Duration::from_secs(5)).await;
             rig.drive.forget();
+            // A block is not used before a turning motor has shown what it holds.
+            rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes 25 Hz");
+            rig.drive.start(Direction::Forward).await.expect("it starts");
+            rig.poll_for(Duration::from_secs(20)).await;
         }
         let claims = rig.drive.capabilities();
         // Settings that are read once.

@@ -3,7 +3,10 @@
 //!
 //! Everything else the Altivar 21 reads and writes one word at a time.
 
-use drive_core::RawWord;
+use drive_core::{
+    RawWord,
+    registers::{Register, access::Read},
+};
 
 use crate::registers as map;
 
@@ -45,8 +48,8 @@ pub enum ReadSlot {
 }
 
 impl ReadSlot {
-    const LISTED: [Self; 12] = [
-        Self::None,
+    /// Everything that a place can hold.
+    pub(crate) const CHOICES: [Self; 11] = [
         Self::StatusWord,
         Self::OutputFrequency,
         Self::OutputCurrent,
@@ -80,9 +83,9 @@ impl ReadSlot {
         }
     }
 
-    /// The word that stands in this place of the block, if it is known.
-    fn word(self, value: u16) -> Option<RawWord> {
-        let register = match self {
+    /// The register that stands in this place of the block, if it is known.
+    pub(crate) const fn register(self) -> Option<Register<Read>> {
+        Some(match self {
             Self::None | Self::Unknown(_) => return None,
             Self::StatusWord => map::STATUS_WORD,
             Self::OutputFrequency => map::OUTPUT_FREQUENCY,
@@ -95,14 +98,16 @@ impl ReadSlot {
             Self::AnalogInputVia => map::ANALOG_INPUT_VIA,
             Self::AnalogInputVib => map::ANALOG_INPUT_VIB,
             Self::OutputSpeed => map::OUTPUT_SPEED,
-        };
-        Some(RawWord { address: register.address(), code: register.row().code, value })
+        })
     }
 }
 
 impl From<u16> for ReadSlot {
     fn from(number: u16) -> Self {
-        let listed = Self::LISTED.into_iter().find(|slot| slot.number() == number);
+        if number == 0 {
+            return Self::None;
+        }
+        let listed = Self::CHOICES.into_iter().find(|slot| slot.number() == number);
         listed.unwrap_or(Self::Unknown(number))
     }
 }
@@ -185,32 +190,40 @@ impl Blocks {
         ],
         write: [WriteSlot::CommandWord, WriteSlot::FrequencyReference],
     };
+}
 
-    /// How many of the words at these addresses the read block holds.
-    pub(crate) fn coverage(&self, addresses: &[u16]) -> usize {
-        let held = |&&address: &&u16| self.words(&[0; 5]).any(|word| word.address == address);
-        addresses.iter().filter(held).count()
-    }
+/// How many of the words at these addresses a read block holds.
+pub(crate) fn coverage(slots: &[ReadSlot], addresses: &[u16]) -> usize {
+    let held = |slot: &&ReadSlot| slot.register().is_some_and(|at| addresses.contains(&at.address()));
+    slots.iter().filter(held).count()
+}
 
-    /// Words to ask for so that every place that holds something is read; the drive takes 2 to 5.
-    pub(crate) fn read_count(&self) -> u16 {
-        let places = (1..).zip(self.read);
-        let last = places.filter(|(_, slot)| slot.word(0).is_some()).map(|(place, _)| place).max();
-        last.unwrap_or(0).max(2)
-    }
+/// Words to ask for so that every place that holds something is read; the drive takes 2 to 5.
+pub(crate) fn read_count(slots: &[ReadSlot]) -> u16 {
+    let places = (1..).zip(slots);
+    let last = places.filter(|(_, slot)| slot.register().is_some()).map(|(place, _)| place).max();
+    last.unwrap_or(0).max(2)
+}
 
-    /// The words of an answer, with their addresses.
-    pub(crate) fn words(&self, answer: &[u16]) -> impl Iterator<Item = RawWord> {
-        self.read.into_iter().zip(answer).filter_map(|(slot, &value)| slot.word(value))
-    }
+/// The words of an answer, with their addresses.
+pub(crate) fn words(slots: &[ReadSlot], answer: &[u16]) -> Vec<RawWord> {
+    let word = |(slot, &value): (&ReadSlot, &u16)| {
+        let register = slot.register()?;
+        Some(RawWord { address: register.address(), code: register.row().code, value })
+    };
+    slots.iter().zip(answer).filter_map(word).collect()
+}
 
-    /// The two words of a write that sets command and frequency reference at once, where the block is set up so.
-    pub(crate) fn command_and_reference(&self, command: u16, reference: u16) -> Option<[u16; 2]> {
-        match self.write {
-            [WriteSlot::CommandWord, WriteSlot::FrequencyReference] => Some([command, reference]),
-            [WriteSlot::FrequencyReference, WriteSlot::CommandWord] => Some([reference, command]),
-            _ => None,
-        }
+/// The two words of a write that sets command and frequency reference at once, where the block is set up so.
+pub(crate) const fn command_and_reference(
+    slots: [WriteSlot; 2],
+    command: u16,
+    reference: u16,
+) -> Option<[u16; 2]> {
+    match slots {
+        [WriteSlot::CommandWord, WriteSlot::FrequencyReference] => Some([command, reference]),
+        [WriteSlot::FrequencyReference, WriteSlot::CommandWord] => Some([reference, command]),
+        _ => None,
     }
 }
 
@@ -232,7 +245,7 @@ mod tests {
 
     #[test]
     fn an_empty_block_holds_nothing() {
-        assert_eq!(Blocks::default().coverage(&FAST), 0);
+        assert_eq!(coverage(&Blocks::default().read, &FAST), 0);
     }
 
     #[test]
@@ -244,18 +257,20 @@ mod tests {
             ReadSlot::StatusWord,
             ReadSlot::None,
         ];
-        let blocks = Blocks { read: slots, ..Blocks::default() };
-        assert_eq!((blocks.coverage(&FAST), blocks.read_count()), (2, 4));
-        let words: Vec<_> = blocks.words(&[1, 2, 3, 4]).map(|word| (word.address, word.value)).collect();
-        assert_eq!(words, [(0xFE03, 1), (0xFD01, 4)]);
+        assert_eq!((coverage(&slots, &FAST), read_count(&slots)), (2, 4));
+        let held = words(&slots, &[1, 2, 3, 4]);
+        assert_eq!(
+            held.iter().map(|word| (word.address, word.value)).collect::<Vec<_>>(),
+            [(0xFE03, 1), (0xFD01, 4)]
+        );
     }
 
     #[test]
     fn command_and_reference_go_to_their_own_places() {
-        let swapped =
-            Blocks { write: [WriteSlot::FrequencyReference, WriteSlot::CommandWord], ..Blocks::default() };
-        assert_eq!(Blocks::STANDARD.command_and_reference(0xC400, 6_000), Some([0xC400, 6_000]));
-        assert_eq!(swapped.command_and_reference(0xC400, 6_000), Some([6_000, 0xC400]));
-        assert_eq!(Blocks::default().command_and_reference(0xC400, 6_000), None);
+        let swapped = [WriteSlot::FrequencyReference, WriteSlot::CommandWord];
+        let words = |slots| command_and_reference(slots, 0xC400, 6_000);
+        assert_eq!(words(Blocks::STANDARD.write), Some([0xC400, 6_000]));
+        assert_eq!(words(swapped), Some([6_000, 0xC400]));
+        assert_eq!(words(Blocks::default().write), None);
     }
 }

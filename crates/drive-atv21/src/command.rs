@@ -7,7 +7,7 @@ use drive_core::{
 
 use crate::{
     Atv21, Authority,
-    blocks::WRITE_BLOCK,
+    blocks::{WRITE_BLOCK, command_and_reference},
     registers as map,
     words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
 };
@@ -23,17 +23,18 @@ const SERIAL_COMMAND: u16 = 2;
 type Reference = (drive_core::registers::Register<drive_core::registers::access::ReadWrite>, u16);
 
 impl<P: Port> Atv21<P> {
-    /// Starts the motor at a frequency. Where the write block holds FA00 and FA01 the drive takes both in one
-    /// exchange; else the setpoint is given first.
+    /// Starts the motor at a frequency. Where the write block holds FA00 and FA01, and its owner says that it is in
+    /// effect ([`with_write_block`](Self::with_write_block)), the drive takes both in one exchange; else the setpoint is
+    /// given first.
     ///
     /// # Errors
     /// Those of [`set_setpoint`](drive_core::Drive::set_setpoint) and [`start`](drive_core::Drive::start).
     pub async fn start_at(&mut self, direction: Direction, frequency: Frequency) -> Result<Status> {
         let setpoint = Setpoint::Frequency(frequency);
         let reference = self.reference(setpoint).await?;
-        let blocks = self.known_blocks(Class::Command).await?;
         let word = self.word(CommandWord::run(direction));
-        let block = blocks.and_then(|blocks| blocks.command_and_reference(word.bits(), reference.1));
+        let slots = self.write_slots().await?;
+        let block = slots.and_then(|slots| command_and_reference(slots, word.bits(), reference.1));
         if block.is_none() {
             self.write_setpoint(setpoint).await?;
         }
@@ -153,6 +154,8 @@ impl<P: Port> Atv21<P> {
             Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return sent.map(|()| status),
             _ => {}
         }
+        // A drive that starts up anew takes other blocks into effect, if they were changed.
+        self.forget_blocks();
         // The edge is cleared whether or not the drive is already starting up again and hears nothing: then it clears
         // the word by itself.
         let clear = self.word(CommandWord::empty()).bits();

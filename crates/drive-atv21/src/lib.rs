@@ -21,6 +21,7 @@
 pub mod blocks;
 mod command;
 mod faults;
+mod in_effect;
 mod model;
 mod reading;
 pub mod registers;
@@ -38,7 +39,7 @@ use drive_core::{
     serial::CharacterFormat,
 };
 
-use crate::blocks::Blocks;
+use crate::{blocks::WriteSlot, in_effect::Belief};
 pub use crate::{
     faults::{ALARMS, FAULTS},
     model::{Enclosure, MODELS, ModelEntry, VoltageClass},
@@ -98,15 +99,15 @@ pub enum Authority {
     Settings,
 }
 
-/// What is known of the indirect blocks.
+/// What is known of the write block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum KnownBlocks {
-    /// Not asked yet.
-    Unread,
-    /// As the drive says.
-    Read(Blocks),
-    /// Not to be used until [`Drive::forget`]: changed and not yet in effect, or refused by the drive.
-    Unusable,
+enum WriteBlock {
+    /// Nobody says that what is configured is in effect.
+    Unused,
+    /// Its owner says so; what is configured was not read yet.
+    Promised,
+    /// Its owner says so, and this is configured.
+    Read([WriteSlot; 2]),
 }
 
 /// An Altivar 21.
@@ -125,7 +126,8 @@ pub struct Atv21<P> {
     registers: Registers<P>,
     authority: Authority,
     selections: CommandWord,
-    blocks: KnownBlocks,
+    read_block: Belief,
+    write_block: WriteBlock,
     upper_limit: Option<Frequency>,
     eeprom_writes: u32,
 }
@@ -141,7 +143,8 @@ impl<P: Port> Atv21<P> {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
             authority: Authority::default(),
             selections: CommandWord::empty(),
-            blocks: KnownBlocks::Unread,
+            read_block: Belief::default(),
+            write_block: WriteBlock::Unused,
             upper_limit: None,
             eeprom_writes: 0,
         }
@@ -151,6 +154,18 @@ impl<P: Port> Atv21<P> {
     #[must_use]
     pub fn with_authority(mut self, authority: Authority) -> Self {
         self.authority = authority;
+        self
+    }
+
+    /// The same drive, whose [`start_at`](Self::start_at) may write command and reference in one exchange, where F870 and
+    /// F871 hold them.
+    ///
+    /// It is a promise that the drive was reset or switched off since F870 and F871 were last changed. Nobody but its
+    /// owner can know: the drive tells what is configured, not what is in effect, and a trial would write a reference
+    /// into a command word. A change of these parameters through this value ends the promise.
+    #[must_use]
+    pub fn with_write_block(mut self) -> Self {
+        self.write_block = WriteBlock::Promised;
         self
     }
 
@@ -211,17 +226,23 @@ impl<P: Port> Drive for Atv21<P> {
     }
 
     fn forget(&mut self) {
-        self.blocks = KnownBlocks::Unread;
+        self.forget_blocks();
         self.upper_limit = None;
     }
 
     /// Reads the fast set: the block of the drive in one exchange where it holds FD01, FD00 and FE03, else the words
-    /// one by one, with FE45 for who commands. The block configuration is read once.
+    /// one by one, with FE45 for who commands.
+    ///
+    /// What is configured for the block is in effect only if the drive was reset since, and no register tells that. So
+    /// the first status with a turning motor also reads the block and every register that it could hold: a place is
+    /// used from then on when nothing but what is configured explains its word. A trip ends that.
     ///
     /// [`Status::control`] is `None` when a block is read and the drive is not local: the block cannot tell.
     /// [`Status::at_reference`] and [`Status::fault_code`] are always `None`: no word of the fast set tells them.
     async fn status(&mut self) -> Result<Status> {
-        self.read_status(Class::Status).await
+        let status = self.read_status(Class::Status).await?;
+        self.look_at_block(&status).await;
+        Ok(status)
     }
 
     async fn measurements(&mut self) -> Result<Measurements> {

@@ -3,16 +3,17 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Error, ExceptionMeaning, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power,
-    RawWord, Result, Setpoint, Speed, Status,
+    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power, RawWord, Result,
+    Setpoint, Speed, State, Status,
     registers::{Register, access::Read},
 };
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{
-    Atv21, KnownBlocks,
-    blocks::{Blocks, READ_BLOCK},
+    Atv21,
+    blocks::{self, Blocks, READ_BLOCK, ReadSlot, WriteSlot},
     faults::{FAULTS, alarms},
+    in_effect::{self, Belief},
     model::ModelEntry,
     registers as map, status,
     words::{
@@ -22,7 +23,8 @@ use crate::{
 };
 
 /// What control and safety need, the most important first.
-const FAST_SET: [Register<Read>; 3] = [map::STATUS_WORD, map::OUTPUT_FREQUENCY, map::OUTPUT_CURRENT];
+pub(crate) const FAST_SET: [Register<Read>; 3] =
+    [map::STATUS_WORD, map::OUTPUT_FREQUENCY, map::OUTPUT_CURRENT];
 
 /// What a trend wants to see.
 pub(crate) const SLOW_SET: [Register<Read>; 15] = [
@@ -87,27 +89,24 @@ impl<P: Port> Atv21<P> {
     /// Reads the fast set in any class.
     pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
         let addresses = FAST_SET.map(Register::address);
-        let blocks = self.known_blocks(class).await?;
-        let mut words = Vec::with_capacity(5);
-        if let Some(blocks) = blocks.filter(|blocks| blocks.coverage(&addresses) > 1) {
-            words = self.read_block(class, &blocks).await?;
-        }
+        let mut words = self.read_block_for(class, &addresses).await?;
         let whole = addresses.iter().all(|&address| find(&words, address).is_some());
         if !whole {
             self.read_missing(class, &FAST_SET, &mut words).await?;
             self.read_missing(class, &[map::COMMAND_SOURCE], &mut words).await?;
         }
-        Ok(status::status(words))
+        let status = status::status(words);
+        if status.is_fault() || status.state == State::NotReady {
+            // It may be reset and started up anew by somebody else.
+            self.forget_blocks();
+        }
+        Ok(status)
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
         let class = Class::Background;
         let addresses = SLOW_SET.map(Register::address);
-        let blocks = self.known_blocks(class).await?;
-        let mut raw = Vec::with_capacity(SLOW_SET.len());
-        if let Some(blocks) = blocks.filter(|blocks| blocks.coverage(&addresses) > 1) {
-            raw = self.read_block(class, &blocks).await?;
-        }
+        let mut raw = self.read_block_for(class, &addresses).await?;
         self.read_missing(class, &SLOW_SET, &mut raw).await?;
         let word = |register: Register<Read>| find(&raw, register.address());
         let hundredths = |register| word(register).map(|word| Percent::from_hundredths(word.into()));
@@ -213,7 +212,8 @@ impl<P: Port> Atv21<P> {
     /// # Errors
     /// As every read.
     pub async fn blocks(&mut self) -> Result<Blocks> {
-        self.read_block_configuration(Class::Background).await
+        let class = Class::Background;
+        Ok(Blocks { read: self.read_slots(class).await?, write: self.configured_write_slots(class).await? })
     }
 
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
@@ -232,29 +232,21 @@ impl<P: Port> Atv21<P> {
         self.registers.at(class).read(map::FAULT_CODE).await
     }
 
-    /// The block configuration, read once; `None` while the blocks are not to be used.
-    pub(crate) async fn known_blocks(&mut self, class: Class) -> Result<Option<Blocks>> {
-        match self.blocks {
-            KnownBlocks::Read(blocks) => Ok(Some(blocks)),
-            KnownBlocks::Unusable => Ok(None),
-            KnownBlocks::Unread => {
-                let blocks = self.read_block_configuration(class).await?;
-                self.blocks = KnownBlocks::Read(blocks);
-                Ok(Some(blocks))
-            }
+    /// F875 to F879.
+    pub(crate) async fn read_slots(&mut self, class: Class) -> Result<[ReadSlot; 5]> {
+        let mut calls = self.registers.at(class);
+        let mut slots = [ReadSlot::None; 5];
+        for (slot, register) in slots.iter_mut().zip(map::READ_SLOTS_IN_ORDER) {
+            *slot = calls.read(register).await?.into();
         }
+        Ok(slots)
     }
 
-    async fn read_block_configuration(&mut self, class: Class) -> Result<Blocks> {
+    /// F870 and F871.
+    pub(crate) async fn configured_write_slots(&mut self, class: Class) -> Result<[WriteSlot; 2]> {
         let mut calls = self.registers.at(class);
-        let mut blocks = Blocks::default();
-        for (slot, register) in blocks.read.iter_mut().zip(map::READ_SLOTS_IN_ORDER) {
-            *slot = calls.read(register).await?.into();
-        }
-        for (slot, register) in blocks.write.iter_mut().zip(map::WRITE_SLOTS_IN_ORDER) {
-            *slot = calls.read(register).await?.into();
-        }
-        Ok(blocks)
+        let [first, second] = map::WRITE_SLOTS_IN_ORDER;
+        Ok([calls.read(first).await?.into(), calls.read(second).await?.into()])
     }
 
     async fn model_codes(&mut self) -> Result<[u16; 2]> {
@@ -262,16 +254,17 @@ impl<P: Port> Atv21<P> {
         Ok([calls.read(map::MODEL_CODE).await?, calls.read(map::MODEL_CLASS).await?])
     }
 
-    /// Reads the block. A drive that refuses it has not taken its set-up over yet: nothing is read then, and the
-    /// block not asked for again.
-    async fn read_block(&mut self, class: Class, blocks: &Blocks) -> Result<Vec<RawWord>> {
-        match self.registers.at(class).read_words(READ_BLOCK, blocks.read_count()).await {
-            Ok(answer) => Ok(blocks.words(&answer).collect()),
-            Err(Error::Exception {
-                meaning: ExceptionMeaning::ValueRefused | ExceptionMeaning::NoSuchRegister,
-                ..
-            }) => {
-                self.blocks = KnownBlocks::Unusable;
+    /// Reads the block where it is worth it for the words at these addresses; nothing where it is not. A drive that
+    /// refuses its block is not asked for it again.
+    async fn read_block_for(&mut self, class: Class, addresses: &[u16]) -> Result<Vec<RawWord>> {
+        let slots = self.read_block.places();
+        if blocks::coverage(&slots, addresses) < 2 {
+            return Ok(Vec::new());
+        }
+        match self.registers.at(class).read_words(READ_BLOCK, blocks::read_count(&slots)).await {
+            Ok(answer) => Ok(blocks::words(&slots, &answer)),
+            Err(Error::Exception { meaning, .. }) if in_effect::is_refusal(meaning) => {
+                self.read_block = Belief::NEVER;
                 Ok(Vec::new())
             }
             Err(error) => Err(error),

@@ -8,8 +8,9 @@ use drive_core::{
 };
 
 use crate::{
-    Atv21, KnownBlocks, WATCHDOG_LONGEST,
+    Atv21, WATCHDOG_LONGEST, WriteBlock,
     blocks::{BlockSetUp, Blocks, ReadSlot, WriteSlot},
+    in_effect::Belief,
     registers as map,
     words::{CommandWord, CommandWord2, StatusWord2},
 };
@@ -43,10 +44,18 @@ pub(crate) fn check_parameter(row: &Row) -> Result<()> {
     Ok(())
 }
 
+/// Whether it chooses what a place of a block holds: F870, F871, F875 to F879.
+fn is_slot(row: &Row) -> bool {
+    map::READ_SLOTS_IN_ORDER
+        .iter()
+        .chain(&map::WRITE_SLOTS_IN_ORDER)
+        .any(|slot| slot.address() == row.address)
+}
+
 impl<P: Port> Atv21<P> {
     /// Sets up the indirect blocks: writes those of F875 to F879, F870 and F871 that differ, each to EEPROM, and reads
-    /// them back. They take effect after the next reset or power cycle of the drive; until [`forget`] this value reads
-    /// single words when something was changed.
+    /// them back. They take effect after the next reset or power cycle of the drive; until [`forget`], or a fault reset
+    /// by this value, it reads single words when something was changed.
     ///
     /// [`forget`]: drive_core::Drive::forget
     ///
@@ -70,10 +79,6 @@ impl<P: Port> Atv21<P> {
             }
         }
         let writes = self.eeprom_writes.saturating_sub(before);
-        if writes > 0 {
-            // What is configured is not in effect yet, also when not all of it was written.
-            self.blocks = KnownBlocks::Unusable;
-        }
         result.map(|()| BlockSetUp { writes, needs_reset: writes > 0 })
     }
 
@@ -180,6 +185,11 @@ impl<P: Port> Atv21<P> {
         let mut calls = self.registers.at(Class::Background);
         if calls.read_row(row).await? == word {
             return Ok(Written { changed: false, storage: row.storage });
+        }
+        if is_slot(row) {
+            // From now on what is configured is not what is in effect, also when the answer is lost.
+            self.read_block = Belief::NEVER;
+            self.write_block = WriteBlock::Unused;
         }
         if row.storage == Storage::Eeprom {
             // Counted before the answer: the EEPROM may wear by a write whose answer is lost.

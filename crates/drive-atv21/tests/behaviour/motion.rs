@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use drive_atv21::{Alarms, Authority, CommandWord};
+use drive_atv21::{Alarms, Atv21, Authority, CommandWord, ROWS};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, SetpointProblem, Speed, State, StopMode,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Row, SetpointProblem, Speed, State,
+    StopMode,
 };
 use drive_sim::{Panel, models::atv21::Atv21 as Model};
+use drive_testing::bench;
 
 use crate::support::{HALF_SPEED, Rig, SECOND, refusal, state};
 
@@ -174,17 +176,34 @@ async fn a_preset_speed_that_overrides_the_setpoint_is_noticed() {
 
 #[tokio::test(start_paused = true)]
 async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_allows_it() {
-    let (rig, mut drive) = Rig::with_blocks().await;
+    let (rig, drive) = Rig::with_blocks().await;
+    let mut drive = drive.with_write_block();
     let set_up = rig.machine.requests(6);
     let status = drive.start_at(Direction::Reverse, HALF_SPEED).await.unwrap();
     assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
     assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6) - set_up), (1, 0));
     rig.until(|seen| seen.output_frequency == -2_500).await;
 
-    let (rig, mut drive) = Rig::factory();
+    let (rig, drive) = Rig::factory();
+    let mut drive = drive.with_write_block();
     drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
     assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6)), (0, 2));
     rig.until(|seen| seen.output_frequency == 2_500).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn start_at_never_writes_the_block_unless_its_owner_says_that_it_is_in_effect() {
+    // What is configured would put the reference into FA00; nobody has reset the drive since.
+    let (rig, drive) = Rig::with_blocks().await;
+    let mut drive = drive.with_write_block();
+    for (register, choice) in [("F870", 3), ("F871", 1)] {
+        drive.write_parameter(Row::find(ROWS, register).unwrap(), choice).await.unwrap();
+    }
+    drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
+    let mut other = Atv21::new(rig.line.slave(1), bench::address(1));
+    other.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
+    assert_eq!(rig.machine.requests(0x10), 0);
+    assert_eq!((rig.machine.peek(0xFA00), rig.machine.peek(0xFA01)), (Some(0xC400), Some(2_500)));
 }
 
 #[tokio::test(start_paused = true)]
@@ -207,6 +226,6 @@ async fn a_broadcast_stop_reaches_the_drive() {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
     let write = drive.broadcast_stop(StopMode::Freewheel).unwrap();
-    drive_testing::bench::broadcast(&rig.line, write).await;
+    bench::broadcast(&rig.line, write).await;
     assert!(!rig.machine.observe().running);
 }

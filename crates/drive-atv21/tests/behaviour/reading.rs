@@ -1,11 +1,14 @@
 //! Status, measurements, faults, identity.
 
 use drive_atv21::{
-    Alarms, CAPABILITIES, MaintenanceAlarms, ModelEntry, StatusWord,
+    Alarms, Atv21, CAPABILITIES, MaintenanceAlarms, ModelEntry, ROWS, StatusWord,
     blocks::{Blocks, ReadSlot},
 };
-use drive_core::{Control, Direction, Drive, Fault, Percent, Setpoint, Speed, State, StopMode};
+use drive_core::{
+    Control, Direction, Drive, Fault, Frequency, Percent, Row, Setpoint, Speed, State, StopMode,
+};
 use drive_sim::{Exception, Panel};
+use drive_testing::bench;
 
 use crate::support::{HALF_SPEED, Rig, SECOND};
 
@@ -17,20 +20,23 @@ async fn a_status_takes_one_exchange_when_the_block_is_set_up_and_four_when_not(
     drive.status().await.unwrap();
     assert_eq!(rig.count() - before, 4);
 
-    let (rig, mut drive) = Rig::with_blocks().await;
-    drive.status().await.unwrap();
-    let before = rig.count();
-    let status = drive.status().await.unwrap();
-    assert_eq!(rig.count() - before, u64::from(CAPABILITIES.status_exchanges));
-    assert_eq!((status.state, status.control, status.raw.len()), (State::Ready, None, 5));
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
+    for state in [State::Running, State::Ready] {
+        let before = rig.count();
+        let status = drive.status().await.unwrap();
+        assert_eq!(rig.count() - before, u64::from(CAPABILITIES.status_exchanges));
+        // FC91 has shown nothing but 0 in its place.
+        assert_eq!((status.state, status.control, status.raw.len()), (state, None, 4));
+        rig.at_rest(&mut drive).await;
+    }
     rig.machine.panel(Panel::TakeControl);
     assert_eq!(drive.status().await.unwrap().control, Some(Control::Local));
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_start_takes_five_exchanges_with_the_block_and_a_stop_two() {
-    let (rig, mut drive) = Rig::with_blocks().await;
-    drive.status().await.unwrap();
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
+    rig.at_rest(&mut drive).await;
     let before = rig.count();
     drive.start(Direction::Forward).await.unwrap();
     assert_eq!(rig.count() - before, 5);
@@ -60,6 +66,9 @@ async fn measurements_take_what_the_capabilities_say_and_fewer_with_the_right_bl
     let _ = drive.set_up_blocks(Blocks { read: slots, ..Blocks::default() }).await.unwrap();
     rig.power_cycle().await;
     drive.forget();
+    rig.at_speed(&mut drive).await;
+    rig.machine.poke(0xFD06, 0x0085);
+    rig.machine.poke(0xFD07, 0x0025);
     drive.status().await.unwrap();
     let before = rig.count();
     drive.measurements().await.unwrap();
@@ -68,10 +77,81 @@ async fn measurements_take_what_the_capabilities_say_and_fewer_with_the_right_bl
 
 #[tokio::test(start_paused = true)]
 async fn a_block_that_the_drive_refuses_is_replaced_by_single_reads() {
-    let (rig, mut drive) = Rig::with_blocks().await;
-    drive.status().await.unwrap();
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
     rig.machine.refuse_next(Exception::ILLEGAL_VALUE);
-    assert_eq!(drive.status().await.unwrap().control, Some(Control::Terminals));
+    assert_eq!(drive.status().await.unwrap().control, Some(Control::Bus));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_block_that_is_configured_and_not_in_effect_is_never_read_as_a_status() {
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
+    // Another program swaps FD01 and FD00; the drive is not reset.
+    for (slot, choice) in [(0x0875, 2), (0x0876, 1)] {
+        bench::write(&rig.line, slot, choice).await;
+    }
+    let before = rig.count();
+    let status = drive.status().await.unwrap();
+    assert_eq!((rig.count() - before, status.output_frequency), (1, Some(HALF_SPEED)), "as it was in effect");
+    // A daemon that starts, or that was reconnected, knows nothing of it.
+    drive.forget();
+    for _ in 0..5 {
+        let status = drive.status().await.unwrap();
+        assert_eq!((status.state, status.output_frequency), (State::Running, Some(HALF_SPEED)));
+    }
+    rig.at_rest(&mut drive).await;
+    assert_eq!(drive.status().await.unwrap().state, State::Ready);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_layout_that_shows_the_same_at_rest_is_not_believed_there() {
+    let (rig, _) = Rig::with_blocks().await;
+    // FE03 and FD00 have changed places; at rest both are 0.
+    for (slot, choice) in [(0x0876, 3), (0x0877, 2)] {
+        bench::write(&rig.line, slot, choice).await;
+    }
+    let mut drive = Atv21::new(rig.line.slave(1), bench::address(1));
+    for _ in 0..5 {
+        assert_eq!(drive.status().await.unwrap().state, State::Ready);
+    }
+    rig.at_speed(&mut drive).await;
+    for _ in 0..5 {
+        assert_eq!(drive.status().await.unwrap().output_frequency, Some(HALF_SPEED));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_reset_that_takes_a_changed_block_into_effect_changes_no_value() {
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
+    for (code, choice) in [("F875", 2), ("F876", 1)] {
+        drive.write_parameter(Row::find(ROWS, code).unwrap(), choice).await.unwrap();
+    }
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.output_frequency, status.raw.len()), (Some(HALF_SPEED), 4));
+    assert_eq!(status.control, Some(Control::Bus), "word by word");
+    rig.machine.trip(1);
+    assert_eq!(drive.status().await.unwrap().state, State::Fault);
+    drive.reset_faults().await.unwrap_err();
+    tokio::time::sleep(15 * SECOND).await;
+    rig.at_speed(&mut drive).await;
+    for (state, control) in [(State::Running, Some(Control::Bus)), (State::Running, None)] {
+        let status = drive.status().await.unwrap();
+        assert_eq!((status.state, status.output_frequency), (state, Some(HALF_SPEED)));
+        assert_eq!(status.control, control, "word by word, then the block that is in effect now");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_trip_that_somebody_else_resets_ends_the_use_of_the_block_as_well() {
+    let (rig, mut drive) = Rig::with_blocks_shown().await;
+    for (slot, choice) in [(0x0875, 2), (0x0876, 1)] {
+        bench::write(&rig.line, slot, choice).await;
+    }
+    rig.machine.trip(1);
+    assert!(drive.status().await.unwrap().is_fault());
+    bench::write(&rig.line, 0xFA00, 0xE000).await;
+    tokio::time::sleep(5 * SECOND).await;
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.state, status.output_frequency), (State::Ready, Some(Frequency::ZERO)));
 }
 
 #[tokio::test(start_paused = true)]

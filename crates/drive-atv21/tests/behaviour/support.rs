@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_atv21::{Atv21, CAPABILITIES, blocks::Blocks};
 use drive_bus::{Line, Slave};
-use drive_core::{Direction, Drive, Error, Frequency, Refusal, Result, State, Status};
+use drive_core::{Direction, Drive, Error, Frequency, Refusal, Result, State, Status, StopMode};
 use drive_sim::{Observation, SimSlave, models::atv21::Atv21 as Model};
 use drive_testing::bench;
 
@@ -36,6 +36,19 @@ impl Rig {
         rig.power_cycle().await;
         drive.forget();
         (rig, drive)
+    }
+
+    /// With the standard blocks in effect, and the motor at speed: the block has shown what it holds.
+    pub(crate) async fn with_blocks_shown() -> (Self, Atv21<Slave>) {
+        let (rig, mut drive) = Self::with_blocks().await;
+        rig.at_speed(&mut drive).await;
+        drive.status().await.unwrap();
+        (rig, drive)
+    }
+
+    pub(crate) async fn at_rest(&self, drive: &mut Atv21<Slave>) {
+        drive.stop(StopMode::Ramp).await.unwrap();
+        self.until(|seen| !seen.running).await;
     }
 
     pub(crate) async fn power_cycle(&self) {
