@@ -40,6 +40,18 @@ async fn rule_1_a_stop_is_repeated_until_the_drive_confirms_it_and_ends_in_an_al
 }
 
 #[tokio::test(start_paused = true)]
+async fn rule_1_a_drive_whose_settings_have_no_ramp_stop_is_stopped_by_another() {
+    let mut plant = Plant::single(Family::Atv312, |_| {});
+    // The normal stop is a freewheel stop: no word of the bus stops this drive along its ramp.
+    assert!(plant.machine().poke(drive_atv312::registers::STT.address(), 2));
+    plant.run_at(30).await;
+    assert_eq!(plant.motor().stop(StopMode::Ramp).await, Outcome::Confirmed);
+    let replaced = EventKind::StopModeReplaced { asked: StopMode::Ramp, used: StopMode::Fast };
+    plant.event("the other stop", |kind| *kind == replaced).await;
+    assert!(!plant.machine().observe().running);
+}
+
+#[tokio::test(start_paused = true)]
 async fn rule_1_a_stop_outranks_a_line_full_of_polls_and_commands() {
     let members = (1..=31)
         .map(|address| {

@@ -15,6 +15,10 @@ use crate::{
 /// The shortest and the longest pause between two attempts of a stop.
 const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
+/// What stands in for a mode that a drive, as it is set up, does not have, the first that it has: better another stop than
+/// none.
+const STAND_INS: [StopMode; 3] = [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel];
+
 /// Longer than any exit: its own limit ends it.
 const EXIT: Duration = Duration::from_secs(86_400);
 
@@ -22,6 +26,8 @@ const EXIT: Duration = Duration::from_secs(86_400);
 #[derive(Debug)]
 pub(super) struct Stopping {
     mode: StopMode,
+    /// The modes that the drive has turned out not to be set up for.
+    lacking: Vec<StopMode>,
     since: Instant,
     attempts: u32,
     /// The drive has shown that no run command is in force.
@@ -108,6 +114,7 @@ impl Supervisor {
             None => {
                 self.stopping = Some(Stopping {
                     mode,
+                    lacking: Vec::new(),
                     since: now,
                     attempts: 0,
                     taken: false,
@@ -166,12 +173,19 @@ impl Supervisor {
                     _ => None,
                 };
                 stopping.error = Some(error);
-                if unsupported && stopping.mode != StopMode::Ramp {
-                    // This drive is not set up for the mode: better another stop than none.
+                if unsupported {
                     let asked = stopping.mode;
-                    stopping.mode = StopMode::Ramp;
-                    stopping.next_try = Some(now);
-                    self.emit(EventKind::StopModeReplaced { asked, used: StopMode::Ramp });
+                    if !stopping.lacking.contains(&asked) {
+                        stopping.lacking.push(asked);
+                    }
+                    let has = |mode: &StopMode| {
+                        self.capabilities.stop_modes.contains(mode) && !stopping.lacking.contains(mode)
+                    };
+                    if let Some(used) = STAND_INS.into_iter().find(has) {
+                        stopping.mode = used;
+                        stopping.next_try = Some(now);
+                        self.emit(EventKind::StopModeReplaced { asked, used });
+                    }
                 }
                 if let Some(status) = status {
                     self.accept_status(now, status);
