@@ -13,6 +13,8 @@ use crate::{
 
 /// How often the drive is read until it shows what was ordered.
 pub(crate) const READS: usize = 20;
+/// How often a stop is written again where a run command has come after it.
+const REPEATS: usize = 2;
 
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
@@ -41,8 +43,8 @@ impl<P: Port> Drive3g3ev<P> {
             }
             if is_run(&shown) && shown.control == Some(Control::Bus) {
                 // RUN is the drive's, the direction may still be the old one: the order itself must stand too.
-                let held = self.read_command(Class::Command, &mut shown).await?;
-                if held == Command::run(direction) {
+                shown.raw.push(self.read_command(Class::Command).await?);
+                if self.command == Some(Command::run(direction)) {
                     return Ok(shown);
                 }
                 break;
@@ -58,24 +60,28 @@ impl<P: Port> Drive3g3ev<P> {
                 reason: "the bus has one stop, a run command of 0; how the motor stops is a setting of the drive",
             });
         }
-        let order = Order::Stop(mode);
         self.write_command(Class::Stop, Command::empty()).await?;
-        let mut shown = self.read_status(Class::Stop).await?;
-        for _ in 1..READS {
-            if !is_run(&shown) {
-                return Ok(shown);
-            }
-            // RUN may stand until the motor does: it is on its way when the order stands and the bus commands.
-            let held = self.read_command(Class::Stop, &mut shown).await?;
-            if held.contains(Command::RUN) {
-                break;
-            }
-            if shown.control == Some(Control::Bus) {
-                return Ok(shown);
-            }
+        let mut repeats = 0;
+        let mut shown = Status::default();
+        for _ in 0..READS {
             shown = self.read_status(Class::Stop).await?;
+            // The confirmation of function 10h tells no value: it may be that of a start that was late, and the start
+            // itself may come later still. So what 0001h holds after all that the drive shows counts.
+            if shown.raw(COMMAND.address()).is_none() {
+                shown.raw.push(self.read_command(Class::Stop).await?);
+            }
+            if self.command.is_none_or(|held| held.contains(Command::RUN)) {
+                if repeats == REPEATS {
+                    break;
+                }
+                self.write_command(Class::Stop, Command::empty()).await?;
+                repeats += 1;
+            } else if !is_run(&shown) || shown.control == Some(Control::Bus) {
+                // RUN may stand until the motor does: it is on its way when the order stands and the bus commands.
+                return Ok(shown);
+            }
         }
-        if is_run(&shown) { Err(self.not_confirmed(order, shown)) } else { Ok(shown) }
+        Err(self.not_confirmed(Order::Stop(mode), shown))
     }
 
     /// Writes 0001h and remembers the word; while the outcome is not known, none is.
@@ -86,13 +92,11 @@ impl<P: Port> Drive3g3ev<P> {
         Ok(())
     }
 
-    /// Reads 0001h back, and adds it to a status.
-    async fn read_command(&mut self, class: Class, status: &mut Status) -> Result<Command> {
+    /// Reads 0001h back.
+    pub(crate) async fn read_command(&mut self, class: Class) -> Result<RawWord> {
         let value = self.registers.at(class).read(COMMAND).await?;
-        status.raw.push(RawWord { address: COMMAND.address(), code: COMMAND.row().code, value });
-        let command = Command::from_bits_retain(value);
-        self.command = Some(command);
-        Ok(command)
+        self.command = Some(Command::from_bits_retain(value));
+        Ok(RawWord { address: COMMAND.address(), code: COMMAND.row().code, value })
     }
 
     pub(crate) fn not_confirmed(&self, command: Order, status: Status) -> Error {
@@ -101,7 +105,7 @@ impl<P: Port> Drive3g3ev<P> {
 }
 
 /// Whether the drive shows RUN in either of its words.
-fn is_run(status: &Status) -> bool {
+pub(crate) fn is_run(status: &Status) -> bool {
     let word = |address| status.raw(address).unwrap_or(0);
     let signals = Signals::from_bits_retain(word(crate::registers::SIGNALS.address()));
     let state = DriveState::from_bits_retain(word(crate::registers::STATE.address()));

@@ -198,7 +198,8 @@ impl<P: Port> Drive for Drive3g3ev<P> {
         self.skips_reserved = false;
     }
 
-    /// Two exchanges, and one more for n39 the first time. `output_frequency` is `None` when n39 counts it in percent.
+    /// Two exchanges, and one more for n39 the first time, or for 0001h while RUN stands after a stop.
+    /// `output_frequency` is `None` when n39 counts it in percent.
     async fn status(&mut self) -> Result<Status> {
         self.read_status(Class::Status).await
     }
@@ -218,7 +219,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     }
 
     /// Stops by a run command of 0, the only stop that the manual has: the motor stops in the way that the drive is
-    /// set to.
+    /// set to. It is confirmed by what 0001h holds, and written again where a run command has come after it.
     async fn stop(&mut self, mode: StopMode) -> Result<Status> {
         self.stop_motor(mode).await
     }

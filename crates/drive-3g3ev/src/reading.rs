@@ -1,12 +1,14 @@
 //! Reading the monitors.
 
 use drive_core::{
-    Class, Error, ExceptionMeaning, Exchange, Faults, Measurements, Port, Result, Setpoint, Status, Voltage,
+    Class, Error, ExceptionMeaning, Exchange, Faults, Measurements, Port, Result, Setpoint, State, Status,
+    Voltage,
 };
 
 use crate::{
     Drive3g3ev,
     blocks::{Block, FAST, OUTPUT, TERMINALS, Words},
+    command::is_run,
     faults::{present, warnings},
     registers::{
         DC_BUS, ERRORS, INPUT_TERMINALS, LINK_ERROR, OUTPUT_CONTACTS, OUTPUT_VOLTAGE, REFERENCE_SEEN,
@@ -23,7 +25,14 @@ impl<P: Port> Drive3g3ev<P> {
         self.read_block(class, &FAST, &mut words).await?;
         let state = self.registers.at(class).read(STATE).await?;
         words.extend(STATE.address(), &[state]);
-        Ok(FastWords::of(words).status(unit, self.command))
+        let mut status = FastWords::of(words.clone()).status(unit, self.command);
+        if status.state == State::Stopping && is_run(&status) {
+            // So it is if the order that it was given last is still the one in force: another may have come since.
+            let held = self.read_command(class).await?;
+            words.extend(held.address, &[held.value]);
+            status = FastWords::of(words).status(unit, self.command);
+        }
+        Ok(status)
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {

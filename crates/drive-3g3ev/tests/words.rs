@@ -68,7 +68,8 @@ async fn a_stop_is_written_first_and_travels_as_a_stop() {
     let asked = drive.into_port().asked;
     assert_eq!(asked[0], Asked::Write(Class::Stop, 1, vec![0]));
     assert!(asked[1..].iter().all(|asked| matches!(asked, Asked::Read(Class::Stop, ..))), "{asked:?}");
-    assert_eq!(asked.len(), 4, "n39, and one status");
+    assert_eq!(asked.last(), Some(&Asked::Read(Class::Stop, 1, 1)), "what is in force after the status");
+    assert_eq!(asked.len(), 5, "n39, and one status");
 }
 
 #[tokio::test]
