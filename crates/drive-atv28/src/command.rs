@@ -36,10 +36,10 @@ impl<P: Port> Drivecom for Atv28<P> {
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let words = self.fast_words(class).await?;
-        // A chart that has left operation enabled holds no run command, whatever was written before.
-        if words.state_words().chart() != Some(ChartState::OperationEnabled) {
-            self.command = self.command.filter(|command| !command.is_run());
-        }
+        // A stop that was just written may not show yet.
+        let fresh = |command: ControlWord| class == Class::Stop && command.is_stop();
+        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
+        self.command = self.command.filter(held);
         Ok(words.status(self.command))
     }
 

@@ -32,6 +32,7 @@ impl<P: Port> Atv312<P> {
     }
 
     async fn stop_word(&mut self, mode: StopMode) -> Result<ControlWord> {
+        const QUICK_STOP: ControlWord = ControlWord::from_bits_retain(drivecom::QUICK_STOP);
         let Some(enabled) = ControlWord::enabled_stop(mode) else {
             return Ok(ControlWord::from_bits_retain(drivecom::DISABLE_VOLTAGE));
         };
@@ -39,9 +40,11 @@ impl<P: Port> Atv312<P> {
             // 400Fh takes a run command at once afterwards, the quick stop does not; but only the latter is sure to
             // act without a look at the settings.
             let has_bit = self.known.control.is_some_and(|settings| settings.lacks(mode).is_none());
-            return Ok(if has_bit { enabled } else { ControlWord::from_bits_retain(drivecom::QUICK_STOP) });
+            return Ok(if has_bit { enabled } else { QUICK_STOP });
         }
-        match self.control_settings(Class::Stop).await?.lacks(mode) {
+        // A stop does not fail for a reading that fails.
+        let Ok(settings) = self.control_settings(Class::Stop).await else { return Ok(QUICK_STOP) };
+        match settings.lacks(mode) {
             None => Ok(enabled),
             Some(reason) if mode == StopMode::Ramp => {
                 Err(Error::Unsupported { what: "a stop along the ramp", reason })
@@ -59,12 +62,10 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
         let resolution = self.resolution(class).await?;
         let words = self.fast_words(class).await?;
-        let state = words.state_words();
-        // A chart that has left operation enabled holds no run command, whatever was written before; nor is one in force
-        // again by itself when somebody else gives control back.
-        if state.chart() != Some(ChartState::OperationEnabled) || state.control() != Control::Bus {
-            self.command = self.command.filter(|command| !command.is_run());
-        }
+        // A stop that was just written may not show yet.
+        let fresh = |command: ControlWord| class == Class::Stop && command.is_stop();
+        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
+        self.command = self.command.filter(held);
         Ok(words.status(resolution, self.command))
     }
 

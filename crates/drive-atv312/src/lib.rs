@@ -138,7 +138,7 @@ impl<P: Port> Drive for Atv312<P> {
 
     /// [`StopMode::Ramp`] is 100Fh where `Stt` makes that a ramp. [`StopMode::Fast`] is 400Fh where it is known to act
     /// and the quick stop 0002h otherwise. [`StopMode::Freewheel`] is 0000h. [`StopMode::DcInjection`] is 200Fh where
-    /// `LAC` or `dCI` allow it.
+    /// `LAC` or `dCI` allow it. Where these settings cannot be read, ramp and DC injection are the quick stop too.
     async fn stop(&mut self, mode: StopMode) -> Result<Status> {
         self.stop_motor(mode).await
     }

@@ -1,11 +1,14 @@
-//! A line that is lost behind a write: what is said of that write.
+//! A line that is lost behind a write, and a drive that does not tell its settings.
 
-use std::io;
+use std::{
+    io,
+    sync::{Arc, Mutex},
+};
 
 use async_trait::async_trait;
 use drive_atv312::{Atv312, CAPABILITIES, exception_meaning, registers::LFR};
-use drive_core::{Class, Drive, ErrorKind, Port, PortError, Registers, Row};
-use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
+use drive_core::{Class, Drive, ErrorKind, Port, PortError, Registers, Row, State, StopMode};
+use tokio_modbus::{ExceptionCode, Request, Response, Slave, client::Client, slave::SlaveContext};
 
 /// Answers every reading with zeros until something is written. The write's own answer may be lost, and nothing is sent
 /// any more behind it.
@@ -60,5 +63,50 @@ async fn a_write_that_cannot_be_read_back_is_unknown_and_never_called_not_sent()
         let row = Row::find(drive.rows(), "ACC").unwrap();
         let error = drive.write_parameter(row, 50).await.unwrap_err();
         assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    }
+}
+
+/// Runs until it is told to stop quickly, and has no register but those of the fast set, `CMI` and `CMD`.
+#[derive(Debug, Clone, Default)]
+struct Silent {
+    written: Arc<Mutex<Vec<(u16, u16)>>>,
+}
+
+impl Port for Silent {}
+
+impl SlaveContext for Silent {
+    fn set_slave(&mut self, _: Slave) {}
+}
+
+#[async_trait]
+impl Client for Silent {
+    async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        let mut written = self.written.lock().unwrap();
+        let eta = if written.contains(&(8501, 0x0002)) { 0x0207 } else { 0x0627 };
+        Ok(match request {
+            Request::ReadHoldingRegisters(3201, 7) => {
+                Ok(Response::ReadHoldingRegisters(vec![eta, 500, 500, 10, 0, 0x4010, 4_000]))
+            }
+            Request::ReadHoldingRegisters(8504, 1) => Ok(Response::ReadHoldingRegisters(vec![0])),
+            Request::WriteSingleRegister(register, word) => {
+                written.push((register, word));
+                Ok(Response::WriteSingleRegister(register, word))
+            }
+            _ => Err(ExceptionCode::IllegalDataAddress),
+        })
+    }
+
+    async fn disconnect(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[tokio::test]
+async fn a_drive_that_does_not_tell_its_settings_is_stopped_all_the_same() {
+    for mode in [StopMode::Ramp, StopMode::DcInjection] {
+        let port = Silent::default();
+        let mut drive = Atv312::new(port.clone(), 1.try_into().unwrap());
+        assert_eq!(drive.stop(mode).await.unwrap().state, State::QuickStop, "{mode}");
+        assert_eq!(*port.written.lock().unwrap(), [(8501, 0x0002)], "{mode}");
     }
 }

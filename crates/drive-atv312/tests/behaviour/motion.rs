@@ -246,6 +246,17 @@ async fn a_run_command_does_not_count_as_given_after_somebody_else_had_control()
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_motor_that_another_master_starts_again_behind_a_stop_is_called_running() {
+    let (mut drive, machine, line) = running().await;
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    machine.wait_until(|seen| seen.output_frequency < 3_000).await;
+    bench::write(&line, 8501, 0x000F).await;
+    assert_eq!(drive.status().await.unwrap().state, State::Running);
+    machine.wait_until(|seen| seen.output_frequency == 5_000).await;
+    assert_eq!(drive.status().await.unwrap().state, State::Running, "also when it speeds up no more");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stop_that_does_not_show_is_tried_without_the_old_settings_the_next_time() {
     let (mut drive, machine, _line) = running().await;
     // Somebody at the panel takes bit 14 away.

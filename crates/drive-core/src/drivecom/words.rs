@@ -220,6 +220,18 @@ impl StatusWords {
         self.chart().map_or(State::Unknown, |chart| chart.state(self.is_turning(), self.enabled(command)))
     }
 
+    /// Whether a drive that shows these words can still hold `command`. A chart that has left operation enabled holds no
+    /// run command, whatever was written before; nor is one in force again by itself when somebody else gives control
+    /// back. And a motor that speeds up was given another word than a stop.
+    #[must_use]
+    pub fn can_hold(self, command: ControlWord) -> bool {
+        if command.is_run() {
+            self.chart() == Some(ChartState::OperationEnabled) && self.control() == Control::Bus
+        } else {
+            !(command.is_stop() && self.is_turning() && self.eti.contains(ExtendedStatus::ACCELERATING))
+        }
+    }
+
     /// What these words say of the fast set; frequency, current, fault code and raw words are the family's to add.
     #[must_use]
     pub fn status(self, command: Option<ControlWord>) -> Status {
@@ -300,6 +312,17 @@ mod tests {
         assert_eq!(standing.state(stop), State::Ready);
         let by_terminals = StatusWords::new(0x0227, 0x0410);
         assert_eq!(by_terminals.state(stop), State::Running, "the word is not in force");
+    }
+
+    #[test]
+    fn a_word_that_the_drive_contradicts_is_held_no_longer() {
+        let [run, stop, quick] = [0x000F, 0x100F, 0x0002].map(ControlWord::from_bits_retain);
+        let held = |eta, eti| [run, stop, quick].map(|word| StatusWords::new(eta, eti).can_hold(word));
+        assert_eq!(held(0x0227, 0x4210), [true, false, true], "speeding up");
+        assert_eq!(held(0x0227, 0x4410), [true; 3], "slowing down");
+        assert_eq!(held(0x0223, 0x4000), [false, true, true], "switched on");
+        assert_eq!(held(0x0027, 0x4010), [false, true, true], "forced local");
+        assert_eq!(held(0x0227, 0x0010), [false, true, true], "by the terminals");
     }
 
     #[test]
