@@ -146,7 +146,8 @@ impl<T> Schedule<T> {
         self.queued.iter().filter(|entry| entry.terms.class == Class::Stop).map(|entry| entry.arrived).min()
     }
 
-    /// Queues a request. Gives its ticket and what it replaces.
+    /// Queues a request. Gives its ticket and what it replaces: everything that waits for the same slave with the same
+    /// key, except that nothing less urgent takes the place of a Stop or of any higher class.
     ///
     /// # Errors
     /// The work back, when too many wait already.
@@ -156,29 +157,27 @@ impl<T> Schedule<T> {
         slave: u8,
         terms: Terms,
         work: T,
-    ) -> Result<(Ticket, Option<Entry<T>>), T> {
-        let replaced = terms.replaces.and_then(|_| {
-            self.queued
-                .iter()
-                // Nothing less urgent takes the place of a Stop.
-                .position(|entry| {
-                    entry.slave == slave
-                        && entry.terms.replaces == terms.replaces
-                        && entry.terms.class <= terms.class
-                })
-        });
+    ) -> Result<(Ticket, Vec<Entry<T>>), T> {
+        let replaced = if terms.replaces.is_some() {
+            self.withdraw_all(|entry| {
+                entry.slave == slave
+                    && entry.terms.replaces == terms.replaces
+                    && entry.terms.class <= terms.class
+            })
+        } else {
+            Vec::new()
+        };
         let limit =
             if terms.class == Class::Stop { self.rules.limit.saturating_mul(2) } else { self.rules.limit };
-        if replaced.is_none() && self.queued.len() >= limit {
+        if replaced.is_empty() && self.queued.len() >= limit {
             return Err(work);
         }
         let ticket = Ticket(self.next_ticket);
         self.next_ticket += 1;
-        let replaced = replaced.map(|index| self.queued.swap_remove(index));
-        let rank = match &replaced {
-            // The successor takes the place in the queue, or a stream of setpoints would never be sent.
-            Some(old) if old.terms.class == terms.class => old.rank,
-            _ => self.rank(now, slave, terms, ticket),
+        // The successor takes the place in the queue, or a stream of setpoints would never be sent.
+        let rank = match replaced.iter().find(|old| old.terms.class == terms.class) {
+            Some(old) => old.rank,
+            None => self.rank(now, slave, terms, ticket),
         };
         self.queued.push(Entry { ticket, slave, terms, arrived: now, work, rank });
         Ok((ticket, replaced))

@@ -177,6 +177,7 @@ proptest! {
         late in 0_u64..20,
         echo in prop::option::of(0_u64..20),
         known in any::<bool>(),
+        reconnects in any::<bool>(),
     ) {
         let setting = match echo {
             None if known => Echo::Off,
@@ -214,6 +215,13 @@ proptest! {
             }
             if rig.random.one_in(30) && !rig.dead.remove(&slave) {
                 rig.dead.insert(slave);
+            }
+            // The connection ends and is there again; what was on its way comes over the next one.
+            if reconnects && rig.random.one_in(25) {
+                rig.master.handle_lost(rig.now, "the test's reason");
+                let away = Duration::from_micros(rig.random.below(100_000));
+                rig.run_until(rig.now + away);
+                rig.master.handle_up(rig.now);
             }
             let pause = Duration::from_micros(rig.random.below(80_000));
             rig.run_until(rig.now + pause);

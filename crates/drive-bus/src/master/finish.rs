@@ -72,6 +72,12 @@ impl<C> Master<C> {
     }
 
     fn note_failure(&mut self, now: Instant, flight: &Flight<C>, failure: &Failure) {
+        // Damage may have made it look like ours: then our own answer is still to come.
+        let may_be_anothers = matches!(failure, Failure::Damaged(_))
+            && self.stations.iter().any(|(slave, other)| *slave != flight.slave && other.may_be_late(now));
+        if may_be_anothers {
+            self.fear_late_answer(now, flight);
+        }
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
             Failure::Damaged(_) | Failure::Refused(_) => {

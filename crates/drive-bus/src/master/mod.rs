@@ -191,7 +191,7 @@ impl<C> Master<C> {
             .schedule
             .push(now, slave, terms, job)
             .map_err(|_| PortError::QueueFull(self.schedule.len()))?;
-        if let Some(old) = replaced {
+        for old in replaced {
             self.drop_unsent(old, PortError::Superseded);
         }
         self.choose_at = None;

@@ -1,6 +1,6 @@
 //! What is sent next, and what follows from its having been sent.
 
-use std::{mem, sync::Arc};
+use std::sync::Arc;
 
 use bytes::Bytes;
 use drive_core::Class;
@@ -9,7 +9,9 @@ use tokio_modbus::Request;
 
 use super::{AGING, Flight, Job, Master, Purpose, Sent, Station, link::Link};
 use crate::{
-    answer, pdu,
+    answer,
+    exchange::Exchange,
+    pdu,
     schedule::{Choice, Entry, Readiness},
 };
 
@@ -66,8 +68,12 @@ impl<C> Master<C> {
             if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
                 if entry.terms.class != Class::Stop || !entry.work.is_write {
-                    let kind = exchange.kind_of_answer(request.function_code().value());
-                    at = at.max(station.late_until(kind).unwrap_or(at));
+                    let kind =
+                        |request: &Request<'_>| exchange.kind_of_answer(request.function_code().value());
+                    at = at.max(station.late_until(kind(request)).unwrap_or(at));
+                    if wants_settling(exchange.as_ref(), entry) {
+                        at = at.max(station.late_until(kind(&station.harmless_read())).unwrap_or(at));
+                    }
                 }
                 takes = station.timeout.typical();
             }
@@ -108,8 +114,8 @@ impl<C> Master<C> {
 
     fn begin(&mut self, now: Instant, mut entry: Entry<Job<C>>) -> Option<Bytes> {
         let slave = entry.slave;
-        let ambiguous = slave != 0 && answer::equals_its_request(&entry.work.request);
-        if ambiguous && self.exchange.echo_is_unknown() && !mem::replace(&mut entry.work.settled, true) {
+        if wants_settling(self.exchange.as_ref(), &entry) && self.may_settle(now, slave) {
+            entry.work.settled = true;
             self.schedule.put_back(entry);
             return self.begin_read(now, slave, Purpose::Settle);
         }
@@ -124,6 +130,14 @@ impl<C> Master<C> {
         let request = Arc::clone(&entry.work.request);
         let bytes = self.exchange.start(slave, Arc::clone(&request), &entry.work.pdu);
         Some(self.fly(now, slave, Purpose::Call(Some(entry)), request, bytes))
+    }
+
+    /// Whether no late answer can be taken for that of the read that finds out about the echo. Only a Stop comes here
+    /// while one can: it is sent as it is, and asks before its next attempt.
+    fn may_settle(&mut self, now: Instant, slave: u8) -> bool {
+        let read = self.station(slave).harmless_read();
+        let kind = self.exchange.kind_of_answer(read.function_code().value());
+        self.station(slave).late_until(kind).is_none_or(|until| until <= now)
     }
 
     fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
@@ -189,4 +203,12 @@ impl<C> Master<C> {
         self.exchange.handle_sent(end, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);
     }
+}
+
+/// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.
+fn wants_settling<C>(exchange: &dyn Exchange, entry: &Entry<Job<C>>) -> bool {
+    exchange.echo_is_unknown()
+        && !entry.work.settled
+        && entry.slave != 0
+        && answer::equals_its_request(&entry.work.request)
 }

@@ -97,6 +97,11 @@ impl Station {
         self.late.iter().filter(|(late, _)| *late == kind).map(|(_, until)| *until).max()
     }
 
+    /// Whether an answer of any kind may still come.
+    pub(super) fn may_be_late(&self, now: Instant) -> bool {
+        self.late.iter().any(|(_, until)| *until > now)
+    }
+
     /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
     pub(super) fn came_late(&mut self, kind: u8) -> bool {
         // What was waited for has come: one thing less to be afraid of.

@@ -147,7 +147,7 @@ fn a_stream_of_setpoints_keeps_the_place_of_the_first() {
     push(&mut schedule, now, 1, setpoint, 1);
     push(&mut schedule, now, 2, Terms::of(Class::Command), 2);
     let (_, replaced) = schedule.push(now + 500 * MS, 1, setpoint, 3).unwrap();
-    assert_eq!(replaced.map(|entry| entry.work), Some(1));
+    assert!(matches!(replaced.as_slice(), [old] if old.work == 1));
     assert_eq!(order(&mut schedule, now + 500 * MS), [3, 2]);
 }
 
@@ -156,8 +156,11 @@ fn nothing_less_urgent_takes_the_place_of_a_stop() {
     let (mut schedule, now) = (schedule(), Instant::now());
     push(&mut schedule, now, 1, Terms::of(Class::Stop).replacing(8501), 1);
     let (_, replaced) = schedule.push(now, 1, Terms::of(Class::Command).replacing(8501), 2).unwrap();
-    assert!(replaced.is_none());
-    assert_eq!(order(&mut schedule, now), [1, 2]);
+    assert!(replaced.is_empty());
+    // The next stop takes the place of both.
+    let (_, replaced) = schedule.push(now, 1, Terms::of(Class::Stop).replacing(8501), 3).unwrap();
+    assert_eq!(replaced.len(), 2);
+    assert_eq!(order(&mut schedule, now), [3]);
 }
 
 #[test]
@@ -211,8 +214,12 @@ proptest! {
                     let lifetime = lifetime.map(Duration::from_millis);
                     let terms = Terms { lifetime, replaces: key, ..Terms::of(class) };
                     let (_, replaced) = schedule.push(now, slave, terms, pushed).unwrap();
-                    ended.extend(replaced.map(|entry| entry.work));
+                    ended.extend(replaced.into_iter().map(|entry| entry.work));
                     pushed += 1;
+                    let same_key = schedule.queued.iter().filter(|entry| {
+                        (entry.slave, entry.terms.replaces) == (slave, key) && entry.terms.class <= class
+                    });
+                    prop_assert!(key.is_none() || same_key.count() == 1, "a predecessor was left behind");
                 }
                 Event::Choose => {
                     let stops = schedule.first_stop().is_some();

@@ -246,7 +246,8 @@ impl Rig {
     /// Whether this read finds out about the echo for a Stop that waits.
     fn settles(&mut self, slave: u8, pdu: &[u8]) -> bool {
         let unsettled = |asked: &&mut Asked| {
-            asked.class == Class::Stop && asked.slave == slave && !asked.sent && !asked.settled
+            let write = matches!(asked.request, Request::WriteSingleRegister(..));
+            write && asked.class == Class::Stop && asked.slave == slave && !asked.settled
         };
         self.config.echo == Echo::Auto
             && pdu[0] == 3
