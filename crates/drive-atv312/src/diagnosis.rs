@@ -32,7 +32,10 @@ impl<P: Port> Atv312<P> {
         self.collect(&mut raw, &[THR.row()]).await?;
         let word =
             |row: &Row| raw.iter().find(|word| word.address == row.address).map_or(0, |word| word.value);
-        let percent = |row: &Row| Percent::from_percent(i16::try_from(word(row)).unwrap_or(i16::MAX));
+        let percent = |row: &Row| Percent::from_hundredths(i32::from(word(row)) * 100);
+        // Whether torque and power have a sign, as of a motor that feeds back, is not printed: a word that would be
+        // negative is left to the raw words.
+        let driving = |row: &Row| (word(row).cast_signed() >= 0).then(|| percent(row));
         let speed = Speed::from_rpm(u32::from(word(RFRD.row()).cast_signed().unsigned_abs()));
         let io = LogicIo::from_bits_retain(word(IOLR.row()));
         let outputs = LogicIo::R1 | LogicIo::R2 | LogicIo::LO | LogicIo::ANALOG_OUTPUT;
@@ -41,8 +44,8 @@ impl<P: Port> Atv312<P> {
             // At high resolution the word counts a frequency, and the motor's poles are no register.
             speed: (resolution == Resolution::Normal).then_some(speed),
             line_voltage: Some(Voltage::from_decivolts(u32::from(word(ULN.row())))),
-            torque: Some(percent(OTR.row())),
-            power_share: Some(percent(OPR.row())),
+            torque: driving(OTR.row()),
+            power_share: driving(OPR.row()),
             drive_thermal: Some(percent(THD.row())),
             motor_thermal: Some(percent(THR.row())),
             running_time: Some(Duration::from_secs(u64::from(word(RTH.row())) * 3_600)),

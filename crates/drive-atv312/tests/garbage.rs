@@ -2,7 +2,7 @@
 //! the manual does not know. What all families have is asked so in the workspace's own tests.
 
 use drive_atv312::{Atv312, CAPABILITIES};
-use drive_core::{Direction, Drive, StopMode};
+use drive_core::{Direction, Drive, Percent, StopMode};
 use drive_testing::{babble::Babble, bench};
 
 /// Words that are plausible somewhere, so that the ladder is climbed and not only refused.
@@ -27,4 +27,18 @@ async fn whatever_the_drive_says_setting_it_up_writes_no_other_control_words_tha
             assert!(ALLOWED.contains(&command), "{command:04X}h was written");
         }
     }
+}
+
+#[tokio::test]
+async fn a_torque_of_which_the_sign_is_not_printed_is_left_raw() {
+    let mut kinds = [false; 2];
+    for seed in 0..100 {
+        let mut drive = Atv312::new(Babble::new(&CAPABILITIES, &[], seed), bench::address(1));
+        let measured = drive.measurements().await.unwrap();
+        let word = measured.raw.iter().find(|word| word.address == 3205).unwrap().value;
+        let shown = i16::try_from(word).ok().map(Percent::from_percent);
+        assert_eq!(measured.torque, shown, "{word:04X}h");
+        kinds[usize::from(shown.is_some())] = true;
+    }
+    assert_eq!(kinds, [true; 2]);
 }
