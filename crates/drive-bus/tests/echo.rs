@@ -126,3 +126,28 @@ fn the_read_that_settles_the_echo_is_never_a_request_whose_answer_equals_it() {
     line.answers(&request, &request[1..6]);
     assert_eq!(line.ended(), Some((3, Ok(Ok(Response::WriteSingleRegister(8501, 0))))));
 }
+
+#[test]
+fn the_read_that_settles_the_echo_waits_for_late_answers_and_a_stop_does_not_wait_for_it() {
+    let config = LineConfig { echo: Echo::Auto, retries: 0, ..LineConfig::stream(SERIAL) };
+    let unanswered = || {
+        let mut line = ByHand::new(config.clone());
+        line.ask(1, 1, READ, Terms::default());
+        let request = line.sent();
+        let end = line.now + SERIAL.characters(request.len());
+        // All that is heard is a damaged echo, so that neither the echo is known nor the answer come.
+        line.hears(SERIAL.characters(8), &damaged(&request));
+        assert_eq!(line.next_sent(line.now + 2 * PATIENCE), None);
+        assert!(matches!(line.ended(), Some((1, Err(_)))));
+        (line, end + config.late_window)
+    };
+    let (mut line, late_until) = unanswered();
+    line.ask(2, 1, WRITE, Terms::of(Class::Command));
+    assert_eq!(line.sent()[1], 3);
+    assert!(line.now >= late_until);
+
+    let (mut line, late_until) = unanswered();
+    line.ask(2, 1, WRITE, Terms::of(Class::Stop));
+    assert_eq!(line.sent()[1], 6);
+    assert!(line.now < late_until);
+}

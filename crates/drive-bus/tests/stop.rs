@@ -3,7 +3,7 @@
 mod support;
 
 use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};
-use drive_core::{Class, PortError, Terms, serial::SerialSettings};
+use drive_core::{Class, Terms, serial::SerialSettings};
 use support::{MS, by_hand::ByHand};
 use tokio_modbus::Request;
 
@@ -164,49 +164,4 @@ fn the_bound_of_a_stop_holds_on_an_unpaced_stream_whose_slave_dribbles() {
         line.master.handle_bytes(line.now, &[1]);
         assert!(line.now - called <= bound + tenth, "{bound:?}");
     }
-}
-
-#[test]
-fn a_late_answer_of_a_slow_slave_is_waited_for_longer_than_its_timeout() {
-    let slow = SlaveSettings { response_timeout: Some(2_000 * MS), ..SlaveSettings::default() };
-    let mut line = ByHand::new(config().slave(1, slow));
-    line.ask(1, 1, READ, Terms::default());
-    let first = line.sent();
-    let asked = line.now;
-    // The answer comes half a second after it was due, and is not the answer to the same question, asked again.
-    line.hears(2_500 * MS, &rtu::frame(1, &[3, 2, 0, 1]));
-    assert!(line.ended().is_none());
-    assert_eq!(line.sent(), first);
-    assert!(line.now - asked > 2_500 * MS);
-    line.answers(&first, &[3, 2, 0, 2]);
-    assert!(
-        matches!(line.ended(), Some((1, Ok(Ok(tokio_modbus::Response::ReadHoldingRegisters(words))))) if words == [2])
-    );
-}
-
-#[test]
-fn exceptions_teach_the_same_timeout_as_answers() {
-    let learned = |pdu: &'static [u8]| {
-        let mut line = ByHand::new(LineConfig { timeout_floor: MS, ..config() });
-        for _ in 0..100 {
-            line.ask(1, 1, Request::ReadHoldingRegisters(0, 1), Terms::default());
-            let request = line.sent();
-            line.answers(&request, pdu);
-            assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
-        }
-        line.master.stats(line.now).slaves[&1].response_timeout
-    };
-    assert_eq!(learned(&[3, 2, 0, 1]), learned(&[0x83, 2]));
-}
-
-#[test]
-fn an_address_that_no_slave_of_a_line_has_is_refused_except_on_modbus_tcp() {
-    let mut line = ByHand::new(config());
-    for slave in [248, 255] {
-        let refused = line.submit(1, slave, READ, Terms::default());
-        assert!(matches!(refused, Err(PortError::NotCarried(_))), "{slave}: {refused:?}");
-    }
-    assert_eq!(line.submit(1, 247, READ, Terms::default()), Ok(()));
-    let mut gateway = ByHand::new(LineConfig::modbus_tcp("gateway:502"));
-    assert_eq!(gateway.submit(1, 255, READ, Terms::default()), Ok(()));
 }
