@@ -73,7 +73,9 @@ async fn ask_everything(family: Family, drive: &mut dyn Drive) {
     let _ = drive.watchdog().await;
     let _ = drive.arm_watchdog(Duration::from_secs(2), Reaction::Ramp).await;
     let _ = drive.release().await;
-    for row in family.rows().iter().filter(|row| row.address != control(family).register).step_by(7) {
+    // The register of the control word among them: it is no parameter.
+    let control = family.rows().iter().filter(|row| row.address == control(family).register);
+    for row in control.chain(family.rows().iter().step_by(7)) {
         let _ = drive.read_parameter(row).await;
         let _ = drive.write_parameter(row, 1).await;
     }

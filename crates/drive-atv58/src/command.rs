@@ -134,11 +134,11 @@ impl<P: Port> Drivecom for Atv58<P> {
         Ok(negative.then_some(Refusal::Settings("the reference W401 is negative: give a setpoint first")))
     }
 
-    /// The drive shows a run command by holding it in the state "operation enabled".
+    /// The drive shows a run command by holding it in the state "operation enabled", and not in forced local mode.
     async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
         let value = self.registers.at(Class::Command).read(CMD).await?;
         status.raw.push(RawWord { address: CMD.address(), code: CMD.row().code, value });
-        Ok(value == word)
+        Ok(value == word && status.control.is_none())
     }
 }
 

@@ -164,6 +164,20 @@ async fn a_start_is_refused_before_anything_is_written() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_start_that_somebody_takes_back_at_the_drive_is_not_confirmed_and_not_given_again() {
+    for panel in [Panel::TakeControl, Panel::Stop] {
+        let (mut drive, machine, _line) = rig();
+        let taken_back = async {
+            machine.wait_until(|seen| seen.running).await;
+            machine.panel(panel);
+        };
+        let (started, ()) = tokio::join!(drive.start(Direction::Forward), taken_back);
+        assert_eq!(started.unwrap_err().kind(), ErrorKind::NotConfirmed, "{panel:?}");
+        assert_eq!(commands(&machine), [6, 7, 15], "{panel:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_out_of_a_quick_stop_waits_for_standstill() {
     let (mut drive, machine, line) = running().await;
     bench::write(&line, 8501, 0x0002).await;
