@@ -14,6 +14,8 @@ use crate::{
 
 /// Statuses that are read for a confirmation before it is given up.
 const CONFIRMATIONS: usize = 20;
+/// How often a stop is written again where another command word has come after it.
+const REPEATS: usize = 2;
 /// FA13 takes no more (Altivar 21 Modbus §8.2).
 const HIGHEST_SPEED: Speed = Speed::from_rpm(24_000);
 /// CMOD: the serial link commands.
@@ -60,6 +62,9 @@ impl<P: Port> Atv21<P> {
         for _ in 1..CONFIRMATIONS {
             let status = self.read_status(Class::Stop).await?;
             if status.is_fault() || status.state == State::QuickStop {
+                if cleared.is_err() {
+                    self.clear_edge(Class::Stop, CommandWord::EMERGENCY_STOP).await?;
+                }
                 return Ok(status);
             }
         }
@@ -90,8 +95,9 @@ impl<P: Port> Atv21<P> {
         for _ in 0..CONFIRMATIONS {
             let status = self.read_status(Class::Command).await?;
             let runs = status_word(&status).contains(StatusWord::RUN) && !status.is_fault();
-            if runs && (status.direction == Some(direction) || self.is_in_force(word, Class::Command).await?)
-            {
+            // RUN may be that of a motor that still turns from before: where the write is in doubt, its word counts.
+            let shows = sent.is_ok() && status.direction == Some(direction);
+            if runs && (shows || self.is_in_force(word, Class::Command).await?) {
                 return Ok(status);
             }
             last = Some(status);
@@ -104,21 +110,42 @@ impl<P: Port> Atv21<P> {
         let word = self.stop_word(mode)?;
         self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
         let mut last = None;
+        let mut repeats = 0;
         for _ in 0..CONFIRMATIONS {
             let mut status = self.read_status(Class::Stop).await?;
             if !status_word(&status).contains(StatusWord::RUN) {
                 return Ok(status);
             }
             // The manual does not say whether FD01 shows "run" until the motor stands, so the order itself counts.
-            if self.is_in_force(word, Class::Stop).await? {
+            let stands = self.registers.at(Class::Stop).read(map::COMMAND_WORD).await? == word.bits();
+            if stands && self.source(Class::Stop).await? == CommandSource::Serial {
                 if status.state == State::Running {
                     status.state = State::Stopping;
                 }
                 return Ok(status);
             }
             last = Some(status);
+            if !stands {
+                // Another word has come after it, perhaps a start that was late.
+                if repeats == REPEATS {
+                    break;
+                }
+                self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
+                repeats += 1;
+            }
         }
         Err(self.not_confirmed(Command::Stop(mode), last.unwrap_or_default()))
+    }
+
+    /// Clears an edge that may still be set because the write that cleared it was lost. A drive that has started up anew
+    /// has cleared it by itself, and is not commanded again.
+    async fn clear_edge(&mut self, class: Class, edge: CommandWord) -> Result<()> {
+        let present = CommandWord::from_bits_retain(self.registers.at(class).read(map::COMMAND_WORD).await?);
+        if !present.contains(edge) {
+            return Ok(());
+        }
+        let clear = self.word(CommandWord::empty()).bits();
+        self.registers.at(class).write(map::COMMAND_WORD, clear).await
     }
 
     /// The word that stops in this mode.
@@ -165,6 +192,9 @@ impl<P: Port> Atv21<P> {
             // The drive is mute while it starts up, so a read without an answer is one more reason to read again.
             let Ok(status) = self.read_status(Class::Command).await else { continue };
             if !status.is_fault() && status.state != State::QuickStop {
+                if cleared.is_err() {
+                    self.clear_edge(Class::Command, CommandWord::FAULT_RESET).await?;
+                }
                 return Ok(status);
             }
             last = Some(status);

@@ -191,6 +191,8 @@ impl<P: Port> Atv21<P> {
             self.read_block = Belief::NEVER;
             self.write_block = WriteBlock::Unused;
         }
+        // UL may be another one then.
+        self.upper_limit = None;
         if row.storage == Storage::Eeprom {
             // Counted before the answer: the EEPROM may wear by a write whose answer is lost.
             self.eeprom_writes = self.eeprom_writes.saturating_add(1);

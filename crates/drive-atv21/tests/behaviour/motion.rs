@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use drive_atv21::{Alarms, Atv21, Authority, CommandWord, ROWS};
+use drive_atv21::{Alarms, Atv21, Authority, CAPABILITIES, CommandWord, ROWS};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Row, SetpointProblem, Speed, State,
-    StopMode,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, PortError, Refusal, Row, SetpointProblem, Speed,
+    State, StopMode,
 };
 use drive_sim::{Panel, models::atv21::Atv21 as Model};
-use drive_testing::bench;
+use drive_testing::{bench, words::Words};
 
 use crate::support::{HALF_SPEED, Rig, SECOND, refusal, state};
 
@@ -148,6 +148,11 @@ async fn a_setpoint_outside_the_limits_is_refused_before_it_is_sent() {
     assert_eq!(problem, SetpointProblem::OutsideFrequencyLimits { low: Frequency::ZERO, high });
     assert!(drive.set_setpoint(Speed::from_rpm(24_001).into()).await.is_err());
     assert_eq!(rig.machine.requests(6), 0);
+    // One that was changed by this value is read again.
+    assert!(drive.write_parameter(Row::find(ROWS, "UL").unwrap(), 4_000).await.unwrap().changed);
+    let writes = rig.machine.requests(6);
+    assert!(drive.set_setpoint(Frequency::from_hertz(45).into()).await.is_err());
+    assert_eq!(rig.machine.requests(6), writes);
     // Another UL is found after forget, not before.
     rig.machine.poke(0x0012, 6_000);
     assert!(drive.set_setpoint(Frequency::from_hertz(60).into()).await.is_err());
@@ -219,6 +224,52 @@ async fn a_lost_confirmation_of_a_stop_is_read_back() {
     });
     assert!(matches!(status.unwrap().state, State::Stopping | State::Ready));
     rig.line.close().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_a_late_start_overtakes_is_written_again_at_once() {
+    let (rig, mut drive) = Rig::factory();
+    drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
+    rig.machine.hold_next_answer();
+    let (status, ()) = tokio::join!(drive.stop(StopMode::Ramp), async {
+        rig.machine.wait_until_held().await;
+        rig.machine.poke(0xFA00, 0xC400);
+        rig.machine.release();
+    });
+    assert_ne!(status.unwrap().state, State::Running);
+    assert_eq!((rig.machine.peek(0xFA00), bench::written(&rig.machine, 0xFA00).len()), (Some(0xC000), 2));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_revoked_again_and_again_is_not_confirmed() {
+    let mut words = Words::new(&CAPABILITIES, &[(0xFD01, 0x6400), (0xFA00, 0xC400), (0xFE45, 2)]);
+    words.deaf = true;
+    let mut drive = Atv21::new(words, bench::address(1));
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap_err().kind(), ErrorKind::NotConfirmed);
+    assert_eq!(drive.into_port().written(), [(0xFA00, 0xC000); 3]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_emergency_stop_whose_clearing_was_lost_is_cleared_before_it_counts_as_done() {
+    let mut words = Words::new(&CAPABILITIES, &[(0xFD01, 0x1003)]);
+    words.writes.extend([None, Some((PortError::OutcomeUnknown("test"), false))]);
+    let mut drive = Atv21::new(words, bench::address(1));
+    assert!(drive.emergency_stop().await.unwrap().is_fault());
+    let port = drive.into_port();
+    assert_eq!(port.written(), [(0xFA00, 0xD000), (0xFA00, 0xC000), (0xFA00, 0xC000)]);
+    assert_eq!(port.words.get(&0xFA00), Some(&0xC000));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_still_turns_does_not_confirm_a_start_that_was_lost() {
+    // FD01 may show "run" until the motor stands; FA00 holds the stop, FA01 the reference that is asked for.
+    let turning = [(0xFD01, 0x6400), (0xFD00, 1_000), (0xFA00, 0xC000), (0xFA01, 2_500)];
+    let set_up = [(0xFE45, 2), (0xFE46, 4), (0x0012, 5_000), (0x0870, 1), (0x0871, 3)];
+    let mut words = Words::new(&CAPABILITIES, &[&turning[..], &set_up].concat());
+    words.writes.push_back(Some((PortError::OutcomeUnknown("test"), false)));
+    let mut drive = Atv21::new(words, bench::address(1)).with_write_block();
+    let error = drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
 }
 
 #[tokio::test(start_paused = true)]
