@@ -37,6 +37,10 @@ impl<P: Port> Drive3g3ev<P> {
         for _ in 0..READS {
             shown = self.read_status(Class::Command).await?;
             if !shown.is_fault() {
+                // A pulse in doubt may have come after its clearing.
+                if pulse.is_err() && self.read_command(Class::Command).await?.value != 0 {
+                    self.write_command(Class::Command, Command::empty()).await?;
+                }
                 return Ok(shown);
             }
         }

@@ -1,5 +1,5 @@
-//! A start that the way to the drive kept back: it comes when a stop was already given, and its confirmation, which by
-//! function 10h tells no value, is taken for the stop's.
+//! A command that the way to the drive kept back: a start comes when a stop was already given, and its confirmation, which
+//! by function 10h tells no value, is taken for the stop's; a pulse comes when it was already cleared.
 
 mod rig;
 
@@ -14,12 +14,14 @@ use drive_3g3ev::Drive3g3ev;
 use drive_core::{Direction, Drive, ErrorKind, Port, PortError, State, StopMode, Terms};
 use drive_sim::SimSlave;
 use drive_testing::bench;
-use rig::{Rig, one};
+use rig::{RESET, Rig, one};
 use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
 
 /// What becomes of a write to 0001h.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fate {
+    /// It is carried out.
+    Passed,
     /// It is kept back, and its sender hears nothing.
     Late,
     /// It is lost, and its sender hears the confirmation of the one that was kept back, which is carried out once so many
@@ -83,7 +85,7 @@ impl Client for Gateway {
         };
         let word = words[0];
         match self.next_fate() {
-            None => self.write(word).await,
+            None | Some(Fate::Passed) => self.write(word).await,
             Some(Fate::Late) => {
                 self.kept = Some(word);
                 return Err(tokio_modbus::Error::Transport(PortError::OutcomeUnknown("test").into_io()));
@@ -102,12 +104,18 @@ impl Client for Gateway {
     }
 }
 
-/// A drive behind a gateway, given a start that is kept back.
-async fn with_a_late_start(fates: &[Fate]) -> (Drive3g3ev<Gateway>, SimSlave, Rig) {
+/// A drive behind a gateway.
+fn behind_a_gateway(fates: impl IntoIterator<Item = Fate>) -> (Drive3g3ev<Gateway>, SimSlave, Rig) {
     let (drive, machine, rig) = one();
-    let fates = Arc::new(Mutex::new([Fate::Late].into_iter().chain(fates.iter().copied()).collect()));
+    let fates = Arc::new(Mutex::new(fates.into_iter().collect()));
     let gateway = Gateway { line: drive.into_port(), fates, kept: None, due: None };
-    let mut drive = Drive3g3ev::new(gateway, bench::address(1));
+    let drive = Drive3g3ev::new(gateway, bench::address(1)).with_fault_reset_function(RESET);
+    (drive, machine, rig)
+}
+
+/// One that was given a start that is kept back.
+async fn with_a_late_start(fates: &[Fate]) -> (Drive3g3ev<Gateway>, SimSlave, Rig) {
+    let (mut drive, machine, rig) = behind_a_gateway([Fate::Late].into_iter().chain(fates.iter().copied()));
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     (drive, machine, rig)
@@ -151,4 +159,13 @@ async fn a_motor_that_a_late_start_runs_is_not_said_to_be_stopping() {
     // The first read of this status lets the start through.
     let status = drive.status().await.unwrap();
     assert_eq!((status.state, status.raw(1), machine.peek(1)), (State::Running, Some(1), Some(1)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_reset_pulse_that_comes_after_its_clearing_is_not_left_set() {
+    let fates = [Fate::Passed, Fate::Late, Fate::Overtaken { reads: 0 }];
+    let (mut drive, machine, _rig) = behind_a_gateway(fates);
+    machine.trip(0);
+    assert_eq!(drive.reset_faults().await.unwrap().state, State::Ready);
+    assert_eq!((machine.peek(1), bench::written(&machine, 1)), (Some(0), vec![0, 0, 0x20, 0]));
 }
