@@ -8,7 +8,7 @@ use std::{
 use drive_bus::Line;
 use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode};
 use tokio::{
-    sync::{Semaphore, broadcast, mpsc, watch},
+    sync::{Mutex, Semaphore, broadcast, mpsc, watch},
     time::Instant,
 };
 
@@ -193,7 +193,8 @@ impl FleetBuilder {
         for ((name, line, budget), demands) in self.lines.into_iter().zip(demands) {
             let plan =
                 plan(budget, &demands).map_err(|problem| FleetError::Plan { line: name.clone(), problem })?;
-            lines.push(LineEntry { name: Arc::from(name), line, plan });
+            let commands = Mutex::new(Instant::now());
+            lines.push(LineEntry { name: Arc::from(name), line, plan, commands });
         }
         Ok((lines, members))
     }

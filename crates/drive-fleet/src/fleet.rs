@@ -8,7 +8,10 @@ use std::{
 
 use drive_bus::Line;
 use futures_util::future::join_all;
-use tokio::sync::broadcast::{self, error::RecvError};
+use tokio::{
+    sync::broadcast::{self, error::RecvError},
+    time::Instant,
+};
 
 use crate::{
     event::{Event, ExitAction},
@@ -22,6 +25,8 @@ pub(crate) struct LineEntry {
     pub(crate) name: Arc<str>,
     pub(crate) line: Line,
     pub(crate) plan: LinePlan,
+    /// When the commands of groups may use it again; who holds it is using it.
+    pub(crate) commands: tokio::sync::Mutex<Instant>,
 }
 
 /// Many drives on many lines, each watched by a task of its own. Cheap to clone.

@@ -12,6 +12,7 @@ use crate::{
     event::ExitAction,
     outcome::{Order, Outcome, Refused, Until},
     snapshot::Snapshot,
+    supervisor::Leave,
     task::{Message, Urgent},
 };
 
@@ -129,12 +130,15 @@ impl DriveHandle {
 
     /// Why a start, with this setpoint, would be refused now; `None` when it would be sent.
     pub async fn unready(&self, setpoint: Option<Setpoint>) -> Option<Refused> {
+        self.ask(setpoint).await.err()
+    }
+
+    /// The leave to start later, or why a start would be refused now.
+    pub(crate) async fn ask(&self, setpoint: Option<Setpoint>) -> Result<Leave, Refused> {
         let (reply, answer) = oneshot::channel();
         let name = Arc::clone(&self.commander);
-        if let Err(refused) = self.post(Message::Unready { name, setpoint, reply }) {
-            return Some(refused);
-        }
-        answer.await.unwrap_or(Some(Refused::ShutDown))
+        self.post(Message::Ask { name, setpoint, reply })?;
+        answer.await.unwrap_or(Err(Refused::ShutDown))
     }
 
     /// Starts the motor at the setpoint that the drive holds. Confirmed when the run command shows in its words.
@@ -195,9 +199,14 @@ impl DriveHandle {
 
     /// Gives an order and waits for its outcome.
     pub async fn order(&self, order: Order) -> Outcome {
+        self.order_on(None, order).await
+    }
+
+    /// Gives an order, and no more if a stop has come since its leave.
+    pub(crate) async fn order_on(&self, leave: Option<Leave>, order: Order) -> Outcome {
         let (reply, outcome) = oneshot::channel();
         let name = Arc::clone(&self.commander);
-        match self.post(Message::Order { order, name, reply }) {
+        match self.post(Message::Order { order, leave, name, reply }) {
             Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
             Err(refused) => Outcome::Refused(refused),
         }

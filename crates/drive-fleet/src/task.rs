@@ -17,16 +17,16 @@ use crate::{
     event::{Event, ExitAction},
     outcome::{Order, Outcome, Refused},
     snapshot::Snapshot,
-    supervisor::{Asker, CallId, Job, Output, Reply, Step, Supervisor, Turn},
+    supervisor::{Asker, CallId, Job, Leave, Output, Reply, Step, Supervisor, Turn},
 };
 
 /// What waits its turn.
 #[derive(Debug)]
 pub(crate) enum Message {
     /// An order.
-    Order { order: Order, name: Arc<str>, reply: oneshot::Sender<Outcome> },
+    Order { order: Order, leave: Option<Leave>, name: Arc<str>, reply: oneshot::Sender<Outcome> },
     /// The question whether a start would be sent now.
-    Unready { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Option<Refused>> },
+    Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
 }
 
 /// What waits for nothing.
@@ -166,12 +166,12 @@ impl Desk {
     fn handle_message(&mut self, message: Message) -> bool {
         let now = Instant::now();
         match message {
-            Message::Order { order, name, reply } => {
+            Message::Order { order, leave, name, reply } => {
                 let asker = self.caller(name, reply);
-                self.supervisor.handle_order(now, asker, order)
+                self.supervisor.handle_order(now, asker, order, leave)
             }
-            Message::Unready { name, setpoint, reply } => {
-                let _ = reply.send(self.supervisor.unready(now, &name, setpoint));
+            Message::Ask { name, setpoint, reply } => {
+                let _ = reply.send(self.supervisor.leave(now, &name, setpoint));
                 false
             }
         }

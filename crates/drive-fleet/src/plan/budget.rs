@@ -99,4 +99,15 @@ impl Demand {
     pub fn watchdog_timeout(&self) -> Option<Duration> {
         self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.capabilities))
     }
+
+    /// The longer of the times from one status to the next.
+    pub(super) fn period(&self) -> Duration {
+        self.periods.running.max(self.periods.rest)
+    }
+
+    /// How long a status that is due may wait: until the next is due or the one before it is too old.
+    pub(super) fn patience(&self) -> Duration {
+        let next = self.periods.running.min(self.periods.rest);
+        self.periods.max_age.saturating_sub(self.period()).min(next)
+    }
 }

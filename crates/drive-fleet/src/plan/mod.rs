@@ -21,6 +21,8 @@ const PROBES_PPM: u64 = 50_000;
 /// What the line gives to its lowest class, to which the measurements belong, even when there is no room: every
 /// twentieth turn, in millionths.
 const BACKGROUND_PPM: u64 = 50_000;
+/// What the line gives to the commands of a group at the least, in millionths.
+const COMMANDS_PPM: u64 = 100_000;
 
 /// What a line will be like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +44,9 @@ pub struct LinePlan {
     slow_sweep: Duration,
     /// What the measurements leave of the line, in millionths.
     slow_ppm: u64,
+    /// The share of the line with which every status comes before the next is due and is fresh until then, in
+    /// millionths.
+    fresh_ppm: u64,
 }
 
 impl LinePlan {
@@ -55,6 +60,15 @@ impl LinePlan {
     #[must_use]
     pub const fn left_ppm(&self) -> u64 {
         WHOLE_PPM.saturating_sub(self.utilisation_ppm)
+    }
+
+    /// How long the commands of a group leave a line to the rest after one that took this time. So the polls keep the
+    /// share with which none is missed, and on a line with watchdogs one half at least; the commands keep a
+    /// tenth at least, or they would never come to an end.
+    pub(crate) fn rest_after(&self, command: Duration) -> Duration {
+        let fed = if self.feed_gap.is_some() { WHOLE_PPM / 2 } else { 0 };
+        let rest = self.fresh_ppm.max(fed).min(WHOLE_PPM - COMMANDS_PPM);
+        stretched(command, WHOLE_PPM - rest).saturating_sub(command)
     }
 
     /// How old a status that is asked for at this period is at the most when the next one comes. Commands go first and
@@ -181,7 +195,11 @@ pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
         status_exchanges: exchanges.fold(0, u32::saturating_add),
         slow_sweep: living.iter().map(|(_, load)| load.slow).sum(),
         slow_ppm,
+        fresh_ppm: 0,
     };
+    let patience = living.iter().map(|(demand, _)| demand.patience()).min();
+    let fresh_ppm = patience.map_or(0, |patience| share(plan.status_wait(), patience));
+    let plan = LinePlan { fresh_ppm, ..plan };
     let shortest = living
         .iter()
         .filter_map(|(demand, _)| Some((demand.watchdog_timeout()?, *demand)))
@@ -208,7 +226,7 @@ fn overloaded(plan: &LinePlan) -> Option<PlanProblem> {
 }
 
 fn stale(plan: &LinePlan, demand: &Demand) -> Option<PlanProblem> {
-    let (period, max_age) = (demand.periods.running.max(demand.periods.rest), demand.periods.max_age);
+    let (period, max_age) = (demand.period(), demand.periods.max_age);
     (plan.status_age(period) > max_age).then(|| PlanProblem::Stale {
         drive: demand.drive.clone(),
         period,

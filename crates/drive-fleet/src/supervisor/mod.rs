@@ -26,13 +26,16 @@ use std::{
 use drive_core::{Capabilities, Error, ErrorKind, Measurements, PortError, Status};
 use tokio::time::Instant;
 
-pub(crate) use self::job::{Job, Reply, Step, Turn};
 use self::{
     checks::Checks,
     exit::Exit,
     orders::{Active, Queued},
     pace::Pace,
     stopping::Stopping,
+};
+pub(crate) use self::{
+    job::{Job, Reply, Step, Turn},
+    permission::Leave,
 };
 use crate::{
     event::{EventKind, ExitAction},
@@ -92,6 +95,8 @@ pub(crate) struct Supervisor {
     active: Option<Active>,
     queue: VecDeque<Queued>,
     stopping: Option<Stopping>,
+    /// How many stops were asked of it.
+    stops: u64,
     exit: Exit,
     started_here: bool,
     exceeded: BTreeSet<&'static str>,
@@ -126,6 +131,7 @@ impl Supervisor {
             active: None,
             queue: VecDeque::new(),
             stopping: None,
+            stops: 0,
             exit: Exit::No,
             started_here: false,
             exceeded: BTreeSet::new(),

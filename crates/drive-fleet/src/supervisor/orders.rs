@@ -5,7 +5,7 @@ use std::{collections::VecDeque, time::Duration};
 use drive_core::Error;
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor, permission::Blocked};
+use super::{Asker, Job, Leave, Supervisor, permission::Blocked};
 use crate::outcome::{Order, Outcome, Refused, Unconfirmed};
 
 /// An order that waits.
@@ -66,10 +66,17 @@ impl Active {
 }
 
 impl Supervisor {
-    /// Somebody commands the drive. Gives whether the job in flight has to be dropped for it.
-    pub(crate) fn handle_order(&mut self, now: Instant, asker: Asker, order: Order) -> bool {
+    /// Somebody commands the drive, on a leave that was given before or on none. Gives whether the job in flight has to
+    /// be dropped for it.
+    pub(crate) fn handle_order(
+        &mut self,
+        now: Instant,
+        asker: Asker,
+        order: Order,
+        leave: Option<Leave>,
+    ) -> bool {
         self.changed = true;
-        if let Some(refused) = self.refuse_at_once(&asker, &order) {
+        if let Some(refused) = self.refuse_at_once(&asker, &order, leave) {
             self.conclude(asker, order.command(), Outcome::Refused(refused));
             return false;
         }

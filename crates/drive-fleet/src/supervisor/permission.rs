@@ -1,6 +1,6 @@
 //! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings.
 
-use drive_core::{Direction, Result, Setpoint, State, Status};
+use drive_core::{Direction, Setpoint, State, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor};
@@ -29,14 +29,24 @@ impl From<Refused> for Blocked {
     }
 }
 
+/// That a drive would start. It is gone once a stop has been asked of the drive, also when that stop is long confirmed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Leave {
+    stops: u64,
+}
+
 impl Supervisor {
-    /// Why a start would not be sent now; `None` when it would.
-    pub(crate) fn unready(
+    /// The leave to start, or why a start would not be sent now.
+    pub(crate) fn leave(
         &mut self,
         now: Instant,
         name: &str,
         setpoint: Option<Setpoint>,
-    ) -> Option<Refused> {
+    ) -> Result<Leave, Refused> {
+        self.unready(now, name, setpoint).map_or(Ok(Leave { stops: self.stops }), Err)
+    }
+
+    fn unready(&mut self, now: Instant, name: &str, setpoint: Option<Setpoint>) -> Option<Refused> {
         let order = Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce };
         if !self.settings.control {
             return Some(Refused::ReadOnly);
@@ -59,7 +69,12 @@ impl Supervisor {
         }
     }
 
-    pub(super) fn refuse_at_once(&self, asker: &Asker, order: &Order) -> Option<Refused> {
+    pub(super) fn refuse_at_once(
+        &self,
+        asker: &Asker,
+        order: &Order,
+        leave: Option<Leave>,
+    ) -> Option<Refused> {
         if !self.settings.control {
             return Some(Refused::ReadOnly);
         }
@@ -73,6 +88,9 @@ impl Supervisor {
         }
         if self.stopping.is_some() && *order != Order::AcceptIdentity {
             return Some(Refused::StopPending);
+        }
+        if leave.is_some_and(|leave| leave.stops != self.stops) {
+            return Some(Refused::Stopped);
         }
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)
     }

@@ -91,6 +91,7 @@ impl Supervisor {
 
     pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, asked: StopMode, patience: Duration) {
         self.end_orders_by_stop();
+        self.stops += 1;
         self.changed = true;
         let mode = usable(self.capabilities, asked);
         if mode != asked {

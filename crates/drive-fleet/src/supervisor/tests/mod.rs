@@ -235,7 +235,7 @@ impl Rig {
 
     fn order(&mut self, order: Order) -> CallId {
         let asker = self.asker();
-        self.machine.handle_order(self.now, asker, order);
+        self.machine.handle_order(self.now, asker, order, None);
         CallId(self.next_call)
     }
 
