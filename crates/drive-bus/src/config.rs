@@ -171,27 +171,32 @@ impl LineConfig {
     pub fn worst_case_stop(&self, longest_request: usize, longest_answer: usize) -> Duration {
         let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
         let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
-        let characters = |count| self.characters(count);
-        let exchange = |request, answer| {
-            let (request, answer) = (self.request_len(request), self.answer_len(answer));
-            let overtime = match self.protocol {
-                _ if self.is_mbap() => Duration::ZERO,
-                Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
-                Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
-                Protocol::UniTelway(settings) => {
-                    unitelway::overtime(self.serial, settings, self.chunk_gap, request, answer)
-                }
-            };
-            characters(request) + timeout + characters(answer) + overtime
-        };
-        let broadcast = characters(self.request_len(longest_request)) + self.broadcast_turnaround;
-        let under_way = exchange(longest_request, longest_answer).max(broadcast);
+        let timeout = timeout.max(self.broadcast_turnaround);
+        let under_way = self.longest_exchange(longest_request, longest_answer, timeout);
         let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
         let silence = self.silence() + pauses.max(self.slave_change_gap);
         let settles =
             self.echo == Echo::Auto && !self.is_mbap() && !matches!(self.protocol, Protocol::UniTelway(_));
-        let settling = if settles { exchange(5, longest_answer) + silence } else { Duration::ZERO };
+        let settling = if settles {
+            self.longest_exchange(5, longest_answer, timeout) + silence
+        } else {
+            Duration::ZERO
+        };
         under_way + silence + settling + self.longest_stray()
+    }
+
+    /// How long an exchange with these PDUs takes at the most, when its answer has `timeout` to begin.
+    pub(crate) fn longest_exchange(&self, request: usize, answer: usize, timeout: Duration) -> Duration {
+        let (request, answer) = (self.request_len(request), self.answer_len(answer));
+        let overtime = match self.protocol {
+            _ if self.is_mbap() => Duration::ZERO,
+            Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
+            Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
+            Protocol::UniTelway(settings) => {
+                unitelway::overtime(self.serial, settings, self.chunk_gap, request, answer)
+            }
+        };
+        self.characters(request) + timeout + self.characters(answer) + overtime
     }
 
     /// How long what belongs to no exchange, the frame of a foreign master or noise, may hold a Stop up.

@@ -1,7 +1,7 @@
 //! The schedule of a line: which request is sent next. Pure: time is an argument.
 //!
-//! - A **higher class** goes first. A Stop is never overtaken, and while one waits, even for its slave's pause, nothing
-//!   else starts.
+//! - A **higher class** goes first. A Stop is never overtaken: while one waits, be it for its slave's pause, nothing starts
+//!   that could still be on the line when the pause is over.
 //! - **Inside a class** the earliest deadline goes first, fair among slaves: the second request of one slave waits until
 //!   every other slave has had its first.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
@@ -69,7 +69,7 @@ impl<T> Entry<T> {
 pub struct Readiness {
     /// Not before this.
     pub at: Instant,
-    /// Expected length of the exchange.
+    /// The length of the exchange with the silence after it: the expected one, or the longest while a Stop waits.
     pub takes: Duration,
 }
 
@@ -255,24 +255,30 @@ impl<T> Schedule<T> {
             return Some(if only.at <= now { Best::Now(0) } else { Best::At(only.at) });
         }
         let all = || self.queued.iter().zip(&self.readiness).enumerate();
-        let first = |class: Class| {
-            all()
-                .filter(|(_, (entry, readiness))| entry.terms.class == class && readiness.at <= now)
-                .min_by_key(|(_, (entry, _))| entry.rank)
-                .map(|(index, _)| Best::Now(index))
-        };
         let next = |class: Class| {
             all()
                 .filter(|(_, (entry, _))| entry.terms.class == class)
                 .map(|(_, (_, readiness))| readiness.at)
                 .min()
         };
-        if let Some(at) = next(Class::Stop) {
-            return Some(first(Class::Stop).unwrap_or(Best::At(at)));
+        let stop_at = next(Class::Stop);
+        let may_start = |entry: &Entry<T>, readiness: &Readiness| {
+            let in_time =
+                entry.terms.class == Class::Stop || stop_at.is_none_or(|at| now + readiness.takes <= at);
+            readiness.at <= now && in_time
+        };
+        let first = |class: Class| {
+            all()
+                .filter(|(_, (entry, readiness))| entry.terms.class == class && may_start(entry, readiness))
+                .min_by_key(|(_, (entry, _))| entry.rank)
+                .map(|(index, _)| Best::Now(index))
+        };
+        if let Some(stop) = first(Class::Stop) {
+            return Some(stop);
         }
         if self.since_aged + 1 >= AGED_TURN
             && let Some((index, _)) = all()
-                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
+                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && may_start(entry, readiness))
                 .min_by_key(|(_, (entry, _))| {
                     (entry.terms.class != Class::KeepAlive, entry.arrived, entry.ticket)
                 })
@@ -285,14 +291,16 @@ impl<T> Schedule<T> {
             return Some(background);
         }
         let best = all()
-            .filter(|(_, (_, readiness))| readiness.at <= now)
+            .filter(|(_, (entry, readiness))| may_start(entry, readiness))
             .min_by_key(|(_, (entry, _))| (Reverse(entry.terms.class), entry.rank));
         let Some((index, (entry, readiness))) = best else {
-            return self.readiness.iter().map(|readiness| readiness.at).min().map(Best::At);
+            // What is ready and does not start waits for a Stop, whose time is among these.
+            let later = self.readiness.iter().map(|readiness| readiness.at).filter(|at| *at > now);
+            return later.min().map(Best::At);
         };
         // What would still be on the line when a Command's pause is over does not start in front of it.
         if entry.terms.class < Class::Command
-            && let Some(at) = next(Class::Command).filter(|at| *at < now + readiness.takes)
+            && let Some(at) = next(Class::Command).filter(|at| *at > now && *at < now + readiness.takes)
         {
             return Some(Best::At(at));
         }

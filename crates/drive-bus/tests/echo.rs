@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use drive_bus::{
     Echo, LineConfig,
     exchange::{
-        Exchange, Failure, Step,
+        Exchange, Failure, Step, Stray,
         ascii::{Ascii, AsciiSettings},
         rtu::Rtu,
     },
@@ -150,4 +150,17 @@ fn the_read_that_settles_the_echo_waits_for_late_answers_and_a_stop_does_not_wai
     line.ask(2, 1, WRITE, Terms::of(Class::Stop));
     assert_eq!(line.sent()[1], 6);
     assert!(line.now < late_until);
+}
+
+#[test]
+fn the_echo_of_a_request_that_was_given_up_while_it_was_sent_is_no_late_answer() {
+    fn given_up<M: Exchange>(mut script: Script<M>) {
+        let request = script.ask(1, &READ);
+        script.machine.abandon();
+        assert_eq!(script.hear(&request), Step::More);
+        script.ask(2, &READ);
+        assert_eq!(script.strays(), [Stray::Echo]);
+    }
+    given_up(rtu(Echo::On));
+    given_up(ascii(Echo::On));
 }

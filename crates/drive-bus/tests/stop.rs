@@ -165,3 +165,28 @@ fn the_bound_of_a_stop_holds_on_an_unpaced_stream_whose_slave_dribbles() {
         assert!(line.now - called <= bound + tenth, "{bound:?}");
     }
 }
+
+#[test]
+fn while_a_stops_confirmation_waits_for_a_late_answer_the_other_watchdogs_are_fed() {
+    let mut line = acquainted(LineConfig { retries: 0, ..config() }, &[1, 2]);
+    line.ask(1, 1, READ, Terms::default());
+    let asked = line.sent();
+    let late_until = line.now + SERIAL.characters(asked.len()) + config().late_window;
+    let until = line.now + 200 * MS;
+    assert_eq!(line.next_sent(until), None);
+    // Slave 1 is mute: its stop is confirmed by a read that waits until no late answer can be taken for its own.
+    line.ask(2, 1, READ, stop());
+    let mut fed = 0;
+    loop {
+        line.ask(3, 2, READ, Terms::of(Class::KeepAlive));
+        let request = line.sent();
+        if request[0] == 1 {
+            break;
+        }
+        fed += 1;
+        line.answers(&request, &[3, 2, 0, 1]);
+    }
+    assert!(fed > 5, "{fed}");
+    // It is asked at the very moment.
+    assert_eq!(line.now, late_until);
+}

@@ -68,6 +68,8 @@ pub struct Ascii {
     configured: Echo,
     delimiters: Delimiters,
     current: Option<Current>,
+    /// What opened the last exchange: slave and PDU.
+    sent: (u8, Bytes),
     receiver: Receiver,
     last_character: Option<Instant>,
     strays: Vec<Stray>,
@@ -77,7 +79,6 @@ pub struct Ascii {
 struct Current {
     slave: u8,
     request: Arc<Request<'static>>,
-    pdu: Bytes,
     answer_by: Option<Instant>,
     /// The echo of this request has been taken away.
     echo_taken: bool,
@@ -100,6 +101,7 @@ impl Ascii {
             configured: echo,
             delimiters: Delimiters::new(settings.delimiter),
             current: None,
+            sent: (0, Bytes::new()),
             receiver: Receiver::default(),
             last_character: None,
             strays: Vec::new(),
@@ -109,11 +111,14 @@ impl Ascii {
     /// A frame whose LRC fits.
     fn heard(&mut self, slave: u8, pdu: Bytes) -> Step {
         let stray = Stray::Frame { slave, function: pdu.first().copied().unwrap_or_default() };
+        let equals = slave == self.sent.0 && pdu == self.sent.1;
         let Some(current) = self.current.as_mut().filter(|current| current.slave == slave) else {
-            self.strays.push(stray);
+            // The echo of a request that was given up while it was sent is no late answer.
+            let echo = equals && self.echo != EchoState::Absent;
+            self.strays.push(if echo { Stray::Echo } else { stray });
             return Step::More;
         };
-        if pdu == current.pdu && !current.echo_taken {
+        if equals && !current.echo_taken {
             // Nobody answers a broadcast, so that what equals it is an echo.
             let sure = self.echo == EchoState::Present || slave == 0;
             if sure || !answer::equals_its_request(&current.request) {
@@ -211,10 +216,10 @@ impl Exchange for Ascii {
         if let Some(Heard::Garbled { len, .. }) = self.receiver.give_up() {
             self.strays.push(Stray::Noise(len));
         }
+        self.sent = (slave, pdu.clone());
         self.current = Some(Current {
             slave,
             request,
-            pdu: pdu.clone(),
             answer_by: None,
             echo_taken: false,
             disturbed: false,

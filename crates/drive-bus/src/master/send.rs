@@ -46,7 +46,7 @@ impl<C> Master<C> {
             }
             self.choose_at = Some(at);
         }
-        match self.choose(now, free_at, soonest) {
+        match self.choose(now, free_at, stop_at) {
             Choice::Send(entry) => self.begin(now, entry),
             Choice::Wait(at) => {
                 self.choose_at = Some(self.choose_at.map_or(at, |probe| probe.min(at)));
@@ -56,16 +56,17 @@ impl<C> Master<C> {
         }
     }
 
-    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Instant) -> Choice<Job<C>> {
+    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Job<C>> {
+        let stop_waits = stop_at.is_some();
         let Self { schedule, stations, config, last_slave, exchange, .. } = self;
         schedule.choose(now, |entry| {
-            let mut at = if entry.terms.class == Class::Stop { stop_at } else { free_at };
+            let mut at = stop_at.filter(|_| entry.terms.class == Class::Stop).unwrap_or(free_at);
             if last_slave.is_some_and(|last| last != entry.slave) {
                 at += config.slave_change_gap;
             }
             let request = &entry.work.request;
-            let mut takes = config.response_timeout;
-            if let Some(station) = stations.get(&entry.slave) {
+            let station = stations.get(&entry.slave);
+            if let Some(station) = station {
                 at = at.max(station.ready_at.unwrap_or(at));
                 if entry.terms.class != Class::Stop || !entry.work.is_write {
                     let kind =
@@ -75,10 +76,20 @@ impl<C> Master<C> {
                         at = at.max(station.late_until(kind(&station.harmless_read())).unwrap_or(at));
                     }
                 }
-                takes = station.timeout.typical();
             }
-            let pdus = (entry.work.pdu.len(), answer::likely_len(request));
-            takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
+            let (sent, answer) = (entry.work.pdu.len(), answer::likely_len(request));
+            let takes = if stop_waits {
+                let timeout = match station {
+                    _ if entry.slave == 0 => config.broadcast_turnaround,
+                    Some(station) => station.timeout.current(),
+                    None => config.response_timeout,
+                };
+                let pauses = config.silence() + config.slave_change_gap;
+                config.longest_exchange(sent, answer, timeout) + pauses
+            } else {
+                let response = station.map_or(config.response_timeout, |station| station.timeout.typical());
+                response + config.characters(config.request_len(sent) + config.answer_len(answer))
+            };
             Readiness { at, takes }
         })
     }

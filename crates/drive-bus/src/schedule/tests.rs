@@ -131,13 +131,23 @@ fn a_pause_of_one_slave_is_spent_on_another_unless_a_command_would_wait_for_it()
 }
 
 #[test]
-fn nothing_starts_while_a_stop_waits_for_its_slaves_pause() {
+fn while_a_stop_waits_for_its_slaves_pause_only_what_ends_before_it_starts() {
     let (mut schedule, now) = (schedule(), Instant::now());
     push(&mut schedule, now, 1, Terms::of(Class::Stop), 1);
     push(&mut schedule, now, 2, Terms::of(Class::Command), 2);
-    let readiness =
-        |entry: &Entry<u32>| Readiness { at: if entry.slave == 1 { now + 500 * MS } else { now }, takes: MS };
-    assert!(matches!(schedule.choose(now, readiness), Choice::Wait(at) if at == now + 500 * MS));
+    push(&mut schedule, now, 3, Terms::of(Class::Status), 3);
+    let pause = now + 500 * MS;
+    let readiness = |entry: &Entry<u32>| match entry.work {
+        1 => Readiness { at: pause, takes: MS },
+        2 => Readiness { at: now, takes: 501 * MS },
+        _ => Readiness { at: now, takes: 500 * MS },
+    };
+    assert!(matches!(schedule.choose(now, readiness), Choice::Send(entry) if entry.work == 3));
+    push(&mut schedule, now, 3, Terms::of(Class::Status), 4);
+    let later = now + MS;
+    assert!(matches!(schedule.choose(later, readiness), Choice::Wait(at) if at == pause));
+    assert!(matches!(schedule.choose(pause, readiness), Choice::Send(entry) if entry.work == 1));
+    assert!(matches!(schedule.choose(pause, readiness), Choice::Send(entry) if entry.work == 2));
 }
 
 #[test]

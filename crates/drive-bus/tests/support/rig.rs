@@ -91,6 +91,10 @@ struct Asked {
     settled: bool,
 }
 
+fn is_write(request: &Request<'_>) -> bool {
+    matches!(request, Request::WriteSingleRegister(..))
+}
+
 /// The word that a slave has in a register that nobody wrote.
 pub(crate) fn word(slave: u8, address: u16) -> u16 {
     (u16::from(slave) << 8 | u16::from(slave)) ^ address.wrapping_mul(0x9E37)
@@ -225,12 +229,13 @@ impl Rig {
         }
     }
 
-    /// While a Stop waits, only a Stop may be sent, or what finds out about the echo on its behalf, once.
+    /// While the write of a Stop waits, only a Stop may be sent, or what finds out about the echo on its behalf, once. A
+    /// read of that class may wait for a late answer, with time for others in between.
     fn stop_is_not_overtaken(&mut self, slave: u8, pdu: &[u8]) {
         let sent =
             |asked: &Asked| asked.slave == slave && drive_bus::pdu::encode(&asked.request).unwrap() == pdu;
         let stops = || self.asked.values().filter(|asked| asked.class == Class::Stop);
-        if stops().any(|stop| !stop.sent) && !stops().any(sent) {
+        if stops().any(|stop| is_write(&stop.request) && !stop.sent) && !stops().any(sent) {
             assert!(self.settles(slave, pdu), "{pdu:02X?} to {slave} overtakes a stop");
         }
         for asked in self.asked.values_mut().filter(|asked| asked.class == Class::Stop) {
@@ -246,8 +251,7 @@ impl Rig {
     /// Whether this read finds out about the echo for a Stop that waits.
     fn settles(&mut self, slave: u8, pdu: &[u8]) -> bool {
         let unsettled = |asked: &&mut Asked| {
-            let write = matches!(asked.request, Request::WriteSingleRegister(..));
-            write && asked.class == Class::Stop && asked.slave == slave && !asked.settled
+            is_write(&asked.request) && asked.class == Class::Stop && asked.slave == slave && !asked.settled
         };
         self.config.echo == Echo::Auto
             && pdu[0] == 3

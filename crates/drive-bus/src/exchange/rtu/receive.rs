@@ -112,6 +112,11 @@ impl Rtu {
         let mut garbled = 0;
         while let [slave, function, ..] = *rest {
             match shortest_frame(rest) {
+                // The echo of a request that was given up while it was sent is no late answer.
+                Some(len) if self.echo != EchoState::Absent && rest.get(..len) == Some(&self.sent) => {
+                    self.strays.push(Stray::Echo);
+                    rest = rest.get(len..).unwrap_or_default();
+                }
                 Some(len) => {
                     let ours = self.current.as_mut().filter(|current| current.slave == slave);
                     if let Some(current) = ours {
