@@ -59,6 +59,10 @@ impl<P: Port> Drive3g3ev<P> {
         outcome
     }
 
+    pub(crate) const fn assume_unsaved(&mut self) {
+        self.eeprom.changed = true;
+    }
+
     pub(crate) async fn enter(&mut self) -> Result<u32> {
         if !self.eeprom.changed {
             return Err(self.refused(Order::Persist, Refusal::NothingToSave));

@@ -287,6 +287,10 @@ impl<P: Port> Drive for Drive3g3ev<P> {
         self.enter().await
     }
 
+    fn assume_changed(&mut self) {
+        self.assume_unsaved();
+    }
+
     fn broadcast_stop(&self, mode: StopMode) -> Option<BroadcastWrite> {
         CAPABILITIES.broadcast_stops.contains(&mode).then(broadcast::stop)
     }

@@ -189,6 +189,10 @@ impl<P: Port> Drive for Atv312<P> {
         self.save_parameters().await
     }
 
+    fn assume_changed(&mut self) {
+        self.unsaved = true;
+    }
+
     fn broadcast_stop(&self, mode: StopMode) -> Option<BroadcastWrite> {
         let (register, value) = command::broadcast_word(mode)?;
         Some(BroadcastWrite { function: 0x06, register: register.address(), value })

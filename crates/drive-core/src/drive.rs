@@ -183,6 +183,11 @@ pub trait Drive: Send {
         Err(Error::Unsupported { what: "saving parameters", reason: "the family has no command for it" })
     }
 
+    /// Says that parameters may have been changed since the last save without this value having seen it: by another
+    /// program, by an earlier run of this one, at the panel. The next [`persist`](Self::persist) is then sent. Families
+    /// without such a command do nothing. Nothing is sent.
+    fn assume_changed(&mut self) {}
+
     /// The write that stops every drive of this family on a line at once, for the modes in
     /// [`Capabilities::broadcast_stops`]. Nobody confirms it: follow it by a `stop` to each.
     fn broadcast_stop(&self, mode: StopMode) -> Option<BroadcastWrite> {

@@ -18,7 +18,7 @@ const NOTES: &str = "\
 To try it:          demo; or sim in one terminal and poll, status, start in another
 Before wiring:      families, plan
 One drive, read:    status, faults, param get, param dump
-One drive, write:   setpoint, start, stop, reset, param set
+One drive, write:   setpoint, start, stop, reset, param set, param save
 One line, read:     scan, poll
 The plant's drives: check, plan, run, each with --config FILE
 

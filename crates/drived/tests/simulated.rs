@@ -180,22 +180,33 @@ fn a_3g3ev_is_reset_once_its_owner_says_which_input_function_resets_faults() {
 }
 
 #[test]
-fn a_parameter_is_saved_to_eeprom_only_when_that_is_asked_for_and_it_was_changed() {
-    let sim = Sim::serve_with("save", &["atv312@1", "3g3ev@2"], &["--baud", "19200"]);
+fn parameters_are_saved_to_eeprom_only_when_that_is_asked_for_and_also_when_they_were_written_before() {
+    let sim = Sim::serve_with("save", &["atv312@1", "3g3ev@2"], &["--baud", "19200", "--format", "8E1"]);
     let line = format!("{},19200,8E1", sim.link());
-    let set = |drive: &str, arguments: &[&str]| {
-        run(&[&["param", "set", "--line", &line, "--drive", drive], arguments].concat())
+    let on = |drive: &str, command: &[&str]| {
+        run(&[&["param"], command, &["--line", &line, "--drive", drive]].concat())
     };
-    let saved = set("3g3ev@2", &["n20", "4.5", "--save", "--option", "saves=120"]);
-    assert!(
-        saved.assert_done().contains("to EEPROM by ENTER, a write to 0900h; saves counted: 121"),
-        "{saved:?}"
-    );
-    let again = set("3g3ev@2", &["n20", "4.5", "--save"]);
-    assert!(again.assert_done().contains("nothing was saved"), "{again:?}");
-    let saved = set("atv312@1", &["ACC", "45", "--save"]);
-    assert!(saved.assert_done().contains("has saved its parameters to EEPROM by CMI bit 1"), "{saved:?}");
-    set("atv58@3", &["ACC", "4.5", "--save"]).assert_refused(2, "no command that saves its parameters");
+    for (drive, register, value, by) in
+        [("atv312@1", "ACC", "45", "CMI bit 1"), ("3g3ev@2", "n20", "4.5", "ENTER, a write to 0900h")]
+    {
+        let written = on(drive, &["set", register, value]);
+        assert!(
+            written.assert_done().contains("is now") && !written.out.contains("saved its"),
+            "{written:?}"
+        );
+        let saved = format!(
+            "{drive} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: 1"
+        );
+        for command in [&["set", register, value, "--save"][..], &["save"]] {
+            let kept = on(drive, command);
+            assert_eq!(kept.assert_done().lines().last(), Some(saved.as_str()));
+        }
+    }
+    let counted = on("3g3ev@2", &["save", "--option", "saves=120"]);
+    assert!(counted.assert_done().ends_with("; saves counted: 121\n"), "{counted:?}");
+    on("atv312@1", &["set", "LFr", "30", "--save"]).assert_refused(2, "LFr (8502) is kept in RAM only");
+    on("atv58@3", &["set", "ACC", "4.5", "--save"]).assert_refused(2, "no command that saves its parameters");
+    on("atv28@3", &["save"]).assert_refused(2, "no command that saves its parameters");
 }
 
 #[test]

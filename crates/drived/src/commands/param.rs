@@ -7,8 +7,9 @@ use drive_core::{
 use drive_families::Family;
 
 use crate::{
+    drive_spec::DriveName,
     failure::Failure,
-    one_drive::OneDriveArgs,
+    one_drive::{OneDrive, OneDriveArgs},
     output::{self, Table},
 };
 
@@ -39,9 +40,18 @@ pub(crate) enum Command {
         /// A number in the register's unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
         #[arg(value_name = "VALUE", allow_hyphen_values = true)]
         value: String,
-        /// Then save the drive's parameters to its EEPROM, where a family has a command for it
+        /// Then save the drive's parameters to its EEPROM, all of them, as `drived param save` does, also when the value was
+        /// there already
         #[arg(long)]
         save: bool,
+    },
+    /// Save a drive's parameters to its EEPROM, all that are kept in RAM, by the family's command for it
+    ///
+    /// What was changed since the last save outlives the next power-off then, whoever changed it. An EEPROM wears out by
+    /// writes: save when you have changed something, not by a timer.
+    Save {
+        #[command(flatten)]
+        one: OneDriveArgs,
     },
     /// Read every register that can be read
     Dump {
@@ -55,6 +65,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
         Command::List { family } => output::say_table(list(family)),
         Command::Get { one, registers } => get(&one, &registers).await,
         Command::Set { one, register, value, save } => set(&one, &register, &value, save).await,
+        Command::Save { one } => save_all(&one).await,
         Command::Dump { one } => dump(&one).await,
     }
 }
@@ -95,12 +106,14 @@ async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
 async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Result<(), Failure> {
     let name = args.name()?;
     let row = find(name.family, register)?;
-    let can_save = name.family.capabilities().persist;
-    if save && can_save.is_none() {
-        let family = name.family.capabilities().name;
-        return Err(Failure::Input(format!(
-            "{name}: a {family} has no command that saves its parameters: leave out --save"
-        )));
+    if save {
+        let by = saving(name, "leave out --save")?;
+        if row.storage == Storage::Volatile {
+            return Err(Failure::Input(format!(
+                "{name}: {} ({}) is kept in RAM only, {by} does not save it: leave out --save",
+                row.code, row.address
+            )));
+        }
     }
     let word = wanted(row, value)?;
     let mut one = args.open().await?;
@@ -108,6 +121,7 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
     let what = if written.changed { "is now" } else { "was already" };
     let kept = match written.storage {
         Storage::Volatile => "kept in RAM, lost at power-off",
+        Storage::RamUntilSaved if save => "kept in RAM until saved",
         Storage::RamUntilSaved => {
             "kept in RAM, lost at power-off unless the drive is told to save its parameters"
         }
@@ -115,18 +129,42 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
         Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
     };
     output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, row.show(word)))?;
-    match can_save {
-        Some(by) if save && written.changed => {
-            let saves = one.drive.persist().await.map_err(|error| one.failure(&error))?;
-            output::say(format_args!(
-                "{name} has saved its parameters to EEPROM by {by}; saves counted: {saves}"
-            ))?;
-        }
-        _ if save => output::say("nothing was changed, so nothing was saved to EEPROM")?,
+    match written.storage {
+        Storage::Eeprom if save => output::say("the write itself has stored it: nothing else was saved")?,
+        _ if save => persist(&mut one).await?,
         _ => {}
     }
     one.close().await;
     Ok(())
+}
+
+async fn save_all(args: &OneDriveArgs) -> Result<(), Failure> {
+    saving(args.name()?, "each write says where its register is kept")?;
+    let mut one = args.open().await?;
+    persist(&mut one).await?;
+    one.close().await;
+    Ok(())
+}
+
+/// The command by which a family saves its parameters.
+fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
+    let capabilities = name.family.capabilities();
+    capabilities.persist.ok_or_else(|| {
+        let family = capabilities.name;
+        Failure::Input(format!("{name}: a {family} has no command that saves its parameters: {instead}"))
+    })
+}
+
+/// Saves whatever the drive keeps in RAM. What an earlier run of this program, another one, or a hand at the panel has
+/// changed cannot be known here, and who asks for a save wants that kept too.
+async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
+    let by = saving(one.name, "")?;
+    one.drive.assume_changed();
+    let saves = one.drive.persist().await.map_err(|error| one.failure(&error))?;
+    output::say(format_args!(
+        "{} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}",
+        one.name
+    ))
 }
 
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
