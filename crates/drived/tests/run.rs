@@ -48,6 +48,27 @@ fn a_configuration_is_checked_without_a_port() {
 }
 
 #[test]
+fn the_options_of_each_drive_are_part_of_what_a_configuration_means() {
+    let text = "[defaults]\noptions = { authority = \"settings\", saves = 120, fault-reset-function = 5 }\n\
+                [lines.bench]\nport = \"/dev/nowhere,9600,8N1\"\n\
+                [[drives]]\nline = \"bench\"\ndrive = \"3g3ev@1-2\"\n\
+                [[drives]]\nline = \"bench\"\ndrive = \"3g3ev@3\"\noptions = { saves = 7 }\n\
+                [[drives]]\nline = \"bench\"\ndrive = \"atv312@4\"\n";
+    let file = File::new("options", text);
+    let checked = run(&["check", "--config", file.path()]);
+    let out = checked.assert_done();
+    // What stands between the head of a drive and the next.
+    let options = |drive: &str| {
+        let block = out.lines().skip_while(|line| !line.starts_with(&format!("  {drive} "))).skip(1);
+        let mut lines = block.take_while(|line| line.starts_with("    "));
+        lines.find_map(|line| line.trim().strip_prefix("options")).map(str::trim)
+    };
+    assert_eq!(options("3g3ev@1,2"), Some("fault-reset-function = 5, saves = 120"), "{out}");
+    assert_eq!(options("3g3ev@3"), Some("fault-reset-function = 5, saves = 7"), "{out}");
+    assert_eq!(options("atv312@4"), None, "{out}");
+}
+
+#[test]
 fn what_is_wrong_is_one_line_with_file_line_and_field() {
     let text = configuration("/dev/nowhere", "atv312@1-20", "running = \"soon\"");
     let file = File::new("wrong", &text);

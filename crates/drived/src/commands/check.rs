@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         for (names, first) in alike(drives) {
             output::say(format_args!("  {}", drive_spec::listed(&names)))?;
             let mut table = Table::texts();
-            for (label, text) in meaning(&first.settings) {
+            for (label, text) in meaning(first) {
                 table.row([format!("    {label}"), text]);
             }
             output::say_table(table)?;
@@ -65,8 +65,9 @@ fn is_alike(one: &DrivePart, other: &DrivePart) -> bool {
     one.name.family == other.name.family && one.options == other.options && one.settings == renamed
 }
 
-/// What settings mean, each with its label.
-fn meaning(settings: &DriveSettings) -> Vec<(&'static str, String)> {
+/// What the settings and options of a drive mean, each with its label.
+fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
+    let DrivePart { settings, options, .. } = drive;
     let Periods { running, rest, slow, max_age } = settings.periods;
     let status = format!("every {running:?} running, {rest:?} at rest; lost without one for {max_age:?}");
     let measurements = if slow.is_zero() { "never".to_owned() } else { format!("every {slow:?}") };
@@ -75,6 +76,8 @@ fn meaning(settings: &DriveSettings) -> Vec<(&'static str, String)> {
     let mut lines = vec![("status", status), ("measurements", measurements)];
     let mut line = |label, text: Option<String>| lines.extend(text.map(|text| (label, text)));
     line("alarms", alarms(settings.alarms));
+    let said: Vec<String> = options.texts.iter().map(|(name, text)| format!("{name} = {text}")).collect();
+    line("options", (!said.is_empty()).then(|| said.join(", ")));
     if !settings.control {
         line("commands", Some("none: it is only read".to_owned()));
         return lines;

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
 use drive_bus::LineConfig;
 use drive_core::{Capabilities, StopMode};
-use drive_families::Options;
+use drive_families::{OptionEntry, Options};
 use drive_fleet::{
     Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss,
     Periods, WatchdogContract, check_settings, plan,
@@ -63,7 +63,14 @@ pub(crate) struct LinePart {
 pub(crate) struct DrivePart {
     pub(crate) name: DriveName,
     pub(crate) settings: DriveSettings,
-    pub(crate) options: Options,
+    pub(crate) options: SaidOptions,
+}
+
+/// The options of a drive, and the texts by which the file says them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct SaidOptions {
+    pub(crate) values: Options,
+    pub(crate) texts: BTreeMap<&'static str, String>,
 }
 
 impl LinePart {
@@ -124,7 +131,7 @@ struct Groups(BTreeMap<String, Vec<Member>>);
 struct Member {
     drive: DriveName,
     settings: DriveSettings,
-    options: Options,
+    options: SaidOptions,
     /// Whether the file says how often it is asked.
     has_own_periods: bool,
 }
@@ -205,7 +212,7 @@ fn line_part(
     let part = |member: &Member| DrivePart {
         name: member.drive,
         settings: member.settings_with(stretch),
-        options: member.options,
+        options: member.options.clone(),
     };
     let drives = group.iter().map(part).collect();
     let line = LinePart { name: name.to_owned(), config, budget, drives, problem: None };
@@ -311,7 +318,7 @@ fn options(
     entry: &DriveEntry,
     defaults: &DriveEntry,
     drive: DriveName,
-) -> Result<Options, ConfigError> {
+) -> Result<SaidOptions, ConfigError> {
     let mut own = Options::default();
     for (name, value) in &entry.options {
         let set = own.set(name.get_ref(), &value.get_ref().0);
@@ -319,12 +326,18 @@ fn options(
         let checked = own.check(drive.family);
         checked.map_err(|error| source.error(name.span(), format_args!("{drive}: {error}")))?;
     }
-    let mut options = Options::default();
+    let mut said = SaidOptions::default();
     for (name, value) in defaults.options.iter().chain(&entry.options) {
-        let set = options.set(name.get_ref(), &value.get_ref().0);
-        set.map_err(|error| source.error(value.span(), error))?;
+        let text = &value.get_ref().0;
+        let set = said.values.set(name.get_ref(), text);
+        let entry = set.and_then(|()| OptionEntry::find(name.get_ref()));
+        let entry = entry.map_err(|error| source.error(value.span(), error))?;
+        if entry.family == drive.family {
+            said.texts.insert(entry.name, text.clone());
+        }
     }
-    Ok(options.of(drive.family))
+    said.values = said.values.of(drive.family);
+    Ok(said)
 }
 
 /// Where a setting of a drive is written.

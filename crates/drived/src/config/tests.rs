@@ -195,8 +195,8 @@ fn what_the_owner_knows_of_a_drive_is_an_option_of_its_entry_or_of_the_defaults(
     };
     let config = read(&text("fault-reset-function = 5, saves = 3", "saves = \"120\"")).unwrap();
     let [one, _, other] = &config.lines[0].drives[..] else { panic!("{config:?}") };
-    assert_eq!((one.options.fault_reset_function, one.options.saves), (Some(5), Some(120)));
-    assert_eq!(other.options, Options::default(), "it has none of these");
+    assert_eq!((one.options.values.fault_reset_function, one.options.values.saves), (Some(5), Some(120)));
+    assert_eq!(&other.options, &SaidOptions::default(), "it has none of these");
     for (own, told) in [
         ("saves = \"many\"", "drives.toml:8: saves: option saves: \"many\" is not a value of it"),
         ("saves = 1.5", "drives.toml:8: saves: expected a text or a whole number"),

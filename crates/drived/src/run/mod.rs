@@ -70,7 +70,7 @@ fn build(config: &Config, lines: &[Line]) -> Result<FleetBuilder, Failure> {
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line(part.name.as_str(), line.clone(), part.budget);
         for DrivePart { name, settings, options } in &part.drives {
-            let drive = open_drive(line, *name, options)?;
+            let drive = open_drive(line, *name, &options.values)?;
             builder = builder.drive(part.name.as_str(), settings.clone(), drive);
         }
     }
