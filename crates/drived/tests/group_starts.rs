@@ -93,7 +93,8 @@ async fn under_way(line: &FullLine, running: usize) -> (JoinHandle<Result<(), Gr
         machine.wait_until(|machine| machine.running).await;
     }
     let mut watched = JoinSet::new();
-    for machine in others.iter().cloned() {
+    for machine in others {
+        let machine = machine.clone();
         watched.spawn(async move {
             machine.wait_until(|machine| machine.running).await;
         });
