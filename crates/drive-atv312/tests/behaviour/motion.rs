@@ -277,8 +277,9 @@ async fn a_stop_that_does_not_show_is_tried_without_the_old_settings_the_next_ti
     assert!(machine.poke(11204, 0));
     let error = drive.stop(StopMode::Fast).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    assert_eq!(commands(&machine)[3..], [0x400F; 4], "the first time it is written until it shows");
     drive.stop(StopMode::Fast).await.unwrap();
-    assert_eq!(commands(&machine)[3..], [0x400F, 0x0002]);
+    assert_eq!(commands(&machine)[7..], [0x0002]);
 }
 
 #[tokio::test(start_paused = true)]

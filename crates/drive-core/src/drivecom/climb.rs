@@ -11,14 +11,15 @@ pub(super) enum Next {
     Wait,
     /// Operation is enabled and the run command was given there or on the way.
     Arrived,
-    /// Somebody has taken the drive down again, or it was powered off: the start is over.
-    Fallen,
+    /// Somebody else has commanded the drive meanwhile, or it was powered off: the start is over.
+    Over,
     /// A fault stands in the way; only a reset leads on, and nobody resets unasked.
     Faulted,
 }
 
-/// How far a start has come. It never writes a word twice: a drive that is slow to follow is waited for, and one that was
-/// stopped meanwhile, by a key or by another master, is not started against that will.
+/// How far a start has come. It never writes a word twice: a drive that is slow to follow is waited for, and one that
+/// somebody else has commanded meanwhile, at a key or from another master, is not started against that will. A drive shows
+/// that by falling back, and by enabling an operation that was not asked for yet: the stops that keep it enabled do so.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Climb {
     height: u8,
@@ -37,8 +38,12 @@ impl Climb {
             return Next::Faulted;
         }
         let Some((height, word)) = rung(state).filter(|&(height, _)| height >= self.height) else {
-            return Next::Fallen;
+            return Next::Over;
         };
+        let not_by_us = self.written.is_some_and(|written| written != ENABLE_OPERATION);
+        if state == ChartState::OperationEnabled && not_by_us {
+            return Next::Over;
+        }
         self.height = height;
         if self.written.replace(word) != Some(word) {
             Next::Write(word)
@@ -118,8 +123,19 @@ mod tests {
             for fallen in RUNGS[..at].iter().copied().chain([ChartState::NotReadyToSwitchOn]) {
                 let mut climb = Climb::from(reached).unwrap();
                 assert!(matches!(climb.next(reached), Next::Write(_)));
-                assert_eq!(climb.next(fallen), Next::Fallen, "{reached:?}, then {fallen:?}");
+                assert_eq!(climb.next(fallen), Next::Over, "{reached:?}, then {fallen:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_stop_that_enables_operation_on_the_way_is_never_answered_by_the_run_command() {
+        for reached in RUNGS.into_iter().filter(|&rung| rung != ChartState::OperationEnabled) {
+            let mut climb = Climb::from(reached).unwrap();
+            assert!(matches!(climb.next(reached), Next::Write(_)));
+            let written = climb.next(ChartState::OperationEnabled) == Next::Write(ENABLE_OPERATION);
+            // On the last rung the run command itself was written before.
+            assert!(!written, "{reached:?}");
         }
     }
 

@@ -17,6 +17,8 @@ use crate::{
 /// How often the status is read for a command to show before it counts as not confirmed. There is no clock here: the
 /// line's own pace makes a time of it.
 pub const CONFIRMING_READS: usize = 20;
+/// After how many readings that do not show a stop it is written again.
+const READS_PER_STOP: usize = 5;
 
 /// A drive that follows the chart, as the sequences see it.
 ///
@@ -61,13 +63,13 @@ fn chart_of(eta: u16, status: &Status) -> Option<ChartState> {
 /// Climbs to operation enabled and gives the run command `word`, which must hold the bits of
 /// [`ENABLE_OPERATION`]; the direction and the family's other bits stand above them.
 ///
-/// Every word is written once, and a drive that lags behind is waited for. A drive that falls back was stopped by
-/// somebody, at its panel or from another master: the start ends there and does not climb again.
+/// Every word is written once, and a drive that lags behind is waited for. A drive that falls back, or enables operation
+/// before it was told to, was stopped by somebody, at its panel or from another master: the start ends there.
 ///
 /// # Errors
-/// [`Error::Refused`] before anything is written, or when a fault appears on the way;
-/// [`Error::NotConfirmed`] when the drive falls back, or does not show the run command within [`CONFIRMING_READS`]
-/// reads.
+/// [`Error::Refused`] before the run command is written: nothing starts then. [`Error::NotConfirmed`] when the drive trips
+/// after it, when somebody else has commanded the drive, or when the run command does not show within
+/// [`CONFIRMING_READS`] reads; one that was written stands in the drive then.
 pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) -> Result<Status> {
     let command = Command::Start(direction);
     let slave = drive.address();
@@ -75,23 +77,9 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     let refused = |reason| Error::Refused { slave, command, reason };
 
     let mut status = drive.read_status(Class::Command).await?;
-    // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
-    let mut climb = match chart_of(eta, &status) {
-        None => return Err(refused(Refusal::State(State::Unknown))),
-        Some(state) if state.is_fault() => return Err(refused(tripped(&status))),
-        Some(state) => Climb::from(state).ok_or_else(|| refused(Refusal::State(State::NotReady)))?,
-    };
-    if let Some(reason) = drive.refuses_start(direction, &status).await? {
-        return Err(refused(reason));
-    }
-    // The way out of a quick stop disables the voltage: a motor that still turns, or of which nothing says that it does
-    // not, would coast out of its fastest stop.
-    let quick_stop = chart_of(eta, &status) == Some(ChartState::QuickStopActive);
-    if quick_stop && status.output_frequency != Some(Frequency::ZERO) {
-        return Err(refused(Refusal::State(State::QuickStop)));
-    }
+    let mut climb = may_start(drive, direction, &status).await?.map_err(refused)?;
     let mut given = false;
-    // Once the run command was written, a reading that fails says nothing of the motor.
+    // Once the run command was written, an exchange that fails says nothing of the motor.
     let failed = |error: Error, given| if given { error.after_write() } else { error };
     for _ in 0..CONFIRMING_READS {
         match chart_of(eta, &status).map(|state| climb.next(state)) {
@@ -106,15 +94,42 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                     return Ok(status);
                 }
             }
-            Some(Next::Faulted) => return Err(refused(tripped(&status))),
-            Some(Next::Fallen) | None => break,
+            Some(Next::Faulted) if !given => return Err(refused(tripped(&status))),
+            Some(Next::Faulted | Next::Over) | None => break,
         }
         status = drive.read_status(Class::Command).await.map_err(|error| failed(error, given))?;
     }
     Err(Error::NotConfirmed { slave, command, status: Box::new(status) })
 }
 
-/// Writes the stop `word`, whatever the drive's state, and then reads until `shows` finds it in the drive's words.
+/// A climb from where the drive stands, or why there is none.
+async fn may_start<D: Drivecom>(
+    drive: &mut D,
+    direction: Direction,
+    status: &Status,
+) -> Result<Result<Climb, Refusal>> {
+    let state = chart_of(drive.status_register(), status);
+    // What the chart forbids is told before settings are read: a tripped drive says that it has tripped.
+    let climb = match state {
+        None => return Ok(Err(Refusal::State(State::Unknown))),
+        Some(state) if state.is_fault() => return Ok(Err(tripped(status))),
+        Some(state) => Climb::from(state),
+    };
+    let Some(climb) = climb else { return Ok(Err(Refusal::State(State::NotReady))) };
+    if let Some(reason) = drive.refuses_start(direction, status).await? {
+        return Ok(Err(reason));
+    }
+    // The way out of a quick stop disables the voltage: a motor that still turns, or of which nothing says that it does
+    // not, would coast out of its fastest stop.
+    if state == Some(ChartState::QuickStopActive) && status.output_frequency != Some(Frequency::ZERO) {
+        return Ok(Err(Refusal::State(State::QuickStop)));
+    }
+    Ok(Ok(climb))
+}
+
+/// Writes the stop `word`, whatever the drive's state, and then reads until `shows` finds it in the drive's words. Where
+/// it does not show it is written again, three times at most: a run command that the way to the drive kept back may have
+/// come after it.
 ///
 /// # Errors
 /// [`Error::NotConfirmed`] when it does not show within [`CONFIRMING_READS`] reads.
@@ -125,12 +140,24 @@ pub async fn stop<D: Drivecom>(
     shows: impl Fn(&Status) -> bool + Send,
 ) -> Result<Status> {
     drive.write_control(Class::Stop, word, Effect::Level).await?;
-    let mut status = drive.read_status(Class::Stop).await.map_err(Error::after_write)?;
-    for _ in 1..CONFIRMING_READS {
+    see_stop(drive, mode, word, shows).await.map_err(Error::after_write)
+}
+
+async fn see_stop<D: Drivecom>(
+    drive: &mut D,
+    mode: StopMode,
+    word: u16,
+    shows: impl Fn(&Status) -> bool + Send,
+) -> Result<Status> {
+    let mut status = drive.read_status(Class::Stop).await?;
+    for read in 1..CONFIRMING_READS {
         if shows(&status) {
             return Ok(status);
         }
-        status = drive.read_status(Class::Stop).await.map_err(Error::after_write)?;
+        if read % READS_PER_STOP == 0 {
+            drive.write_control(Class::Stop, word, Effect::Level).await?;
+        }
+        status = drive.read_status(Class::Stop).await?;
     }
     if shows(&status) {
         return Ok(status);
@@ -336,10 +363,22 @@ mod tests {
                 }
                 let mut drive = Chart { stopped: Some((read, left)), ..Chart::at(0x0040) };
                 let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
-                let kind = if left == 0x0008 { ErrorKind::Refused } else { ErrorKind::NotConfirmed };
+                // A trip refuses the start only where the run command was not yet given.
+                let refused = left == 0x0008 && written < 3;
+                let kind = if refused { ErrorKind::Refused } else { ErrorKind::NotConfirmed };
                 assert_eq!(error.kind(), kind, "{left:04X}h at the {read}th reading");
                 assert_eq!(drive.written, ladder[..written], "{left:04X}h at the {read}th reading");
             }
+        }
+    }
+
+    #[tokio::test]
+    async fn a_stop_that_enables_operation_on_the_way_is_not_undone_by_the_start() {
+        for (read, written) in [(2, vec![SHUTDOWN]), (3, vec![SHUTDOWN, SWITCH_ON])] {
+            let mut drive = Chart { stopped: Some((read, 0x0027)), ..Chart::at(0x0040) };
+            let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+            assert_eq!(drive.written, written, "the ramp stop 100Fh at the {read}th reading");
         }
     }
 
@@ -355,7 +394,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_stop_is_written_once_and_before_anything_is_read() {
+    async fn a_stop_is_written_before_anything_is_read_and_again_only_while_it_does_not_show() {
         let mut drive = Chart::at(0x0027);
         let shows = |status: &Status| chart_of(ETA, status) == Some(ChartState::QuickStopActive);
         stop(&mut drive, StopMode::Fast, QUICK_STOP, shows).await.unwrap();
@@ -364,7 +403,15 @@ mod tests {
         let mut deaf = Chart { deaf: true, ..Chart::at(0x0027) };
         let error = stop(&mut deaf, StopMode::Fast, QUICK_STOP, shows).await.unwrap_err();
         assert_eq!(error.kind(), ErrorKind::NotConfirmed);
-        assert_eq!(deaf.written, [QUICK_STOP]);
+        assert_eq!(deaf.written, [QUICK_STOP; 4]);
+    }
+
+    #[tokio::test]
+    async fn a_stop_that_a_late_run_command_overtakes_is_written_again() {
+        let shows = |status: &Status| chart_of(ETA, status) == Some(ChartState::SwitchedOn);
+        let mut drive = Chart { stopped: Some((1, 0x0027)), ..Chart::at(0x0027) };
+        stop(&mut drive, StopMode::Ramp, SWITCH_ON, shows).await.unwrap();
+        assert_eq!((drive.eta, drive.written), (0x0023, vec![SWITCH_ON; 2]));
     }
 
     #[tokio::test]

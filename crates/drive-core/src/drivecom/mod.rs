@@ -3,7 +3,8 @@
 //! the drive shows it.
 //!
 //! The chart's control word is a level, so a write whose answer was lost may be repeated; the one edge is the fault
-//! reset. A start that has written a word writes it no second time: a drive that falls back has been stopped.
+//! reset. A start writes each word once, because a drive that does not follow may have been stopped; a stop is written
+//! until it shows.
 
 mod chart;
 mod climb;
