@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
 
-use super::{Flight, Job, Master, PROBE_REST, Purpose};
+use super::{Flight, Job, Master, PROBE_REST, Purpose, link::Link};
 use crate::{
     answer,
     exchange::{Answer, Failure},
@@ -106,7 +106,8 @@ impl<C> Master<C> {
         // A slave that may take longer than the window to answer in time may take longer still to be late.
         let window = self.config.late_window.max(timeout * 3 / 2);
         let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
-        self.station(flight.slave).expect_late(kind, sent + window);
+        let lost = !matches!(self.link, Link::Up);
+        self.station(flight.slave).expect_late(kind, sent + window, lost);
     }
 
     fn go_offline(&mut self, now: Instant, slave: u8) {

@@ -26,13 +26,22 @@ pub(super) struct Station {
     pub(super) stats: SlaveStats,
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
-    /// The kinds of answer that may still come late, and until when.
-    late: Vec<(u8, Instant)>,
+    late: Vec<Late>,
     failures: u32,
     offline: Option<Offline>,
     /// What a probe asks: the last read that was asked of this slave.
     last_read: Option<Arc<Request<'static>>>,
     asked: Option<Instant>,
+}
+
+/// An answer that may still come.
+#[derive(Debug, Clone, Copy)]
+struct Late {
+    kind: u8,
+    until: Instant,
+    /// Its port was lost. What comes over the next one may be anything that the last one left behind, also an echo, so
+    /// that no frame proves that this answer has come.
+    over_a_lost_port: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -78,37 +87,39 @@ impl Station {
     /// It has answered, at `now`. True: it had been off-line.
     pub(super) fn answered(&mut self, now: Instant) -> bool {
         self.failures = 0;
-        self.late.retain(|(_, until)| *until > now);
+        self.late.retain(|late| late.until > now);
         self.ready_at = Some(now + self.settings.turnaround);
         self.stats.offline = false;
         self.offline.take().is_some()
     }
 
     /// An answer of this kind may still come, until `until`.
-    pub(super) fn expect_late(&mut self, kind: u8, until: Instant) {
+    pub(super) fn expect_late(&mut self, kind: u8, until: Instant, over_a_lost_port: bool) {
         if self.late.len() >= MOST_LATE {
             self.late.remove(0);
         }
-        self.late.push((kind, until));
+        self.late.push(Late { kind, until, over_a_lost_port });
     }
 
     /// Until when a request with answers of this kind must wait, because a late answer could be taken for its own.
     pub(super) fn late_until(&self, kind: u8) -> Option<Instant> {
-        self.late.iter().filter(|(late, _)| *late == kind).map(|(_, until)| *until).max()
+        self.late.iter().filter(|late| late.kind == kind).map(|late| late.until).max()
     }
 
     /// Whether an answer of any kind may still come.
     pub(super) fn may_be_late(&self, now: Instant) -> bool {
-        self.late.iter().any(|(_, until)| *until > now)
+        self.late.iter().any(|late| late.until > now)
     }
 
     /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
     pub(super) fn came_late(&mut self, kind: u8) -> bool {
-        // What was waited for has come: one thing less to be afraid of.
-        let Some(index) = self.late.iter().position(|(late, _)| *late == kind) else {
+        if !self.late.iter().any(|late| late.kind == kind) {
             return false;
-        };
-        self.late.remove(index);
+        }
+        // What was waited for has come: one thing less to be afraid of.
+        if let Some(index) = self.late.iter().position(|late| late.kind == kind && !late.over_a_lost_port) {
+            self.late.remove(index);
+        }
         self.stats.late += 1;
         true
     }
@@ -137,7 +148,7 @@ impl Station {
     /// When it is off-line: when it is asked next.
     pub(super) fn probe_at(&self) -> Option<Instant> {
         let offline = self.offline?;
-        Some(self.late.iter().map(|(_, until)| *until).fold(offline.probe_at, Instant::max))
+        Some(self.late.iter().map(|late| late.until).fold(offline.probe_at, Instant::max))
     }
 
     /// [`probe_at`](Self::probe_at), as long as somebody cares.
