@@ -107,10 +107,11 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
         // A write of the most words that the family takes is under way and is never answered.
         let longest = characters(baud, 9 + 2 * Nanos::from(family.write_words));
         let answered = characters(baud, 5 + 2 * Nanos::from(family.read_words));
-        // It is given up after a frame's longest babble and an adapter's longest pause.
+        // It is given up after a frame's longest babble and an adapter's longest pause, and then somebody else's may
+        // come.
         let babble = characters(baud, 256) + 20 * MS;
         let pause = family.turnaround.as_nanos();
-        let wire = longest + timeout + answered + babble + t3_5(baud) + pause;
+        let wire = longest + timeout + answered + 2 * babble + t3_5(baud) + pause;
         assert_eq!(cell("a stop is on the wire"), shown(wire));
 
         // When it is on the wire, a broadcast goes out, then three writes and a status of each, and each mute
