@@ -89,16 +89,18 @@ impl Command {
     }
 }
 
-/// Carries out a subcommand and says why it failed, on one line.
-pub(crate) fn run(command: Command) -> ExitCode {
-    let runtime = match tokio::runtime::Runtime::new() {
-        Ok(runtime) => runtime,
-        Err(error) => {
-            output::complain(format_args!("the system gives no threads or timers: {error}"));
-            return ExitCode::FAILURE;
-        }
-    };
-    match runtime.block_on(command.run()) {
+/// Carries out a subcommand.
+pub(crate) fn run(command: Command) -> Result<(), Failure> {
+    let runtime = tokio::runtime::Runtime::new().map_err(|error| {
+        // No input and no output helps it.
+        Failure::Drive(format!("the system gives no threads or timers: {error}"))
+    })?;
+    runtime.block_on(command.run())
+}
+
+/// Says why a subcommand failed, on one line, and gives the exit code.
+pub(crate) fn end(result: Result<(), Failure>) -> ExitCode {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure != Failure::OutputClosed {

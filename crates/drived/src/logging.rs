@@ -1,23 +1,171 @@
 //! The log: to stderr, as much as `DRIVED_LOG` says (`debug`, `drive_bus=trace,warn`).
+//!
+//! Writing may block for as long as a terminal is held or a pipe is full, and may fail for ever. The tasks that feed the
+//! drives' watchdogs write to the log, so they only hand their lines to a thread: what it cannot take is lost and counted.
 
-use std::io::{self, IsTerminal as _};
+use std::{
+    io::{self, IsTerminal as _, Write},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
+    time::Duration,
+};
 
 use tracing::Level;
 use tracing_subscriber::{EnvFilter, filter::LevelFilter};
 
 const VARIABLE: &str = "DRIVED_LOG";
+/// Lines that wait for the writer.
+const WAITING: usize = 1_024;
+/// How long the reader of stderr has for the last lines.
+const LAST_WORDS: Duration = Duration::from_millis(500);
 
 /// Starts the log at a level, or at what the environment says instead. `None`: no log, because the screen is a table.
-pub(crate) fn start(level: Option<Level>) {
-    let Some(level) = level else { return };
+pub(crate) fn start(level: Option<Level>) -> Option<Log> {
     let filter = EnvFilter::builder()
-        .with_default_directive(LevelFilter::from_level(level).into())
+        .with_default_directive(LevelFilter::from_level(level?).into())
         .with_env_var(VARIABLE)
         .from_env_lossy();
+    let log = Log::to(io::stderr());
+    let lines = log.lines.clone();
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(io::stderr)
+        .with_writer(move || lines.clone())
         .with_ansi(io::stderr().is_terminal())
         .with_target(false)
+        // It would be told on stderr, by a panic where nobody reads that.
+        .log_internal_errors(false)
         .init();
+    Some(log)
+}
+
+enum Message {
+    Line(Vec<u8>),
+    /// Everything before it has been written.
+    End(SyncSender<()>),
+}
+
+/// The log and its thread.
+pub(crate) struct Log {
+    lines: Lines,
+}
+
+/// Where the lines are handed in; each write is one line.
+#[derive(Clone)]
+struct Lines {
+    waiting: SyncSender<Message>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Log {
+    fn to(writer: impl Write + Send + 'static) -> Self {
+        let (waiting, lines) = sync_channel(WAITING);
+        let lost = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&lost);
+        std::thread::spawn(move || write(&lines, &counted, writer));
+        Self { lines: Lines { waiting, lost } }
+    }
+
+    /// Writes what is left, if it finds a reader in time.
+    pub(crate) fn finish(self) {
+        let (written, all) = sync_channel(1);
+        if self.lines.waiting.try_send(Message::End(written)).is_ok() {
+            // Nobody is left to be told that nobody reads.
+            let _ = all.recv_timeout(LAST_WORDS);
+        }
+    }
+}
+
+impl Write for Lines {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        if self.waiting.try_send(Message::Line(line.to_vec())).is_err() {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn write(lines: &Receiver<Message>, lost: &AtomicU64, mut writer: impl Write) {
+    for message in lines {
+        // What a closed stderr does not take is lost; there is no other place to tell it.
+        match message {
+            Message::Line(line) => {
+                let _ = writer.write_all(&line);
+            }
+            Message::End(written) => {
+                let _ = written.send(());
+            }
+        }
+        match lost.swap(0, Ordering::Relaxed) {
+            0 => {}
+            lost => {
+                let _ = writeln!(writer, "{lost} lines of the log are lost: it was not read in time");
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    /// Takes a line only when it is allowed to, and tells it.
+    struct Slow {
+        allowed: Receiver<()>,
+        taken: std::sync::mpsc::Sender<String>,
+    }
+
+    impl Write for Slow {
+        fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+            let _ = self.allowed.recv();
+            let _ = self.taken.send(String::from_utf8_lossy(line).into_owned());
+            Ok(line.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_log_that_is_not_read_holds_up_nobody_and_what_is_lost_is_counted() {
+        let (allow, allowed) = channel();
+        let (taken, told) = channel();
+        let log = Log::to(Slow { allowed, taken });
+        let mut lines = log.lines.clone();
+        let written = 2 * WAITING;
+        for number in 0..written {
+            writeln!(lines, "{number}").unwrap();
+        }
+        drop((allow, lines));
+        log.finish();
+        let whole: String = told.iter().collect();
+        assert!(whole.contains(" lines of the log are lost"), "{whole}");
+        assert!(whole.contains("0\n") && !whole.contains(&format!("{}\n", written - 1)), "{whole}");
+    }
+
+    #[test]
+    fn a_log_that_cannot_be_written_is_no_reason_to_end() {
+        struct Closed;
+        impl Write for Closed {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::BrokenPipe.into())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let log = Log::to(Closed);
+        assert!(writeln!(log.lines.clone(), "line").is_ok());
+        log.finish();
+    }
 }

@@ -26,6 +26,10 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return cli::refuse(&error),
     };
-    logging::start(cli.command.log_level());
-    cli::run(cli.command)
+    let log = logging::start(cli.command.log_level());
+    let result = cli::run(cli.command);
+    if let Some(log) = log {
+        log.finish();
+    }
+    cli::end(result)
 }

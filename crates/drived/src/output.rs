@@ -31,12 +31,16 @@ pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
     say_as_it_is(Table { available: terminal_width(&io::stdout()), ..table })
 }
 
-/// Says on stderr why the program ends.
+/// Says on stderr why the program ends, if anybody reads that.
 pub(crate) fn complain(why: impl fmt::Display) {
     let line = format!("drived: {why}");
-    match terminal_width(&io::stderr()) {
-        Some(width) => hanging(&line, width).iter().for_each(|line| eprintln!("{line}")),
-        None => eprintln!("{line}"),
+    let lines = match terminal_width(&io::stderr()) {
+        Some(width) => hanging(&line, width),
+        None => vec![line],
+    };
+    for line in lines {
+        // The exit code says it too.
+        let _ = writeln!(io::stderr(), "{line}");
     }
 }
 

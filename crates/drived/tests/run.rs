@@ -34,6 +34,23 @@ fn a_daemon_tells_events_and_snapshots_and_at_its_end_what_each_drive_did() {
 }
 
 #[test]
+fn a_daemon_whose_stdout_and_log_nobody_reads_any_more_watches_its_drives_on() {
+    let sim = Sim::serve("unread", &["atv312@1"]);
+    let control = "control = true\nwatchdog = { time = \"5s\", reaction = \"ramp\" }";
+    let file = File::new("unread", &configuration(sim.link(), "atv312@1", control));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"watchdog verified""#);
+    daemon.close_stdout();
+    daemon.wait_for_log("nobody reads stdout any more");
+    daemon.close_log();
+    // Its port is its own as long as it watches.
+    sim.on("atv312@1", &["status"]).assert_refused(2, sim.link());
+    // What it logs at its end is no reason to panic.
+    assert_eq!(daemon.interrupt().0, Some(1), "its last events were not heard");
+    sim.on("atv312@1", &["status"]).assert_done();
+}
+
+#[test]
 fn a_configuration_is_checked_without_a_port() {
     let file = File::new("check", &configuration("/dev/nowhere", "atv312@1-10", "control = true"));
     let checked = run(&["check", "--config", file.path()]);

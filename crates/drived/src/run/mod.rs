@@ -20,7 +20,8 @@ use crate::{
 ///
 /// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal, where the log tells
 /// the events, stdout has one line for each drive whose state has changed instead. Ctrl-C and SIGTERM end it: each drive's
-/// policy acts, and what was done is told. A second Ctrl-C ends it at once.
+/// policy acts, and what was done is told. A second Ctrl-C ends it at once. A stdout that nobody reads any more ends nothing:
+/// the drives are watched on.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The configuration, in TOML
@@ -41,14 +42,22 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let result = tokio::select! {
         () = ending.asked() => Ok(()),
-        result = report.ended() => result,
+        result = report.ended() => {
+            // Without this program the drives' watchdogs would stop their motors.
+            tracing::warn!("nobody reads stdout any more: the drives are watched on, Ctrl-C ends it");
+            ending.asked().await;
+            result
+        }
     };
-    tokio::select! {
+    let in_order = tokio::select! {
         // Each drive's event tells what was done.
-        _ = fleet.shutdown(config.shutdown) => {}
-        () = ending.asked() => tracing::warn!("asked to end a second time: drives are left as they are"),
-    }
-    if result.is_ok() {
+        _ = fleet.shutdown(config.shutdown) => true,
+        () = ending.asked() => {
+            tracing::warn!("asked to end a second time: drives are left as they are");
+            false
+        }
+    };
+    if result.is_ok() && in_order {
         report.finish().await;
     }
     for line in lines {

@@ -1,7 +1,12 @@
 //! What stdout is told, as JSON lines or as text. Writing may block for as long as the reader likes, so it has a thread of
 //! its own: the fleet goes on meanwhile, and a reader that is slow is told how many events it missed.
 
-use std::{collections::BTreeMap, io::Write as _, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    io::{self, Write as _},
+    sync::Arc,
+    time::Duration,
+};
 
 use drive_fleet::{Events, Fleet, Link, Received, Snapshot};
 use tokio::{
@@ -147,10 +152,24 @@ async fn tick(ticks: &mut Option<Interval>) {
     }
 }
 
+/// Writes until nobody is left to read. What cannot be written for another reason, such as a full disk, is lost, and what
+/// comes after it is tried again.
 fn write(mut lines: mpsc::Receiver<String>) -> Result<(), Failure> {
     let mut stdout = std::io::stdout();
+    let mut failing = false;
     while let Some(line) = lines.blocking_recv() {
-        writeln!(stdout, "{line}").and_then(|()| stdout.flush()).map_err(|error| Failure::output(&error))?;
+        // A line of which only a part could be written must not run into the next.
+        let start = if failing { "\n" } else { "" };
+        match writeln!(stdout, "{start}{line}").and_then(|()| stdout.flush()) {
+            Ok(()) => failing = false,
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Err(Failure::OutputClosed),
+            Err(error) => {
+                if !failing {
+                    tracing::warn!(%error, "stdout cannot be written: events and snapshots are lost");
+                }
+                failing = true;
+            }
+        }
     }
     Ok(())
 }

@@ -84,7 +84,7 @@ impl Drop for File {
 /// The program running beside the test; killed when dropped.
 pub(crate) struct Running {
     child: Child,
-    lines: BufReader<ChildStdout>,
+    lines: Option<BufReader<ChildStdout>>,
 }
 
 impl Running {
@@ -95,14 +95,38 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
-        let lines = BufReader::new(child.stdout.take().expect("stdout is piped"));
+        let lines = Some(BufReader::new(child.stdout.take().expect("stdout is piped")));
         Self { child, lines }
+    }
+
+    /// Nobody reads its stdout from now on.
+    pub(crate) fn close_stdout(&mut self) {
+        self.lines = None;
+    }
+
+    /// Waits for a line of its log that contains this.
+    pub(crate) fn wait_for_log(&mut self, text: &str) {
+        let log = self.child.stderr.as_mut().expect("stderr is read");
+        let (mut line, mut byte) = (Vec::new(), [0]);
+        while !String::from_utf8_lossy(&line).contains(text) {
+            std::io::Read::read_exact(log, &mut byte).expect("the program ended without saying it");
+            line.extend(byte.iter().filter(|byte| **byte != b'\n'));
+            if byte == *b"\n" {
+                line.clear();
+            }
+        }
+    }
+
+    /// Nobody reads its log from now on.
+    pub(crate) fn close_log(&mut self) {
+        self.child.stderr = None;
     }
 
     /// Its next line that contains this.
     pub(crate) fn wait_for(&mut self, text: &str) -> String {
         let mut line = String::new();
-        while self.lines.read_line(&mut line).expect("stdout is text") > 0 {
+        let lines = self.lines.as_mut().expect("stdout is read");
+        while lines.read_line(&mut line).expect("stdout is text") > 0 {
             if line.contains(text) {
                 return line;
             }
@@ -117,7 +141,9 @@ impl Running {
         let sent = Command::new("kill").args(["-INT", &pid]).status().expect("kill runs");
         assert!(sent.success());
         let mut rest = String::new();
-        std::io::Read::read_to_string(&mut self.lines, &mut rest).expect("stdout is text");
+        if let Some(lines) = &mut self.lines {
+            std::io::Read::read_to_string(lines, &mut rest).expect("stdout is text");
+        }
         (self.child.wait().expect("it can be waited for").code(), rest)
     }
 }
