@@ -63,8 +63,9 @@ fn chart_of(eta: u16, status: &Status) -> Option<ChartState> {
 /// Climbs to operation enabled and gives the run command `word`, which must hold the bits of
 /// [`ENABLE_OPERATION`]; the direction and the family's other bits stand above them.
 ///
-/// Every word is written once, and a drive that lags behind is waited for. A drive that falls back, or enables operation
-/// before it was told to, was stopped by somebody, at its panel or from another master: the start ends there.
+/// Every word is written once, and a drive that lags behind is waited for. A drive that falls back, or skips a rung, was
+/// commanded by somebody else, at its panel or from another master: the start ends there. A stop whose word is one of the
+/// ladder's own cannot be told from it.
 ///
 /// # Errors
 /// [`Error::Refused`] before the run command is written: nothing starts then. [`Error::NotConfirmed`] when the drive trips
