@@ -42,7 +42,7 @@ impl<P: Port> Atv21<P> {
         }
         let status = self.start_motor(direction, block).await?;
         if block.is_some() {
-            self.confirm_reference(setpoint, reference).await?;
+            self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)?;
         }
         Ok(status)
     }
@@ -59,17 +59,18 @@ impl<P: Port> Atv21<P> {
         let sent = self.registers.at(Class::Stop).edge().write(map::COMMAND_WORD, edge).await;
         // Whatever became of the edge: a word without it clears it, and stops along the ramp.
         let cleared = self.registers.at(Class::Stop).write(map::COMMAND_WORD, clear).await;
-        for _ in 1..CONFIRMATIONS {
-            let status = self.read_status(Class::Stop).await?;
-            if status.is_fault() || status.state == State::QuickStop {
-                if cleared.is_err() {
-                    self.clear_edge(Class::Stop, CommandWord::EMERGENCY_STOP).await?;
-                }
-                return Ok(status);
+        let trips = |status: &Status| status.is_fault() || status.state == State::QuickStop;
+        let status = self.read_until(Class::Stop, trips).await.map_err(Error::after_write)?;
+        if trips(&status) {
+            if cleared.is_err() {
+                self.clear_edge(Class::Stop, CommandWord::EMERGENCY_STOP)
+                    .await
+                    .map_err(Error::after_write)?;
             }
+            return Ok(status);
         }
-        sent.and(cleared)?;
-        let status = self.read_status(Class::Stop).await?;
+        sent?;
+        cleared.map_err(Error::after_write)?;
         Err(self.not_confirmed(Command::Configure("emergency stop"), status))
     }
 
@@ -86,55 +87,73 @@ impl<P: Port> Atv21<P> {
             Some(words) => calls.write_words(WRITE_BLOCK, &words).await,
             None => calls.write(map::COMMAND_WORD, word.bits()).await,
         };
-        // An ambiguous write of the block is read back by what follows.
         match sent {
-            Err(error) if block.is_none() || error.kind() != ErrorKind::OutcomeUnknown => return Err(error),
-            _ => {}
+            // A write of the block that is in doubt is read back by what follows.
+            Err(error) if block.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
+            sent => sent?,
         }
-        let mut last = None;
+        self.see_start(direction, word).await.map_err(Error::after_write)
+    }
+
+    /// Reads until the drive runs and holds the run command `word`: RUN may be that of a motor that still turns from
+    /// before, and the direction the old one while it reverses.
+    async fn see_start(&mut self, direction: Direction, word: CommandWord) -> Result<Status> {
+        let mut status = Status::default();
         for _ in 0..CONFIRMATIONS {
-            let status = self.read_status(Class::Command).await?;
+            status = self.read_status(Class::Command).await?;
             let runs = status_word(&status).contains(StatusWord::RUN) && !status.is_fault();
-            // RUN may be that of a motor that still turns from before: where the write is in doubt, its word counts.
-            let shows = sent.is_ok() && status.direction == Some(direction);
-            if runs && (shows || self.is_in_force(word, Class::Command).await?) {
-                return Ok(status);
+            if runs && self.holds(word, Class::Command).await? {
+                let directed = status.direction == Some(direction);
+                if directed || self.source(Class::Command).await? == CommandSource::Serial {
+                    return Ok(status);
+                }
             }
-            last = Some(status);
         }
-        sent?;
-        Err(self.not_confirmed(command, last.unwrap_or_default()))
+        Err(self.not_confirmed(Command::Start(direction), status))
     }
 
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
         let word = self.stop_word(mode)?;
         self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
-        let mut last = None;
+        self.see_stop(mode, word).await.map_err(Error::after_write)
+    }
+
+    /// Reads until the drive holds the stop `word` after all that it shows, and either does not run, or obeys the bus: the
+    /// manual does not say whether FD01 shows "run" until the motor stands. Where another word has come after the stop,
+    /// such as that of a start that was late, the stop is written again.
+    async fn see_stop(&mut self, mode: StopMode, word: CommandWord) -> Result<Status> {
         let mut repeats = 0;
+        let mut status = Status::default();
         for _ in 0..CONFIRMATIONS {
-            let mut status = self.read_status(Class::Stop).await?;
-            if !status_word(&status).contains(StatusWord::RUN) {
-                return Ok(status);
-            }
-            // The manual does not say whether FD01 shows "run" until the motor stands, so the order itself counts.
-            let stands = self.registers.at(Class::Stop).read(map::COMMAND_WORD).await? == word.bits();
-            if stands && self.source(Class::Stop).await? == CommandSource::Serial {
-                if status.state == State::Running {
-                    status.state = State::Stopping;
-                }
-                return Ok(status);
-            }
-            last = Some(status);
-            if !stands {
-                // Another word has come after it, perhaps a start that was late.
+            status = self.read_status(Class::Stop).await?;
+            if !self.holds(word, Class::Stop).await? {
                 if repeats == REPEATS {
                     break;
                 }
                 self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
                 repeats += 1;
+            } else if !status_word(&status).contains(StatusWord::RUN) {
+                return Ok(status);
+            } else if self.source(Class::Stop).await? == CommandSource::Serial {
+                if status.state == State::Running {
+                    status.state = State::Stopping;
+                }
+                return Ok(status);
             }
         }
-        Err(self.not_confirmed(Command::Stop(mode), last.unwrap_or_default()))
+        Err(self.not_confirmed(Command::Stop(mode), status))
+    }
+
+    /// Reads the status until it shows something, and gives the last one.
+    async fn read_until(&mut self, class: Class, shows: impl Fn(&Status) -> bool + Send) -> Result<Status> {
+        let mut status = self.read_status(class).await?;
+        for _ in 1..CONFIRMATIONS {
+            if shows(&status) {
+                break;
+            }
+            status = self.read_status(class).await?;
+        }
+        Ok(status)
     }
 
     /// Clears an edge that may still be set because the write that cleared it was lost. A drive that has started up anew
@@ -167,7 +186,7 @@ impl<P: Port> Atv21<P> {
         self.check_preset(command).await?;
         let mut calls = self.registers.at(Class::Command).replacing(register.address());
         calls.write(register, word).await?;
-        self.confirm_reference(setpoint, reference).await
+        self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
     }
 
     pub(crate) async fn reset_trip(&mut self) -> Result<Status> {
@@ -193,7 +212,8 @@ impl<P: Port> Atv21<P> {
             let Ok(status) = self.read_status(Class::Command).await else { continue };
             if !status.is_fault() && status.state != State::QuickStop {
                 if cleared.is_err() {
-                    self.clear_edge(Class::Command, CommandWord::FAULT_RESET).await?;
+                    let edge = CommandWord::FAULT_RESET;
+                    self.clear_edge(Class::Command, edge).await.map_err(Error::after_write)?;
                 }
                 return Ok(status);
             }
@@ -201,7 +221,7 @@ impl<P: Port> Atv21<P> {
         }
         match last {
             Some(status) => {
-                sent.and(cleared)?;
+                sent.and(cleared).map_err(Error::after_write)?;
                 Err(self.not_confirmed(Command::ResetFaults, status))
             }
             None => Err(Error::Port {
@@ -228,15 +248,20 @@ impl<P: Port> Atv21<P> {
             return Err(self.refused(Command::Release, reason));
         }
         self.registers.at(Class::Command).write(map::COMMAND_WORD, 0).await?;
-        let mut last = status;
+        self.see_release().await.map_err(Error::after_write)
+    }
+
+    async fn see_release(&mut self) -> Result<Status> {
+        let mut status = Status::default();
         for _ in 0..CONFIRMATIONS {
-            last = self.read_status(Class::Command).await?;
-            if self.source(Class::Command).await? != CommandSource::Serial {
-                last.control = status_control(&last, self.source(Class::Command).await?);
-                return Ok(last);
+            status = self.read_status(Class::Command).await?;
+            let source = self.source(Class::Command).await?;
+            if source != CommandSource::Serial {
+                status.control = status_control(&status, source);
+                return Ok(status);
             }
         }
-        Err(self.not_confirmed(Command::Release, last))
+        Err(self.not_confirmed(Command::Release, status))
     }
 
     /// The command word with what this drive's owner has chosen.
@@ -293,11 +318,8 @@ impl<P: Port> Atv21<P> {
         Err(self.refused(command, reason))
     }
 
-    /// Whether the bus commands the drive and this word is what it holds.
-    async fn is_in_force(&mut self, word: CommandWord, class: Class) -> Result<bool> {
-        if self.source(class).await? != CommandSource::Serial {
-            return Ok(false);
-        }
+    /// Whether this is the command word that the drive holds.
+    async fn holds(&mut self, word: CommandWord, class: Class) -> Result<bool> {
         Ok(self.registers.at(class).read(map::COMMAND_WORD).await? == word.bits())
     }
 

@@ -109,8 +109,9 @@ impl<P: Port> Atv21<P> {
         let clear = (present - CommandWord2::ENERGY_RESET).bits();
         let sent = self.registers.at(Class::Background).edge().write(map::COMMAND_WORD_2, edge).await;
         let shown = self.shows(StatusWord2::ENERGY_RESET, true).await;
-        self.registers.at(Class::Background).write(map::COMMAND_WORD_2, clear).await?;
-        if shown? {
+        let cleared = self.registers.at(Class::Background).write(map::COMMAND_WORD_2, clear).await;
+        cleared.map_err(Error::after_write)?;
+        if shown.map_err(Error::after_write)? {
             return Ok(());
         }
         sent?;
@@ -134,7 +135,7 @@ impl<P: Port> Atv21<P> {
         let second = level == StallLevel::Oc2;
         word.set(CommandWord2::STALL_LEVEL_2, second);
         self.registers.at(Class::Background).write(map::COMMAND_WORD_2, word.bits()).await?;
-        if self.shows(StatusWord2::STALL_LEVEL_2, second).await? {
+        if self.shows(StatusWord2::STALL_LEVEL_2, second).await.map_err(Error::after_write)? {
             return Ok(());
         }
         let status = self.read_status(Class::Background).await?;
@@ -202,7 +203,7 @@ impl<P: Port> Atv21<P> {
             Err(error) if error.kind() != drive_core::ErrorKind::OutcomeUnknown => return Err(error),
             _ => {}
         }
-        if calls.read_row(row).await? == word {
+        if calls.read_row(row).await.map_err(Error::after_write)? == word {
             return Ok(Written { changed: true, storage: row.storage });
         }
         sent?;

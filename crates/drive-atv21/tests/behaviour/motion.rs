@@ -269,7 +269,7 @@ async fn a_motor_that_still_turns_does_not_confirm_a_start_that_was_lost() {
     words.writes.push_back(Some((PortError::OutcomeUnknown("test"), false)));
     let mut drive = Atv21::new(words, bench::address(1)).with_write_block();
     let error = drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
 }
 
 #[tokio::test(start_paused = true)]

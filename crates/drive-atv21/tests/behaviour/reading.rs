@@ -34,14 +34,14 @@ async fn a_status_takes_one_exchange_when_the_block_is_set_up_and_four_when_not(
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_start_takes_five_exchanges_with_the_block_and_a_stop_two() {
+async fn a_start_takes_six_exchanges_with_the_block_and_a_stop_three() {
     let (rig, mut drive) = Rig::with_blocks_shown().await;
     rig.at_rest(&mut drive).await;
     let before = rig.count();
     drive.start(Direction::Forward).await.unwrap();
-    assert_eq!(rig.count() - before, 5);
+    assert_eq!(rig.count() - before, 6);
     drive.stop(StopMode::Ramp).await.unwrap();
-    assert_eq!(rig.count() - before, 7);
+    assert_eq!(rig.count() - before, 9);
 }
 
 #[tokio::test(start_paused = true)]

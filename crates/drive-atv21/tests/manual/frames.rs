@@ -282,6 +282,7 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
     ] {
         let source = format!("01 03 02 {mode}");
         let write = format!("01 06 FA00 {word}");
+        let held = format!("01 03 02 {word}");
         let running =
             format!("01 03 02 {:04X}", if direction == Direction::Forward { 0x6400 } else { 0x6600 });
         let (line, other_end) = scripted(&[
@@ -295,6 +296,7 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
             ("01 03 FD00 0001", "01 03 02 0000"),
             ("01 03 FE03 0001", "01 03 02 0000"),
             ("01 03 FE45 0001", "01 03 02 0002"),
+            ("01 03 FA00 0001", &held),
         ]);
         let mut drive = Atv21::new(line.slave(1), bench::address(1)).with_authority(authority);
         assert_eq!(drive.start(direction).await.unwrap().direction, Some(direction));
