@@ -35,7 +35,12 @@ impl<P: Port> Drive3g3ev<P> {
             return Err(self.refused(order, Refusal::State(State::NotReady)));
         }
         self.write_command(Class::Command, Command::run(direction)).await?;
-        let mut shown = status;
+        self.see_start(direction).await.map_err(Error::after_write)
+    }
+
+    /// Reads until the drive runs under the bus and holds the run command.
+    async fn see_start(&mut self, direction: Direction) -> Result<Status> {
+        let mut shown = Status::default();
         for _ in 0..READS {
             shown = self.read_status(Class::Command).await?;
             if shown.is_fault() {
@@ -50,7 +55,7 @@ impl<P: Port> Drive3g3ev<P> {
                 break;
             }
         }
-        Err(self.not_confirmed(order, shown))
+        Err(self.not_confirmed(Order::Start(direction), shown))
     }
 
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
@@ -61,12 +66,17 @@ impl<P: Port> Drive3g3ev<P> {
             });
         }
         self.write_command(Class::Stop, Command::empty()).await?;
+        self.see_stop(mode).await.map_err(Error::after_write)
+    }
+
+    /// Reads until 0001h holds no run command after all that the drive shows: the confirmation of function 10h tells no
+    /// value, so it may be that of a start that was late, and the start itself may come later still. Then the stop is
+    /// written again.
+    async fn see_stop(&mut self, mode: StopMode) -> Result<Status> {
         let mut repeats = 0;
         let mut shown = Status::default();
         for _ in 0..READS {
             shown = self.read_status(Class::Stop).await?;
-            // The confirmation of function 10h tells no value: it may be that of a start that was late, and the start
-            // itself may come later still. So what 0001h holds after all that the drive shows counts.
             if shown.raw(COMMAND.address()).is_none() {
                 shown.raw.push(self.read_command(Class::Stop).await?);
             }

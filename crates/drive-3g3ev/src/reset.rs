@@ -31,9 +31,15 @@ impl<P: Port> Drive3g3ev<P> {
                 return Err(Error::Port { problem, exchange, slave });
             }
             Err(error @ Error::Exception { .. }) => return Err(error),
-            _ => self.write_command(Class::Command, Command::empty()).await?,
+            _ => {}
         }
-        let mut shown = status;
+        self.see_reset(pulse).await.map_err(Error::after_write)
+    }
+
+    /// Clears the bit, and reads until no fault shows.
+    async fn see_reset(&mut self, pulse: Result<()>) -> Result<Status> {
+        self.write_command(Class::Command, Command::empty()).await?;
+        let mut shown = Status::default();
         for _ in 0..READS {
             shown = self.read_status(Class::Command).await?;
             if !shown.is_fault() {

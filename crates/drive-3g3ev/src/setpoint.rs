@@ -64,7 +64,7 @@ impl<P: Port> Drive3g3ev<P> {
     async fn write_reference(&mut self, word: u16, order: Order) -> Result<()> {
         let mut calls = self.registers.at(Class::Command).replacing(REFERENCE.address());
         calls.write(REFERENCE, word).await?;
-        let value = self.registers.at(Class::Command).read(REFERENCE).await?;
+        let value = self.registers.at(Class::Command).read(REFERENCE).await.map_err(Error::after_write)?;
         if value == word {
             return Ok(());
         }
