@@ -2,6 +2,7 @@
 
 pub mod cable;
 pub mod drives;
+pub mod interrupted;
 pub mod peers;
 pub mod plant;
 pub mod rig;

@@ -1,0 +1,182 @@
+//! Starts and stops in every family in whose midst the line fails, the drive is busy, the caller gives up, somebody else
+//! stops the motor, or a start comes that was late: between any two of their exchanges.
+
+use std::time::Duration;
+
+use drive_core::{Direction, Drive, ErrorKind, Frequency, SlaveAddress, StopMode};
+use drive_families::Family;
+use drive_testing::bench;
+use support::{
+    drives,
+    interrupted::{Event, Interrupted},
+    rig::{ADDRESS, Rig},
+};
+use tokio_modbus::Request;
+
+/// More exchanges than a start or a stop has.
+const MANY: usize = 100;
+
+/// Longer than any ramp here.
+const A_RAMP: Duration = Duration::from_secs(20);
+
+/// The register of the control word, a run command, and the bits that tell it from the other words.
+const fn run_command(family: Family) -> (u16, u16, u16) {
+    match family {
+        Family::Atv21 => (0xFA00, 0xC400, 0x0400),
+        Family::Atv28 | Family::Atv58 => (400, 0x000F, 0x700F),
+        Family::Atv312 => (8501, 0x000F, 0x700F),
+        Family::Omron3g3ev => (0x0001, 0x0001, 0x0001),
+    }
+}
+
+/// What a start or a stop meets in front of one of its exchanges.
+const FAILURES: [fn() -> Event; 2] = [|| Event::Expiry, || Event::Busy];
+
+/// A rig whose motor stands ready to run at 25 Hz, and another driver of its drive on a port where something may happen.
+async fn ready(family: Family) -> (Rig, Box<dyn Drive>, Interrupted) {
+    let mut rig = Rig::new(family);
+    rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes 25 Hz");
+    let port = Interrupted::new(rig.line.slave(ADDRESS));
+    let drive = another(family, port.clone());
+    (rig, drive, port)
+}
+
+fn another(family: Family, port: Interrupted) -> Box<dyn Drive> {
+    drives::drive(family, port, SlaveAddress::try_from(ADDRESS).expect("it is one"))
+}
+
+/// Whether a run command was ever written.
+fn is_run_given(family: Family, rig: &Rig) -> bool {
+    let (register, word, mask) = run_command(family);
+    bench::written(&rig.machine, register).iter().any(|written| written & mask == word & mask)
+}
+
+/// Whether the motor runs when any ramp is over.
+async fn runs(rig: &mut Rig) -> bool {
+    rig.poll_for(A_RAMP).await;
+    rig.machine.observe().running
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_that_fails_behind_its_run_command_is_unknown_and_one_that_fails_before_starts_nothing() {
+    for family in Family::ALL {
+        for failure in FAILURES {
+            let mut unknown = 0;
+            for exchanges in 0..MANY {
+                let (mut rig, mut drive, port) = ready(family).await;
+                port.after(exchanges, failure());
+                let outcome = drive.start(Direction::Forward).await;
+                if port.calm().is_none() {
+                    outcome.expect("nothing has happened");
+                    break;
+                }
+                let Err(error) = outcome else { continue };
+                if is_run_given(family, &rig) {
+                    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{family}, {exchanges}: {error}");
+                    unknown += 1;
+                } else {
+                    assert!(!runs(&mut rig).await, "{family}, {exchanges}: {error}");
+                }
+            }
+            assert!(unknown > 0, "{family}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_fails_behind_its_word_is_unknown_and_has_stopped_the_motor() {
+    for family in Family::ALL {
+        let (register, ..) = run_command(family);
+        for failure in FAILURES {
+            let mut unknown = 0;
+            for exchanges in 0..MANY {
+                let (mut rig, mut drive, port) = ready(family).await;
+                drive.start(Direction::Forward).await.expect("it starts");
+                let before = bench::written(&rig.machine, register).len();
+                port.after(exchanges, failure());
+                let outcome = drive.stop(StopMode::Ramp).await;
+                if port.calm().is_none() {
+                    outcome.expect("nothing has happened");
+                    break;
+                }
+                let Err(error) = outcome else { continue };
+                if bench::written(&rig.machine, register).len() > before {
+                    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{family}, {exchanges}: {error}");
+                    assert!(!runs(&mut rig).await, "{family}, {exchanges}");
+                    unknown += 1;
+                }
+            }
+            assert!(unknown > 0, "{family}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_whose_caller_gives_up_moves_nothing_before_its_run_command_and_is_stopped_after_it() {
+    for family in Family::ALL {
+        for exchanges in 0..MANY {
+            let (mut rig, mut drive, port) = ready(family).await;
+            port.after(exchanges, Event::Silence);
+            let start = drive.start(Direction::Forward);
+            let ended = tokio::time::timeout(Duration::from_secs(1), start).await;
+            if port.calm().is_none() {
+                ended.expect("nothing holds it up").expect("nothing has happened");
+                break;
+            }
+            let given = is_run_given(family, &rig);
+            assert_eq!(runs(&mut rig).await, given, "{family}, {exchanges}");
+            drive.stop(StopMode::Ramp).await.expect("it stops");
+            assert!(!runs(&mut rig).await, "{family}, {exchanges}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_neither_undoes_nor_hides_a_stop_that_somebody_else_gives_on_its_way() {
+    for family in Family::ALL {
+        // The ramp stop of the Altivar 58 is a word of the ladder itself, and so nothing tells the two apart.
+        let told_apart = |mode| (family, mode) != (Family::Atv58, StopMode::Ramp);
+        let modes = [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel];
+        let has = |mode: &StopMode| family.capabilities().stop_modes.contains(mode);
+        for mode in modes.into_iter().filter(has).filter(|&mode| told_apart(mode)) {
+            for exchanges in 0..MANY {
+                let (mut rig, mut drive, port) = ready(family).await;
+                let somebody = another(family, Interrupted::new(rig.line.slave(ADDRESS)));
+                port.after(exchanges, Event::Stop(somebody, mode));
+                let outcome = drive.start(Direction::Forward).await;
+                let Some(happened) = port.calm() else {
+                    outcome.expect("nothing has happened");
+                    break;
+                };
+                // It was stopped and then the start began, or the start had no reading left that could tell it.
+                if happened.writes == 0 || happened.before_a_write {
+                    continue;
+                }
+                let words = bench::written(&rig.machine, run_command(family).0);
+                assert!(outcome.is_err(), "{family}, {mode}, {exchanges}: {words:04X?}");
+                assert!(!runs(&mut rig).await, "{family}, {mode}, {exchanges}: {words:04X?}");
+            }
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_not_confirmed_while_a_start_that_came_late_runs_the_motor() {
+    for family in Family::ALL {
+        let (register, run, _) = run_command(family);
+        for exchanges in 1..MANY {
+            let (mut rig, mut drive, port) = ready(family).await;
+            drive.start(Direction::Forward).await.expect("it starts");
+            let late = match family {
+                Family::Omron3g3ev => Request::WriteMultipleRegisters(register, vec![run].into()),
+                _ => Request::WriteSingleRegister(register, run),
+            };
+            port.after(exchanges, Event::Late(late));
+            drive.stop(StopMode::Ramp).await.expect("it stops");
+            if port.calm().is_none() {
+                break;
+            }
+            assert!(!runs(&mut rig).await, "{family}, {exchanges}");
+        }
+    }
+}
