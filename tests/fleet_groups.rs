@@ -42,7 +42,9 @@ async fn a_group_starts_together_and_reaches_its_reference() {
     let plant = four().await;
     plant.fleet.all().start(start(Duration::ZERO)).await.expect("all start");
     for drive in plant.fleet.drives() {
-        assert_eq!(plant.machine_of(drive.name()).observe().output_frequency, 3_000, "{}", drive.name());
+        // Where no bit tells it, it counts as reached a little before.
+        let output = plant.machine_of(drive.name()).observe().output_frequency;
+        assert!(output.abs_diff(3_000) <= 10, "{}: {output}", drive.name());
     }
 }
 
