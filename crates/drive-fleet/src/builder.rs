@@ -209,6 +209,9 @@ pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> 
     if settings.name.trim().is_empty() {
         return problem("name", "a drive needs a name".to_owned());
     }
+    if settings.name.chars().any(char::is_control) {
+        return problem("name", "a name has no control characters".to_owned());
+    }
     let periods = settings.periods;
     for (name, period) in [("running", periods.running), ("rest", periods.rest)] {
         if period.is_zero() {

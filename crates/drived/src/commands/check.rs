@@ -84,6 +84,7 @@ fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
     }
     let commanders = match &settings.commanders {
         Commanders::Anyone => "by anyone".to_owned(),
+        Commanders::Only(names) if names.is_empty() => "by nobody; a stop by anyone".to_owned(),
         Commanders::Only(names) => format!("by {}; a stop by anyone", names.join(", ")),
     };
     line("commands", Some(commanders));

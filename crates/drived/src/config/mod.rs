@@ -9,12 +9,12 @@ mod values;
 
 use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
-use drive_bus::LineConfig;
+use drive_bus::{Endpoint, LineConfig};
 use drive_core::{Capabilities, StopMode};
 use drive_families::{OptionEntry, Options};
 use drive_fleet::{
-    Alarms, Band, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss,
-    Periods, WatchdogContract, check_settings, plan,
+    Alarms, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss, Periods,
+    WatchdogContract, check_settings, plan,
 };
 
 pub(crate) use self::place::ConfigError;
@@ -31,6 +31,9 @@ const SNAPSHOTS: Duration = Duration::from_secs(5);
 const SHUTDOWN: Duration = Duration::from_secs(60);
 /// How long an answer may take unless the file says otherwise: the slowest family needs 50 ms.
 const RESPONSE_TIMEOUT: Duration = Duration::from_millis(200);
+
+const SHORTEST_TIMEOUT: Duration = Duration::from_millis(10);
+const LONGEST_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The part of a line that polls of unnamed periods may take, in millionths; the rest is for commands.
 const ROOM_PPM: u64 = 800_000;
@@ -108,6 +111,7 @@ impl Config {
         for (name, entry) in &raw.lines {
             lines.push(line_part(source, name.get_ref(), name.span(), entry, &groups)?);
         }
+        check_ports(source, &raw, &lines)?;
         Ok(Self {
             snapshots: raw.snapshots.map_or(SNAPSHOTS, |time| time.0.0),
             shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
@@ -200,14 +204,25 @@ fn line_part(
     let names: Vec<DriveName> = group.iter().map(|member| member.drive).collect();
     let port = entry.port.get_ref();
     let config = port.0.config(&names).map_err(|error| source.error(entry.port.span(), error))?;
+    if name.trim().is_empty() || name.chars().any(char::is_control) {
+        return Err(source.error(span, "expected a name without control characters for the line"));
+    }
     let config = LineConfig {
-        response_timeout: entry.response_timeout.map_or(RESPONSE_TIMEOUT, |time| time.0.0),
+        response_timeout: response_timeout(source, entry)?,
         slave_change_gap: entry.slave_change_gap.map_or(config.slave_change_gap, |time| time.0.0),
         low_latency: entry.low_latency.unwrap_or(config.low_latency),
         ..config
     };
     let budget = LineBudget::of(&config);
-    let budget = LineBudget { response: entry.response.map_or(budget.response, |time| time.0.0), ..budget };
+    let response = entry.response.as_ref().map_or(budget.response, |time| time.get_ref().0.0);
+    if let Some(time) = entry.response.as_ref().filter(|_| response > config.response_timeout) {
+        let problem = format_args!(
+            "{response:?} as the usual time of an answer, and {:?} as the longest: expected less",
+            config.response_timeout
+        );
+        return Err(source.error(time.span(), problem));
+    }
+    let budget = LineBudget { response, ..budget };
     let stretch = fitting_stretch(budget, group);
     let part = |member: &Member| DrivePart {
         name: member.drive,
@@ -218,6 +233,42 @@ fn line_part(
     let line = LinePart { name: name.to_owned(), config, budget, drives, problem: None };
     let problem = plan(budget, &line.demands()).err().map(|problem| source.error(span, problem));
     Ok(LinePart { problem, ..line })
+}
+
+/// How long an answer may take: nothing is an answer in no time, and a stop waits for the longest one.
+fn response_timeout(source: Source<'_>, entry: &LineEntry) -> Result<Duration, ConfigError> {
+    let Some(said) = &entry.response_timeout else { return Ok(RESPONSE_TIMEOUT) };
+    let time = said.get_ref().0.0;
+    if (SHORTEST_TIMEOUT..=LONGEST_TIMEOUT).contains(&time) {
+        return Ok(time);
+    }
+    let problem = format_args!(
+        "{time:?}: expected {SHORTEST_TIMEOUT:?} to {LONGEST_TIMEOUT:?}, for a stop waits for an answer that does not come"
+    );
+    Err(source.error(said.span(), problem))
+}
+
+/// Two lines over one port would talk into each other. Where a port has several names, links to it are followed. A
+/// gateway for Modbus TCP keeps its connections apart.
+fn check_ports(source: Source<'_>, raw: &File, lines: &[LinePart]) -> Result<(), ConfigError> {
+    let mut ports: BTreeMap<String, &str> = BTreeMap::new();
+    for line in lines {
+        let port = match &line.config.endpoint {
+            Endpoint::Serial(path) => {
+                path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string()
+            }
+            Endpoint::RtuOverTcp(address) => format!("rtu+tcp://{address}"),
+            _ => continue,
+        };
+        if let Some(other) = ports.insert(port, &line.name) {
+            let entry = raw.lines.iter().find(|(name, _)| *name.get_ref() == line.name);
+            let span = entry.map(|(_, entry)| entry.port.span()).unwrap_or_default();
+            let problem =
+                format_args!("it is the port of line {other:?} too: expected all its drives on one line");
+            return Err(source.error(span, problem));
+        }
+    }
+    Ok(())
 }
 
 /// By how much the periods that the file does not name are longer than usual: as little as leaves a fifth of the line for
@@ -307,7 +358,7 @@ fn settings(
     check_settings(&settings, capabilities).map_err(|problem| {
         let place = place_of(problem.setting, entry).or_else(|| place_of(problem.setting, defaults));
         let place = place.or_else(|| entry.drive.as_ref().map(toml::Spanned::span)).unwrap_or_default();
-        source.error(place, format_args!("{}: {problem}", settings.name))
+        source.error(place, format_args!("{}: {problem}", settings.name.escape_debug()))
     })?;
     Ok(settings)
 }
@@ -375,7 +426,7 @@ fn limits(entry: &DriveEntry, defaults: &DriveEntry) -> FrequencyLimits {
     FrequencyLimits {
         low: frequency.low.map(|value| value.0),
         high: frequency.high.map(|value| value.0),
-        forbidden: frequency.forbidden.iter().map(|[low, high]| Band { low: low.0, high: high.0 }).collect(),
+        forbidden: frequency.forbidden.iter().map(|band| band.0).collect(),
         change_per_second: frequency.change_per_second.map(|value| value.0),
     }
 }

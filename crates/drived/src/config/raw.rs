@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::values::{
-    CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue, Parsed,
+    BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue, Parsed,
     PercentValue, ReactionValue,
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
@@ -33,8 +33,8 @@ pub(super) struct File {
 pub(super) struct LineEntry {
     /// As `--line` has it.
     pub(super) port: Spanned<Parsed<LineSpec>>,
-    pub(super) response_timeout: Option<Parsed<Time>>,
-    pub(super) response: Option<Parsed<Time>>,
+    pub(super) response_timeout: Option<Spanned<Parsed<Time>>>,
+    pub(super) response: Option<Spanned<Parsed<Time>>>,
     pub(super) slave_change_gap: Option<Parsed<Time>>,
     pub(super) low_latency: Option<bool>,
 }
@@ -84,7 +84,7 @@ pub(super) struct FrequencyEntry {
     pub(super) low: Option<FrequencyValue>,
     pub(super) high: Option<FrequencyValue>,
     #[serde(default)]
-    pub(super) forbidden: Vec<[FrequencyValue; 2]>,
+    pub(super) forbidden: Vec<BandValue>,
     pub(super) change_per_second: Option<FrequencyValue>,
 }
 

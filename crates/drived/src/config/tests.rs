@@ -113,7 +113,11 @@ fn periods_that_the_file_names_are_kept_or_refused() {
 #[test]
 fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
     for (instead_of, with, told) in [
-        ("snapshots = \"1s\"", "snapshots = 1", "drives.toml:2: snapshots: "),
+        (
+            "snapshots = \"1s\"",
+            "snapshots = 1",
+            "drives.toml:2: snapshots: expected a text in quotes, such as",
+        ),
         (
             "running = \"1s\"",
             "running = \"fast\"",
@@ -124,7 +128,7 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
         (
             "reaction = \"ramp\" }",
             "reaction = \"beep\" }",
-            "drives.toml:9: reaction: \"beep\": expected one of ramp fast",
+            "drives.toml:9: reaction: \"beep\": expected one of ramp, fast, ",
         ),
         (
             "19200,8N1",
@@ -153,11 +157,39 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
             "drives.toml:22: frequency: fan 1: the lowest frequency 60.00 Hz is above",
         ),
         ("47.5", "47.555", "drives.toml:22: high: expected a number from 0 on with at most 2 decimals"),
+        ("[[20, 22.5]]", "[[20, 22.5, 30]]", "drives.toml:22: forbidden: a band of 3 frequencies: expected"),
+        (
+            "[[20, 22.5]]",
+            "[[20]]",
+            "drives.toml:22: forbidden: a band of 1 frequencies: expected [LOW, HIGH]",
+        ),
+        (
+            "response_timeout = \"100ms\"",
+            "response_timeout = \"0\"",
+            "drives.toml:16: response_timeout: 0ns: expected 10ms to 10s",
+        ),
+        (
+            "response_timeout = \"100ms\"",
+            "response_timeout = \"10min\"",
+            "drives.toml:16: response_timeout: 600s: expected 10ms to 10s",
+        ),
+        (
+            "response_timeout = \"100ms\"",
+            "response_timeout = \"100ms\"\nresponse = \"150ms\"",
+            "drives.toml:17: response: 150ms as the usual time of an answer, and 100ms as the longest",
+        ),
+        (
+            "tcp://gateway:502",
+            "/dev/ttyUSB0,19200,8N1",
+            "drives.toml:15: port: it is the port of line \"north\" too",
+        ),
+        ("\"fan {}\"", "\"fan\\u001b {}\"", "drives.toml:21: name: fan\\u{1b} 1: a name has no control"),
+        ("[lines.south]", "[lines.\"\"]", "drives.toml:32: line: there is no line \"south\""),
         ("atv28@20", "atv28@7", "drives.toml:27: drive: address 7 of this line is taken"),
         (
             "on_exit = \"leave\"",
             "on_exit = \"explode\"",
-            "drives.toml:29: on_exit: \"explode\": expected one of stop release leave",
+            "drives.toml:29: on_exit: \"explode\": expected one of stop, release, leave",
         ),
         ("max_age = \"5s\"", "max_age = \"1s\"", "drives.toml:8: max_age: fan 1: with a status every 1s"),
         (
@@ -182,6 +214,21 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
         assert!(error.starts_with(told), "{error}\nexpected {told}");
         assert!(!error.contains('\n'), "{error}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_port_under_two_names_is_one_port() {
+    let link = std::env::temp_dir().join(format!("drived-port-{}", std::process::id()));
+    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    let text = format!(
+        "[lines.a]\nport = \"/dev/null\"\n[lines.b]\nport = {:?}\n\
+         [[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n[[drives]]\nline = \"b\"\ndrive = \"atv312@2\"\n",
+        link
+    );
+    let error = read(&text);
+    std::fs::remove_file(&link).unwrap();
+    assert!(error.unwrap_err().starts_with("drives.toml:4: port: it is the port of line \"a\" too"));
 }
 
 #[test]

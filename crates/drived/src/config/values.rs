@@ -3,6 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use drive_core::{Current, Frequency, Percent, Reaction, StopMode};
+use drive_fleet::Band;
 use serde::{Deserialize, Deserializer, de};
 
 /// A value that is written as a text and read by its own rules, whose error says what was expected.
@@ -14,15 +15,20 @@ where
     T: FromStr<Err: fmt::Display>,
 {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
+        #[derive(Deserialize)]
+        #[serde(untagged, expecting = "expected a text in quotes, such as \"500ms\" or \"ramp\"")]
+        enum Text {
+            Text(String),
+        }
+        let Text::Text(text) = Text::deserialize(deserializer)?;
         text.parse().map(Self).map_err(|error| de::Error::custom(format_args!("{text:?}: {error}")))
     }
 }
 
 /// A text that is none of a few words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected one of {0}")]
-pub(super) struct NotAmong(&'static str);
+#[error("expected one of {}", .0.join(", "))]
+pub(super) struct NotAmong(&'static [&'static str]);
 
 /// Declares a value that is one of a few words.
 macro_rules! words {
@@ -37,7 +43,7 @@ macro_rules! words {
             fn from_str(text: &str) -> Result<Self, NotAmong> {
                 match text {
                     $($word => Ok(Self($value)),)+
-                    _ => Err(NotAmong(concat!($($word, " "),+))),
+                    _ => Err(NotAmong(&[$($word),+])),
                 }
             }
         }
@@ -164,5 +170,22 @@ impl<'de> Deserialize<'de> for PercentValue {
         let value = decimal(deserializer, 2)?;
         let value = i32::try_from(value).map_err(|_| de::Error::custom("expected a smaller percentage"))?;
         Ok(Self(Percent::from_hundredths(value)))
+    }
+}
+
+/// A band of frequencies, `[LOW, HIGH]` in hertz.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct BandValue(pub(super) Band);
+
+impl<'de> Deserialize<'de> for BandValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // An array of two would take the first two of more.
+        match Vec::<FrequencyValue>::deserialize(deserializer)?.as_slice() {
+            [low, high] => Ok(Self(Band { low: low.0, high: high.0 })),
+            other => Err(de::Error::custom(format_args!(
+                "a band of {} frequencies: expected [LOW, HIGH]",
+                other.len()
+            ))),
+        }
     }
 }
