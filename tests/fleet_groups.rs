@@ -44,7 +44,7 @@ async fn a_group_starts_together_and_reaches_its_reference() {
     for drive in plant.fleet.drives() {
         // Where no bit tells it, it counts as reached a little before.
         let output = plant.machine_of(drive.name()).observe().output_frequency;
-        assert!(output.abs_diff(3_000) <= 10, "{}: {output}", drive.name());
+        assert!(output.abs_diff(3_000) <= 50, "{}: {output}", drive.name());
     }
 }
 

@@ -81,7 +81,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     broadcast_stops: &[StopMode::Ramp, StopMode::Freewheel, StopMode::DcInjection],
     fault_history: 4,
     turnaround: Duration::ZERO,
-    status_exchanges: 1,
+    // One where the read block is used, which is never from the first status on.
+    status_exchanges: 4,
     measurement_exchanges: reading::SLOW_SET.len() as u8,
 };
 
