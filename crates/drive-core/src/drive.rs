@@ -36,6 +36,8 @@ pub struct BroadcastWrite {
 /// - Nothing is called done because it was sent. A command that returns `Ok` was seen in the drive's own words; one
 ///   that returns [`Error::NotConfirmed`] was sent and not seen; [`ErrorKind::OutcomeUnknown`](crate::ErrorKind) means
 ///   that nobody knows.
+/// - **A start that ends in one of these two may still start the motor**: its run command is not taken back, and acts when
+///   what kept it from acting goes away. Unless the motor is to run, follow it by [`stop`](Self::stop).
 /// - Nothing restarts by itself. No method retries a start, and none clears a fault but `reset_faults`.
 /// - A setpoint is refused when the drive's limits forbid it or its register cannot hold it exactly; it is never
 ///   clamped or rounded.
@@ -52,7 +54,7 @@ pub struct BroadcastWrite {
 ///
 /// # Cancellation
 /// Dropping the future of any method leaves the line whole and the drive as the last exchange left it. A dropped
-/// command may have been carried out, in part; read the status.
+/// command may have been carried out, in part; read the status, and stop a drive whose start was dropped.
 ///
 /// # Errors
 /// Every method that talks to the drive returns [`Error::Port`] when no valid answer came and [`Error::Exception`]
@@ -75,7 +77,7 @@ pub trait Drive: Send {
     /// drive is the same and was not switched off. Call it after a reconnect.
     fn forget(&mut self);
 
-    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges when the drive is set up for the fewest.
+    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs.
     async fn status(&mut self) -> Result<Status>;
 
     /// Reads the slow set.
@@ -89,8 +91,9 @@ pub trait Drive: Send {
     /// way, not reached.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the drive has tripped, is not ready or is commanded by somebody else;
-    /// [`Error::NotConfirmed`] when the run command does not show.
+    /// [`Error::Refused`] when the drive has tripped, is not ready or is commanded by somebody else: no run command was
+    /// written. [`Error::NotConfirmed`] when it does not show. It may stand in the drive then, and start the motor later:
+    /// [`stop`](Self::stop) takes it back.
     async fn start(&mut self, direction: Direction) -> Result<Status>;
 
     /// Stops the motor. Returns the status in which the drive shows that no run command is in force any more; the

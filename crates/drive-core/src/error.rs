@@ -309,7 +309,8 @@ pub enum Error {
         /// Why not.
         reason: Refusal,
     },
-    /// The command was sent and the drive's own words do not show it.
+    /// The command was sent and the drive's own words do not show it. What was written stands in the drive and may take
+    /// effect later: a start that is not confirmed is taken back by a stop, and by nothing else.
     #[error("slave {slave}: {command} not confirmed: the drive says {status}")]
     NotConfirmed {
         /// The slave.
@@ -327,7 +328,7 @@ pub enum Error {
 pub enum ErrorKind {
     /// No valid answer: the drive may be mute, the line disturbed.
     NoAnswer,
-    /// It is not known whether the drive carried it out.
+    /// It is not known whether the drive carried it out, or will.
     OutcomeUnknown,
     /// Nothing was sent: expired, superseded, off-line, queue full, line down.
     NotSent,
@@ -337,7 +338,7 @@ pub enum ErrorKind {
     Answer,
     /// Refused here, by what is known of the drive.
     Refused,
-    /// Sent and not seen in the drive's words.
+    /// Sent and not seen in the drive's words; it may take effect later.
     NotConfirmed,
     /// The family cannot do it.
     Unsupported,
