@@ -9,6 +9,7 @@ use crate::{
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
+    signals::Ending,
 };
 
 /// `--line` and `--drive` of the subcommands that act on one drive.
@@ -57,6 +58,19 @@ pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Res
     drive.map_err(|error| Failure::Input(format!("{name}: {error}")))
 }
 
+/// Waits for what became of something that a drive was told. Whoever asks the program to end meanwhile has to know that
+/// it may have been sent.
+pub(crate) async fn told<T>(name: DriveName, command: impl Future<Output = T>) -> Result<T, Failure> {
+    let mut ending = Ending::listen()?;
+    tokio::select! {
+        biased;
+        outcome = command => Ok(outcome),
+        () = ending.asked() => Err(Failure::Drive(format!(
+            "{name}: asked to end before it was confirmed: nobody knows whether it was carried out, read it back"
+        ))),
+    }
+}
+
 /// A drive and its open line.
 pub(crate) struct OneDrive {
     pub(crate) name: DriveName,
@@ -80,6 +94,13 @@ impl OneDrive {
             ErrorKind::Unsupported => format!("{name}: {error}{}", drive_options::hint(name.family)),
             _ => format!("{name}: {error}"),
         })
+    }
+
+    /// A drive on a line of a test.
+    #[cfg(test)]
+    pub(crate) fn over(name: DriveName, line: Line, config: LineConfig) -> Self {
+        let drive = open_drive(&line, name, &Options::default()).unwrap();
+        Self { name, drive, config, line }
     }
 
     /// Closes the port.

@@ -70,6 +70,18 @@ fn a_drive_that_does_not_answer_is_named_and_the_exit_code_is_1() {
 }
 
 #[test]
+fn a_stop_that_is_given_up_says_that_it_is_not_confirmed() {
+    let sim = Sim::serve("given-up", &["atv312@1"]);
+    let mut stop = Running::start(&["stop", "--line", sim.link(), "--drive", "atv312@2"]);
+    stop.wait_for("has not confirmed the stop (1 of 5)");
+    stop.ask_to_end();
+    stop.wait_for_log(
+        "STOP NOT CONFIRMED, the motor may turn: use the emergency stop. atv312@2: asked to end",
+    );
+    assert_eq!(stop.end().0, Some(1));
+}
+
+#[test]
 fn a_port_that_another_program_uses_is_refused() {
     let sim = Sim::serve("in-use", &["atv312@1"]);
     let mut poll = Running::start(&["poll", "--line", sim.link(), "--drive", "atv312@1"]);

@@ -9,7 +9,7 @@ use drive_families::Family;
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
-    one_drive::{OneDrive, OneDriveArgs},
+    one_drive::{OneDrive, OneDriveArgs, told},
     output::{self, Table},
 };
 
@@ -117,7 +117,8 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
     }
     let word = wanted(row, value)?;
     let mut one = args.open().await?;
-    let written = one.drive.write_parameter(row, word).await.map_err(|error| one.failure(&error))?;
+    let written = told(name, one.drive.write_parameter(row, word)).await?;
+    let written = written.map_err(|error| one.failure(&error))?;
     let what = if written.changed { "is now" } else { "was already" };
     let kept = match written.storage {
         Storage::Volatile => "kept in RAM, lost at power-off",
@@ -160,7 +161,7 @@ fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
 async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
     let by = saving(one.name, "")?;
     one.drive.assume_changed();
-    let saves = one.drive.persist().await.map_err(|error| one.failure(&error))?;
+    let saves = told(one.name, one.drive.persist()).await?.map_err(|error| one.failure(&error))?;
     output::say(format_args!(
         "{} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}",
         one.name

@@ -5,7 +5,11 @@ use std::time::Duration;
 use drive_core::{Drive, ErrorKind, Result, Status};
 use tokio::time::{self, Instant};
 
-use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{
+    failure::Failure,
+    one_drive::{OneDriveArgs, told},
+    output,
+};
 
 /// How long a drive that restarts by its reset may be mute.
 const RESTART: Duration = Duration::from_secs(10);
@@ -22,7 +26,7 @@ pub(crate) struct Args {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut one = args.one.open().await?;
-    let status = reset(&mut *one.drive).await.map_err(|error| one.failure(&error))?;
+    let status = told(one.name, reset(&mut *one.drive)).await?.map_err(|error| one.failure(&error))?;
     output::say(format_args!("{} has no fault any more: the drive shows {status}", one.name))?;
     one.close().await;
     Ok(())

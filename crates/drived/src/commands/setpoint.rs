@@ -4,7 +4,11 @@ use std::str::FromStr;
 
 use drive_core::{Frequency, Setpoint, Speed};
 
-use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{
+    failure::Failure,
+    one_drive::{OneDriveArgs, told},
+    output,
+};
 
 /// Give one drive a setpoint; a motor that runs follows its ramp to it
 #[derive(Debug, clap::Args)]
@@ -57,7 +61,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         )));
     }
     let mut one = args.one.open().await?;
-    one.drive.set_setpoint(setpoint).await.map_err(|error| one.failure(&error))?;
+    told(name, one.drive.set_setpoint(setpoint)).await?.map_err(|error| one.failure(&error))?;
     let status = one.drive.status().await.map_err(|error| one.failure(&error))?;
     output::say(format_args!("{name} holds the setpoint {setpoint}: the drive shows {status}"))?;
     one.close().await;

@@ -8,10 +8,13 @@ use crate::{
     failure::Failure,
     one_drive::{OneDrive, OneDriveArgs},
     output,
+    signals::Ending,
 };
 
 /// How often a stop is sent before it is given up with an alarm.
 const ATTEMPTS: u32 = 5;
+
+const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
 
 /// Stop the motor of one drive, again and again until the drive confirms it
 #[derive(Debug, clap::Args)]
@@ -50,7 +53,15 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mode = StopMode::from(args.mode);
     check(args.one.name()?, mode)?;
     let mut one = args.one.open().await?;
-    let status = stop(&mut one, mode).await?;
+    let mut ending = Ending::listen()?;
+    let stopped = tokio::select! {
+        biased;
+        stopped = stop(&mut one, mode) => Some(stopped),
+        () = ending.asked() => None,
+    };
+    let status = stopped.unwrap_or_else(|| {
+        Err(Failure::Drive(format!("{UNCONFIRMED}. {}: asked to end before it was confirmed", one.name)))
+    })?;
     let done = if status.is_standstill() { "stands still" } else { "is stopping" };
     output::say(format_args!("{} {done} ({mode} stop): the drive shows {status}", one.name))?;
     one.close().await;
@@ -72,7 +83,7 @@ fn check(name: DriveName, mode: StopMode) -> Result<(), Failure> {
 }
 
 /// A stop is repeated until it is confirmed; only what no repetition can change ends it sooner.
-async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
+pub(super) async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
     let mut why = None;
     for attempt in 1..=ATTEMPTS {
         let error = match one.drive.stop(mode).await {
@@ -100,7 +111,7 @@ async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
 
 fn alarm(one: &OneDrive, error: &Error) -> Failure {
     let Failure::Drive(text) = one.failure(error) else { return one.failure(error) };
-    Failure::Drive(format!("STOP NOT CONFIRMED, the motor may turn: use the emergency stop. {text}"))
+    Failure::Drive(format!("{UNCONFIRMED}. {text}"))
 }
 
 #[cfg(test)]

@@ -135,11 +135,21 @@ impl Running {
         panic!("the program ended without saying {text:?}");
     }
 
-    /// Asks it to end as Ctrl-C does, and waits for it: its exit code and its last lines.
-    pub(crate) fn interrupt(mut self) -> (Option<i32>, String) {
+    /// Asks it to end as Ctrl-C does.
+    pub(crate) fn ask_to_end(&mut self) {
         let pid = self.child.id().to_string();
         let sent = Command::new("kill").args(["-INT", &pid]).status().expect("kill runs");
         assert!(sent.success());
+    }
+
+    /// Asks it to end as Ctrl-C does, and waits for it: its exit code and its last lines.
+    pub(crate) fn interrupt(mut self) -> (Option<i32>, String) {
+        self.ask_to_end();
+        self.end()
+    }
+
+    /// Waits for its end: its exit code and its last lines.
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         let mut rest = String::new();
         if let Some(lines) = &mut self.lines {
             std::io::Read::read_to_string(lines, &mut rest).expect("stdout is text");
