@@ -192,12 +192,6 @@ impl Blocks {
     };
 }
 
-/// How many of the words at these addresses a read block holds.
-pub(crate) fn coverage(slots: &[ReadSlot], addresses: &[u16]) -> usize {
-    let held = |slot: &&ReadSlot| slot.register().is_some_and(|at| addresses.contains(&at.address()));
-    slots.iter().filter(held).count()
-}
-
 /// Words to ask for so that every place that holds something is read; the drive takes 2 to 5.
 pub(crate) fn read_count(slots: &[ReadSlot]) -> u16 {
     let places = (1..).zip(slots);
@@ -241,13 +235,6 @@ pub struct BlockSetUp {
 mod tests {
     use super::*;
 
-    const FAST: [u16; 3] = [0xFD01, 0xFD00, 0xFE03];
-
-    #[test]
-    fn an_empty_block_holds_nothing() {
-        assert_eq!(coverage(&Blocks::default().read, &FAST), 0);
-    }
-
     #[test]
     fn a_place_that_holds_nothing_is_skipped_and_its_word_not_used() {
         let slots = [
@@ -257,7 +244,7 @@ mod tests {
             ReadSlot::StatusWord,
             ReadSlot::None,
         ];
-        assert_eq!((coverage(&slots, &FAST), read_count(&slots)), (2, 4));
+        assert_eq!(read_count(&slots), 4);
         let held = words(&slots, &[1, 2, 3, 4]);
         assert_eq!(
             held.iter().map(|word| (word.address, word.value)).collect::<Vec<_>>(),

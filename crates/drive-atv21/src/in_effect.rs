@@ -1,87 +1,52 @@
 //! Whether the blocks hold what F870, F871 and F875 to F879 say.
 //!
 //! A changed slot takes effect only after a reset of the drive (§6.3), anybody may have changed one, and no register
-//! tells what is in effect. A block of another layout would be read as a wrong frequency or a wrong state. So a place of
-//! the read block is believed only once it has shown a word that, of all registers that it could hold, only the
-//! configured one explains. At rest nearly every word is 0 and explains nothing; that needs a turning motor.
+//! tells what is in effect. A block of another layout would be read as a wrong frequency or a wrong state. So the read
+//! block is used only once each word of the fast set has stood in its place, and no other register that the block could
+//! hold explains it. At rest nearly every word is 0 and explains nothing; that needs a turning motor.
 
-use drive_core::{Class, Error, ExceptionMeaning, Port, Result, Status};
+use drive_core::{Class, Error, ExceptionMeaning, Port, Result, Status, registers::Register};
 
 use crate::{
     Atv21, WriteBlock,
     blocks::{self, READ_BLOCK, ReadSlot, WriteSlot},
-    reading::{FAST_SET, SLOW_SET},
+    reading::FAST_SET,
     registers as map,
 };
 
-/// What is believed of the read block.
+/// What is known of the read block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Belief {
-    places: [ReadSlot; 5],
-    /// How many statuses with a turning motor until the block is looked at again; `None`: it is not.
-    next_look: Option<u32>,
-    pause: u32,
+pub(crate) enum ReadBlock {
+    /// It has not shown what it holds. It is looked at after so many more statuses with a turning motor, and then after
+    /// ever more, because a look takes many exchanges.
+    Unshown { wait: u32, pause: u32 },
+    /// It holds the fast set in these places; the others are not used.
+    Shown([ReadSlot; 5]),
+    /// It is not used.
+    Unused,
 }
 
-impl Default for Belief {
+impl Default for ReadBlock {
     fn default() -> Self {
-        Self { places: [ReadSlot::None; 5], next_look: Some(0), pause: 1 }
+        Self::Unshown { wait: 0, pause: 1 }
     }
 }
 
-impl Belief {
-    /// The block is not used.
-    pub(crate) const NEVER: Self = Self { places: [ReadSlot::None; 5], next_look: None, pause: 1 };
-
-    /// The places that may be used; the others are [`ReadSlot::None`].
-    pub(crate) const fn places(&self) -> [ReadSlot; 5] {
-        self.places
-    }
-
-    /// Whether to look at the block now. A look that has not shown enough is repeated ever more rarely, because it
-    /// takes many exchanges.
+impl ReadBlock {
+    /// Whether to look at it with this status of a turning motor.
     const fn is_look_due(&mut self) -> bool {
-        match self.next_look {
-            Some(0) => {
-                self.next_look = Some(self.pause);
-                self.pause = self.pause.saturating_mul(2);
+        match self {
+            Self::Unshown { wait: 0, pause } => {
+                *self = Self::Unshown { wait: *pause, pause: pause.saturating_mul(2) };
                 true
             }
-            Some(statuses) => {
-                self.next_look = Some(statuses - 1);
+            Self::Unshown { wait, .. } => {
+                *wait -= 1;
                 false
             }
-            None => false,
+            Self::Shown(_) | Self::Unused => false,
         }
     }
-
-    /// Takes in what a look at the block has shown.
-    fn learn(&mut self, configured: &[ReadSlot; 5], block: &[u16], seen: &[Seen]) {
-        let places = self.places.iter_mut().zip(configured);
-        for ((place, &slot), &word) in places.zip(block) {
-            match judge(slot, word, seen) {
-                Verdict::Shown if *place == ReadSlot::None => *place = slot,
-                // Another layout, or a motor that moved too fast to tell: nothing that this look shows counts.
-                Verdict::Refuted => {
-                    self.places = [ReadSlot::None; 5];
-                    return;
-                }
-                Verdict::Shown | Verdict::Open => {}
-            }
-        }
-        let wanted = worth_reading(configured);
-        if blocks::coverage(&self.places, &wanted) == blocks::coverage(configured, &wanted) {
-            self.next_look = None;
-        }
-    }
-}
-
-/// The registers for whose sake a block of these slots is read: the fast set, else the slow set, if it holds more than
-/// one of them.
-fn worth_reading(slots: &[ReadSlot; 5]) -> Vec<u16> {
-    let sets = [&FAST_SET[..], &SLOW_SET[..]];
-    let mut addresses = sets.into_iter().map(|set| set.iter().map(|at| at.address()).collect::<Vec<_>>());
-    addresses.find(|addresses| blocks::coverage(slots, addresses) > 1).unwrap_or_default()
 }
 
 /// What a register has shown just before and just after the block was read.
@@ -107,25 +72,29 @@ impl Seen {
     }
 }
 
-/// What a word says of the place that it stands in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
-    /// The place holds what is configured: nothing else explains the word.
-    Shown,
-    /// The place holds something else: what is configured does not explain the word.
-    Refuted,
-    /// It may be this or that.
-    Open,
+/// The places of the fast set in a block of these words, if it shows all of them: each word explained by the register
+/// that is configured and by no other. A place that holds nothing may read 0, so 0 shows nothing.
+fn shown(configured: [ReadSlot; 5], block: &[u16], seen: &[Seen]) -> Option<[ReadSlot; 5]> {
+    let mut places = [ReadSlot::None; 5];
+    for ((place, slot), &word) in places.iter_mut().zip(configured).zip(block) {
+        let mut explained = seen.iter().filter(|seen| seen.explains(word)).map(|seen| seen.slot);
+        if is_fast(slot) && word != 0 && explained.next() == Some(slot) && explained.next().is_none() {
+            *place = slot;
+        }
+    }
+    holds_fast_set(&places).then_some(places)
 }
 
-fn judge(slot: ReadSlot, word: u16, seen: &[Seen]) -> Verdict {
-    let Some(configured) = seen.iter().find(|seen| seen.slot == slot) else { return Verdict::Open };
-    if !configured.explains(word) {
-        return Verdict::Refuted;
-    }
-    // A place that holds nothing may read 0.
-    let alone = seen.iter().all(|other| other.slot == slot || !other.explains(word));
-    if alone && word != 0 { Verdict::Shown } else { Verdict::Open }
+/// Whether its register belongs to the fast set.
+fn is_fast(slot: ReadSlot) -> bool {
+    slot.register().is_some_and(|register| FAST_SET.map(Register::address).contains(&register.address()))
+}
+
+fn holds_fast_set(slots: &[ReadSlot; 5]) -> bool {
+    FAST_SET.iter().all(|wanted| {
+        let held = |slot: &ReadSlot| slot.register().is_some_and(|at| at.address() == wanted.address());
+        slots.iter().any(held)
+    })
 }
 
 /// Whether an exception says that the drive does not have such a block.
@@ -136,7 +105,7 @@ pub(crate) const fn is_refusal(meaning: ExceptionMeaning) -> bool {
 impl<P: Port> Atv21<P> {
     /// Nothing that was known of the blocks counts any more: the drive may have started up anew.
     pub(crate) fn forget_blocks(&mut self) {
-        self.read_block = Belief::default();
+        self.read_block = ReadBlock::default();
         if let WriteBlock::Read(_) = self.write_block {
             self.write_block = WriteBlock::Promised;
         }
@@ -149,18 +118,21 @@ impl<P: Port> Atv21<P> {
             return;
         }
         match self.compare_block(status).await {
-            Err(Error::Exception { meaning, .. }) if is_refusal(meaning) => self.read_block = Belief::NEVER,
-            // The status was read whole all the same; what the line lacks, the next one will tell.
-            Ok(()) | Err(_) => {}
+            Ok(Some(read_block)) => self.read_block = read_block,
+            Err(Error::Exception { meaning, .. }) if is_refusal(meaning) => {
+                self.read_block = ReadBlock::Unused;
+            }
+            // The status was read whole all the same; what the line lacks, the next look will tell.
+            Ok(None) | Err(_) => {}
         }
     }
 
-    async fn compare_block(&mut self, status: &Status) -> Result<()> {
+    /// What is known of the block after a look; `None`: no more than before.
+    async fn compare_block(&mut self, status: &Status) -> Result<Option<ReadBlock>> {
         let class = Class::Status;
         let configured = self.read_slots(class).await?;
-        if worth_reading(&configured).is_empty() {
-            self.read_block = Belief::NEVER;
-            return Ok(());
+        if !holds_fast_set(&configured) {
+            return Ok(Some(ReadBlock::Unused));
         }
         let mut calls = self.registers.at(class);
         let block = calls.read_words(READ_BLOCK, blocks::read_count(&configured)).await?;
@@ -171,8 +143,7 @@ impl<P: Port> Atv21<P> {
             let before = status.raw(register.address()).unwrap_or(after);
             seen.push(Seen { slot, before, after });
         }
-        self.read_block.learn(&configured, &block, &seen);
-        Ok(())
+        Ok(shown(configured, &block, &seen).map(ReadBlock::Shown))
     }
 
     /// What the write block holds; `None` where nobody says that it is in effect.
@@ -206,61 +177,43 @@ mod tests {
         seen([0x6400, 5_000, 3_700, 10_000, 0, 0, 1, 0, 700, 12, 1_500])
     }
 
-    fn at_rest() -> Vec<Seen> {
-        seen([0x4000, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0])
+    #[test]
+    fn a_turning_motor_shows_the_places_of_the_fast_set() {
+        let mut places = STANDARD;
+        places[3..].fill(ReadSlot::None);
+        assert_eq!(shown(STANDARD, &[0x6400, 5_010, 3_650, 9_990, 0], &running()), Some(places));
+        let swapped = [ReadSlot::None, STANDARD[2], STANDARD[1], ReadSlot::Unknown(12), STANDARD[0]];
+        let expected = [ReadSlot::None, STANDARD[2], STANDARD[1], ReadSlot::None, STANDARD[0]];
+        assert_eq!(shown(swapped, &[0, 3_700, 5_000, 7, 0x6400], &running()), Some(expected));
     }
 
     #[test]
-    fn a_turning_motor_shows_each_place_of_the_fast_set_and_the_look_is_not_repeated() {
-        let mut belief = Belief::default();
-        assert!(belief.is_look_due());
-        belief.learn(&STANDARD, &[0x6400, 5_010, 3_650, 9_990, 0], &running());
-        let mut shown = STANDARD;
-        shown[4] = ReadSlot::None;
-        assert_eq!(belief.places(), shown, "an alarm word of 0 shows nothing");
-        assert!((0..1_000).all(|_| !belief.is_look_due()));
-    }
-
-    #[test]
-    fn at_rest_only_the_status_word_is_shown_and_the_look_is_repeated_ever_more_rarely() {
-        let mut belief = Belief::default();
-        let mut looks = Vec::new();
-        for status in 0..20 {
-            if belief.is_look_due() {
-                belief.learn(&STANDARD, &[0x4000, 0, 0, 0, 0], &at_rest());
-                looks.push(status);
-            }
-        }
-        assert_eq!(blocks::coverage(&belief.places(), &[0xFD01, 0xFD00, 0xFE03, 0xFE05, 0xFC91]), 1);
+    fn a_motor_at_rest_shows_nothing_and_the_look_is_repeated_ever_more_rarely() {
+        let at_rest = seen([0x4000, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(shown(STANDARD, &[0x4000, 0, 0, 0, 0], &at_rest), None);
+        let mut block = ReadBlock::default();
+        let looks: Vec<_> = (0..20).filter(|_| block.is_look_due()).collect();
         assert_eq!(looks, [0, 2, 5, 10, 19]);
+        assert!(!ReadBlock::Shown(STANDARD).is_look_due());
+        assert!(!ReadBlock::Unused.is_look_due());
     }
 
     #[test]
-    fn one_word_that_the_configured_register_does_not_explain_discredits_the_whole_block() {
+    fn another_layout_than_the_configured_one_shows_nothing_whatever_it_shows() {
         for block in [[0x6400, 3_700, 5_000, 10_000, 0], [5_000, 0x6400, 3_700, 10_000, 0], [0; 5]] {
-            let mut belief = Belief::default();
-            for _ in 0..20 {
-                belief.learn(&STANDARD, &block, &running());
-                assert_eq!(belief, Belief::default(), "{block:?}");
-            }
+            assert_eq!(shown(STANDARD, &block, &running()), None, "{block:?}");
         }
-    }
-
-    #[test]
-    fn no_other_layout_is_ever_believed_whatever_it_shows() {
-        // Two registers of every pair agree, apart from a wrong place: neither may be believed.
-        for (place, configured) in STANDARD.into_iter().enumerate() {
+        // Another register stands in one place, and happens to hold the same word as the one that belongs there.
+        for (place, configured) in STANDARD.into_iter().enumerate().take(3) {
             for held in ReadSlot::CHOICES.into_iter().filter(|held| *held != configured) {
                 for word in [0, 1, 500, 5_000, 0x6400, u16::MAX] {
                     let mut seen = running();
                     for other in seen.iter_mut().filter(|seen| [held, configured].contains(&seen.slot)) {
                         (other.before, other.after) = (word, word);
                     }
-                    let mut belief = Belief::default();
                     let mut block = [0x6400, 5_000, 3_700, 10_000, 0];
                     block[place] = word;
-                    belief.learn(&STANDARD, &block, &seen);
-                    assert_eq!(belief.places()[place], ReadSlot::None, "{held:?} for {configured:?}: {word}");
+                    assert_eq!(shown(STANDARD, &block, &seen), None, "{held:?} for {configured:?}: {word}");
                 }
             }
         }
@@ -268,26 +221,22 @@ mod tests {
 
     #[test]
     fn a_value_that_moves_while_it_is_read_still_explains_its_word() {
-        let mut seen = running();
-        seen[1] = Seen { slot: ReadSlot::OutputFrequency, before: 2_000, after: 2_600 };
-        let word = |word| judge(ReadSlot::OutputFrequency, word, &seen);
-        assert_eq!([word(1_990), word(2_300), word(2_700)], [Verdict::Shown; 3]);
-        assert_eq!([word(1_500), word(3_200), word(0)], [Verdict::Refuted; 3]);
+        let moving = Seen { slot: ReadSlot::OutputFrequency, before: 2_000, after: 2_600 };
+        assert_eq!([1_990, 2_300, 2_700].map(|word| moving.explains(word)), [true; 3]);
+        assert_eq!([1_500, 3_200, 0].map(|word| moving.explains(word)), [false; 3]);
     }
 
     #[test]
-    fn a_slot_that_the_manual_does_not_list_is_left_alone() {
-        assert_eq!(judge(ReadSlot::Unknown(12), 5_000, &running()), Verdict::Open);
-        assert_eq!(judge(ReadSlot::None, 0, &running()), Verdict::Open);
-    }
-
-    #[test]
-    fn a_block_is_worth_reading_for_more_than_one_word_of_a_set() {
+    fn a_block_without_the_whole_fast_set_is_not_worth_a_look() {
         use ReadSlot as R;
-        let fast = [R::OutputSpeed, R::OutputVoltage, R::OutputCurrent, R::StatusWord, R::None];
-        assert_eq!(worth_reading(&fast), [0xFD01, 0xFD00, 0xFE03]);
-        let slow = [R::OutputSpeed, R::OutputVoltage, R::OutputCurrent, R::None, R::None];
-        assert!(worth_reading(&slow).contains(&0xFE90));
-        assert!(worth_reading(&[R::StatusWord, R::Alarms, R::None, R::Unknown(12), R::None]).is_empty());
+        assert!(holds_fast_set(&STANDARD));
+        assert!(holds_fast_set(&[
+            R::OutputSpeed,
+            R::OutputFrequency,
+            R::OutputCurrent,
+            R::StatusWord,
+            R::None
+        ]));
+        assert!(!holds_fast_set(&[R::StatusWord, R::OutputFrequency, R::Alarms, R::Unknown(3), R::None]));
     }
 }

@@ -39,7 +39,7 @@ use drive_core::{
     serial::CharacterFormat,
 };
 
-use crate::{blocks::WriteSlot, in_effect::Belief};
+use crate::{blocks::WriteSlot, in_effect::ReadBlock};
 pub use crate::{
     faults::{ALARMS, FAULTS},
     model::{Enclosure, MODELS, ModelEntry, VoltageClass},
@@ -81,7 +81,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     broadcast_stops: &[StopMode::Ramp, StopMode::Freewheel, StopMode::DcInjection],
     fault_history: 4,
     turnaround: Duration::ZERO,
-    // One where the read block is used, which is never from the first status on.
+    // One where the read block is used; it never is from the first status on.
     status_exchanges: 4,
     measurement_exchanges: reading::SLOW_SET.len() as u8,
 };
@@ -127,7 +127,7 @@ pub struct Atv21<P> {
     registers: Registers<P>,
     authority: Authority,
     selections: CommandWord,
-    read_block: Belief,
+    read_block: ReadBlock,
     write_block: WriteBlock,
     upper_limit: Option<Frequency>,
     eeprom_writes: u32,
@@ -144,7 +144,7 @@ impl<P: Port> Atv21<P> {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
             authority: Authority::default(),
             selections: CommandWord::empty(),
-            read_block: Belief::default(),
+            read_block: ReadBlock::default(),
             write_block: WriteBlock::Unused,
             upper_limit: None,
             eeprom_writes: 0,
@@ -231,12 +231,12 @@ impl<P: Port> Drive for Atv21<P> {
         self.upper_limit = None;
     }
 
-    /// Reads the fast set: the block of the drive in one exchange where it holds FD01, FD00 and FE03, else the words
-    /// one by one, with FE45 for who commands.
+    /// Reads the fast set: from the block of the drive, in one exchange, where it is known to hold FD01, FD00 and FE03;
+    /// else the words one by one, with FE45 for who commands.
     ///
     /// What is configured for the block is in effect only if the drive was reset since, and no register tells that. So
-    /// the first status with a turning motor also reads the block and every register that it could hold: a place is
-    /// used from then on when nothing but what is configured explains its word. A trip ends that.
+    /// the first status with a turning motor also reads the block and every register that it could hold: the block is
+    /// used from then on when nothing but what is configured explains its words. A trip ends that.
     ///
     /// [`Status::control`] is `None` when a block is read and the drive is not local: the block cannot tell.
     /// [`Status::at_reference`] and [`Status::fault_code`] are always `None`: no word of the fast set tells them.

@@ -13,7 +13,7 @@ use crate::{
     Atv21,
     blocks::{self, Blocks, READ_BLOCK, ReadSlot, WriteSlot},
     faults::{FAULTS, alarms},
-    in_effect::{self, Belief},
+    in_effect::{self, ReadBlock},
     model::ModelEntry,
     registers as map, status,
     words::{
@@ -88,13 +88,14 @@ pub struct LastTrip {
 impl<P: Port> Atv21<P> {
     /// Reads the fast set in any class.
     pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
-        let addresses = FAST_SET.map(Register::address);
-        let mut words = self.read_block_for(class, &addresses).await?;
-        let whole = addresses.iter().all(|&address| find(&words, address).is_some());
-        if !whole {
-            self.read_missing(class, &FAST_SET, &mut words).await?;
-            self.read_missing(class, &[map::COMMAND_SOURCE], &mut words).await?;
-        }
+        let words = match self.read_fast_block(class).await? {
+            Some(words) => words,
+            None => {
+                let mut words = self.read_each(class, &FAST_SET).await?;
+                words.extend(self.read_each(class, &[map::COMMAND_SOURCE]).await?);
+                words
+            }
+        };
         let status = status::status(words);
         if status.is_fault() || status.state == State::NotReady {
             // It may be reset and started up anew by somebody else.
@@ -104,10 +105,7 @@ impl<P: Port> Atv21<P> {
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
-        let class = Class::Background;
-        let addresses = SLOW_SET.map(Register::address);
-        let mut raw = self.read_block_for(class, &addresses).await?;
-        self.read_missing(class, &SLOW_SET, &mut raw).await?;
+        let raw = self.read_each(Class::Background, &SLOW_SET).await?;
         let word = |register: Register<Read>| find(&raw, register.address());
         let hundredths = |register| word(register).map(|word| Percent::from_hundredths(word.into()));
         let percent = |register| word(register).map(|word| Percent::from_hundredths(i32::from(word) * 100));
@@ -167,7 +165,7 @@ impl<P: Port> Atv21<P> {
         };
         let now = StatusWord::from_bits_retain(calls.read(map::STATUS_WORD).await?);
         if now.contains(StatusWord::TRIPPED) {
-            self.read_missing(Class::Background, &FROZEN, &mut trip.frozen).await?;
+            trip.frozen = self.read_each(Class::Background, &FROZEN).await?;
         }
         Ok(trip)
     }
@@ -254,38 +252,29 @@ impl<P: Port> Atv21<P> {
         Ok([calls.read(map::MODEL_CODE).await?, calls.read(map::MODEL_CLASS).await?])
     }
 
-    /// Reads the block where it is worth it for the words at these addresses; nothing where it is not. A drive that
-    /// refuses its block is not asked for it again.
-    async fn read_block_for(&mut self, class: Class, addresses: &[u16]) -> Result<Vec<RawWord>> {
-        let slots = self.read_block.places();
-        if blocks::coverage(&slots, addresses) < 2 {
-            return Ok(Vec::new());
-        }
-        match self.registers.at(class).read_words(READ_BLOCK, blocks::read_count(&slots)).await {
-            Ok(answer) => Ok(blocks::words(&slots, &answer)),
+    /// Reads the fast set from the block, where that is known to hold it; `None` where it is not. A drive that refuses
+    /// its block is not asked for it again.
+    async fn read_fast_block(&mut self, class: Class) -> Result<Option<Vec<RawWord>>> {
+        let ReadBlock::Shown(places) = self.read_block else { return Ok(None) };
+        match self.registers.at(class).read_words(READ_BLOCK, blocks::read_count(&places)).await {
+            Ok(answer) => Ok(Some(blocks::words(&places, &answer))),
             Err(Error::Exception { meaning, .. }) if in_effect::is_refusal(meaning) => {
-                self.read_block = Belief::NEVER;
-                Ok(Vec::new())
+                self.read_block = ReadBlock::Unused;
+                Ok(None)
             }
             Err(error) => Err(error),
         }
     }
 
-    /// Reads one by one what is not among the words yet.
-    async fn read_missing(
-        &mut self,
-        class: Class,
-        wanted: &[Register<Read>],
-        words: &mut Vec<RawWord>,
-    ) -> Result<()> {
+    /// Reads registers one by one.
+    async fn read_each(&mut self, class: Class, registers: &[Register<Read>]) -> Result<Vec<RawWord>> {
         let mut calls = self.registers.at(class);
-        for &register in wanted {
-            if find(words, register.address()).is_none() {
-                let value = calls.read(register).await?;
-                words.push(RawWord { address: register.address(), code: register.row().code, value });
-            }
+        let mut words = Vec::with_capacity(registers.len());
+        for &register in registers {
+            let value = calls.read(register).await?;
+            words.push(RawWord { address: register.address(), code: register.row().code, value });
         }
-        Ok(())
+        Ok(words)
     }
 }
 

@@ -10,7 +10,7 @@ use drive_core::{
 use crate::{
     Atv21, WATCHDOG_LONGEST, WriteBlock,
     blocks::{BlockSetUp, Blocks, ReadSlot, WriteSlot},
-    in_effect::Belief,
+    in_effect::ReadBlock,
     registers as map,
     words::{CommandWord, CommandWord2, StatusWord2},
 };
@@ -189,7 +189,7 @@ impl<P: Port> Atv21<P> {
         }
         if is_slot(row) {
             // From now on what is configured is not what is in effect, also when the answer is lost.
-            self.read_block = Belief::NEVER;
+            self.read_block = ReadBlock::Unused;
             self.write_block = WriteBlock::Unused;
         }
         // UL may be another one then.

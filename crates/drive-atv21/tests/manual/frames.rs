@@ -1,7 +1,7 @@
 //! Every frame that the manual prints with its CRC, byte for byte: what the driver sends and how it reads the answer, and
 //! what the simulated drive answers.
 
-use drive_atv21::{Alarms, Atv21, Authority, CAPABILITIES};
+use drive_atv21::{Atv21, Authority, CAPABILITIES};
 use drive_bus::Line;
 use drive_core::{Class, Direction, Drive, Error, ExceptionMeaning, Frequency, Percent, Registers, State};
 use drive_sim::{Exception, Model, SimLine, SimSlave, Wiring, models};
@@ -160,7 +160,7 @@ async fn two_words_beside_the_block_are_refused_as_in_7_4() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_status_is_the_block_of_five_as_in_7_5_once_it_has_shown_what_it_holds() {
+async fn the_block_of_five_of_7_5_is_looked_at_and_not_used_because_its_current_of_0_shows_nothing() {
     let (line, other_end) = scripted(&[
         ("01 03 FD01 0001", "01 03 02 6404"),
         ONE_WORD,
@@ -183,20 +183,18 @@ async fn a_status_is_the_block_of_five_as_in_7_5_once_it_has_shown_what_it_holds
         ("01 03 FE35 0001", "01 03 02 03FF"),
         ("01 03 FE36 0001", "01 03 02 0000"),
         ("01 03 FE90 0001", "01 03 02 0708"),
-        // The example's current is 0, which shows nothing: it is read by itself.
-        BLOCK_OF_FIVE,
+        ("01 03 FD01 0001", "01 03 02 6404"),
+        ONE_WORD,
         ("01 03 FE03 0001", "01 03 02 0000"),
         ("01 03 FE45 0001", "01 03 02 0002"),
     ]);
     let mut drive = Atv21::new(line.slave(1), bench::address(1));
-    let alone = drive.status().await.unwrap();
-    let status = drive.status().await.unwrap();
-    assert_eq!((status.state, status.direction), (State::Running, Some(Direction::Forward)));
-    assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
-    assert_eq!((status.current_share, status.warning), (Some(Percent::from_percent(0)), Some(true)));
-    // The output voltage is 99.79 %, the alarm undercurrent.
-    assert_eq!((status.raw(0xFE05), status.raw(0xFC91)), (Some(9_979), Some(Alarms::UNDERCURRENT.bits())));
-    assert_eq!((alone.state, alone.output_frequency), (status.state, status.output_frequency));
+    for _ in 0..2 {
+        let status = drive.status().await.unwrap();
+        assert_eq!((status.state, status.direction), (State::Running, Some(Direction::Forward)));
+        assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
+        assert_eq!((status.current_share, status.warning), (Some(Percent::from_percent(0)), Some(true)));
+    }
     other_end.is_done().await;
 }
 
