@@ -1,28 +1,23 @@
 //! What moves the motor, stops it, or decides who may.
 
 use drive_core::{
-    Class, Command, Control, Direction, Error, ErrorKind, ExceptionMeaning, Frequency, Port, PortError,
-    Refusal, Result, Setpoint, SetpointProblem, Speed, State, Status, StopMode,
+    Class, Command, Control, Direction, Error, ErrorKind, Frequency, Port, PortError, Refusal, Result,
+    Setpoint, State, Status, StopMode,
 };
 
 use crate::{
     Atv21, Authority,
     blocks::{WRITE_BLOCK, command_and_reference},
     registers as map,
-    words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
+    words::{CommandSource, CommandWord, StatusWord},
 };
 
 /// Statuses that are read for a confirmation before it is given up.
 const CONFIRMATIONS: usize = 20;
 /// How often a stop is written again where another command word has come after it.
 const REPEATS: usize = 2;
-/// FA13 takes no more (Altivar 21 Modbus §8.2).
-const HIGHEST_SPEED: Speed = Speed::from_rpm(24_000);
 /// CMOD: the serial link commands.
 const SERIAL_COMMAND: u16 = 2;
-
-/// What a setpoint is written to.
-type Reference = (drive_core::registers::Register<drive_core::registers::access::ReadWrite>, u16);
 
 impl<P: Port> Atv21<P> {
     /// Starts the motor at a frequency. Where the write block holds FA00 and FA01, and its owner says that it is in
@@ -180,15 +175,6 @@ impl<P: Port> Atv21<P> {
         }
     }
 
-    pub(crate) async fn write_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        let reference @ (register, word) = self.reference(setpoint).await?;
-        let command = Command::Setpoint(setpoint);
-        self.check_preset(command).await?;
-        let mut calls = self.registers.at(Class::Command).replacing(register.address());
-        calls.write(register, word).await?;
-        self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
-    }
-
     pub(crate) async fn reset_trip(&mut self) -> Result<Status> {
         let status = self.read_status(Class::Command).await?;
         if !status.is_fault() && status.state != State::QuickStop {
@@ -297,27 +283,6 @@ impl<P: Port> Atv21<P> {
         self.check_preset(command).await
     }
 
-    /// Refuses what a preset speed from elsewhere would override. One that stands in FA00 is overwritten by the next
-    /// command word, and one of our own choice is meant.
-    async fn check_preset(&mut self, command: Command) -> Result<()> {
-        let is_start = matches!(command, Command::Start(_));
-        if is_start && self.selections.preset_speed() != 0 {
-            return Ok(());
-        }
-        let mut calls = self.registers.at(Class::Command);
-        if ReferenceSource::from(calls.read(map::REFERENCE_SOURCE).await?) != ReferenceSource::PresetSpeed {
-            return Ok(());
-        }
-        if is_start {
-            let present = CommandWord::from_bits_retain(calls.read(map::COMMAND_WORD).await?);
-            if present.preset_speed() != 0 {
-                return Ok(());
-            }
-        }
-        let reason = Refusal::Settings("a preset speed overrides the reference (FE46 = 255)");
-        Err(self.refused(command, reason))
-    }
-
     /// Whether this is the command word that the drive holds.
     async fn holds(&mut self, word: CommandWord, class: Class) -> Result<bool> {
         Ok(self.registers.at(class).read(map::COMMAND_WORD).await? == word.bits())
@@ -333,57 +298,6 @@ impl<P: Port> Atv21<P> {
             Some(word) => Ok(word.into()),
             None => self.source(Class::Command).await,
         }
-    }
-
-    /// The register and the word of a setpoint, if the drive's limits allow it.
-    async fn reference(&mut self, setpoint: Setpoint) -> Result<Reference> {
-        let slave = self.registers.slave();
-        let refuse = |problem| Error::Setpoint { slave, setpoint, problem };
-        match setpoint {
-            Setpoint::Frequency(frequency) => {
-                let high = self.upper_limit().await?;
-                if frequency > high {
-                    let low = Frequency::ZERO;
-                    return Err(refuse(SetpointProblem::OutsideFrequencyLimits { low, high }));
-                }
-                let word =
-                    u16::try_from(frequency.centihertz()).map_err(|_| refuse(SetpointProblem::TooLarge))?;
-                Ok((map::FREQUENCY_REFERENCE, word))
-            }
-            Setpoint::Speed(speed) => {
-                let low = Speed::default();
-                let outside = SetpointProblem::OutsideSpeedLimits { low, high: HIGHEST_SPEED };
-                match u16::try_from(speed.rpm()) {
-                    Ok(word) if speed <= HIGHEST_SPEED => Ok((map::SPEED_REFERENCE, word)),
-                    _ => Err(refuse(outside)),
-                }
-            }
-        }
-    }
-
-    /// The drive's UL, read once. A drive that has no such register judges the setpoint by itself.
-    async fn upper_limit(&mut self) -> Result<Frequency> {
-        if let Some(limit) = self.upper_limit {
-            return Ok(limit);
-        }
-        let limit = match self.registers.at(Class::Command).read(map::UPPER_LIMIT).await {
-            Ok(word) => Frequency::from_centihertz(word.into()),
-            Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
-                Frequency::from_centihertz(u16::MAX.into())
-            }
-            Err(error) => return Err(error),
-        };
-        self.upper_limit = Some(limit);
-        Ok(limit)
-    }
-
-    /// Reads a reference back.
-    async fn confirm_reference(&mut self, setpoint: Setpoint, (register, word): Reference) -> Result<()> {
-        if self.registers.at(Class::Command).read(register).await? == word {
-            return Ok(());
-        }
-        let status = self.read_status(Class::Command).await?;
-        Err(self.not_confirmed(Command::Setpoint(setpoint), status))
     }
 }
 

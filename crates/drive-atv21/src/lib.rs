@@ -25,6 +25,7 @@ mod in_effect;
 mod model;
 mod reading;
 pub mod registers;
+mod setpoint;
 mod settings;
 mod status;
 mod words;

@@ -1,9 +1,6 @@
 //! Status, measurements, faults, identity.
 
-use drive_atv21::{
-    Alarms, Atv21, CAPABILITIES, MaintenanceAlarms, ModelEntry, ROWS, StatusWord,
-    blocks::{Blocks, ReadSlot},
-};
+use drive_atv21::{Alarms, Atv21, CAPABILITIES, MaintenanceAlarms, ModelEntry, ROWS, StatusWord};
 use drive_core::{
     Control, Direction, Drive, Fault, Frequency, Percent, Row, Setpoint, Speed, State, StopMode,
 };
