@@ -3,6 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
+    time::Duration,
 };
 
 use drive_bus::Line;
@@ -17,13 +18,15 @@ use crate::{
     fleet::{Fleet, LineEntry},
     handle::Entry,
     plan::{Demand, LineBudget, PlanProblem, plan},
-    settings::{DriveSettings, WatchdogContract},
+    settings::{DriveSettings, Times, WatchdogContract},
     supervisor::Supervisor,
     task::{Desk, Task},
 };
 
 /// How many orders of one drive may be on their way to its task.
 const MAILBOX: usize = 32;
+/// The longest that any period or time of a drive may be. Longer ones are mistakes, and a clock cannot hold the longest.
+const LONGEST: Duration = Duration::from_secs(365 * 86_400);
 /// How many events are kept for a slow reader.
 const EVENTS: usize = 4_096;
 
@@ -228,6 +231,23 @@ pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> 
             );
         }
     }
+    let Times { lifetime, effect, reference, standstill, stop_alarm } = settings.times;
+    for (setting, name, time) in [
+        ("periods", "slow", periods.slow),
+        ("periods", "max_age", periods.max_age),
+        ("times", "lifetime", lifetime),
+        ("times", "effect", effect),
+        ("times", "reference", reference),
+        ("times", "standstill", standstill),
+        ("times", "stop_alarm", stop_alarm),
+    ] {
+        if time > LONGEST {
+            return problem(setting, format!("{name} is {time:?}: expected a year at the most"));
+        }
+    }
+    if lifetime.is_zero() {
+        return problem("times", "lifetime is zero: no command would ever be sent".to_owned());
+    }
     if let Err(reason) = settings.limits.check() {
         return problem("limits", reason);
     }
@@ -294,4 +314,31 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore
         snapshots: snapshot,
         exit: exited,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{settings::Periods, testing::CAPABILITIES};
+
+    #[test]
+    fn times_that_no_clock_can_hold_and_a_lifetime_of_nothing_are_refused() {
+        let usual = DriveSettings::controlled("pump");
+        assert_eq!(check_settings(&usual, &CAPABILITIES), Ok(()));
+        let (periods, times, for_ever) = (Periods::default(), Times::default(), Duration::MAX);
+        for (setting, periods, times) in [
+            ("periods", Periods { max_age: for_ever, ..periods }, times),
+            ("periods", Periods { slow: for_ever, ..periods }, times),
+            ("times", periods, Times { lifetime: for_ever, ..times }),
+            ("times", periods, Times { effect: for_ever, ..times }),
+            ("times", periods, Times { reference: for_ever, ..times }),
+            ("times", periods, Times { standstill: for_ever, ..times }),
+            ("times", periods, Times { stop_alarm: for_ever, ..times }),
+            ("times", periods, Times { lifetime: Duration::ZERO, ..times }),
+        ] {
+            let settings = DriveSettings { periods, times, ..usual.clone() };
+            let problem = check_settings(&settings, &CAPABILITIES).unwrap_err();
+            assert_eq!(problem.setting, setting, "{problem}");
+        }
+    }
 }

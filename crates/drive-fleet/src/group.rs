@@ -13,7 +13,7 @@ use std::{
 
 use drive_core::{BroadcastWrite, Class, Direction, Setpoint, StopMode, Terms};
 use futures_util::future::{join, join_all};
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
@@ -260,10 +260,9 @@ impl Group {
         order: Order,
         spacing: Duration,
     ) -> Vec<(Arc<str>, Outcome)> {
-        let begin = Instant::now();
         let failed = &AtomicBool::new(false);
         let commands = leaves.iter().zip(0_u32..).map(|(&(member, leave), number)| async move {
-            sleep_until(begin + spacing.saturating_mul(number)).await;
+            sleep(spacing.saturating_mul(number)).await;
             let command = async || {
                 if failed.load(Ordering::Relaxed) {
                     return None;

@@ -1,11 +1,11 @@
 //! [`DriveHandle`]: one drive of a fleet, as its users hold it.
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{fmt, pin::pin, sync::Arc, time::Duration};
 
 use drive_core::{BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode};
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    time::Instant,
+    time::sleep,
 };
 
 use crate::{
@@ -112,7 +112,8 @@ impl DriveHandle {
     /// # Errors
     /// Why a start would be refused.
     pub async fn ready(&self, patience: Duration) -> Result<(), Refused> {
-        let deadline = Instant::now() + patience;
+        // Patience without end is a wish that a point in time could not hold.
+        let mut over = pin!(sleep(patience));
         let mut watch = self.watch();
         loop {
             watch.mark_unchanged();
@@ -121,9 +122,11 @@ impl DriveHandle {
                 None | Some(Refused::Limit(_)) => return Ok(()),
                 Some(refused) => refused,
             };
-            match tokio::time::timeout_at(deadline, watch.changed()).await {
-                Ok(Ok(())) => {}
-                Ok(Err(_)) | Err(_) => return Err(refused),
+            tokio::select! {
+                changed = watch.changed() => if changed.is_err() {
+                    return Err(refused);
+                },
+                () = &mut over => return Err(refused),
             }
         }
     }
