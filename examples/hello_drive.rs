@@ -32,10 +32,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
     println!("before:   {}", drive.status().await?);
     drive.set_setpoint(Frequency::from_hertz(20).into()).await?;
-    println!("started:  {}", drive.start(Direction::Forward).await?);
-
-    // From here on the motor turns: whatever fails, the stop below is sent.
-    let ran = watch(&mut drive).await;
+    // From here on the motor may turn, also when the start is not confirmed: whatever fails, the stop below is sent.
+    let ran = run(&mut drive).await;
     println!("stopping: {}", drive.stop(StopMode::Ramp).await?);
     ran?;
     while !drive.status().await?.is_standstill() {
@@ -45,8 +43,9 @@ async fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Watches the motor until it has reached its setpoint, then slows it down and watches again.
-async fn watch(drive: &mut impl Drive) -> drive_core::Result<()> {
+/// Starts the motor and watches it until it has reached its setpoint, then slows it down and watches again.
+async fn run(drive: &mut impl Drive) -> drive_core::Result<()> {
+    println!("started:  {}", drive.start(Direction::Forward).await?);
     for hertz in [20, 10] {
         drive.set_setpoint(Frequency::from_hertz(hertz).into()).await?;
         loop {

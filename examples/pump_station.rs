@@ -11,7 +11,9 @@ use std::{error::Error, time::Duration};
 use drive_atv312::Atv312;
 use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, Reaction, SerialSettings, SlaveAddress, StopMode};
-use drive_fleet::{DriveHandle, DriveSettings, EventKind, Fleet, LineBudget, Received, WatchdogContract};
+use drive_fleet::{
+    DriveHandle, DriveSettings, EventKind, Fleet, LineBudget, Order, Received, Until, WatchdogContract,
+};
 use drive_sim::{SimLine, Wiring, models};
 use tokio::time::{interval, sleep};
 
@@ -42,15 +44,18 @@ async fn main() -> Result<(), Box<dyn Error>> {
     for pump in fleet.drives() {
         pump.ready(Duration::from_secs(30)).await.map_err(|reason| format!("{}: {reason}", pump.name()))?;
     }
-    run_the_day(&fleet).await;
-
-    println!("the day is over, all stop: {}", fleet.stop_all(StopMode::Ramp).await);
+    // Heard at any moment, also while a pump comes down its ramp.
+    let end = tokio::select! {
+        () = run_the_day(&fleet) => "the day is over",
+        _ = tokio::signal::ctrl_c() => "Ctrl-C",
+    };
+    println!("{end}, all stop: {}", fleet.stop_all(StopMode::Ramp).await);
     fleet.shutdown(Duration::from_secs(30)).await;
     line.close().await;
     Ok(())
 }
 
-/// Follows the demand until the day is over or somebody presses Ctrl-C.
+/// Follows the demand until the day is over.
 async fn run_the_day(fleet: &Fleet) {
     let mut events = fleet.events();
     let mut healthy = fleet.drives();
@@ -59,7 +64,6 @@ async fn run_the_day(fleet: &Fleet) {
     let mut demand = DEMAND[0];
     loop {
         tokio::select! {
-            _ = tokio::signal::ctrl_c() => return,
             _ = clock.tick() => match hours.next() {
                 Some(next) => demand = next,
                 None => return,
@@ -91,8 +95,9 @@ async fn share(healthy: &[DriveHandle], demand: u16) {
             pump.set_setpoint(each).await
         } else {
             println!("  {} joins", pump.name());
-            pump.set_setpoint(each).await;
-            pump.start(Direction::Forward).await
+            // One order: no start at whatever the pump was given before.
+            let setpoint = Some(each.into());
+            pump.order(Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce }).await
         };
         if !outcome.is_confirmed() {
             println!("  {}: {outcome}", pump.name());
