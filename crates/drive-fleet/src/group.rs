@@ -164,6 +164,12 @@ impl Group {
     /// The report comes when every drive stands or its time is over; a drive that does not answer is named after the time
     /// that its line's plan gives. Stops that are not confirmed go on being repeated.
     pub async fn stop(&self, mode: StopMode) -> StopReport {
+        self.stop_each(mode, false).await
+    }
+
+    /// Stops every drive of the group; `anyhow`: a stop in another mode that is under way does as well, and no broadcast
+    /// comes over it.
+    async fn stop_each(&self, mode: StopMode, anyhow: bool) -> StopReport {
         let mut report = StopReport::default();
         let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
             self.members.iter().cloned().partition(|member| member.entry.control);
@@ -171,7 +177,8 @@ impl Group {
         let mut stops = Vec::new();
         for (number, line) in self.fleet.lines().iter().enumerate() {
             let members = members.iter().filter(|member| member.entry.line == number);
-            stops.push(stop_line(line, self.common_write(number, mode), members.cloned().collect(), mode));
+            let write = self.common_write(number, mode).filter(|_| !anyhow);
+            stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow));
         }
         for (broadcast, outcomes) in join_all(stops).await {
             report.broadcasts.extend(broadcast);
@@ -293,8 +300,9 @@ impl Group {
         if outcomes.is_empty() {
             return Ok(());
         }
-        // A drive whose start is uncertain is among those that are stopped.
-        let stopped = Box::pin(self.stop(StopMode::Ramp)).await;
+        // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
+        // perhaps by its freewheel, is not slowed down by this.
+        let stopped = Box::pin(self.stop_each(StopMode::Ramp, true)).await;
         Err(GroupFailure::Failed { outcomes, stopped })
     }
 }
@@ -305,6 +313,7 @@ async fn stop_line(
     write: Option<BroadcastWrite>,
     members: Vec<DriveHandle>,
     mode: StopMode,
+    anyhow: bool,
 ) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
     let broadcast = async {
         match write {
@@ -315,13 +324,18 @@ async fn stop_line(
     let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
     let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
     let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
-    let stops: Vec<_> = members.into_iter().map(|member| stop_one(member, mode, patience)).collect();
+    let stops: Vec<_> = members.into_iter().map(|member| stop_one(member, mode, anyhow, patience)).collect();
     // Both at once: the broadcast is first on the line, and no start of before can come behind it.
     join(broadcast, join_all(stops)).await
 }
 
-async fn stop_one(member: DriveHandle, mode: StopMode, patience: Duration) -> (Arc<str>, Outcome) {
-    let outcome = member.stop_within(mode, Some(patience)).await;
+async fn stop_one(
+    member: DriveHandle,
+    mode: StopMode,
+    anyhow: bool,
+    patience: Duration,
+) -> (Arc<str>, Outcome) {
+    let outcome = member.stop_within(mode, anyhow, Some(patience)).await;
     (Arc::clone(member.name()), outcome)
 }
 

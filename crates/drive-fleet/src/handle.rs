@@ -166,13 +166,18 @@ impl DriveHandle {
     ///
     /// The outcome comes at standstill, or when the time of the settings is over: the stop goes on being repeated then.
     pub async fn stop(&self, mode: StopMode) -> Outcome {
-        self.stop_within(mode, None).await
+        self.stop_within(mode, false, None).await
     }
 
-    pub(crate) async fn stop_within(&self, mode: StopMode, patience: Option<Duration>) -> Outcome {
+    pub(crate) async fn stop_within(
+        &self,
+        mode: StopMode,
+        anyhow: bool,
+        patience: Option<Duration>,
+    ) -> Outcome {
         let (reply, outcome) = oneshot::channel();
         let name = Arc::clone(&self.commander);
-        if self.entry.urgent.send(Urgent::Stop { mode, name, patience, reply }).is_err() {
+        if self.entry.urgent.send(Urgent::Stop { mode, anyhow, name, patience, reply }).is_err() {
             return Outcome::Refused(Refused::ShutDown);
         }
         outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown))

@@ -166,7 +166,8 @@ pub enum OnExit {
     Stop(StopMode),
     /// As [`Stop`](Self::Stop), and at standstill control is given back to the panel or the terminals.
     Release(StopMode),
-    /// It is left as it is. Its own watchdog acts, if it is armed.
+    /// It is left as it is, unless a stop of it is under way: that is repeated until it is confirmed. Its own watchdog
+    /// acts, if it is armed.
     Leave,
 }
 

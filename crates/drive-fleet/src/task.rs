@@ -35,6 +35,8 @@ pub(crate) enum Urgent {
     /// A stop.
     Stop {
         mode: StopMode,
+        /// A stop in another mode that is under way does as well.
+        anyhow: bool,
         name: Arc<str>,
         /// Until its lack of confirmation is an alarm; `None`: as the settings say.
         patience: Option<Duration>,
@@ -180,13 +182,13 @@ impl Desk {
     fn handle_urgent(&mut self, message: Urgent) -> bool {
         let now = Instant::now();
         match message {
-            Urgent::Stop { mode, name, patience, reply } => {
+            Urgent::Stop { mode, anyhow, name, patience, reply } => {
                 // A stop may be pending for hours; only those who still wait for it are kept.
                 self.callers.retain(|_, caller| !caller.is_closed());
                 let callers = &self.callers;
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
                 let asker = self.caller(name, reply);
-                self.supervisor.handle_stop(now, asker, mode, patience)
+                self.supervisor.handle_stop(now, asker, mode, anyhow, patience)
             }
             Urgent::Exit => self.supervisor.handle_exit(now),
             Urgent::ExitTimeOver => {

@@ -1,5 +1,6 @@
 //! The exit: each drive's policy acts (rule 8).
 
+use drive_core::StopMode;
 use tokio::time::Instant;
 
 use super::{Asker, Supervisor, orders::Queued};
@@ -34,13 +35,19 @@ impl Supervisor {
             return false;
         }
         self.refuse_queue();
-        let started = self.started_here || self.is_starting() || self.stopping.is_some();
+        let started = self.started_here || self.is_starting();
+        // Rule 1 ends with its confirmation, whatever the policy.
+        let stopping = self.stopping.is_some();
         let policy = self.settings.on_exit;
         match policy {
             _ if !self.settings.control => self.exit_done(ExitAction::Left),
-            OnExit::Stop(mode) | OnExit::Release(mode) if started => {
+            OnExit::Stop(mode) | OnExit::Release(mode) if started || stopping => {
                 self.exit = Exit::Stopping { release: matches!(policy, OnExit::Release(_)) };
-                self.begin_stop(now, Asker::Exit, mode, self.settings.times.stop_alarm);
+                self.stop_by_policy(now, Asker::Exit, mode);
+            }
+            OnExit::Leave if stopping => {
+                self.exit = Exit::Stopping { release: false };
+                self.stop_by_policy(now, Asker::Exit, StopMode::Ramp);
             }
             OnExit::Release(_) if self.stands() => self.exit = Exit::Release,
             OnExit::Stop(_) | OnExit::Release(_) | OnExit::Leave => self.exit_done(ExitAction::Left),

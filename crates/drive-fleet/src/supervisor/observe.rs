@@ -81,7 +81,7 @@ impl Supervisor {
             && self.settings.control
             && let OnLoss::Stop(mode) = self.settings.on_loss
         {
-            self.begin_stop(now, Asker::Policy("on loss"), mode, self.settings.times.stop_alarm);
+            self.stop_by_policy(now, Asker::Policy("on loss"), mode);
         }
         self.judge_stop(now);
         self.judge_order(now);

@@ -69,24 +69,34 @@ fn usable(capabilities: &Capabilities, asked: StopMode) -> StopMode {
 }
 
 impl Supervisor {
-    /// Somebody wants the drive stopped. Gives whether the job in flight has to be dropped for it.
+    /// Somebody wants the drive stopped, `anyhow` if a stop in another mode that is under way does as well. Gives whether
+    /// the job in flight has to be dropped for it.
     pub(crate) fn handle_stop(
         &mut self,
         now: Instant,
         asker: Asker,
         mode: StopMode,
+        anyhow: bool,
         patience: Option<Duration>,
     ) -> bool {
         if !self.settings.control {
             self.conclude(asker, drive_core::Command::Stop(mode), Outcome::Refused(Refused::ReadOnly));
             return false;
         }
+        let mode = self.stopping.as_ref().filter(|_| anyhow).map_or(mode, |stopping| stopping.mode);
         self.begin_stop(now, asker, mode, patience.unwrap_or(self.settings.times.stop_alarm));
         match self.in_flight {
             Some(Job::Stop(mode)) => self.stopping.as_ref().is_some_and(|stopping| stopping.mode != mode),
             Some(_) => true,
             None => false,
         }
+    }
+
+    /// Stops for a policy. A stop that is under way keeps its mode: whoever asked for it may have wanted it faster than
+    /// the settings do.
+    pub(super) fn stop_by_policy(&mut self, now: Instant, asker: Asker, mode: StopMode) {
+        let mode = self.stopping.as_ref().map_or(mode, |stopping| stopping.mode);
+        self.begin_stop(now, asker, mode, self.settings.times.stop_alarm);
     }
 
     pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, asked: StopMode, patience: Duration) {

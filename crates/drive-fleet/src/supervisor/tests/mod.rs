@@ -241,7 +241,7 @@ impl Rig {
 
     fn stop(&mut self, mode: StopMode) -> CallId {
         let asker = self.asker();
-        if self.machine.handle_stop(self.now, asker, mode, None) {
+        if self.machine.handle_stop(self.now, asker, mode, false, None) {
             self.machine.handle_dropped();
         }
         CallId(self.next_call)

@@ -9,7 +9,7 @@ fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
     let waiting = rig.order(Order::Persist);
     let asker = rig.asker();
-    assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, None));
+    assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, false, None));
     rig.machine.handle_dropped();
     let stop = CallId(rig.next_call);
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
@@ -97,6 +97,52 @@ fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
             assert_eq!(rig.drive.writes(), []);
         }
     }
+}
+
+/// A drive that runs, and a stop along no ramp that has not reached it yet.
+fn unheard(mode: StopMode) -> Rig {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.stop(mode);
+    rig.pass(500 * MS);
+    rig
+}
+
+#[test]
+fn a_stop_under_way_keeps_its_mode_whatever_policy_or_group_stops_the_drive_besides() {
+    let mode = StopMode::Freewheel;
+    for policy in [OnExit::Stop(StopMode::Ramp), OnExit::Release(StopMode::Ramp), OnExit::Leave] {
+        let mut rig = unheard(mode);
+        rig.machine.settings.on_exit = policy;
+        rig.machine.handle_exit(rig.now);
+        rig.machine.handle_dropped();
+        rig.pass(1_000 * MS);
+        assert_eq!(rig.machine.exit_action(), None, "{policy:?}: the stop goes on");
+        rig.drive.failing = None;
+        rig.pass(5_000 * MS);
+        assert!(rig.machine.exit_action().is_some() && rig.drive.status.is_standstill(), "{policy:?}");
+        let stops = rig.drive.writes();
+        assert!(
+            stops.iter().all(|job| matches!(job, Job::Stop(StopMode::Freewheel) | Job::Release)),
+            "{stops:?}"
+        );
+    }
+
+    let mut rig = unheard(mode);
+    let asker = rig.asker();
+    rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, true, None);
+    rig.drive.failing = None;
+    rig.pass(1_000 * MS);
+    assert!(rig.drive.writes().iter().all(|job| *job == Job::Stop(mode)));
+
+    let mut rig = unheard(mode);
+    rig.drive.failing = None;
+    rig.stop(StopMode::Ramp);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.drive.writes().last(), Some(&Job::Stop(StopMode::Ramp)), "who stops anew says how");
 }
 
 #[test]
