@@ -70,11 +70,13 @@ impl Order {
 pub enum Outcome {
     /// The drive's own words show it.
     Confirmed,
-    /// It was sent and the drive's own words do not show it.
+    /// It was sent and the drive's own words do not show it. A run command may still take effect later, so that a start
+    /// is taken back by a ramp stop, which is repeated until it is confirmed.
     NotConfirmed(Unconfirmed),
     /// Its lifetime ran out before it was sent. It never will be.
     Expired,
-    /// It was sent, an answer was lost, and the drive could not be asked in time what became of it.
+    /// It was sent, an answer was lost, and the drive could not be asked in time what became of it. A start is taken back
+    /// as above.
     OutcomeUnknown(Error),
     /// It was refused; nothing moved because of it.
     Refused(Refused),

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use drive_core::{
-    Control, Direction, Error, ErrorKind, Measurements, PortError, Result, Setpoint, State, Status,
+    Control, Direction, Error, ErrorKind, Measurements, PortError, Result, Setpoint, State, Status, StopMode,
 };
 use tokio::time::Instant;
 
 use super::{
-    Job, Supervisor,
+    Asker, Job, Supervisor,
     orders::{Active, Phase},
 };
 use crate::{
@@ -174,7 +174,18 @@ impl Supervisor {
             }
             _ => return,
         };
+        let start = matches!(active.phase, Phase::Verifying { job: Job::Start(_), .. });
         self.end_order(outcome);
+        if start {
+            self.withdraw_start(now);
+        }
+    }
+
+    /// A run command whose effect has not shown may still stand in the drive, or on its way there, and turn the motor when
+    /// nobody expects it any more. A stop takes it back.
+    fn withdraw_start(&mut self, now: Instant) {
+        let by = Asker::Policy("start not confirmed");
+        self.begin_stop(now, by, StopMode::Ramp, self.settings.times.stop_alarm);
     }
 }
 

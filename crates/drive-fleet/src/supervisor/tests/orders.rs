@@ -35,26 +35,34 @@ fn a_start_whose_answer_was_lost_is_read_back_and_confirmed() {
 }
 
 #[test]
-fn a_start_that_the_drive_denies_is_not_confirmed_and_not_repeated() {
+fn a_start_that_the_drive_denies_is_not_confirmed_not_repeated_and_taken_back_by_a_stop() {
     let mut rig = Rig::ready();
     rig.drive.loses_answer = true;
     rig.drive.obeys = false;
     let id = rig.order(START);
     rig.pass(8_000 * MS);
     assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(Unconfirmed::Denied(_)))));
-    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)]);
+    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward), Job::Stop(StopMode::Ramp)]);
 }
 
 #[test]
-fn a_start_whose_drive_goes_mute_has_an_unknown_outcome() {
+fn a_start_whose_drive_goes_mute_has_an_unknown_outcome_and_the_drive_is_stopped_when_it_is_back() {
     let mut rig = Rig::ready();
     let id = rig.order(START);
     rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
     rig.pass(8_000 * MS);
     assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(id));
+    assert!(rig.machine.snapshot().stop.is_some());
     rig.drive.failing = None;
     rig.pass(20_000 * MS);
-    assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)], "nothing is replayed");
+    let (start, stops) =
+        rig.drive.writes().split_first().map(|(first, rest)| (*first, rest.to_vec())).unwrap();
+    assert_eq!(start, Job::Start(Direction::Forward));
+    assert!(
+        !stops.is_empty() && stops.iter().all(|job| *job == Job::Stop(StopMode::Ramp)),
+        "nothing is replayed"
+    );
+    assert_eq!(rig.machine.snapshot().stop, None);
 }
 
 #[test]
