@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use drive_core::{Direction, Frequency, SerialSettings, StopMode};
 use drive_families::Family;
-use drive_fleet::{DriveSettings, GroupStart, Periods, Received, Until};
+use drive_fleet::{DriveSettings, GroupStart, Link, Periods, Received, Until};
 use support::plant::{Plant, Site, common_settings, contract};
 use tokio::time::{Instant, sleep};
 
@@ -151,7 +151,16 @@ async fn a_stop_of_31_running_drives_of_mixed_families_stops_the_living_in_the_b
     assert_eq!(unconfirmed, mute, "{report}");
     assert_eq!(report.broadcasts, [], "the families do not share a broadcast");
 
-    // The stops of the mute go on until they are heard.
+    // The stops of the mute go on until they are heard, and the living are seen and fed meanwhile.
+    let drives = plant.fleet.drives();
+    for _ in 0..60 {
+        sleep(SECOND).await;
+        for drive in drives.iter().filter(|drive| !mute.contains(&drive.name().to_string())) {
+            let snapshot = drive.snapshot();
+            assert_eq!(snapshot.link, Link::Connected, "{}", drive.name());
+            assert!(snapshot.trips.is_empty(), "{}: {:?}", drive.name(), snapshot.trips);
+        }
+    }
     for name in &mute {
         plant.machine_of(name).unmute();
         plant.drive(name).wait_until(|snapshot| snapshot.stop.is_none()).await;

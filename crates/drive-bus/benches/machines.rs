@@ -68,8 +68,11 @@ fn schedule(criterion: &mut Criterion) {
     criterion.bench_function("schedule: one choice among 1000 requests", |bench| {
         bench.iter_batched_ref(
             full,
-            |schedule| match schedule.choose(now, |_| Readiness { at: now, takes: Duration::from_millis(20) })
-            {
+            |schedule| match schedule.choose(now, |_| Readiness {
+                at: now,
+                takes: Duration::from_millis(20),
+                holds_line: false,
+            }) {
                 Choice::Send(entry) => entry.work,
                 Choice::Wait(_) | Choice::Idle => 0,
             },

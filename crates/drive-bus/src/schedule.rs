@@ -1,7 +1,7 @@
 //! The schedule of a line: which request is sent next. Pure: time is an argument.
 //!
-//! - A **higher class** goes first. A Stop is never overtaken: while one waits, be it for its slave's pause, nothing starts
-//!   that could still be on the line when the pause is over.
+//! - A **higher class** goes first. A Stop is never overtaken, and while one waits, even for its slave's pause, nothing
+//!   else starts, except in front of one that has to [wait long](Readiness::holds_line).
 //! - **Inside a class** the earliest deadline goes first, fair among slaves: the second request of one slave waits until
 //!   every other slave has had its first.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
@@ -69,8 +69,10 @@ impl<T> Entry<T> {
 pub struct Readiness {
     /// Not before this.
     pub at: Instant,
-    /// The length of the exchange with the silence after it: the expected one, or the longest while a Stop waits.
+    /// Expected length of the exchange.
     pub takes: Duration,
+    /// Whether nothing else starts while it waits.
+    pub holds_line: bool,
 }
 
 /// What to do next.
@@ -140,10 +142,11 @@ impl<T> Schedule<T> {
         self.queued.iter().any(which)
     }
 
-    /// Since when a Stop waits, if one does.
+    /// Since when a Stop that `which` names waits, if one does.
     #[must_use]
-    pub fn first_stop(&self) -> Option<Instant> {
-        self.queued.iter().filter(|entry| entry.terms.class == Class::Stop).map(|entry| entry.arrived).min()
+    pub fn first_stop(&self, which: impl Fn(&Entry<T>) -> bool) -> Option<Instant> {
+        let stops = self.queued.iter().filter(|entry| entry.terms.class == Class::Stop && which(entry));
+        stops.map(|entry| entry.arrived).min()
     }
 
     /// Queues a request. Gives its ticket and what it replaces: everything that waits for the same slave with the same
@@ -255,30 +258,22 @@ impl<T> Schedule<T> {
             return Some(if only.at <= now { Best::Now(0) } else { Best::At(only.at) });
         }
         let all = || self.queued.iter().zip(&self.readiness).enumerate();
-        let next = |class: Class| {
-            all()
-                .filter(|(_, (entry, _))| entry.terms.class == class)
-                .map(|(_, (_, readiness))| readiness.at)
-                .min()
-        };
-        let stop_at = next(Class::Stop);
-        let may_start = |entry: &Entry<T>, readiness: &Readiness| {
-            let in_time =
-                entry.terms.class == Class::Stop || stop_at.is_none_or(|at| now + readiness.takes <= at);
-            readiness.at <= now && in_time
-        };
         let first = |class: Class| {
             all()
-                .filter(|(_, (entry, readiness))| entry.terms.class == class && may_start(entry, readiness))
+                .filter(|(_, (entry, readiness))| entry.terms.class == class && readiness.at <= now)
                 .min_by_key(|(_, (entry, _))| entry.rank)
                 .map(|(index, _)| Best::Now(index))
         };
         if let Some(stop) = first(Class::Stop) {
             return Some(stop);
         }
+        let held = self.readiness.iter().filter(|readiness| readiness.holds_line).map(|held| held.at);
+        if let Some(at) = held.min() {
+            return Some(Best::At(at));
+        }
         if self.since_aged + 1 >= AGED_TURN
             && let Some((index, _)) = all()
-                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && may_start(entry, readiness))
+                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
                 .min_by_key(|(_, (entry, _))| {
                     (entry.terms.class != Class::KeepAlive, entry.arrived, entry.ticket)
                 })
@@ -291,16 +286,16 @@ impl<T> Schedule<T> {
             return Some(background);
         }
         let best = all()
-            .filter(|(_, (entry, readiness))| may_start(entry, readiness))
+            .filter(|(_, (_, readiness))| readiness.at <= now)
             .min_by_key(|(_, (entry, _))| (Reverse(entry.terms.class), entry.rank));
         let Some((index, (entry, readiness))) = best else {
-            // What is ready and does not start waits for a Stop, whose time is among these.
-            let later = self.readiness.iter().map(|readiness| readiness.at).filter(|at| *at > now);
-            return later.min().map(Best::At);
+            return self.readiness.iter().map(|readiness| readiness.at).min().map(Best::At);
         };
         // What would still be on the line when a Command's pause is over does not start in front of it.
+        let command = all().filter(|(_, (entry, _))| entry.terms.class == Class::Command);
+        let command_at = command.map(|(_, (_, readiness))| readiness.at).min();
         if entry.terms.class < Class::Command
-            && let Some(at) = next(Class::Command).filter(|at| *at > now && *at < now + readiness.takes)
+            && let Some(at) = command_at.filter(|at| *at < now + readiness.takes)
         {
             return Some(Best::At(at));
         }

@@ -2,6 +2,8 @@
 
 mod support;
 
+use std::time::Duration;
+
 use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};
 use drive_core::{Class, Terms, serial::SerialSettings};
 use support::{MS, by_hand::ByHand};
@@ -187,6 +189,63 @@ fn while_a_stops_confirmation_waits_for_a_late_answer_the_other_watchdogs_are_fe
         line.answers(&request, &[3, 2, 0, 1]);
     }
     assert!(fed > 5, "{fed}");
-    // It is asked at the very moment.
-    assert_eq!(line.now, late_until);
+    // It is the next but one frame.
+    assert!(line.now >= late_until && line.now < late_until + 40 * MS);
+}
+
+#[test]
+fn stops_of_dead_drives_that_are_repeated_for_ever_take_a_fifth_of_the_line_together() {
+    let mut line = acquainted(config(), &[1, 2, 3, 9]);
+    for slave in 1..=3 {
+        line.ask(u32::from(slave), slave, STOP, stop());
+    }
+    line.ask(9, 9, READ, Terms::of(Class::KeepAlive));
+    let (mut fed, mut stops) = (Duration::ZERO, 0);
+    let until = line.now + Duration::from_secs(300);
+    while let Some(request) = line.next_sent(until) {
+        let begun = line.now;
+        if request[0] == 9 {
+            line.answers(&request, &[3, 2, 0, 1]);
+            fed += line.now - begun;
+        } else if request[1] == 6 {
+            stops += 1;
+        }
+        while let Some((caller, outcome)) = line.ended() {
+            match caller {
+                9 => line.ask(9, 9, READ, Terms::of(Class::KeepAlive)),
+                // Whoever asked for the stop asks again at once.
+                slave => {
+                    assert!(outcome.is_err());
+                    line.ask(slave, slave as u8, STOP, stop());
+                }
+            }
+        }
+    }
+    // Half a second each, and four times as much for the others.
+    assert!((110..=130).contains(&stops), "{stops}");
+    assert!(fed > Duration::from_secs(180), "{fed:?}");
+}
+
+#[test]
+fn the_stop_of_a_dead_drive_is_sent_as_soon_as_a_probe_finds_that_it_is_back() {
+    let mut line = acquainted(config(), &[1]);
+    line.ask(1, 1, STOP, stop());
+    let mut attempts = 0;
+    loop {
+        let request = line.sent();
+        if request[1] == 3 {
+            line.answers(&request, &[3, 2, 0, 1]);
+            break;
+        }
+        attempts += 1;
+        while line.ended().is_some() {
+            line.ask(1, 1, STOP, stop());
+        }
+        assert!(attempts < 20);
+    }
+    let back = line.now;
+    while line.ended().is_some() {}
+    line.ask(1, 1, STOP, stop());
+    assert_eq!(line.sent()[1], 6);
+    assert!(line.now - back <= config().silence());
 }

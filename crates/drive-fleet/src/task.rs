@@ -92,14 +92,10 @@ impl Task {
                     None => std::future::pending().await,
                 }
             });
-            let mut timer = pin!(async {
-                match until {
-                    Some(until) => sleep_until(until).await,
-                    None => std::future::pending().await,
-                }
-            });
+            let mut timer = pin!(passing(until));
             // A stop is looked at before everything else, an order before the answer of a poll.
             loop {
+                let alarm_at = desk.supervisor.stop_alarm_at().filter(|_| talking);
                 let drops = tokio::select! {
                     biased;
                     message = urgent.recv() => match message {
@@ -128,6 +124,12 @@ impl Task {
                         true
                     }
                     () = &mut timer => true,
+                    // A call may take long on a line with dead drives; who waits for a stop hears in time that it does.
+                    () = passing(alarm_at) => {
+                        desk.supervisor.handle_stop_alarm(Instant::now());
+                        desk.publish();
+                        continue;
+                    }
                 };
                 if drops || !talking {
                     desk.supervisor.handle_dropped();
@@ -139,6 +141,14 @@ impl Task {
                 drop(turn.take());
             }
         }
+    }
+}
+
+/// Until this time, and for ever when there is none.
+async fn passing(at: Option<Instant>) {
+    match at {
+        Some(at) => sleep_until(at).await,
+        None => std::future::pending().await,
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
 
-use super::{Flight, Job, Master, PROBE_REST, Purpose, link::Link};
+use super::{Flight, Job, Master, OFFLINE_STOP_REST, PROBE_REST, Purpose, link::Link};
 use crate::{
     answer,
     exchange::{Answer, Failure},
@@ -31,10 +31,14 @@ impl<C> Master<C> {
             }
             Err(failure) => self.note_failure(now, &flight, failure),
         }
+        let took = now.saturating_duration_since(flight.started);
         match flight.purpose {
             Purpose::Call(Some(entry)) => match result {
                 Ok(answer) => self.outcomes.push_back((entry.work.caller, Ok(answer))),
                 Err(failure) => {
+                    if entry.terms.class == Class::Stop && self.offline.contains(&slave) {
+                        self.offline_stop_at = Some(now + took * OFFLINE_STOP_REST);
+                    }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
                     });
@@ -43,7 +47,6 @@ impl<C> Master<C> {
             },
             Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
             Purpose::Probe => {
-                let took = now.saturating_duration_since(flight.started);
                 self.probe_free_at = Some(now + took * PROBE_REST);
             }
             Purpose::Settle => {

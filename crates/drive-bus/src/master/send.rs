@@ -7,11 +7,9 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{AGING, Flight, Job, Master, Purpose, Sent, Station, link::Link};
+use super::{AGING, Flight, Job, Master, Purpose, Sent, Station, link::Link, station::wants_settling};
 use crate::{
-    answer,
-    exchange::Exchange,
-    pdu,
+    answer, pdu,
     schedule::{Choice, Entry, Readiness},
 };
 
@@ -32,7 +30,9 @@ impl<C> Master<C> {
             return None;
         }
         let free_at = self.free_at();
-        let stop_at = self.schedule.first_stop().map(|since| self.stop_free_at(since));
+        let waits_long = |entry: &Entry<Job<C>>| self.waits_long(now, entry);
+        let stop_at =
+            self.schedule.first_stop(|entry| !waits_long(entry)).map(|since| self.stop_free_at(since));
         let probe = self.next_probe().filter(|_| stop_at.is_none());
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
@@ -57,41 +57,36 @@ impl<C> Master<C> {
     }
 
     fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Job<C>> {
-        let stop_waits = stop_at.is_some();
-        let Self { schedule, stations, config, last_slave, exchange, .. } = self;
+        let Self { schedule, stations, config, last_slave, exchange, offline_stop_at, .. } = self;
         schedule.choose(now, |entry| {
-            let mut at = stop_at.filter(|_| entry.terms.class == Class::Stop).unwrap_or(free_at);
+            let stop = entry.terms.class == Class::Stop;
+            let mut at = stop_at.filter(|_| stop).unwrap_or(free_at);
             if last_slave.is_some_and(|last| last != entry.slave) {
                 at += config.slave_change_gap;
             }
             let request = &entry.work.request;
-            let station = stations.get(&entry.slave);
-            if let Some(station) = station {
+            let mut takes = config.response_timeout;
+            let mut long = None;
+            if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
-                if entry.terms.class != Class::Stop || !entry.work.is_write {
-                    let kind =
-                        |request: &Request<'_>| exchange.kind_of_answer(request.function_code().value());
-                    at = at.max(station.late_until(kind(request)).unwrap_or(at));
-                    if wants_settling(exchange.as_ref(), entry) {
-                        at = at.max(station.late_until(kind(&station.harmless_read())).unwrap_or(at));
-                    }
-                }
+                long = station
+                    .held_until(exchange.as_ref(), entry, *offline_stop_at)
+                    .filter(|until| *until > now);
+                at = at.max(long.unwrap_or(at));
+                takes = station.timeout.typical();
             }
-            let (sent, answer) = (entry.work.pdu.len(), answer::likely_len(request));
-            let takes = if stop_waits {
-                let timeout = match station {
-                    _ if entry.slave == 0 => config.broadcast_turnaround,
-                    Some(station) => station.timeout.current(),
-                    None => config.response_timeout,
-                };
-                let pauses = config.silence() + config.slave_change_gap;
-                config.longest_exchange(sent, answer, timeout) + pauses
-            } else {
-                let response = station.map_or(config.response_timeout, |station| station.timeout.typical());
-                response + config.characters(config.request_len(sent) + config.answer_len(answer))
-            };
-            Readiness { at, takes }
+            let pdus = (entry.work.pdu.len(), answer::likely_len(request));
+            takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
+            Readiness { at, takes, holds_line: stop && long.is_none() }
         })
+    }
+
+    /// Whether a Stop has to wait for longer than its slave's pause, so that the line is free for others meanwhile.
+    fn waits_long(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
+        self.stations
+            .get(&entry.slave)
+            .and_then(|station| station.held_until(self.exchange.as_ref(), entry, self.offline_stop_at))
+            .is_some_and(|until| until > now)
     }
 
     /// When the silence before any request is over.
@@ -214,12 +209,4 @@ impl<C> Master<C> {
         self.exchange.handle_sent(end, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);
     }
-}
-
-/// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.
-fn wants_settling<C>(exchange: &dyn Exchange, entry: &Entry<Job<C>>) -> bool {
-    exchange.echo_is_unknown()
-        && !entry.work.settled
-        && entry.slave != 0
-        && answer::equals_its_request(&entry.work.request)
 }

@@ -2,12 +2,16 @@
 
 use std::{sync::Arc, time::Duration};
 
+use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
+use super::Job;
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
+    exchange::Exchange,
+    schedule::Entry,
     stats::SlaveStats,
     timeout::LearnedTimeout,
 };
@@ -106,6 +110,25 @@ impl Station {
         self.late.iter().filter(|late| late.kind == kind).map(|late| late.until).max()
     }
 
+    /// Until when this request waits, besides its slave's pause: a late answer could be taken for its own, or it is the
+    /// stop of a slave that is off-line. The write of a Stop to one that is not waits for neither.
+    pub(super) fn held_until<C>(
+        &self,
+        exchange: &dyn Exchange,
+        entry: &Entry<Job<C>>,
+        offline_stop_at: Option<Instant>,
+    ) -> Option<Instant> {
+        let stop = entry.terms.class == Class::Stop;
+        let offline = offline_stop_at.filter(|_| stop && self.offline.is_some());
+        let late =
+            |request: &Request<'_>| self.late_until(exchange.kind_of_answer(request.function_code().value()));
+        if stop && entry.work.is_write {
+            return offline;
+        }
+        let settling = wants_settling(exchange, entry).then(|| late(&self.harmless_read())).flatten();
+        [late(&entry.work.request), settling, offline].into_iter().flatten().max()
+    }
+
     /// Whether an answer of any kind may still come.
     pub(super) fn may_be_late(&self, now: Instant) -> bool {
         self.late.iter().any(|late| late.until > now)
@@ -163,4 +186,12 @@ impl Station {
             offline.probe_at = at;
         }
     }
+}
+
+/// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.
+pub(super) fn wants_settling<C>(exchange: &dyn Exchange, entry: &Entry<Job<C>>) -> bool {
+    exchange.echo_is_unknown()
+        && !entry.work.settled
+        && entry.slave != 0
+        && answer::equals_its_request(&entry.work.request)
 }

@@ -14,9 +14,11 @@ fn push(schedule: &mut Schedule<u32>, now: Instant, slave: u8, terms: Terms, wor
 
 /// What is chosen, one after the other, when every slave is ready.
 fn order(schedule: &mut Schedule<u32>, now: Instant) -> Vec<u32> {
-    std::iter::from_fn(|| match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS }) {
-        Choice::Send(entry) => Some(entry.work),
-        Choice::Wait(_) | Choice::Idle => None,
+    std::iter::from_fn(|| {
+        match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false }) {
+            Choice::Send(entry) => Some(entry.work),
+            Choice::Wait(_) | Choice::Idle => None,
+        }
     })
     .collect()
 }
@@ -112,8 +114,8 @@ fn background_gets_every_twentieth_turn_and_no_more() {
 fn a_pause_of_one_slave_is_spent_on_another_unless_a_command_would_wait_for_it() {
     let (mut schedule, now) = (schedule(), Instant::now());
     let readiness = |entry: &Entry<u32>| match entry.slave {
-        1 => Readiness { at: now + 5 * MS, takes: 20 * MS },
-        _ => Readiness { at: now, takes: 20 * MS },
+        1 => Readiness { at: now + 5 * MS, takes: 20 * MS, holds_line: false },
+        _ => Readiness { at: now, takes: 20 * MS, holds_line: false },
     };
     push(&mut schedule, now, 1, Terms::of(Class::Status), 1);
     push(&mut schedule, now, 2, Terms::of(Class::Background), 2);
@@ -126,28 +128,26 @@ fn a_pause_of_one_slave_is_spent_on_another_unless_a_command_would_wait_for_it()
     let long = |entry: &Entry<u32>| Readiness {
         at: if entry.slave == 1 { now + 50 * MS } else { now },
         takes: 20 * MS,
+        holds_line: false,
     };
     assert!(matches!(schedule.choose(now, long), Choice::Send(entry) if entry.work == 4));
 }
 
 #[test]
-fn while_a_stop_waits_for_its_slaves_pause_only_what_ends_before_it_starts() {
+fn nothing_starts_while_a_stop_holds_the_line_for_its_slaves_pause() {
     let (mut schedule, now) = (schedule(), Instant::now());
     push(&mut schedule, now, 1, Terms::of(Class::Stop), 1);
     push(&mut schedule, now, 2, Terms::of(Class::Command), 2);
-    push(&mut schedule, now, 3, Terms::of(Class::Status), 3);
     let pause = now + 500 * MS;
-    let readiness = |entry: &Entry<u32>| match entry.work {
-        1 => Readiness { at: pause, takes: MS },
-        2 => Readiness { at: now, takes: 501 * MS },
-        _ => Readiness { at: now, takes: 500 * MS },
+    let waits = |holds_line: bool| {
+        move |entry: &Entry<u32>| match entry.slave {
+            1 => Readiness { at: pause, takes: MS, holds_line },
+            _ => Readiness { at: now, takes: MS, holds_line: false },
+        }
     };
-    assert!(matches!(schedule.choose(now, readiness), Choice::Send(entry) if entry.work == 3));
-    push(&mut schedule, now, 3, Terms::of(Class::Status), 4);
-    let later = now + MS;
-    assert!(matches!(schedule.choose(later, readiness), Choice::Wait(at) if at == pause));
-    assert!(matches!(schedule.choose(pause, readiness), Choice::Send(entry) if entry.work == 1));
-    assert!(matches!(schedule.choose(pause, readiness), Choice::Send(entry) if entry.work == 2));
+    assert!(matches!(schedule.choose(now, waits(true)), Choice::Wait(at) if at == pause));
+    assert!(matches!(schedule.choose(now, waits(false)), Choice::Send(entry) if entry.work == 2));
+    assert!(matches!(schedule.choose(now, waits(false)), Choice::Wait(at) if at == pause));
 }
 
 #[test]
@@ -232,7 +232,7 @@ proptest! {
                     prop_assert!(key.is_none() || same_key.count() == 1, "a predecessor was left behind");
                 }
                 Event::Choose => {
-                    let stops = schedule.first_stop().is_some();
+                    let stops = schedule.first_stop(|_| true).is_some();
                     let background = schedule.any(|entry| entry.terms.class == Class::Background);
                     let oldest_of = |schedule: &Schedule<u32>, slave, class| {
                         let mut least = None;
@@ -248,7 +248,7 @@ proptest! {
                         .flat_map(|slave| Class::ALL.map(|class| (slave, class)))
                         .map(|(slave, class)| (slave, class, oldest_of(&schedule, slave, class)))
                         .collect();
-                    match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS }) {
+                    match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false }) {
                         Choice::Send(entry) => {
                             let class = entry.terms.class;
                             prop_assert!(!stops || class == Class::Stop, "a stop is overtaken");

@@ -313,6 +313,17 @@ impl Supervisor {
         }
     }
 
+    /// When a stop under way becomes an alarm or is over for those who wait for it, whatever is in flight.
+    pub(crate) fn stop_alarm_at(&self) -> Option<Instant> {
+        self.stopping.as_ref().and_then(Stopping::alarm_at)
+    }
+
+    /// [`stop_alarm_at`](Self::stop_alarm_at) has passed.
+    pub(crate) fn handle_stop_alarm(&mut self, now: Instant) {
+        self.changed = true;
+        self.check_stop_times(now);
+    }
+
     /// The job in flight was dropped: because the machine asked for it, or because its time was over.
     pub(crate) fn handle_dropped(&mut self) {
         self.in_flight = None;

@@ -54,8 +54,12 @@ impl Stopping {
     }
 
     pub(super) fn wake_at(&self) -> Option<Instant> {
+        self.alarm_at().into_iter().chain(self.next_try).min()
+    }
+
+    pub(super) fn alarm_at(&self) -> Option<Instant> {
         let waiters = self.waiters.iter().map(|waiter| waiter.until);
-        waiters.chain(self.next_try).chain(self.alarm_at).min()
+        waiters.chain(self.alarm_at).min()
     }
 }
 

@@ -222,9 +222,13 @@ impl Rig {
                 Step::Wait(at) => self.now = at.clamp(self.now + Duration::from_micros(1), until),
                 Step::Finished => self.now = until,
             }
-            while let Some(output) = self.machine.poll_output() {
-                self.outputs.push(output);
-            }
+            self.collect();
+        }
+    }
+
+    fn collect(&mut self) {
+        while let Some(output) = self.machine.poll_output() {
+            self.outputs.push(output);
         }
     }
 

@@ -159,3 +159,21 @@ fn the_exit_goes_on_stopping_a_mute_drive_until_its_own_limit() {
     rig.machine.handle_exit_time_over();
     assert_eq!(rig.machine.exit_action(), Some(&ExitAction::TimeOver));
 }
+
+#[test]
+fn a_stop_whose_call_takes_long_is_an_alarm_in_its_time() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    let id = rig.stop(StopMode::Ramp);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    let alarm_at = rig.machine.stop_alarm_at().expect("it waits for its confirmation");
+    rig.machine.handle_stop_alarm(alarm_at - MS);
+    rig.collect();
+    assert_eq!(rig.outcome(id), None);
+    rig.machine.handle_stop_alarm(alarm_at);
+    rig.collect();
+    assert!(rig.events().contains(&"stop unconfirmed"));
+    assert!(rig.outcome(id).is_some_and(|outcome| !outcome.is_confirmed()));
+    assert_eq!(rig.machine.stop_alarm_at(), None, "it is told once");
+}
