@@ -165,6 +165,9 @@ impl LineConfig {
     /// silences after it, and one foreign frame or as much noise. What the host itself adds, some tenths of a
     /// millisecond, comes on top; so does a port that takes no bytes, which counts as lost after a second.
     ///
+    /// A Stop that is **repeated** to a slave that is off-line may wait longer: all such repetitions together take a fifth of
+    /// the line.
+    ///
     /// With [`Echo::Auto`] it includes the one read that finds out about the echo, though that happens only before the
     /// first write after opening.
     #[must_use]

@@ -249,3 +249,27 @@ fn the_stop_of_a_dead_drive_is_sent_as_soon_as_a_probe_finds_that_it_is_back() {
     assert_eq!(line.sent()[1], 6);
     assert!(line.now - back <= config().silence());
 }
+
+#[test]
+fn the_first_stop_of_a_drive_that_is_off_line_waits_for_no_share() {
+    let mut line = ByHand::new(config());
+    for slave in [1, 2] {
+        line.ask(u32::from(slave), slave, READ, Terms::default());
+    }
+    while line.next_sent(line.now + 3_000 * MS).is_some() && line.master.stats(line.now).slaves[&2].sent < 4 {
+    }
+    while line.ended().is_some() {}
+    line.ask(1, 1, STOP, stop());
+    while line.sent()[..2] != [1, 6] {}
+    while line.ended().is_none_or(|(caller, _)| caller != 1) {
+        line.next_sent(line.now + 10 * MS);
+        line.now += 10 * MS;
+    }
+    // Slave 1 has had its stop in vain; slave 2, off-line as well, has had none.
+    let called = line.now;
+    line.ask(2, 2, STOP, stop());
+    line.ask(1, 1, STOP, stop());
+    let next = line.sent();
+    assert_eq!(next[..2], [2, 6]);
+    assert!(line.now - called <= config().worst_case_stop(8, 8));
+}

@@ -36,7 +36,7 @@ impl<C> Master<C> {
             Purpose::Call(Some(entry)) => match result {
                 Ok(answer) => self.outcomes.push_back((entry.work.caller, Ok(answer))),
                 Err(failure) => {
-                    if entry.terms.class == Class::Stop && self.offline.contains(&slave) {
+                    if entry.terms.class == Class::Stop && self.station(slave).stop_failed() {
                         self.offline_stop_at = Some(now + took * OFFLINE_STOP_REST);
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {

@@ -249,7 +249,8 @@ impl<C> Master<C> {
         for entry in overtaken {
             self.drop_unsent(entry, PortError::Superseded);
         }
-        if self.offline.contains(&slave) && self.offline_stop_at.is_some_and(|at| at > now) {
+        // A repetition that waits for its share of the line is worth no probe.
+        if self.station(slave).was_stopped_in_vain() && self.offline_stop_at.is_some_and(|at| at > now) {
             return;
         }
         let Some(flight) = self.flight.take_if(|flight| matches!(flight.purpose, Purpose::Probe)) else {

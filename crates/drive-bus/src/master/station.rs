@@ -52,6 +52,8 @@ struct Late {
 struct Offline {
     probe_at: Instant,
     backoff: Duration,
+    /// A Stop was sent to it in vain: the next is a repetition.
+    stopped_in_vain: bool,
 }
 
 impl Station {
@@ -110,8 +112,8 @@ impl Station {
         self.late.iter().filter(|late| late.kind == kind).map(|late| late.until).max()
     }
 
-    /// Until when this request waits, besides its slave's pause: a late answer could be taken for its own, or it is the
-    /// stop of a slave that is off-line. The write of a Stop to one that is not waits for neither.
+    /// Until when this request waits, besides its slave's pause: a late answer could be taken for its own, or it repeats
+    /// the stop of a slave that is off-line. The write of any other Stop waits for neither.
     pub(super) fn held_until<C>(
         &self,
         exchange: &dyn Exchange,
@@ -119,7 +121,7 @@ impl Station {
         offline_stop_at: Option<Instant>,
     ) -> Option<Instant> {
         let stop = entry.terms.class == Class::Stop;
-        let offline = offline_stop_at.filter(|_| stop && self.offline.is_some());
+        let offline = offline_stop_at.filter(|_| stop && self.was_stopped_in_vain());
         let late =
             |request: &Request<'_>| self.late_until(exchange.kind_of_answer(request.function_code().value()));
         if stop && entry.work.is_write {
@@ -127,6 +129,16 @@ impl Station {
         }
         let settling = wants_settling(exchange, entry).then(|| late(&self.harmless_read())).flatten();
         [late(&entry.work.request), settling, offline].into_iter().flatten().max()
+    }
+
+    /// A Stop to it failed. True: it is off-line.
+    pub(super) fn stop_failed(&mut self) -> bool {
+        self.offline.as_mut().map(|offline| offline.stopped_in_vain = true).is_some()
+    }
+
+    /// Whether a Stop to it would be a repetition, since it is off-line.
+    pub(super) fn was_stopped_in_vain(&self) -> bool {
+        self.offline.is_some_and(|offline| offline.stopped_in_vain)
     }
 
     /// Whether an answer of any kind may still come.
@@ -159,7 +171,8 @@ impl Station {
                 false
             }
             None if config.offline_after > 0 && self.failures >= config.offline_after => {
-                self.offline = Some(Offline { probe_at: now + first, backoff: first });
+                self.offline =
+                    Some(Offline { probe_at: now + first, backoff: first, stopped_in_vain: false });
                 self.stats.offline = true;
                 self.stats.went_offline += 1;
                 true
