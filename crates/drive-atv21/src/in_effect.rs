@@ -10,8 +10,8 @@ use drive_core::{Class, Error, ExceptionMeaning, Port, Result, Status, registers
 use crate::{
     Atv21, WriteBlock,
     blocks::{self, READ_BLOCK, ReadSlot, WriteSlot},
-    reading::FAST_SET,
     registers as map,
+    status::FAST_SET,
 };
 
 /// What is known of the read block.

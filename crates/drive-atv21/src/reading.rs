@@ -15,16 +15,13 @@ use crate::{
     faults::{FAULTS, alarms},
     in_effect::{self, ReadBlock},
     model::ModelEntry,
-    registers as map, status,
+    registers as map,
+    status::{self, FAST_SET},
     words::{
         Alarms, CommandSource, LogicInputs, LogicOutputs, MaintenanceAlarms, ReferenceSource, StatusWord,
         StatusWord2, StatusWord3,
     },
 };
-
-/// What control and safety need, the most important first.
-pub(crate) const FAST_SET: [Register<Read>; 3] =
-    [map::STATUS_WORD, map::OUTPUT_FREQUENCY, map::OUTPUT_CURRENT];
 
 /// What a trend wants to see.
 pub(crate) const SLOW_SET: [Register<Read>; 15] = [

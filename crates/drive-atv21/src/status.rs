@@ -1,11 +1,18 @@
 //! From words to a state: what FD01 says, in the terms that all families share.
 
-use drive_core::{Control, Frequency, Percent, RawWord, State, Status};
+use drive_core::{
+    Control, Frequency, Percent, RawWord, State, Status,
+    registers::{Register, access::Read},
+};
 
 use crate::{
     registers as map,
     words::{CommandSource, StatusWord},
 };
+
+/// What control and safety need, the most important first.
+pub(crate) const FAST_SET: [Register<Read>; 3] =
+    [map::STATUS_WORD, map::OUTPUT_FREQUENCY, map::OUTPUT_CURRENT];
 
 /// The state that a status word tells, with the output frequency where it is known.
 ///
