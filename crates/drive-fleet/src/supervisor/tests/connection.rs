@@ -22,6 +22,34 @@ fn a_running_drive_is_adopted_without_a_write() {
 }
 
 #[test]
+fn a_drive_may_go_from_any_state_to_any_other_by_itself() {
+    const STATES: [State; 9] = [
+        State::NotReady,
+        State::Disabled,
+        State::Ready,
+        State::Running,
+        State::Stopping,
+        State::QuickStop,
+        State::FaultReaction,
+        State::Fault,
+        State::Unknown,
+    ];
+    for from in STATES {
+        for to in STATES {
+            let mut rig = Rig::ready();
+            for state in [from, to] {
+                rig.drive.status.state = state;
+                rig.pass(3_000 * MS);
+                let snapshot = rig.machine.snapshot();
+                let status = snapshot.status.expect("it answers");
+                assert_eq!((status.value.state, snapshot.link), (state, Link::Connected), "{from} to {to}");
+            }
+            assert_eq!(rig.drive.writes(), [], "{from} to {to}");
+        }
+    }
+}
+
+#[test]
 fn a_drive_that_is_only_read_is_never_written() {
     let mut rig = Rig::new(DriveSettings { control: false, ..settings() });
     rig.drive.run();
