@@ -147,11 +147,7 @@ async fn nobody_starts_a_drive_that_is_in_forced_local_control() {
 async fn a_start_that_somebody_takes_back_at_the_drive_is_not_confirmed_and_not_given_again() {
     for panel in [Panel::TakeControl, Panel::Stop] {
         let (mut drive, machine, _line) = rig();
-        let taken_back = async {
-            machine.wait_until(|seen| seen.running).await;
-            machine.panel(panel);
-        };
-        let (started, ()) = tokio::join!(drive.start(Direction::Forward), taken_back);
+        let started = bench::start_taken_back(&mut drive, &machine, panel).await;
         assert_eq!(started.unwrap_err().kind(), ErrorKind::NotConfirmed, "{panel:?}");
         assert_eq!(commands(&machine).last(), Some(&15), "{panel:?}");
         assert_eq!(commands(&machine).iter().filter(|&&word| word == 15).count(), 1, "{panel:?}");

@@ -189,7 +189,7 @@ impl LineConfig {
     }
 
     /// How long an exchange with these PDUs takes at the most, when its answer has `timeout` to begin.
-    pub(crate) fn longest_exchange(&self, request: usize, answer: usize, timeout: Duration) -> Duration {
+    fn longest_exchange(&self, request: usize, answer: usize, timeout: Duration) -> Duration {
         let (request, answer) = (self.request_len(request), self.answer_len(answer));
         let overtime = match self.protocol {
             _ if self.is_mbap() => Duration::ZERO,

@@ -13,26 +13,13 @@ use drive_bus::{
     },
     protocol::{NetworkHeader, UniTelwaySettings},
 };
-use drive_core::{
-    Class,
-    serial::{CharacterFormat, SerialSettings},
-};
+use drive_core::Class;
 use support::{
     MS,
     script::{PATIENCE, Script},
+    unitelway::{ACK, EOT, NAK, READ, WRITE, WRITTEN, serial},
 };
 use tokio_modbus::{ExceptionCode, Request, Response};
-
-const ACK: &[u8] = &[0x06];
-const NAK: &[u8] = &[0x15];
-const EOT: &[u8] = &[0x04];
-const READ: Request<'static> = Request::ReadHoldingRegisters(400, 1);
-const WRITE: Request<'static> = Request::WriteSingleRegister(400, 6);
-const WRITTEN: Response = Response::WriteSingleRegister(400, 6);
-
-fn serial() -> SerialSettings {
-    SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap()
-}
 
 fn script(settings: UniTelwaySettings) -> Script<UniTelway> {
     Script::new(UniTelway::new(serial(), settings, 20 * MS))

@@ -12,24 +12,13 @@ use drive_bus::{
     protocol::UniTelwaySettings,
     unite::{SpecificCommand, SpecificReport, UniTeError},
 };
-use drive_core::{
-    Class, Port, PortError, Terms,
-    serial::{CharacterFormat, SerialSettings},
+use drive_core::{Class, Port, PortError, Terms};
+use support::{
+    MS,
+    unitelway::{ACK, EOT, NAK, READ, WRITE, WRITTEN, serial},
 };
-use support::MS;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
-use tokio_modbus::{Request, Response, client::Client};
-
-const ACK: &[u8] = &[0x06];
-const NAK: &[u8] = &[0x15];
-const EOT: &[u8] = &[0x04];
-const READ: Request<'static> = Request::ReadHoldingRegisters(400, 1);
-const WRITE: Request<'static> = Request::WriteSingleRegister(400, 6);
-const WRITTEN: Response = Response::WriteSingleRegister(400, 6);
-
-fn serial() -> SerialSettings {
-    SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap()
-}
+use tokio_modbus::client::Client;
 
 /// A reply of slave 1 with the standard header.
 fn reply(unite: &[u8]) -> Bytes {

@@ -1,8 +1,8 @@
 //! One simulated drive at address 1 of a line, in virtual time.
 
 use drive_bus::{Line, LineConfig, Slave, SlaveSettings};
-use drive_core::{BroadcastWrite, Capabilities, Direction, Drive, Frequency, SlaveAddress};
-use drive_sim::{Model, SimLine, SimSlave, Wiring};
+use drive_core::{BroadcastWrite, Capabilities, Direction, Drive, Frequency, Result, SlaveAddress, Status};
+use drive_sim::{Model, Panel, SimLine, SimSlave, Wiring};
 use tokio_modbus::{Request, client::Client};
 
 /// An address of a slave.
@@ -40,6 +40,20 @@ pub async fn run_at_fifty(drive: &mut impl Drive, machine: &SimSlave) {
     drive.set_setpoint(Frequency::from_hertz(50).into()).await.expect("it takes 50 Hz");
     drive.start(Direction::Forward).await.expect("it starts");
     machine.wait_until(|seen| seen.output_frequency == 5_000).await;
+}
+
+/// Starts a drive forward, and has somebody at its panel take the start back as soon as the machine runs; how the start
+/// ends.
+///
+/// # Errors
+/// The start's.
+pub async fn start_taken_back(drive: &mut impl Drive, machine: &SimSlave, panel: Panel) -> Result<Status> {
+    let taken_back = async {
+        machine.wait_until(|seen| seen.running).await;
+        machine.panel(panel);
+    };
+    let (started, ()) = tokio::join!(drive.start(Direction::Forward), taken_back);
+    started
 }
 
 /// The words that were written to a register, in order.

@@ -69,9 +69,7 @@ impl<C> Master<C> {
             let mut long = None;
             if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
-                long = station
-                    .held_until(exchange.as_ref(), entry, *offline_stop_at)
-                    .filter(|until| *until > now);
+                long = station.held_until(now, exchange.as_ref(), entry, *offline_stop_at);
                 at = at.max(long.unwrap_or(at));
                 takes = station.timeout.typical();
             }
@@ -83,10 +81,9 @@ impl<C> Master<C> {
 
     /// Whether a Stop has to wait for longer than its slave's pause, so that the line is free for others meanwhile.
     fn waits_long(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
-        self.stations
-            .get(&entry.slave)
-            .and_then(|station| station.held_until(self.exchange.as_ref(), entry, self.offline_stop_at))
-            .is_some_and(|until| until > now)
+        self.stations.get(&entry.slave).is_some_and(|station| {
+            station.held_until(now, self.exchange.as_ref(), entry, self.offline_stop_at).is_some()
+        })
     }
 
     /// When the silence before any request is over.
@@ -140,10 +137,12 @@ impl<C> Master<C> {
 
     /// Whether no late answer can be taken for that of the read that finds out about the echo. Only a Stop comes here
     /// while one can: it is sent as it is, and asks before its next attempt.
-    fn may_settle(&mut self, now: Instant, slave: u8) -> bool {
-        let read = self.station(slave).harmless_read();
-        let kind = self.exchange.kind_of_answer(read.function_code().value());
-        self.station(slave).late_until(kind).is_none_or(|until| until <= now)
+    fn may_settle(&self, now: Instant, slave: u8) -> bool {
+        let late_until = self
+            .stations
+            .get(&slave)
+            .and_then(|station| station.late_until(self.exchange.as_ref(), &station.harmless_read()));
+        late_until.is_none_or(|until| until <= now)
     }
 
     fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {

@@ -107,28 +107,31 @@ impl Station {
         self.late.push(Late { kind, until, over_a_lost_port });
     }
 
-    /// Until when a request with answers of this kind must wait, because a late answer could be taken for its own.
-    pub(super) fn late_until(&self, kind: u8) -> Option<Instant> {
+    /// Until when this request must wait, because a late answer could be taken for its own.
+    pub(super) fn late_until(&self, exchange: &dyn Exchange, request: &Request<'_>) -> Option<Instant> {
+        let kind = exchange.kind_of_answer(request.function_code().value());
         self.late.iter().filter(|late| late.kind == kind).map(|late| late.until).max()
     }
 
-    /// Until when this request waits, besides its slave's pause: a late answer could be taken for its own, or it repeats
-    /// the stop of a slave that is off-line. The write of any other Stop waits for neither.
+    /// Until when this request still waits, besides its slave's pause: a late answer could be taken for its own, or it
+    /// repeats the stop of a slave that is off-line. The write of any other Stop waits for neither.
     pub(super) fn held_until<C>(
         &self,
+        now: Instant,
         exchange: &dyn Exchange,
         entry: &Entry<Job<C>>,
         offline_stop_at: Option<Instant>,
     ) -> Option<Instant> {
         let stop = entry.terms.class == Class::Stop;
         let offline = offline_stop_at.filter(|_| stop && self.was_stopped_in_vain());
-        let late =
-            |request: &Request<'_>| self.late_until(exchange.kind_of_answer(request.function_code().value()));
-        if stop && entry.work.is_write {
-            return offline;
-        }
-        let settling = wants_settling(exchange, entry).then(|| late(&self.harmless_read())).flatten();
-        [late(&entry.work.request), settling, offline].into_iter().flatten().max()
+        let (late, settling) = if stop && entry.work.is_write {
+            (None, None)
+        } else {
+            let settling = wants_settling(exchange, entry).then(|| self.harmless_read());
+            let late = |request: &Request<'_>| self.late_until(exchange, request);
+            (late(&entry.work.request), settling.and_then(|read| late(&read)))
+        };
+        [late, settling, offline].into_iter().flatten().max().filter(|until| *until > now)
     }
 
     /// A Stop to it failed. True: it is off-line.

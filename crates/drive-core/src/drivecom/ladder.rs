@@ -17,6 +17,7 @@ use crate::{
 /// How often the status is read for a command to show before it counts as not confirmed. There is no clock here: the
 /// line's own pace makes a time of it.
 pub const CONFIRMING_READS: usize = 20;
+
 /// After how many readings that do not show a stop it is written again.
 const READS_PER_STOP: usize = 5;
 
