@@ -1,7 +1,8 @@
 //! Parameters, and their way to the EEPROM.
 
 use drive_core::{
-    Class, Command as Order, Error, ErrorKind, Port, Refusal, Result, Row, Written, registers::Storage,
+    Class, Command as Order, Error, ErrorKind, Port, Refusal, Result, Row, Written,
+    registers::{Storage, refuse_commands},
 };
 
 use crate::{
@@ -32,12 +33,7 @@ impl Eeprom {
 
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        if [COMMAND.address(), REFERENCE.address()].contains(&row.address) {
-            return Err(Error::Unsupported {
-                what: "writing a command as a parameter",
-                reason: "start, stop, reset and setpoint check the drive first; use them",
-            });
-        }
+        refuse_commands(row, &[COMMAND.address(), REFERENCE.address()])?;
         if row.address == ENTER.address() {
             return Err(Error::Unsupported {
                 what: "writing ENTER as a parameter",

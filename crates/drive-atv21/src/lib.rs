@@ -37,7 +37,7 @@ use drive_core::{
     BroadcastWrite, Capabilities, Class, Command, Direction, Drive, Error, ExceptionMeaning, Faults,
     Frequency, Identity, Lifetimes, Measurements, Port, Reaction, Refusal, Registers, Result, Row,
     SerialSettings, Setpoint, SlaveAddress, Status, StopMode, Watchdog, WatchdogCapability, Written,
-    serial::CharacterFormat,
+    registers::refuse_commands, serial::CharacterFormat,
 };
 
 use crate::{blocks::WriteSlot, in_effect::ReadBlock};
@@ -315,7 +315,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// Also [`Unsupported`](drive_core::Error::Unsupported) for FA00, FA20, FA01 and FA13, which have methods of their
     /// own.
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        settings::check_parameter(row)?;
+        refuse_commands(row, &settings::COMMANDS)?;
         self.change_parameter(row, word, Command::WriteParameter(row.address)).await
     }
 

@@ -21,8 +21,12 @@ const STALL_LEVEL: Command = Command::Configure("stall level");
 const ENERGY_RESET: Command = Command::Configure("energy reset");
 
 /// What orders the drive: each has methods that check the drive first.
-const COMMANDS: [Register<ReadWrite>; 4] =
-    [map::COMMAND_WORD, map::COMMAND_WORD_2, map::FREQUENCY_REFERENCE, map::SPEED_REFERENCE];
+pub(crate) const COMMANDS: [u16; 4] = [
+    map::COMMAND_WORD.address(),
+    map::COMMAND_WORD_2.address(),
+    map::FREQUENCY_REFERENCE.address(),
+    map::SPEED_REFERENCE.address(),
+];
 
 /// From which current on the drive limits it (Altivar 21 Modbus §8.4, p. 32).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -31,17 +35,6 @@ pub enum StallLevel {
     Oc1,
     /// OC2, the parameter F185.
     Oc2,
-}
-
-/// Refuses a register that commands the drive: written as a parameter it would move the motor past every check.
-pub(crate) fn check_parameter(row: &Row) -> Result<()> {
-    if COMMANDS.iter().any(|command| command.address() == row.address) {
-        return Err(Error::Unsupported {
-            what: "writing a command as a parameter",
-            reason: "start, stop, reset and setpoint check the drive first; use them",
-        });
-    }
-    Ok(())
 }
 
 /// Whether it chooses what a place of a block holds: F870, F871, F875 to F879.

@@ -2,6 +2,7 @@
 
 use drive_core::{
     Class, Error, Frequency, Port, Result, Row, Setpoint, SetpointProblem, Speed, Written, drivecom,
+    registers::refuse_commands,
 };
 
 use crate::{
@@ -70,7 +71,7 @@ impl<P: Port> Atv28<P> {
 
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
         let commands = [CMD.address(), CMDD.address(), LFR.address(), LFRD.address()];
-        drivecom::refuse_commands(row, &commands)?;
+        refuse_commands(row, &commands)?;
         if row.address == CMI.address() {
             return Err(Error::Unsupported {
                 what: "writing CMI as a parameter",

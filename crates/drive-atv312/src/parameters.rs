@@ -5,8 +5,8 @@ use std::time::Duration;
 use drive_core::{
     Class, Command, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog, WatchdogCapability,
     Written,
-    drivecom::{self, CONFIRMING_READS},
-    registers::{Access, Storage},
+    drivecom::CONFIRMING_READS,
+    registers::{Access, Storage, refuse_commands},
 };
 
 use crate::{
@@ -172,7 +172,7 @@ fn refuse_orders(row: &Row, word: u16) -> Result<()> {
         "saving to EEPROM by a parameter",
         "a save to EEPROM is counted and refused when nothing changed; use it",
     );
-    drivecom::refuse_commands(row, &[CMD.address(), CMDD.address(), LFR.address(), LFRD.address()])?;
+    refuse_commands(row, &[CMD.address(), CMDD.address(), LFR.address(), LFRD.address()])?;
     let is = |register: u16| row.address == register;
     let cmi = ExtendedControl::from_bits_retain(if is(CMI.address()) { word } else { 0 });
     let (what, reason) = if cmi.contains(ExtendedControl::FACTORY_SETTINGS)

@@ -16,6 +16,7 @@ use drive_core::{
     Lifetimes, Measurements, Port, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status,
     StopMode, Watchdog, WatchdogCapability, Written,
     drivecom::{self, Drivecom},
+    registers::refuse_commands,
     serial::CharacterFormat,
 };
 
@@ -208,7 +209,7 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
-        drivecom::refuse_commands(row, &[CMD.address(), W401.address()])?;
+        refuse_commands(row, &[CMD.address(), W401.address()])?;
         if row.address == W402.address() {
             return Err(Error::Unsupported {
                 what: "writing W402 as a parameter",

@@ -260,7 +260,7 @@ impl<C> Master<C> {
         self.to_send = None;
         self.fear_late_answer(now, &flight);
         self.station(flight.slave).probe_again(now);
-        self.quiet_from = self.quiet_from.max(self.end_of_sending(now));
+        self.quiet_from = self.quiet_from.max(now);
         self.exchange_end = self.quiet_from;
     }
 

@@ -8,7 +8,6 @@
 
 mod chart;
 mod climb;
-mod guard;
 mod ladder;
 mod limits;
 mod words;
@@ -16,7 +15,6 @@ mod words;
 pub use chart::{
     ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, QUICK_STOP, SHUTDOWN, SWITCH_ON,
 };
-pub use guard::refuse_commands;
 pub use ladder::{CONFIRMING_READS, Drivecom, reset_fault, start, stop};
 pub use limits::{speed_limits, speed_word};
 pub use words::{ControlWord, ExtendedStatus, StatusWord, StatusWords};

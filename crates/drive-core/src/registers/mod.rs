@@ -50,12 +50,14 @@
 //! ```
 
 pub mod access;
+mod guard;
 mod row;
 mod unit;
 
 use std::{fmt, marker::PhantomData};
 
 pub use access::Access;
+pub use guard::refuse_commands;
 pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};
 pub use unit::{Form, Unit};
 

@@ -1,9 +1,7 @@
 //! What is no parameter, though it stands in the map.
 
-use crate::{
-    error::{Error, Result},
-    registers::Row,
-};
+use super::Row;
+use crate::error::{Error, Result};
 
 /// Refuses to write one of the registers that command the motor, its control words and references, as a parameter: a
 /// write of a parameter looks at nothing that a command looks at.
