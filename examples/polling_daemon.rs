@@ -108,7 +108,7 @@ async fn stop(drive: &mut Atv312<Slave>) -> drive_core::Result<Status> {
     loop {
         match drive.stop(StopMode::Ramp).await {
             Err(error) if error.kind() != ErrorKind::NotSent => {}
-            outcome => return outcome,
+            outcome => return outcome.map(|stopped| stopped.status),
         }
     }
 }

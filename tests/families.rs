@@ -110,9 +110,9 @@ async fn it_stops_by_each_mode_that_it_claims_and_by_no_other(rig: &mut Rig) {
         rig.until_at(SETPOINT).await;
         let claimed = rig.drive.capabilities().stop_modes.contains(&mode);
         match rig.drive.stop(mode).await {
-            Ok(status) => {
+            Ok(stopped) => {
                 assert!(claimed, "{mode} is not claimed");
-                assert_ne!(status.state, State::Running, "{mode}");
+                assert_ne!(stopped.status.state, State::Running, "{mode}");
                 if mode == StopMode::DcInjection {
                     // Some drives inject for as long as they are told to.
                     rig.until("no output", |status| status.output_frequency == Some(Frequency::ZERO)).await;

@@ -110,7 +110,12 @@ impl<P: Port> Drive3g3ev<P> {
     }
 
     pub(crate) fn not_confirmed(&self, command: Order, status: Status) -> Error {
-        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status) }
+        Error::NotConfirmed {
+            slave: self.registers.slave(),
+            command,
+            status: Box::new(status),
+            because: None,
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, ExceptionMeaning, Faults, Lifetimes, Measurements,
     Port, Reaction, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status, StopMode,
-    Watchdog, WatchdogCapability, Written, serial::CharacterFormat,
+    Stopped, Watchdog, WatchdogCapability, Written, serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -220,8 +220,8 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     /// Stops by a run command of 0, the only stop that the manual has: the motor stops in the way that the drive is
     /// set to. It is confirmed by what 0001h holds, and written again where a run command has come after it.
-    async fn stop(&mut self, mode: StopMode) -> Result<Status> {
-        self.stop_motor(mode).await
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await.map(|status| Stopped::by(mode, status))
     }
 
     /// Two exchanges: the confirmation of function 10h does not say the value, so it is read back. The first one also

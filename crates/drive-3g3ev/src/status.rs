@@ -50,6 +50,7 @@ impl FastWords {
             fault_code: (self.errors.bits() != 0).then(|| lowest_bit(self.errors)),
             control: Some(self.control()),
             raw: self.raw,
+            at: None,
         }
     }
 

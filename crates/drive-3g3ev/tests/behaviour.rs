@@ -83,7 +83,7 @@ async fn a_running_motor_turns_to_the_other_direction_through_standstill() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_is_seen_at_once_and_ends_at_standstill() {
     let (mut drive, machine, _rig) = running().await;
-    let status = drive.stop(StopMode::Ramp).await.unwrap();
+    let status = drive.stop(StopMode::Ramp).await.unwrap().status;
     assert_eq!(status.state, State::Stopping);
     assert!(machine.observe().running, "a stop takes its time");
     assert_eq!(drive.status().await.unwrap().state, State::Stopping);
@@ -99,7 +99,7 @@ async fn a_stop_is_seen_at_once_and_ends_at_standstill() {
 async fn a_stop_is_sent_whatever_the_state_and_other_modes_send_nothing() {
     let (mut drive, machine, _rig) = one();
     machine.trip(0);
-    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Fault);
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().status.state, State::Fault);
     assert_eq!(commands(&machine), [0]);
     for mode in [StopMode::Fast, StopMode::Freewheel, StopMode::DcInjection] {
         let before = machine.all_requests();

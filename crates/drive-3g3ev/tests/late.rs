@@ -126,7 +126,7 @@ async fn a_stop_is_never_confirmed_by_the_late_confirmation_of_a_start() {
     // A status is two reads; the start is carried out before the first, between them, or when they have shown no RUN.
     for reads in 0..3 {
         let (mut drive, machine, _rig) = with_a_late_start(&[Fate::Mistaken { reads }]).await;
-        let status = drive.stop(StopMode::Ramp).await.unwrap();
+        let status = drive.stop(StopMode::Ramp).await.unwrap().status;
         assert_ne!(status.state, State::Running);
         assert_eq!((machine.peek(1), machine.observe().setpoint), (Some(0), 0), "after {reads} reads");
         assert_eq!(bench::written(&machine, 1), [1, 0], "the stop was written again");

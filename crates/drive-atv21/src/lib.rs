@@ -36,7 +36,7 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Command, Direction, Drive, Error, ExceptionMeaning, Faults,
     Frequency, Identity, Lifetimes, Measurements, Port, Reaction, Refusal, Registers, Result, Row,
-    SerialSettings, Setpoint, SlaveAddress, Status, StopMode, Watchdog, WatchdogCapability, Written,
+    SerialSettings, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     registers::refuse_commands, serial::CharacterFormat,
 };
 
@@ -194,7 +194,12 @@ impl<P: Port> Atv21<P> {
     }
 
     fn not_confirmed(&self, command: Command, status: Status) -> Error {
-        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status) }
+        Error::NotConfirmed {
+            slave: self.registers.slave(),
+            command,
+            status: Box::new(status),
+            because: None,
+        }
     }
 }
 
@@ -260,8 +265,8 @@ impl<P: Port> Drive for Atv21<P> {
         self.start_motor(direction, None).await
     }
 
-    async fn stop(&mut self, mode: StopMode) -> Result<Status> {
-        self.stop_motor(mode).await
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await.map(|status| Stopped::by(mode, status))
     }
 
     /// Writes FA01 in steps of 0.01 Hz, up to the drive's UL, or FA13 in rpm, up to 24000: how F856 counts the

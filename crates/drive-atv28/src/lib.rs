@@ -15,7 +15,7 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, ExceptionMeaning, Fault, Faults, Identity,
     Lifetimes, Measurements, Percent, Port, RawWord, Registers, Result, Row, SerialSettings, Setpoint,
-    SlaveAddress, Speed, Status, StopMode, Voltage, Written,
+    SlaveAddress, Speed, Status, StopMode, Stopped, Voltage, Written,
     drivecom::{self, Drivecom, StatusWords},
     registers::{Register, access::Readable},
     serial::CharacterFormat,
@@ -182,8 +182,8 @@ impl<P: Port> Drive for Atv28<P> {
         self.start_motor(direction).await
     }
 
-    async fn stop(&mut self, mode: StopMode) -> Result<Status> {
-        self.stop_motor(mode).await
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await.map(|status| Stopped::by(mode, status))
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {

@@ -66,7 +66,7 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
         (StopMode::Freewheel, 0x0000, State::Disabled),
     ] {
         let (mut drive, machine, _line) = running().await;
-        let status = drive.stop(mode).await.unwrap();
+        let status = drive.stop(mode).await.unwrap().status;
         assert_eq!(status.state, state, "{mode}");
         assert_eq!(commands(&machine).last(), Some(&word), "{mode}");
         assert!(machine.observe().shaft_frequency > 0, "{mode}: a stop takes its time");

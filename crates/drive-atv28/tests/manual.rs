@@ -153,7 +153,7 @@ async fn function_06_is_laid_out_as_the_table_says() {
         ("05 03 01C9 0004", "05 03 08 0000 0240 4002 0000"),
     ]);
     let mut drive = Atv28::new(line.slave(5), slave(5));
-    assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().state, State::Disabled);
+    assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().status.state, State::Disabled);
     other_end.is_done().await;
 }
 

@@ -74,7 +74,12 @@ impl<P: Port> Atv312<P> {
     }
 
     pub(crate) fn not_confirmed(&self, command: Command, status: Status) -> Error {
-        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status) }
+        Error::NotConfirmed {
+            slave: self.registers.slave(),
+            command,
+            status: Box::new(status),
+            because: None,
+        }
     }
 
     /// Whose command the drive is under, for a start.

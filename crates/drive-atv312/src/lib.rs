@@ -18,7 +18,7 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, ExceptionMeaning, Faults, Identity, Lifetimes,
     Measurements, Port, Reaction, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status,
-    StopMode, Watchdog, Written, drivecom, serial::CharacterFormat,
+    StopMode, Stopped, Watchdog, Written, drivecom, serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -139,8 +139,8 @@ impl<P: Port> Drive for Atv312<P> {
     /// [`StopMode::Ramp`] is 100Fh where `Stt` makes that a ramp. [`StopMode::Fast`] is 400Fh where it is known to act
     /// and the quick stop 0002h otherwise. [`StopMode::Freewheel`] is 0000h. [`StopMode::DcInjection`] is 200Fh where
     /// `LAC` or `dCI` allow it. Where these settings cannot be read, ramp and DC injection are the quick stop too.
-    async fn stop(&mut self, mode: StopMode) -> Result<Status> {
-        self.stop_motor(mode).await
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await.map(|status| Stopped::by(mode, status))
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {

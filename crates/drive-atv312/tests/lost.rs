@@ -106,7 +106,7 @@ async fn a_drive_that_does_not_tell_its_settings_is_stopped_all_the_same() {
     for mode in [StopMode::Ramp, StopMode::DcInjection] {
         let port = Silent::default();
         let mut drive = Atv312::new(port.clone(), 1.try_into().unwrap());
-        assert_eq!(drive.stop(mode).await.unwrap().state, State::QuickStop, "{mode}");
+        assert_eq!(drive.stop(mode).await.unwrap().status.state, State::QuickStop, "{mode}");
         assert_eq!(*port.written.lock().unwrap(), [(8501, 0x0002)], "{mode}");
     }
 }

@@ -14,7 +14,7 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, Error, ExceptionMeaning, Fault, Faults, Frequency,
     Lifetimes, Measurements, Port, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status,
-    StopMode, Watchdog, WatchdogCapability, Written,
+    StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     drivecom::{self, Drivecom},
     registers::refuse_commands,
     serial::CharacterFormat,
@@ -182,8 +182,8 @@ impl<P: Port> Drive for Atv58<P> {
         self.start_motor(direction).await
     }
 
-    async fn stop(&mut self, mode: StopMode) -> Result<Status> {
-        self.stop_motor(mode).await
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await.map(|status| Stopped::by(mode, status))
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {

@@ -92,6 +92,7 @@ impl Words {
                 .and_then(|word| FaultRegister(word).bits().next()),
             control: self.control(map),
             raw: self.words.clone(),
+            at: None,
         }
     }
 

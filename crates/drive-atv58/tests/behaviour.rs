@@ -68,7 +68,7 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
         (StopMode::Freewheel, 0, State::Disabled),
     ] {
         let (mut drive, machine, _line) = running().await;
-        assert_eq!(drive.stop(mode).await.unwrap().state, state, "{mode}");
+        assert_eq!(drive.stop(mode).await.unwrap().status.state, state, "{mode}");
         assert_eq!(commands(&machine).last(), Some(&word), "{mode}");
         assert!(machine.observe().shaft_frequency > 0, "{mode}: a stop takes its time");
         if mode == StopMode::Fast {

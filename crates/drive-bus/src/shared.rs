@@ -2,7 +2,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::{Notify, oneshot, watch};
+use tokio::{
+    sync::{Notify, oneshot, watch},
+    time::Instant,
+};
 
 use crate::{
     capture::Tap,
@@ -67,16 +70,19 @@ impl Shared {
 }
 
 /// Who waits for an answer.
-pub(crate) struct Caller(oneshot::Sender<Outcome>);
+pub(crate) struct Caller(oneshot::Sender<Told>);
+
+/// What a caller is told: the outcome, and when its exchange ended on the line.
+pub(crate) type Told = (Outcome, Instant);
 
 impl Caller {
-    pub(crate) fn new() -> (Self, oneshot::Receiver<Outcome>) {
+    pub(crate) fn new() -> (Self, oneshot::Receiver<Told>) {
         let (caller, outcome) = oneshot::channel();
         (Self(caller), outcome)
     }
 
-    pub(crate) fn answer(self, outcome: Outcome) {
+    pub(crate) fn answer(self, outcome: Outcome, at: Instant) {
         // Whoever dropped the call does not want the answer.
-        let _ = self.0.send(outcome);
+        let _ = self.0.send((outcome, at));
     }
 }

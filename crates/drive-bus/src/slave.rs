@@ -32,11 +32,12 @@ pub struct Slave {
     handle: Arc<Handle>,
     address: u8,
     terms: Terms,
+    answered_at: Option<Instant>,
 }
 
 impl Slave {
     pub(crate) fn new(handle: Arc<Handle>, address: u8) -> Self {
-        Self { handle, address, terms: Terms::default() }
+        Self { handle, address, terms: Terms::default(), answered_at: None }
     }
 
     /// Its address, 0 for the broadcast.
@@ -87,8 +88,11 @@ impl Client for Slave {
         };
         self.handle.shared.wake.notify_one();
         // The task drops a caller without an outcome only when its runtime goes down.
-        let outcome = outcome.await.unwrap_or(Err(PortError::Closed));
+        let (outcome, at) = outcome.await.unwrap_or_else(|_| (Err(PortError::Closed), Instant::now()));
         waiting.done();
+        if outcome.is_ok() {
+            self.answered_at = Some(at);
+        }
         outcome.map_err(|error| tokio_modbus::Error::Transport(error.into_io()))
     }
 
@@ -106,6 +110,10 @@ impl SlaveContext for Slave {
 impl Port for Slave {
     fn set_terms(&mut self, terms: Terms) {
         self.terms = terms;
+    }
+
+    fn answered_at(&self) -> Option<Instant> {
+        self.answered_at
     }
 }
 

@@ -105,17 +105,18 @@ impl Task {
     /// Lets the master decide and writes what it wants written, until there is nothing to do but wait. `None`: the end.
     async fn decide(&mut self) -> Option<Option<Instant>> {
         loop {
-            let (frame, deadline, finished) = {
+            let (frame, deadline, finished, exchange_end) = {
                 let now = Instant::now();
                 let mut master = self.shared.master();
                 master.handle_timeout(now);
+                let exchange_end = master.exchange_end();
                 let frame = master.poll_transmit(now);
                 self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
-                (frame, master.deadline(), master.is_finished())
+                (frame, master.deadline(), master.is_finished(), exchange_end)
             };
             let answered = !self.ended.is_empty();
             for (caller, outcome) in self.ended.drain(..) {
-                caller.answer(outcome);
+                caller.answer(outcome, exchange_end);
             }
             let Some(frame) = frame else {
                 if answered && !finished {

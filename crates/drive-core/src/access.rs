@@ -3,6 +3,7 @@
 
 use std::{borrow::Cow, time::Duration};
 
+use tokio::time::Instant;
 use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 
 use crate::{
@@ -66,6 +67,8 @@ pub struct Registers<P> {
     slave: SlaveAddress,
     capabilities: &'static Capabilities,
     meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
+    /// When the oldest answer since [`begin_snapshot`](Self::begin_snapshot) ended on the line.
+    oldest: Option<Instant>,
     /// How long calls may wait.
     pub lifetimes: Lifetimes,
 }
@@ -80,7 +83,7 @@ impl<P: Port> Registers<P> {
         meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
     ) -> Self {
         port.set_slave(Slave(slave.number()));
-        Self { port, slave, capabilities, meaning, lifetimes: Lifetimes::default() }
+        Self { port, slave, capabilities, meaning, oldest: None, lifetimes: Lifetimes::default() }
     }
 
     /// The slave.
@@ -99,6 +102,18 @@ impl<P: Port> Registers<P> {
     pub const fn at(&mut self, class: Class) -> Calls<'_, P> {
         let terms = Terms { lifetime: self.lifetimes.of(class), ..Terms::of(class) };
         Calls { registers: self, terms }
+    }
+
+    /// What is read from here on makes one picture of the drive, which is as old as its oldest answer.
+    pub const fn begin_snapshot(&mut self) {
+        self.oldest = None;
+    }
+
+    /// When the oldest answer since [`begin_snapshot`](Self::begin_snapshot) ended on the line; `None` on a port that keeps
+    /// no time, and before the first answer.
+    #[must_use]
+    pub const fn snapshot_time(&self) -> Option<Instant> {
+        self.oldest
     }
 
     /// Gives the port back.
@@ -275,7 +290,7 @@ impl<P: Port> Calls<'_, P> {
         let raw = vec![RawWord { address: row.address, code: row.code, value }];
         let status = Box::new(Status { raw, ..Status::default() });
         let command = Command::WriteParameter(row.address);
-        Err(Error::NotConfirmed { slave: self.registers.slave, command, status })
+        Err(Error::NotConfirmed { slave: self.registers.slave, command, status, because: None })
     }
 
     /// Sends `data` round by function 08, sub-function 00, and checks that it comes back: the cheapest proof that the
@@ -307,7 +322,11 @@ impl<P: Port> Calls<'_, P> {
     /// Sends any request and returns the response as tokio-modbus decodes it. What the typed methods do not cover.
     pub async fn request(&mut self, request: Request<'_>, exchange: Exchange) -> Result<Response> {
         self.registers.port.set_terms(self.terms);
-        match self.registers.port.call(request).await {
+        let outcome = self.registers.port.call(request).await;
+        if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.answered_at()) {
+            self.registers.oldest = Some(self.registers.oldest.map_or(at, |oldest| oldest.min(at)));
+        }
+        match outcome {
             Ok(Ok(response)) => Ok(response),
             Ok(Err(exception)) => {
                 let code = u8::from(exception);

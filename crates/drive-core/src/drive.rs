@@ -6,13 +6,14 @@ use async_trait::async_trait;
 
 use crate::{
     access::Lifetimes,
-    capabilities::{Capabilities, Reaction, Watchdog},
-    error::{Error, Result, SlaveAddress},
+    capabilities::{Capabilities, Reaction, Watchdog, WatchdogCapability},
+    error::{Error, Result, SelfRestart, SlaveAddress},
     faults::Faults,
     identity::Identity,
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
+    stopped::Stopped,
 };
 
 /// A write to all slaves at once: no slave answers, so nothing is confirmed by it.
@@ -87,8 +88,9 @@ pub trait Drive: Send {
     async fn faults(&mut self) -> Result<Faults>;
 
     /// Starts the motor in a direction, or turns a running motor to that direction, at the setpoint that the drive
-    /// holds. Returns the status in which the drive shows that the run command is in force; the speed is then on its
-    /// way, not reached.
+    /// holds. Returns the status in which the drive shows that the run command **is in force**: the bus is the active
+    /// source of commands and of the reference, the run command stands, and the motor is driven in that direction. The
+    /// speed is then on its way, not reached. That the word which was written reads back is no confirmation.
     ///
     /// # Errors
     /// [`Error::Refused`] when the drive has tripped, is not ready or is commanded by somebody else: no run command was
@@ -96,19 +98,41 @@ pub trait Drive: Send {
     /// [`stop`](Self::stop) takes it back.
     async fn start(&mut self, direction: Direction) -> Result<Status>;
 
-    /// Stops the motor. Returns the status in which the drive shows that no run command is in force any more; the
-    /// motor may still be coming down. It never refuses for the drive's state: a stop is sent whatever is known.
+    /// Stops the motor, whatever is known of the drive and whatever its settings are: **it never ends without a stop on
+    /// the wire**. A mode that the family, or the drive as it is set up, does not have is replaced: by the stop that the
+    /// drive's own settings select when the run command goes, provided that it acts; else by a fast stop; else by
+    /// freewheel. DC injection is never a substitute. [`Stopped`] says which mode was used. Returns when the drive shows
+    /// that no run command is in force any more; the motor may still be coming down.
+    ///
+    /// Nothing is read before the first stop word is written: it is kept ready from the last reading. A drive that was
+    /// never read gets a word that stops it and leaves command where it was last known to be.
     ///
     /// Some drives inject direct current for as long as they are told to: end a stop by [`StopMode::DcInjection`] with
     /// one by [`StopMode::Ramp`] once the output has come to zero, or the motor is heated at rest.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for a mode that the family or its settings do not have: **nothing is stopped then**,
-    /// choose among [`Capabilities::stop_modes`]; [`Error::NotConfirmed`] when the stop does not show: repeat it.
-    async fn stop(&mut self, mode: StopMode) -> Result<Status>;
+    /// [`Error::NotConfirmed`] when the stop does not show, with what keeps the motor turning where the drive tells it:
+    /// repeat it, or stop the motor where it is commanded from. Never [`Error::Unsupported`] or [`Error::Refused`].
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped>;
 
-    /// Gives the drive a setpoint. `Ok` means that the drive confirmed the value; the motor follows its ramp if it
-    /// runs. A setpoint that is not yet sent is replaced by a later one.
+    /// Ends the run command that this side has given, and nothing else: no fast stop, no freewheel, no injection and no
+    /// change of who commands, any of which could stop what somebody else has started. For a drive that somebody else has
+    /// taken over while it ran by our command, so that nothing starts when he gives it back. Returns when the drive holds
+    /// no run command of this side.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for families that have no such word; [`Error::NotConfirmed`] when the run command still
+    /// stands.
+    async fn withdraw(&mut self) -> Result<Status> {
+        Err(Error::Unsupported {
+            what: "withdrawal of the run command",
+            reason: "the family has no word that ends it and nothing else",
+        })
+    }
+
+    /// Gives the drive a setpoint. `Ok` means that the drive holds the value and that it is the reference **in force**, or
+    /// will be with the next start by the bus; the motor follows its ramp if it runs. A setpoint that is not yet sent is
+    /// replaced by a later one.
     ///
     /// # Errors
     /// [`Error::Setpoint`] when the drive's limits or its register forbid the value; [`Error::Unsupported`] for a kind
@@ -140,6 +164,25 @@ pub trait Drive: Send {
     /// [`Error::Unsupported`] for families in which the bus cannot do it; [`Error::Refused`] while the motor runs.
     async fn release(&mut self) -> Result<Status> {
         Err(Error::Unsupported { what: "release", reason: "the family's bus cannot give control back" })
+    }
+
+    /// Reads which settings of the drive start its motor again by themselves. Empty: none does, as far as the manual
+    /// says. A start is refused with [`Refusal::RestartsItself`](crate::Refusal::RestartsItself) while one does that was
+    /// not accepted.
+    async fn self_restarts(&mut self) -> Result<Vec<SelfRestart>> {
+        Ok(Vec::new())
+    }
+
+    /// Accepts that the drive starts again by itself by these settings, named by their mnemonics, from now on. Nothing is
+    /// sent.
+    fn accept_self_restart(&mut self, codes: &[&str]) {
+        let _ = codes;
+    }
+
+    /// The communication watchdog of this drive on its line, which may differ from the one that
+    /// [`capabilities`](Self::capabilities) list for the family, as the protocol decides it on some.
+    fn watchdog_capability(&self) -> Option<WatchdogCapability> {
+        self.capabilities().watchdog
     }
 
     /// Sends the cheapest request that feeds the drive's communication watchdog.

@@ -120,7 +120,22 @@ impl fmt::Display for ExceptionMeaning {
     }
 }
 
-/// Why a command was refused before anything was sent.
+/// A setting by which a drive starts its motor again without being told: after a trip, a power cut or the loss of the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SelfRestart {
+    /// The manual's mnemonic of the setting, such as `Atr`: the name by which it is accepted.
+    pub code: &'static str,
+    /// What it does, in words that finish "the drive …".
+    pub meaning: &'static str,
+}
+
+impl fmt::Display for SelfRestart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "by {} the drive {}", self.code, self.meaning)
+    }
+}
+
+/// Why a command is refused before anything is sent, or what keeps one that was sent from being in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -136,6 +151,16 @@ pub enum Refusal {
     DirectionForbidden,
     /// The drive's settings do not let the bus command it; the text says which setting.
     Settings(&'static str),
+    /// Something else than this command decides what the motor does.
+    Overridden {
+        /// What decides instead, such as an input with its function, a channel or a setting, by the manual's mnemonics.
+        by: &'static str,
+        /// What to set or do, so that the bus decides.
+        remedy: &'static str,
+    },
+    /// A setting of the drive starts the motor again by itself, such as `Atr` of the Altivar 312, and nobody has accepted
+    /// that: see [`Drive::accept_self_restart`](crate::Drive::accept_self_restart).
+    RestartsItself(SelfRestart),
     /// Nothing has changed since the last save: the EEPROM is not written.
     NothingToSave,
     /// The EEPROM's life is used up by this drive's own count of saves.
@@ -153,6 +178,14 @@ impl fmt::Display for Refusal {
             Self::State(state) => write!(f, "the drive is in state {state}"),
             Self::DirectionForbidden => f.write_str("the drive's settings forbid this direction"),
             Self::Settings(which) => write!(f, "the drive's settings do not allow it: {which}"),
+            Self::Overridden { by, remedy } => write!(f, "{by} decides instead: {remedy}"),
+            Self::RestartsItself(restart) => {
+                write!(
+                    f,
+                    "{restart}; switch that off, or accept {} by name in the drive's settings",
+                    restart.code
+                )
+            }
             Self::NothingToSave => f.write_str("nothing has changed since the last save"),
             Self::EepromLife => f.write_str("the EEPROM's life is used up"),
             Self::MotorRunning => f.write_str("the motor runs; stop it first"),
@@ -311,7 +344,7 @@ pub enum Error {
     },
     /// The command was sent and the drive's own words do not show it. What was written stands in the drive and may take
     /// effect later: a start that is not confirmed is taken back by a stop, and by nothing else.
-    #[error("slave {slave}: {command} not confirmed: the drive says {status}")]
+    #[error("slave {slave}: {command} not confirmed: the drive says {status}{}", because.map_or_else(String::new, |because| format!("; {because}")))]
     NotConfirmed {
         /// The slave.
         slave: SlaveAddress,
@@ -319,6 +352,8 @@ pub enum Error {
         command: Command,
         /// The last status that was read.
         status: Box<Status>,
+        /// What keeps the command from being in force, where the drive tells it.
+        because: Option<Refusal>,
     },
 }
 

@@ -2,8 +2,8 @@
 //!
 //! This crate is the contract between the drives and everything else: the [`Drive`] trait, what a drive says
 //! ([`Status`], [`Measurements`], [`Faults`]), what is asked of it ([`Setpoint`], [`Direction`], [`StopMode`]), what
-//! can go wrong ([`Error`]), the register tables ([`registers`](mod@registers)) and the way to the line ([`Port`]). It has no task,
-//! no port and no clock.
+//! can go wrong ([`Error`]), the register tables ([`registers`](mod@registers)) and the way to the line ([`Port`]). It has no task
+//! and no port, and of a clock only as much as a command needs to be confirmed in its time ([`Confirming`]).
 //!
 //! A program that uses drives reads [`Drive`]. A crate that adds a family lists its registers with
 //! [`registers!`](crate::registers!), reaches them through [`Registers`] and implements [`Drive`]. A crate that adds
@@ -13,6 +13,7 @@
 
 mod access;
 mod capabilities;
+mod confirm;
 mod drive;
 pub mod drivecom;
 mod error;
@@ -23,14 +24,16 @@ pub mod registers;
 pub mod serial;
 mod setpoint;
 mod status;
+mod stopped;
 mod units;
 
 pub use access::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
+pub use confirm::{CONFIRMED_WITHIN, Confirming};
 pub use drive::{BroadcastWrite, Drive};
 pub use error::{
-    Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SetpointProblem, SlaveAddress,
-    SlaveAddressError,
+    Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SelfRestart, SetpointProblem,
+    SlaveAddress, SlaveAddressError,
 };
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
@@ -39,4 +42,5 @@ pub use registers::{Row, Written};
 pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
 pub use status::{Control, Measurements, RawWord, State, Status};
+pub use stopped::Stopped;
 pub use units::{Current, Frequency, Percent, Power, Speed, Voltage};

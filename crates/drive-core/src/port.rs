@@ -2,6 +2,7 @@
 
 use std::{fmt, io, time::Duration};
 
+use tokio::time::Instant;
 use tokio_modbus::client::{Client, Context};
 
 /// How urgent a call is. A line serves a higher class first, always.
@@ -107,6 +108,12 @@ pub trait Port: Client {
     /// Sets the terms of the calls that follow.
     fn set_terms(&mut self, terms: Terms) {
         let _ = terms;
+    }
+
+    /// When the exchange that brought the last answer ended on the line; `None` where the port does not keep it. A value is
+    /// as old as that, whenever its caller is told.
+    fn answered_at(&self) -> Option<Instant> {
+        None
     }
 }
 

@@ -88,6 +88,8 @@ pub enum Command {
     Start(Direction),
     /// Stop.
     Stop(StopMode),
+    /// End the run command that this side has given, and nothing else.
+    Withdraw,
     /// Change the setpoint.
     Setpoint(Setpoint),
     /// Reset the present fault.
@@ -109,6 +111,7 @@ impl fmt::Display for Command {
         match self {
             Self::Start(direction) => write!(f, "start {direction}"),
             Self::Stop(mode) => write!(f, "stop by {mode}"),
+            Self::Withdraw => f.write_str("withdrawal of the run command"),
             Self::Setpoint(setpoint) => write!(f, "setpoint {setpoint}"),
             Self::ResetFaults => f.write_str("fault reset"),
             Self::Release => f.write_str("release"),

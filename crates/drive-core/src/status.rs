@@ -3,6 +3,8 @@
 
 use std::{fmt, time::Duration};
 
+use tokio::time::Instant;
+
 use crate::{
     setpoint::{Direction, Setpoint},
     units::{Current, Frequency, Percent, Power, Speed, Voltage},
@@ -125,6 +127,8 @@ pub struct Status {
     pub control: Option<Control>,
     /// Every word that was read for this status.
     pub raw: Vec<RawWord>,
+    /// When the oldest of these words ended on the line; `None` on a port that keeps no time.
+    pub at: Option<Instant>,
 }
 
 impl Status {
@@ -185,6 +189,8 @@ impl fmt::Display for Status {
 /// `None` where the family has no such value.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Measurements {
+    /// When the oldest of these values ended on the line; `None` on a port that keeps no time.
+    pub at: Option<Instant>,
     /// The reference before the ramp.
     pub reference: Option<Setpoint>,
     /// The motor speed.

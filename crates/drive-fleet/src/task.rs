@@ -255,7 +255,7 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         _ => {}
     }
     match job {
-        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
+        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await.map(|stopped| stopped.status)),
         Job::Start(direction) => Reply::Started(drive.start(direction).await),
         Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
         Job::ResetFaults => Reply::Reset(drive.reset_faults().await),

@@ -25,7 +25,7 @@ async fn it_starts_reverses_and_stops_along_the_ramp() {
     rig.until(|seen| seen.output_frequency == -2_500).await;
     let status = drive.status().await.unwrap();
     assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
-    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().status.state, State::Stopping);
     rig.until(|seen| !seen.running).await;
     let status = drive.status().await.unwrap();
     assert!(status.is_standstill(), "{status}");
@@ -35,7 +35,7 @@ async fn it_starts_reverses_and_stops_along_the_ramp() {
 async fn a_stop_is_confirmed_by_its_order_where_run_shows_until_standstill() {
     let (rig, mut drive) = Rig::new(Model::new().running_until_standstill());
     rig.at_speed(&mut drive).await;
-    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().status.state, State::Stopping);
     drive.start(Direction::Reverse).await.unwrap();
     rig.until(|seen| seen.output_frequency < 0).await;
 }
@@ -44,10 +44,10 @@ async fn a_stop_is_confirmed_by_its_order_where_run_shows_until_standstill() {
 async fn freewheel_and_dc_injection_hold_until_the_next_command() {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
-    assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().state, State::Disabled);
+    assert_eq!(drive.stop(StopMode::Freewheel).await.unwrap().status.state, State::Disabled);
     assert!(!rig.machine.observe().running);
     rig.at_speed(&mut drive).await;
-    assert_eq!(drive.stop(StopMode::DcInjection).await.unwrap().state, State::Stopping);
+    assert_eq!(drive.stop(StopMode::DcInjection).await.unwrap().status.state, State::Stopping);
     rig.until(|seen| seen.shaft_frequency == 0).await;
     assert!(rig.machine.observe().running, "the injection goes on at rest");
     drive.stop(StopMode::Ramp).await.unwrap();
@@ -222,7 +222,7 @@ async fn a_lost_confirmation_of_a_stop_is_read_back() {
         tokio::time::sleep(SECOND).await;
         rig.machine.release();
     });
-    assert!(matches!(status.unwrap().state, State::Stopping | State::Ready));
+    assert!(matches!(status.unwrap().status.state, State::Stopping | State::Ready));
     rig.line.close().await;
 }
 
@@ -236,7 +236,7 @@ async fn a_stop_that_a_late_start_overtakes_is_written_again_at_once() {
         rig.machine.poke(0xFA00, 0xC400);
         rig.machine.release();
     });
-    assert_ne!(status.unwrap().state, State::Running);
+    assert_ne!(status.unwrap().status.state, State::Running);
     assert_eq!((rig.machine.peek(0xFA00), bench::written(&rig.machine, 0xFA00).len()), (Some(0xC000), 2));
 }
 

@@ -57,7 +57,7 @@ async fn each_stop_mode_is_one_write_seen_at_once_and_ends_at_standstill() {
     ] {
         let (mut drive, machine, _line) = running().await;
         let before = machine.all_requests();
-        let status = drive.stop(mode).await.unwrap();
+        let status = drive.stop(mode).await.unwrap().status;
         assert_eq!(machine.all_requests() - before, 2, "{mode}: one write, one status");
         assert_eq!(status.state, state, "{mode}");
         assert_eq!(commands(&machine).last(), Some(&word), "{mode}");
@@ -258,7 +258,7 @@ async fn a_run_command_does_not_count_as_given_after_somebody_else_had_control()
 #[tokio::test(start_paused = true)]
 async fn a_motor_that_another_master_starts_again_behind_a_stop_is_called_running() {
     let (mut drive, machine, line) = running().await;
-    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().state, State::Stopping);
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().status.state, State::Stopping);
     machine.wait_until(|seen| seen.output_frequency < 3_000).await;
     bench::write(&line, 8501, 0x000F).await;
     assert_eq!(drive.status().await.unwrap().state, State::Running);
@@ -282,7 +282,7 @@ async fn a_stop_that_does_not_show_is_tried_without_the_old_settings_the_next_ti
 async fn a_stop_whose_confirmation_is_lost_is_read_back() {
     let (mut drive, machine, _line) = running().await;
     machine.hold_next_answer();
-    let status = drive.stop(StopMode::Ramp).await.unwrap();
+    let status = drive.stop(StopMode::Ramp).await.unwrap().status;
     assert!(machine.requests(0x03) > 0);
     assert_eq!(status.state, State::Stopping);
     machine.wait_until(|seen| !seen.running).await;

@@ -350,6 +350,12 @@ impl<C> Master<C> {
         self.outcomes.pop_front()
     }
 
+    /// When the last exchange ended on the line: what [`poll_outcome`](Self::poll_outcome) gives now is as old as that.
+    #[must_use]
+    pub const fn exchange_end(&self) -> Instant {
+        self.exchange_end
+    }
+
     /// What was counted so far, at `now`.
     #[must_use]
     pub fn stats(&self, now: Instant) -> Stats {

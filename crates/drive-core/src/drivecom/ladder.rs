@@ -101,7 +101,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
         }
         status = drive.read_status(Class::Command).await.map_err(|error| failed(error, given))?;
     }
-    Err(Error::NotConfirmed { slave, command, status: Box::new(status) })
+    Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None })
 }
 
 /// A climb from where the drive stands, or why there is none.
@@ -165,7 +165,7 @@ async fn see_stop<D: Drivecom>(
         return Ok(status);
     }
     let command = Command::Stop(mode);
-    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status) })
+    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status), because: None })
 }
 
 /// One rising edge of the fault reset, cleared at once. A drive without a fault is left alone. Both words disable the
@@ -202,7 +202,7 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
             return Ok(status);
         }
     }
-    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status) })
+    Err(Error::NotConfirmed { slave: drive.address(), command, status: Box::new(status), because: None })
 }
 
 const fn tripped(status: &Status) -> Refusal {

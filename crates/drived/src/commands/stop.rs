@@ -87,7 +87,7 @@ pub(super) async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, F
     let mut why = None;
     for attempt in 1..=ATTEMPTS {
         let error = match one.drive.stop(mode).await {
-            Ok(status) => return Ok(status),
+            Ok(stopped) => return Ok(stopped.status),
             Err(error) => error,
         };
         tracing::info!(drive = %one.name, attempt, %error, "stop not confirmed");

@@ -189,7 +189,7 @@ impl Task {
         loop {
             match self.drive.stop(mode).await {
                 Err(error) if is_worth_repeating(&error) => time::sleep(POLL_PAUSE).await,
-                result => return result,
+                result => return result.map(|stopped| stopped.status),
             }
         }
     }

@@ -1,0 +1,35 @@
+//! What became of a stop: [`Stopped`].
+
+use std::fmt;
+
+use crate::{setpoint::StopMode, status::Status};
+
+/// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stopped {
+    /// The status in which it shows.
+    pub status: Status,
+    /// How the motor is stopped: the mode that was asked for, or the one that took its place.
+    pub mode: StopMode,
+    /// Why another mode took the place of the one that was asked for, such as a setting that keeps it from acting; `None`
+    /// where the mode is the one that was asked for.
+    pub instead: Option<&'static str>,
+}
+
+impl Stopped {
+    /// A stop in the mode that was asked for.
+    #[must_use]
+    pub const fn by(mode: StopMode, status: Status) -> Self {
+        Self { status, mode, instead: None }
+    }
+}
+
+impl fmt::Display for Stopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} stop", self.mode)?;
+        if let Some(why) = self.instead {
+            write!(f, " ({why})")?;
+        }
+        write!(f, ": {}", self.status)
+    }
+}
