@@ -82,7 +82,7 @@ impl<P: Port> Atv58<P> {
     async fn speed_limits(&mut self) -> Result<Option<(Frequency, Frequency)>> {
         let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
         if self.limits.is_none() {
-            let words = Words::read(&mut self.registers.at(Class::Command), &[low, high]).await?;
+            let words = Words::read(&mut self.registers.at(Class::Command), false, &[low, high]).await?;
             let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
             self.limits = frequency(low).zip(frequency(high));
         }
@@ -107,14 +107,14 @@ impl<P: Port> Drivecom for Atv58<P> {
         let fast = [Some(map.status), map.output_frequency, map.current];
         let addresses: Vec<u16> = fast.into_iter().flatten().collect();
         let mut calls = self.registers.at(class);
-        let mut words = Words::read(&mut calls, &addresses).await?;
+        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
         if words.is_tripped(&map) {
-            words.append(&mut calls, W483.address(), 1).await?;
+            words.append(&mut calls, map.input_words, W483.address(), 1).await?;
         }
         // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
         // that it holds tells the stop from the run.
         if class == Class::Stop && words.chart(&map) == Some(ChartState::OperationEnabled) {
-            words.append(&mut calls, CMD.address(), 1).await?;
+            words.append(&mut calls, false, CMD.address(), 1).await?;
         }
         Ok(words.status(&map))
     }

@@ -142,15 +142,7 @@ impl<P: Port> Atv58<P> {
             let slave = self.registers.slave();
             return Err(Error::TooManyWords { slave, words: usize::from(count), limit });
         }
-        let exchange = Exchange { function: 0x04, register: Some(first) };
-        let mut calls = self.registers.at(Class::Background);
-        match calls.request(Request::ReadInputRegisters(first, count), exchange).await? {
-            Response::ReadInputRegisters(words) if words.len() == usize::from(count) => Ok(words),
-            Response::ReadInputRegisters(_) => {
-                Err(calls.answer(exchange, "the answer holds another number of words"))
-            }
-            _ => Err(calls.answer(exchange, "the answer is of another function")),
-        }
+        read_input_words(&mut self.registers.at(Class::Background), first, count).await
     }
 
     /// A sub-code whose answer repeats the request.
@@ -161,6 +153,22 @@ impl<P: Port> Atv58<P> {
         } else {
             Err(calls.answer(DIAGNOSTICS, "the confirmation does not repeat the request"))
         }
+    }
+}
+
+/// Function 04, within the limit of words.
+pub(crate) async fn read_input_words<P: Port>(
+    calls: &mut Calls<'_, P>,
+    first: u16,
+    count: u16,
+) -> Result<Vec<u16>> {
+    let exchange = Exchange { function: 0x04, register: Some(first) };
+    match calls.request(Request::ReadInputRegisters(first, count), exchange).await? {
+        Response::ReadInputRegisters(words) if words.len() == usize::from(count) => Ok(words),
+        Response::ReadInputRegisters(_) => {
+            Err(calls.answer(exchange, "the answer holds another number of words"))
+        }
+        _ => Err(calls.answer(exchange, "the answer is of another function")),
     }
 }
 

@@ -13,12 +13,13 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, Error, ExceptionMeaning, Fault, Faults, Frequency,
-    Lifetimes, Measurements, Port, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress, Status,
-    StopMode, Stopped, Watchdog, WatchdogCapability, Written,
+    Identity, Lifetimes, Measurements, Port, Registers, Result, Row, SerialSettings, Setpoint, SlaveAddress,
+    Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     drivecom::{self, Drivecom},
     registers::refuse_commands,
     serial::CharacterFormat,
 };
+use tokio_modbus::prelude::ReadCode;
 
 pub use crate::{diagnostics::Counters, map::Atv58Map, registers::ROWS};
 use crate::{
@@ -65,7 +66,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         reactions: &[],
         settable: false,
     }),
-    identification: None,
+    identification: Some("UNI-TE request 0Fh, on a UNI-TELWAY line"),
     release: false,
     persist: None,
     broadcast_stops: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
@@ -119,7 +120,13 @@ impl<P: Port> Atv58<P> {
     /// # Errors
     /// [`Error::Port`] and [`Error::Exception`].
     pub async fn fault_register(&mut self) -> Result<FaultRegister> {
-        self.registers.at(Class::Background).read(W483).await.map(FaultRegister)
+        let words = self.produced(Class::Background, W483.address()).await?;
+        Ok(FaultRegister(words.at(Some(W483.address())).unwrap_or_default()))
+    }
+
+    /// Reads a word that the drive alone writes.
+    async fn produced(&mut self, class: Class, address: u16) -> Result<Words> {
+        Words::read(&mut self.registers.at(class), self.map.input_words, &[address]).await
     }
 }
 
@@ -161,15 +168,16 @@ impl<P: Port> Drive for Atv58<P> {
         let map = self.map;
         let mapped = [map.reference, map.line_voltage, map.motor_thermal, map.drive_thermal];
         let addresses: Vec<u16> = mapped.into_iter().flatten().collect();
-        let mut words = Words::read(&mut self.registers.at(Class::Background), &addresses).await?;
-        words.append(&mut self.registers.at(Class::Background), W463.address(), 4).await?;
+        let mut calls = self.registers.at(Class::Background);
+        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
+        words.append(&mut calls, map.input_words, W463.address(), 4).await?;
         Ok(words.measurements(&map))
     }
 
     /// The bits of W483 while the drive is tripped, each as its number: their meanings are not public. The family has
     /// no history and names no alarm.
     async fn faults(&mut self) -> Result<Faults> {
-        let words = Words::read(&mut self.registers.at(Class::Background), &[self.map.status]).await?;
+        let words = self.produced(Class::Background, self.map.status).await?;
         if !words.is_tripped(&self.map) {
             return Ok(Faults::default());
         }
@@ -195,7 +203,23 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn keep_alive(&mut self) -> Result<()> {
-        self.registers.at(Class::KeepAlive).read_word(self.map.status).await.map(drop)
+        self.produced(Class::KeepAlive, self.map.status).await.map(drop)
+    }
+
+    /// What the card says of itself on a UNI-TELWAY line: its rating and the version of its software (request 0Fh,
+    /// p. 11/35). A line asks for it as it asks for a device identification.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] over Modbus, for which the manual names nothing of the kind and the card answers exception
+    /// 01 (p. 22/46).
+    async fn identify(&mut self) -> Result<Identity> {
+        match self.registers.at(Class::Background).identification(ReadCode::Basic).await {
+            Err(Error::Exception { code: 0x01, .. }) => Err(Error::Unsupported {
+                what: "identification",
+                reason: "the card says what it is over UNI-TELWAY only",
+            }),
+            result => result,
+        }
     }
 
     /// What the card's manual prints, without an exchange: the time can neither be read nor set, and what the drive does

@@ -45,6 +45,10 @@ pub struct Atv58Map {
     pub remote: u16,
     /// The bit of ETA that is 1 while the reference is reached, as a mask. Default bit 10.
     pub at_reference: u16,
+    /// Whether the words that the drive alone writes are read by function 04 instead of 03. The manual has 03 for the
+    /// words that a master can write and 04 for those that it can only read (p. 17–18/41–42), and reads W463 to W466 by 03
+    /// (p. 20/44); whether each reads all words is not said. Default no.
+    pub input_words: bool,
     /// How long the card waits for a message before it shows a communication fault. Default 10 s, which the manual prints
     /// for the bus (p. 24/48); it is 1 s in Modbus ASCII.
     pub message_watch: Duration,
@@ -68,6 +72,7 @@ impl Default for Atv58Map {
             alarm: 1 << 7,
             remote: 1 << 9,
             at_reference: 1 << 10,
+            input_words: false,
             message_watch: crate::MESSAGE_WATCH,
         }
     }

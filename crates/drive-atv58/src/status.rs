@@ -7,6 +7,7 @@ use drive_core::{
 
 use crate::{
     Atv58Map, CAPABILITIES, ROWS,
+    diagnostics::read_input_words,
     registers::{CMD, W483},
     words::FaultRegister,
 };
@@ -19,17 +20,21 @@ pub(crate) struct Words {
 
 impl Words {
     /// Reads these words: in one request from the lowest to the highest where the limit of words allows it, else one by
-    /// one.
-    pub(crate) async fn read<P: Port>(calls: &mut Calls<'_, P>, addresses: &[u16]) -> Result<Self> {
+    /// one. `input`: by function 04.
+    pub(crate) async fn read<P: Port>(
+        calls: &mut Calls<'_, P>,
+        input: bool,
+        addresses: &[u16],
+    ) -> Result<Self> {
         let mut words = Self::default();
         let (Some(&first), Some(&last)) = (addresses.iter().min(), addresses.iter().max()) else {
             return Ok(words);
         };
         if last - first < CAPABILITIES.read_words {
-            words.append(calls, first, last - first + 1).await?;
+            words.append(calls, input, first, last - first + 1).await?;
         } else {
             for &address in addresses {
-                words.append(calls, address, 1).await?;
+                words.append(calls, input, address, 1).await?;
             }
         }
         Ok(words)
@@ -39,10 +44,15 @@ impl Words {
     pub(crate) async fn append<P: Port>(
         &mut self,
         calls: &mut Calls<'_, P>,
+        input: bool,
         first: u16,
         count: u16,
     ) -> Result<()> {
-        let values = calls.read_words(first, count).await?;
+        let values = if input {
+            read_input_words(calls, first, count).await?
+        } else {
+            calls.read_words(first, count).await?
+        };
         let words = (first..=u16::MAX).zip(values);
         self.words.extend(words.map(|(address, value)| RawWord { address, code: code(address), value }));
         Ok(())

@@ -4,12 +4,12 @@
 use std::time::Duration;
 
 use drive_atv58::{Atv58, Atv58Map, CAPABILITIES, ROWS};
-use drive_bus::{Line, Slave};
+use drive_bus::{Line, LineConfig, Protocol, Slave, protocol::UniTelwaySettings};
 use drive_core::{
     Control, Direction, Drive, Error, ErrorKind, Frequency, Reaction, Refusal, Row, Setpoint,
     SetpointProblem, Speed, State, StopMode, Watchdog,
 };
-use drive_sim::{Panel, SimSlave, models};
+use drive_sim::{Panel, SimLine, SimSlave, Wiring, models};
 use drive_testing::bench;
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
@@ -96,12 +96,49 @@ async fn what_the_map_leaves_out_is_unsupported_and_stops_nothing() {
         drive.set_setpoint(Speed::from_rpm(100).into()).await.unwrap_err(),
         drive.release().await.unwrap_err(),
         drive.persist().await.unwrap_err(),
-        drive.identify().await.unwrap_err(),
         drive.arm_watchdog(Duration::from_secs(10), Reaction::Freewheel).await.unwrap_err(),
     ] {
         assert_eq!(error.kind(), ErrorKind::Unsupported, "{error}");
     }
     assert_eq!(machine.all_requests(), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn over_modbus_the_card_cannot_say_what_it_is() {
+    let (mut drive, machine, _line) = rig();
+    assert_eq!(drive.identify().await.unwrap_err().kind(), ErrorKind::Unsupported);
+    assert_eq!(machine.all_requests(), 1, "asked once, and refused");
+}
+
+#[tokio::test(start_paused = true)]
+async fn over_uni_telway_the_card_says_its_rating_and_its_version() {
+    let simulated = SimLine::new(Wiring {
+        protocol: drive_sim::Protocol::UniTelway,
+        ..Wiring::rtu(CAPABILITIES.factory)
+    });
+    simulated.add(1, models::atv58::Atv58::new()).unwrap();
+    let protocol = Protocol::UniTelway(UniTelwaySettings::default());
+    let config = LineConfig { protocol, ..LineConfig::stream(CAPABILITIES.factory) };
+    let line = Line::over(simulated.in_memory(), config);
+    let mut drive = Atv58::new(line.slave(1), bench::address(1));
+    let identity = drive.identify().await.unwrap();
+    // p. 11/35: a chain with its length, and 21h for V2.1.
+    assert_eq!(identity.model.as_deref(), Some("ATV58U18N4"));
+    assert_eq!(identity.version.as_deref(), Some("V2.1"));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_words_that_the_drive_alone_writes_are_read_by_function_04_where_its_owner_says_so() {
+    let (mut drive, machine, _line) = rig_with(Atv58Map { input_words: true, ..Atv58Map::default() });
+    drive.status().await.unwrap();
+    drive.keep_alive().await.unwrap();
+    drive.measurements().await.unwrap();
+    drive.fault_register().await.unwrap();
+    assert_eq!((machine.requests(3), machine.requests(4)), (0, 5));
+    drive.set_setpoint(FIFTY).await.unwrap();
+    drive.start(Direction::Forward).await.unwrap();
+    drive.stop(StopMode::Ramp).await.unwrap();
+    assert!(machine.requests(3) > 0, "what a master writes is read by function 03");
 }
 
 #[tokio::test(start_paused = true)]

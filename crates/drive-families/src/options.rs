@@ -133,6 +133,7 @@ mod tests {
                 "authority" => "settings",
                 "speed-limits" => "1,2",
                 "message-watch" => "1s",
+                "read-only-function" => "4",
                 "saves" => "123",
                 _ => "007Bh",
             };

@@ -171,6 +171,13 @@ pub const OPTIONS: &[OptionEntry] = &[
         set: |options, text| mask(text).map(|value| options.map_mut().at_reference = value),
     },
     OptionEntry {
+        name: "read-only-function",
+        family: Family::Atv58,
+        value: "3 or 4",
+        meaning: "the function that reads the words which the drive alone writes (default 3)",
+        set: |options, text| ["3", "4"].contains(&text).then(|| options.map_mut().input_words = text == "4"),
+    },
+    OptionEntry {
         name: "message-watch",
         family: Family::Atv58,
         value: "a time such as 10s or 1500ms",

@@ -140,7 +140,8 @@ async fn likeness(family: Family, drive: &mut dyn Drive) -> Likeness {
     let identity = drive.identify().await.ok();
     let says = identity.as_ref().and_then(says);
     let model = identity.and_then(|identity| identity.model).unwrap_or_default();
-    let certain = model.to_ascii_lowercase().contains(family.capabilities().key);
+    // The Altivar 58's manual writes it with a hyphen and without (VVDED397054 p. 11/35).
+    let certain = model.to_ascii_lowercase().replace('-', "").contains(family.capabilities().key);
     Likeness { family, certain, says }
 }
 
@@ -258,6 +259,20 @@ mod tests {
             }
             assert_eq!(simulated.violations(), []);
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn on_uni_telway_a_drive_is_known_by_its_own_words() {
+        let settings = SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap();
+        let wiring = Wiring { protocol: drive_sim::Protocol::UniTelway, ..Wiring::rtu(settings) };
+        let simulated = SimLine::new(wiring);
+        simulated.add_boxed(4, simulated::model(Family::Atv58, SetUp::ForTheBus)).unwrap();
+        let protocol = "unitelway".parse().unwrap();
+        let config =
+            of_scan(LineConfig { protocol, ..LineConfig::stream(settings) }, Duration::from_millis(100));
+        let line = Line::over(simulated.in_memory(), config.clone());
+        let answer = look(&line, &config, SlaveAddress::try_from(4).unwrap()).await.unwrap();
+        assert_eq!(answer, Answer::Slave(vec![like(Family::Atv58, true, Some("ATV58U18N4 V2.1"))]));
     }
 
     #[tokio::test(start_paused = true)]

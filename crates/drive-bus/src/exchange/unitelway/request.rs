@@ -2,7 +2,10 @@
 //! among them. Words are little-endian.
 
 use bytes::{BufMut, Bytes, BytesMut};
-use tokio_modbus::{ExceptionCode, Request, Response};
+use tokio_modbus::{
+    ExceptionCode, Request, Response,
+    prelude::{ConformityLevel, DeviceIdObject, ReadDeviceIdentificationResponse},
+};
 
 use crate::exchange::Answer;
 
@@ -18,7 +21,9 @@ const MOST_WRITTEN: usize = 60;
 const WORDS: [u8; 2] = [0x68, WORD];
 const WORD: u8 = 0x07;
 /// The negative reply (p. 13/37).
-const REFUSED: u8 = 0xFD;
+pub(super) const REFUSED: u8 = 0xFD;
+/// The reply to a mirror request.
+pub(super) const MARK: u8 = 0xFB;
 /// The reply of what brings nothing but its being done.
 const DONE: u8 = 0xFE;
 
@@ -73,6 +78,7 @@ pub(super) fn encode(request: &Request<'_>, category: u8) -> Result<Bytes, Strin
             put(code::MIRROR);
             unite.put_slice(mirrored);
         }
+        Request::ReadDeviceIdentification(_, 0) => put(code::IDENTIFICATION),
         Request::Custom(UNITE, data) => {
             let [code, body @ ..] = &**data else { return Err("a UNI-TE request has a code".to_owned()) };
             put(*code);
@@ -91,8 +97,9 @@ pub(super) fn encode(request: &Request<'_>, category: u8) -> Result<Bytes, Strin
 /// # Errors
 /// What does not fit, in words.
 pub(super) fn decode(request: &Request<'_>, reply: &Bytes) -> Result<Answer, String> {
-    // Of the causes only one is printed, a wrong number of parameters (p. 13/37). That is what the exception 03 says.
-    if **reply == [REFUSED] {
+    // Of the causes only one is printed, a wrong number of parameters (p. 13/37), without its number. That is what the
+    // exception 03 says.
+    if let [REFUSED] | [REFUSED, _] = **reply {
         return Ok(Err(ExceptionCode::IllegalDataValue));
     }
     let words = |data: &[u8], quantity: u16| {
@@ -121,8 +128,22 @@ pub(super) fn decode(request: &Request<'_>, reply: &Bytes) -> Result<Answer, Str
         (Request::WriteMultipleRegisters(first, words), [DONE]) => {
             Response::WriteMultipleRegisters(*first, words.len() as u16)
         }
-        (Request::Custom(0x08, data), [0xFB, mirrored @ ..]) if data.get(2..) == Some(mirrored) => {
+        (Request::Custom(0x08, data), [MARK, mirrored @ ..]) if data.get(2..) == Some(mirrored) => {
             Response::Custom(0x08, Bytes::copy_from_slice(data))
+        }
+        (
+            Request::ReadDeviceIdentification(read_code, 0),
+            [0x3F, _product, _subtype, version, len, rating @ ..],
+        ) if rating.len() == usize::from(*len) => {
+            let object = |id, value| DeviceIdObject { id, value };
+            let version = Bytes::from(format!("V{}.{}", version >> 4, version & 0x0F));
+            Response::ReadDeviceIdentification(ReadDeviceIdentificationResponse {
+                read_code: *read_code,
+                conformity_level: ConformityLevel::BasicIdentificationStreamOnly,
+                more_follows: false,
+                next_object_id: 0,
+                device_id_objects: vec![object(1, Bytes::copy_from_slice(rating)), object(2, version)],
+            })
         }
         (Request::Custom(UNITE, data), [code, ..])
             if data.first().map(|code| reply_to(*code)) == Some(*code) =>
@@ -157,7 +178,7 @@ pub(super) fn is_specific(request: &Request<'_>) -> bool {
 /// The code of the positive reply.
 const fn reply_to(request: u8) -> u8 {
     match request {
-        code::MIRROR => 0xFB,
+        code::MIRROR => MARK,
         code::CLEAR_COUNTERS | code::WRITE_WORD | code::WRITE_OBJECTS => DONE,
         code::SPECIFIC => code::SPECIFIC,
         other => other.wrapping_add(0x30),
@@ -221,7 +242,9 @@ mod tests {
         let decode = |request: &Request<'_>, reply: &[u8]| decode(request, &Bytes::copy_from_slice(reply));
         let words = Response::ReadHoldingRegisters(vec![500, 0x1234]);
         assert_eq!(decode(&read, &[0x66, 0x07, 0xF4, 0x01, 0x34, 0x12]), Ok(Ok(words)));
-        assert_eq!(decode(&read, &[0xFD]), Ok(Err(ExceptionCode::IllegalDataValue)));
+        for refused in [&[0xFD][..], &[0xFD, 0x06]] {
+            assert_eq!(decode(&read, refused), Ok(Err(ExceptionCode::IllegalDataValue)), "{refused:02X?}");
+        }
         let wrong: [&[u8]; 6] = [
             &[0x66, 0x07, 0xF4, 0x01],
             &[0x66, 0x07, 0xF4, 0x01, 0x34],
