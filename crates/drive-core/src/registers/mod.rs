@@ -116,7 +116,8 @@ pub const fn assert_addresses_differ(rows: &[Row]) {
     }
 }
 
-/// Declares the registers of a family: a typed constant for each row, and a slice of all rows.
+/// Declares the registers of a family: a typed constant for each row, its address as a plain constant of the same name in
+/// a module `address`, and a slice of all rows.
 ///
 /// A row is `CONSTANT: Access(address, mnemonic, name, Storage, unit, range, factory, Confidence, source);` with the
 /// variants of [`Access`](crate::registers::Access), [`Storage`](crate::registers::Storage) and
@@ -155,6 +156,17 @@ macro_rules! registers {
             };
         )*
 
+        /// The addresses of the registers by their names, for patterns.
+        #[allow(unused_imports)]
+        $visibility mod address {
+            use super::*;
+
+            $(
+                #[doc = concat!("`", $code, "`, ", $name, ".")]
+                pub const $constant: u16 = $address;
+            )*
+        }
+
         $(#[$rows_meta])*
         $visibility const $rows: &[$crate::registers::Row] = &[$(*$constant.row()),*];
 
@@ -174,6 +186,16 @@ mod tests {
 
         RFR: Read(3202, "rFr", "output frequency", Volatile, Unit::scaled("Hz", 1).signed(), Range::Any, Factory::None, Elsewhere, "p. 21");
         SLL: WriteStopped(7010, "SLL", "reaction to SLF", RamUntilSaved, Unit::CODE, Range::OneOf(LIST), Factory::Value(1), Elsewhere, "p. 53");
+    }
+
+    #[test]
+    fn an_address_is_a_pattern() {
+        let name = |address| match address {
+            address::RFR => "rFr",
+            address::SLL => "SLL",
+            _ => "?",
+        };
+        assert_eq!([3_202, 7_010, 3].map(name), ["rFr", "SLL", "?"]);
     }
 
     #[test]
