@@ -100,7 +100,7 @@ impl Model for Ledger {
 
     fn advance(&mut self, _: Duration) {}
 
-    fn power_cycle(&mut self) {}
+    fn power(&mut self, _: bool) {}
 
     fn trip(&mut self, _: u16) {}
 

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod bank;
+mod control;
 mod fault;
 mod framing;
 mod line;
@@ -17,8 +18,10 @@ mod state;
 mod unite;
 mod watchdog;
 mod wire;
+mod world;
 
 pub use bank::{Bank, Refusal};
+pub use control::ControlError;
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};
 pub use model::{Block, Cast, Exception, Model, Observation, Panel, Protocol, Rules, UniTe};
@@ -29,3 +32,4 @@ pub use serve::Serving;
 pub use slave::Received;
 pub use watchdog::Watchdog;
 pub use wire::Delivery;
+pub use world::{Act, Surroundings, Switch, UnknownName};

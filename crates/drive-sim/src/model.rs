@@ -2,6 +2,10 @@
 
 use std::time::Duration;
 
+use drive_core::Frequency;
+
+use crate::world::{Act, Surroundings};
+
 /// An exception code, as a slave answers it after the function code with its highest bit set.
 ///
 /// The codes 1 to 4 are those of Modbus; families have their own beyond them, so this is a number and not a list.
@@ -86,7 +90,7 @@ pub struct UniTe {
     pub report: [u16; 4],
 }
 
-/// What somebody at the machine does.
+/// What somebody does at the drive's panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Panel {
     /// Takes control away from the bus (forced local, LOC/REM key).
@@ -95,6 +99,12 @@ pub enum Panel {
     ReleaseControl,
     /// Presses the STOP key.
     Stop,
+    /// Presses the RUN key.
+    Run,
+    /// Resets a fault.
+    Reset,
+    /// Sets the panel's own reference.
+    Reference(Frequency),
 }
 
 /// What an observer of the machine sees, without using the line.
@@ -147,8 +157,15 @@ pub trait Model: Send {
     /// Lets time pass.
     fn advance(&mut self, elapsed: Duration);
 
+    /// The supply of the control comes or goes. Without it the motor is not fed and coasts, and nothing acts; the
+    /// slave hears and says nothing meanwhile. With it the drive is as after power-up, what is in EEPROM apart.
+    fn power(&mut self, on: bool);
+
     /// Supply off and on again.
-    fn power_cycle(&mut self);
+    fn power_cycle(&mut self) {
+        self.power(false);
+        self.power(true);
+    }
 
     /// The drive trips with a code of its family, as if the cause had come and gone: a reset clears it.
     fn trip(&mut self, code: u16);
@@ -156,8 +173,18 @@ pub trait Model: Send {
     /// Sets the load at the shaft in percent of the motor's nominal torque.
     fn set_load(&mut self, percent: u16);
 
-    /// Somebody at the machine acts.
+    /// Somebody at the panel acts.
     fn panel(&mut self, action: Panel);
+
+    /// What there is around the drive.
+    fn surroundings(&self) -> &'static Surroundings {
+        &Surroundings::NONE
+    }
+
+    /// Something happens around the drive; every name is one of its [`surroundings`](Self::surroundings).
+    fn world(&mut self, act: Act) {
+        let _ = act;
+    }
 
     /// What an observer of the machine sees.
     fn observe(&self) -> Observation;
@@ -168,6 +195,16 @@ pub trait Model: Send {
     /// The exception that the drive answers instead of reading.
     fn check_read(&self, block: Block) -> Result<(), Exception> {
         let _ = block;
+        Ok(())
+    }
+
+    /// Whether [`write`](Self::write) would take this word now. Every word of a block is asked before the first is
+    /// written, so that a block with one word that is refused writes nothing.
+    ///
+    /// # Errors
+    /// The exception that the drive answers instead of writing.
+    fn check_word(&self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+        let _ = (address, value, cast);
         Ok(())
     }
 
@@ -196,9 +233,16 @@ pub trait Model: Send {
         let _ = cast;
     }
 
-    /// The drive is put on a line that speaks this. A drive whose times depend on the protocol learns it here.
-    fn join(&mut self, protocol: Protocol) {
-        let _ = protocol;
+    /// The drive is put on a line that speaks this, at this address. A drive that shows its address as a setting, or
+    /// whose times depend on the protocol, learns it here.
+    fn join(&mut self, address: u8, protocol: Protocol) {
+        let _ = (address, protocol);
+    }
+
+    /// The address that the drive has given itself since it [joined](Self::join), for a family where the setting acts
+    /// at once; 0: it answers nobody. `None`: still the one that it was put at.
+    fn own_address(&self) -> Option<u8> {
+        None
     }
 
     /// How the drive answers UNI-TE; `None`: it does not speak it.

@@ -68,10 +68,11 @@ fn write(
     if block.quantity == 0 || !fits || data.len() != bytes {
         return Err(Exception::ILLEGAL_VALUE);
     }
-    for (register, value) in registers(block)?.zip(values) {
-        model.write(register, value, cast)?;
+    let words: Vec<_> = registers(block)?.zip(values).collect();
+    if words.len() > 1 {
+        words.iter().try_for_each(|&(register, value)| model.check_word(register, value, cast))?;
     }
-    Ok(())
+    words.into_iter().try_for_each(|(register, value)| model.write(register, value, cast))
 }
 
 /// Whether an answer repeats what the request named, so that a master can check it: single and multiple writes, and

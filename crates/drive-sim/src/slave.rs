@@ -60,6 +60,8 @@ enum Hold {
 
 pub(crate) struct Slave {
     model: Box<dyn Model>,
+    /// Where it was put on the line.
+    address: u8,
     /// Until when the model's time has passed.
     advanced: Instant,
     counters: Counters,
@@ -67,6 +69,7 @@ pub(crate) struct Slave {
     delimiter: u8,
     turnaround: Option<Duration>,
     connected: bool,
+    powered: bool,
     hold: Hold,
     refuses: Option<Exception>,
     requests: BTreeMap<u8, u64>,
@@ -74,15 +77,17 @@ pub(crate) struct Slave {
 }
 
 impl Slave {
-    pub(crate) fn new(model: Box<dyn Model>, now: Instant, line: LineCounters) -> Self {
+    pub(crate) fn new(model: Box<dyn Model>, address: u8, now: Instant, line: LineCounters) -> Self {
         Self {
             model,
+            address,
             advanced: now,
             counters: Counters { line_base: line, ..Counters::default() },
             listen_only: false,
             delimiter: LINE_FEED,
             turnaround: None,
             connected: true,
+            powered: true,
             hold: Hold::No,
             refuses: None,
             requests: BTreeMap::new(),
@@ -184,7 +189,7 @@ impl Slave {
     /// Whether it can be heard on the line at all.
     pub(crate) fn is_connected(&mut self, now: Instant) -> bool {
         let listens = self.at(now).listens();
-        self.connected && listens
+        self.connected && self.powered && listens
     }
 
     /// The answer itself, or nothing while a test holds it.
@@ -254,12 +259,39 @@ impl Slave {
         self.at(now).observe()
     }
 
-    pub(crate) fn power_cycle(&mut self, now: Instant, line: LineCounters) {
-        self.at(now).power_cycle();
+    pub(crate) fn power(&mut self, now: Instant, on: bool, line: LineCounters) {
+        if on == self.powered {
+            return;
+        }
+        self.powered = on;
+        self.at(now).power(on);
         self.reset_counters(line);
         self.listen_only = false;
         self.delimiter = LINE_FEED;
         self.hold = Hold::No;
+    }
+
+    /// The address at which it takes requests: the one that it has given itself, or where it was put.
+    pub(crate) fn address(&self) -> u8 {
+        self.model.own_address().unwrap_or(self.address)
+    }
+
+    /// Another master writes one word, by the function that the family has for it.
+    pub(crate) fn written_by_another(
+        &mut self,
+        now: Instant,
+        register: u16,
+        value: u16,
+    ) -> Result<(), Exception> {
+        let [[a, b], [c, d]] = [register, value].map(u16::to_be_bytes);
+        let request = match self.model.rules().write_single {
+            true => vec![pdu::WRITE_SINGLE, a, b, c, d],
+            false => vec![pdu::WRITE_MULTIPLE, a, b, 0, 1, 2, c, d],
+        };
+        if self.hears(now, &request, Cast::Unicast) {
+            pdu::answer(&mut *self.model, &request, Cast::Unicast)?;
+        }
+        Ok(())
     }
 
     pub(crate) const fn set_turnaround(&mut self, turnaround: Option<Duration>) {

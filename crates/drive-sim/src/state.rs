@@ -72,7 +72,8 @@ impl State {
             }
             return None;
         }
-        let slave = self.slaves.get_mut(&address).filter(|slave| sees_end(slave))?;
+        let mut slaves = self.slaves.values_mut();
+        let slave = slaves.find(|slave| slave.address() == address).filter(|slave| sees_end(slave))?;
         let answer = slave.request(at, request, Cast::Unicast, self.counters)?;
         let turnaround = slave.turnaround();
         Some(Speech { slave: address, content: Content::Message(answer), heard: at, turnaround })
@@ -96,8 +97,9 @@ impl State {
     }
 
     pub(crate) fn release(&mut self, address: u8) {
-        if let Some(answer) = self.slaves.get_mut(&address).and_then(Slave::release) {
-            self.released.push((address, answer));
+        let Some(slave) = self.slaves.get_mut(&address) else { return };
+        if let Some(answer) = slave.release() {
+            self.released.push((slave.address(), answer));
         }
     }
 

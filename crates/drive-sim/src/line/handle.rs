@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use drive_core::Percent;
 use tokio::time::Instant;
 
 use super::SimLine;
 use crate::{
     model::{Exception, Observation, Panel},
     slave::{LineCounters, Received, Slave},
+    world::{Act, Surroundings, UnknownName},
 };
 
 /// How often a waiting observer looks. The time of a model passes only while somebody looks at it.
@@ -21,7 +23,7 @@ pub struct SimSlave {
 }
 
 impl SimSlave {
-    /// Its address.
+    /// The address at which it was put on the line.
     #[must_use]
     pub const fn address(&self) -> u8 {
         self.address
@@ -87,14 +89,69 @@ impl SimSlave {
         self.order(|slave, _| slave.at(Instant::now()).trip(code));
     }
 
-    /// Switches the supply off and on.
-    pub fn power_cycle(&self) {
-        self.order(|slave, state| slave.power_cycle(Instant::now(), state));
+    /// Switches the supply of the control, and with it the whole drive, on or off. Nothing happens when it already is
+    /// so.
+    pub fn power(&self, on: bool) {
+        self.order(|slave, line| slave.power(Instant::now(), on, line));
     }
 
-    /// Somebody at the machine acts.
+    /// Switches the supply off and on.
+    pub fn power_cycle(&self) {
+        self.power(false);
+        self.power(true);
+    }
+
+    /// Switches the supply of the power stage on or off, while the control is supplied all the time.
+    pub fn motor_supply(&self, on: bool) {
+        self.world(Act::MotorSupply(on));
+    }
+
+    /// Somebody at the panel acts.
     pub fn panel(&self, action: Panel) {
         self.order(|slave, _| slave.at(Instant::now()).panel(action));
+    }
+
+    /// What there is around the drive.
+    #[must_use]
+    pub fn surroundings(&self) -> &'static Surroundings {
+        let mut found = &Surroundings::NONE;
+        self.with(|slave, _| found = slave.at(Instant::now()).surroundings());
+        found
+    }
+
+    /// Closes a logic input, or opens it.
+    ///
+    /// # Errors
+    /// [`UnknownName`] with the inputs of the family.
+    pub fn terminal(&self, name: &str, closed: bool) -> Result<(), UnknownName> {
+        self.surroundings().terminal(name, closed).map(|act| self.world(act))
+    }
+
+    /// Puts an analog input on a share of its full scale.
+    ///
+    /// # Errors
+    /// [`UnknownName`] with the inputs of the family.
+    pub fn analog(&self, name: &str, level: Percent) -> Result<(), UnknownName> {
+        self.surroundings().analog(name, level).map(|act| self.world(act))
+    }
+
+    /// Has the drive follow one reading of what its manual leaves open.
+    ///
+    /// # Errors
+    /// [`UnknownName`] with the switches of the family, or the readings of the switch.
+    pub fn reading(&self, name: &str, reading: &str) -> Result<(), UnknownName> {
+        self.surroundings().reading(name, reading).map(|act| self.world(act))
+    }
+
+    /// Another master of the line writes one word to the drive, of which the line's own master sees nothing. A drive
+    /// that hears nothing takes nothing.
+    ///
+    /// # Errors
+    /// The exception that the drive answers.
+    pub fn written_by_another(&self, register: u16, value: u16) -> Result<(), Exception> {
+        let mut result = Ok(());
+        self.order(|slave, _| result = slave.written_by_another(Instant::now(), register, value));
+        result
     }
 
     /// Sets the load at the shaft in percent of the motor's nominal torque.
@@ -137,6 +194,10 @@ impl SimSlave {
     #[must_use]
     pub fn received(&self) -> Vec<Received> {
         self.with(|slave, _| slave.received())
+    }
+
+    pub(crate) fn world(&self, act: Act) {
+        self.order(|slave, _| slave.at(Instant::now()).world(act));
     }
 
     async fn wait_for<T: Default>(&self, look: impl Fn(&mut Slave) -> T, is_so: impl Fn(&T) -> bool) -> T {

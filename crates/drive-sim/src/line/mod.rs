@@ -134,9 +134,9 @@ impl SimLine {
         if address == BROADCAST || address > HIGHEST {
             return Err(AddressError::OutOfRange(address));
         }
-        model.join(self.wiring.protocol);
+        model.join(address, self.wiring.protocol);
         let mut state = self.shared.lock();
-        let slave = Slave::new(model, Instant::now(), state.counters());
+        let slave = Slave::new(model, address, Instant::now(), state.counters());
         if !state.add(address, slave) {
             return Err(AddressError::Taken(address));
         }
@@ -155,6 +155,16 @@ impl SimLine {
     pub fn slaves(&self) -> Vec<SimSlave> {
         let addresses = self.shared.lock().addresses();
         addresses.into_iter().map(|address| SimSlave { line: self.clone(), address }).collect()
+    }
+
+    /// Cuts the cable of every drive, as [`SimSlave::mute`] does of one.
+    pub fn cut(&self) {
+        self.slaves().iter().for_each(SimSlave::mute);
+    }
+
+    /// Joins the cable of every drive again.
+    pub fn join(&self) {
+        self.slaves().iter().for_each(SimSlave::unmute);
     }
 
     /// How the line is made.

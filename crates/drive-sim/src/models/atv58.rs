@@ -16,8 +16,13 @@ use drive_atv58::{
 
 use super::drivecom::{CommandBits, Drivecom, LinkWatch, Reaction, Settings, Stop, word};
 use crate::{
-    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Protocol, Ramp, Ramps, Rules, UniTe,
+    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Protocol, Ramp, Ramps, Rules, Surroundings,
+    UniTe,
 };
+
+/// What is around it.
+const SURROUNDINGS: Surroundings =
+    Surroundings { family: "atv58", trips: &[], rows: ROWS, ..Surroundings::NONE };
 
 const RULES: Rules = Rules {
     read_holding: 63,
@@ -112,6 +117,10 @@ impl Default for Atv58 {
 }
 
 impl Model for Atv58 {
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
     fn rules(&self) -> &Rules {
         &RULES
     }
@@ -128,14 +137,21 @@ impl Model for Atv58 {
         Ok(())
     }
 
+    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
+        Ok(self.bank.check(address, value, !self.drive.motor().is_fed())?)
+    }
+
     fn advance(&mut self, elapsed: Duration) {
         self.drive.advance(elapsed);
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        if !on {
+            return self.drive.power(false);
+        }
         self.bank.power_cycle();
         self.drive.set_settings(settings(&self.bank, self.protocol));
-        self.drive.power_cycle();
+        self.drive.power(true);
     }
 
     /// The code is the number of the bit of W483, 0 to 15.
@@ -159,7 +175,7 @@ impl Model for Atv58 {
         self.drive.frame_seen();
     }
 
-    fn join(&mut self, protocol: Protocol) {
+    fn join(&mut self, _: u8, protocol: Protocol) {
         self.protocol = protocol;
         self.drive.set_settings(settings(&self.bank, protocol));
     }
@@ -276,7 +292,7 @@ mod tests {
     #[test]
     fn in_ascii_one_second_without_a_message_is_a_fault() {
         let mut drive = Atv58::new();
-        drive.join(Protocol::Ascii);
+        drive.join(1, Protocol::Ascii);
         drive.frame_seen(Cast::Unicast);
         drive.advance(SECOND - Duration::from_nanos(1));
         assert_eq!(drive.observe().trip, None);

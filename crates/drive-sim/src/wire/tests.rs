@@ -11,7 +11,7 @@ fn wire(baud: u32, delivery: Delivery) -> (Wire, State, Instant) {
     let settings = SerialSettings::new(baud, CharacterFormat::F8E1).unwrap();
     let now = Instant::now();
     let mut line = State::default();
-    let mut slave = Slave::new(Box::new(Atv312::under_bus_control()), now, line.counters());
+    let mut slave = Slave::new(Box::new(Atv312::under_bus_control()), 1, now, line.counters());
     slave.set_turnaround(Some(TURNAROUND));
     assert!(line.add(1, slave));
     (Wire::new(settings, Pacing::Simulated, delivery, Box::new(rtu::Rtu::default())), line, now)

@@ -1,6 +1,7 @@
 //! The simulator seen from a master and from a test, with a small drive and a master of its own.
 
 mod ascii;
+mod control;
 mod endpoints;
 mod faults;
 mod fuzz;

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use crc::{CRC_16_MODBUS, Crc};
-use drive_core::registers;
+use drive_core::{FaultEntry, registers};
 use drive_sim::{
-    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules, UniTe,
-    Watchdog,
+    Act, Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules,
+    Surroundings, Switch, UniTe, Watchdog,
 };
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
@@ -27,6 +27,7 @@ registers! {
     REF: ReadWrite(2, "REF", "reference", Volatile, Unit::scaled("Hz", 2), Range::Within(0, 5_000), Factory::None, Manual, "test");
     OUT: Read(3, "OUT", "output frequency", Volatile, Unit::scaled("Hz", 2), Range::Any, Factory::None, Manual, "test");
     KEEP: ReadWrite(4, "EEP", "kept", Eeprom, Unit::COUNT, Range::Any, Factory::Value(7), Manual, "test");
+    HOME: ReadWrite(5, "ADD", "address, if not 0", Eeprom, Unit::COUNT, Range::Any, Factory::Value(0), Manual, "test");
     ACC: ReadWrite(252, "ACC", "unused", Volatile, Unit::COUNT, Range::Within(0, 1_000), Factory::None, Manual, "test");
 }
 
@@ -41,6 +42,20 @@ const RULES: Rules = Rules {
     turnaround: TURNAROUND,
 };
 
+/// An input that takes control away, one that gives the reference, and a switch that says what a trip does.
+const SURROUNDINGS: Surroundings = Surroundings {
+    family: "small",
+    terminals: &["LOC"],
+    analog_inputs: &["AI1"],
+    switches: &[Switch {
+        name: "trip",
+        readings: &["coasts", "ramps"],
+        question: "how a trip stops the motor",
+    }],
+    trips: &[FaultEntry::new(LINK_LOST, "SLF", "link lost", "look at the cable")],
+    rows: ROWS,
+};
+
 /// A drive with four registers.
 pub(crate) struct Small {
     bank: Bank,
@@ -48,6 +63,7 @@ pub(crate) struct Small {
     watchdog: Watchdog,
     trip: Option<u16>,
     local: bool,
+    ramps_at_trip: bool,
 }
 
 impl Small {
@@ -58,6 +74,7 @@ impl Small {
             watchdog: Watchdog::new(Some(TIMEOUT)),
             trip: None,
             local: false,
+            ramps_at_trip: false,
         }
     }
 
@@ -123,14 +140,20 @@ impl Model for Small {
         self.motor.advance(elapsed - first);
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        if !on {
+            return self.motor.freewheel();
+        }
         *self = Self { bank: self.bank.clone(), ..Self::new() };
         self.bank.power_cycle();
     }
 
     fn trip(&mut self, code: u16) {
         self.trip = Some(code);
-        self.motor.freewheel();
+        if !self.ramps_at_trip {
+            self.motor.freewheel();
+        }
+        self.obey();
     }
 
     fn set_load(&mut self, percent: u16) {
@@ -140,6 +163,31 @@ impl Model for Small {
     fn panel(&mut self, action: Panel) {
         self.local = action == Panel::TakeControl;
         self.obey();
+    }
+
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
+    fn world(&mut self, act: Act) {
+        match act {
+            Act::Terminal(_, closed) => self.local = closed,
+            Act::Analog(_, level) => {
+                self.bank.set(REF.address(), u16::try_from(level.hundredths() / 2).unwrap_or(0));
+            }
+            Act::MotorSupply(true) => {}
+            Act::MotorSupply(false) => self.motor.freewheel(),
+            Act::Reading(_, reading) => self.ramps_at_trip = reading == "ramps",
+        }
+        self.obey();
+    }
+
+    fn own_address(&self) -> Option<u8> {
+        u8::try_from(self.bank.value(HOME.address())).ok().filter(|address| *address != 0)
+    }
+
+    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
+        Ok(self.bank.check(address, value, true)?)
     }
 
     fn observe(&self) -> Observation {

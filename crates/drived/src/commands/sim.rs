@@ -1,9 +1,10 @@
 //! `drived sim`: serves simulated drives on a pty.
 
-use std::path::PathBuf;
+use std::{io, path::PathBuf, thread};
 
 use drive_families::Options;
 use drive_sim::{SimLine, Wiring};
+use tokio::sync::mpsc;
 
 use crate::{
     drive_spec::{self, DriveName, DriveSpec},
@@ -15,6 +16,9 @@ use crate::{
 };
 
 /// Serve simulated drives on a pty, with the line's character times, until Ctrl-C
+///
+/// Lines on standard input act on the drives and on the world around them, such as `atv312@1 terminal LI1 on` or `line
+/// cut`; `help` lists them. Each is answered by what it tells, by `done`, or by `refused:` and the reason.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Where the symbolic link to the pty is made; other programs open it as their serial port
@@ -56,15 +60,35 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     for name in &drives {
         output::say(describe(name, set_up))?;
     }
-    tokio::select! {
-        () = ending.asked() => {}
-        ended = serving.ended() => ended.map_err(|error| Failure::Drive(format!("the pty is gone: {error}")))?,
+    let mut lines = standard_input();
+    loop {
+        tokio::select! {
+            () = ending.asked() => break,
+            ended = serving.ended() => {
+                ended.map_err(|error| Failure::Drive(format!("the pty is gone: {error}")))?;
+                break;
+            }
+            Some(text) = lines.recv() => match line.control(&text) {
+                Ok(answer) => output::say(answer)?,
+                Err(refused) => output::say(format_args!("refused: {refused}"))?,
+            },
+        }
     }
     let stats = line.stats();
     output::say(format_args!(
         "served {} requests, {} answers; {} damaged frames, {} breaches of the line's rules",
         stats.requests, stats.answers, stats.bad_frames, stats.violations
     ))
+}
+
+/// The lines of standard input, until it ends. A thread reads them that is left behind when the program ends: nothing
+/// else ends a read of a terminal.
+fn standard_input() -> mpsc::Receiver<String> {
+    let (lines, read) = mpsc::channel(1);
+    thread::spawn(move || {
+        io::stdin().lines().map_while(Result::ok).try_for_each(|line| lines.blocking_send(line))
+    });
+    read
 }
 
 /// The drive, and with what it has to be told of to whoever opens it.

@@ -4,9 +4,9 @@
 #![allow(dead_code)]
 
 use std::{
-    io::{BufRead, BufReader},
+    io::{BufRead, BufReader, Write},
     path::PathBuf,
-    process::{Child, ChildStdout, Command, Output, Stdio},
+    process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio},
 };
 
 /// The program with arguments, not yet started.
@@ -84,19 +84,27 @@ impl Drop for File {
 /// The program running beside the test; killed when dropped.
 pub(crate) struct Running {
     child: Child,
+    input: Option<ChildStdin>,
     lines: Option<BufReader<ChildStdout>>,
 }
 
 impl Running {
     pub(crate) fn start(arguments: &[&str]) -> Self {
         let mut child = drived(arguments)
-            .stdin(Stdio::null())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
+        let input = child.stdin.take();
         let lines = Some(BufReader::new(child.stdout.take().expect("stdout is piped")));
-        Self { child, lines }
+        Self { child, input, lines }
+    }
+
+    /// Says a line on its stdin.
+    pub(crate) fn say(&mut self, line: &str) {
+        let input = self.input.as_mut().expect("stdin is written");
+        writeln!(input, "{line}").expect("the program reads its stdin");
     }
 
     /// Nobody reads its stdout from now on.
@@ -197,6 +205,13 @@ impl Sim {
     pub(crate) fn on(&self, drive: &str, subcommand: &[&str]) -> Ended {
         let arguments = [subcommand, &["--line", self.link(), "--drive", drive]].concat();
         run(&arguments)
+    }
+
+    /// Says a line on its stdin, and waits for an answer that contains this.
+    pub(crate) fn say(&mut self, line: &str, answer: &str) -> String {
+        let running = self.running.as_mut().expect("it runs");
+        running.say(line);
+        running.wait_for(answer)
     }
 
     /// Ends it as Ctrl-C does.

@@ -12,13 +12,17 @@ mod tests;
 
 use std::{collections::BTreeMap, time::Duration};
 
-use drive_atv21::{ROWS, blocks, registers as map};
+use drive_atv21::{FAULTS, ROWS, blocks, registers as map};
 use drive_core::registers::Storage;
 
 use crate::{
-    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Rules, Watchdog,
+    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Rules, Surroundings, Watchdog,
     identification,
 };
+
+/// What is around it.
+const SURROUNDINGS: Surroundings =
+    Surroundings { family: "atv21", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
 
 const RULES: Rules = Rules {
     read_holding: 5,
@@ -213,6 +217,10 @@ impl Atv21 {
 }
 
 impl Model for Atv21 {
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
     fn rules(&self) -> &Rules {
         &RULES
     }
@@ -296,10 +304,14 @@ impl Model for Atv21 {
         }
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        self.motor.freewheel();
+        if !on {
+            self.watchdog = Watchdog::default();
+            return;
+        }
         self.bank.power_cycle();
         self.pinned.clear();
-        self.motor.freewheel();
         self.local = false;
         self.start_up(POWER_UP);
     }
@@ -316,7 +328,7 @@ impl Model for Atv21 {
         match action {
             Panel::TakeControl => self.local = true,
             Panel::ReleaseControl => self.local = false,
-            Panel::Stop => {}
+            Panel::Stop | Panel::Run | Panel::Reset | Panel::Reference(_) => {}
         }
         // Whatever the bus had ordered does not come back by itself.
         self.heeds = false;

@@ -10,7 +10,7 @@ mod parameters;
 use std::time::Duration;
 
 use drive_atv28::{
-    ROWS,
+    FAULTS, ROWS,
     registers::{
         AC2, ACC, ADD, BFR, BRA, CMD, CMDD, COD, CRH3, CRL3, CTD, DE2, DEC, DP1, DP2, DP3, DP4, ERRD, ETA,
         ETAD, ETI, FBS, FRH, FRHD, FRS, FTD, HSP, IDC, INV, IOLR, IPL, ITH, JGF, LCR, LFR, LFRD, LFT, LSP,
@@ -22,8 +22,13 @@ use drive_core::registers::Access;
 
 use super::drivecom::{Drivecom, Reaction, centihertz, profile_code, rpm, word};
 use crate::{
-    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, models::atv28::parameters::settings,
+    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, Surroundings,
+    models::atv28::parameters::settings,
 };
+
+/// What is around it.
+const SURROUNDINGS: Surroundings =
+    Surroundings { family: "atv28", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
 
 const RULES: Rules = Rules {
     read_holding: 7,
@@ -183,6 +188,10 @@ impl Default for Atv28 {
 }
 
 impl Model for Atv28 {
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
     fn rules(&self) -> &Rules {
         &RULES
     }
@@ -204,15 +213,22 @@ impl Model for Atv28 {
         Ok(())
     }
 
+    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
+        Ok(self.bank.check(address, value, !self.drive.motor().is_fed())?)
+    }
+
     fn advance(&mut self, elapsed: Duration) {
         self.drive.advance(elapsed);
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        if !on {
+            return self.drive.power(false);
+        }
         self.bank.power_cycle();
         self.commanded = false;
         self.take_settings();
-        self.drive.power_cycle();
+        self.drive.power(true);
     }
 
     fn trip(&mut self, code: u16) {

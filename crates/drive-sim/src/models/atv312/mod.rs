@@ -13,11 +13,17 @@ mod settings;
 
 use std::time::Duration;
 
-use drive_atv312::{ROWS, words::ExtendedControl};
+use drive_atv312::{FAULTS, ROWS, words::ExtendedControl};
 use drive_core::registers::{Access, Storage};
 
 use super::drivecom::{Drivecom, Reaction};
-use crate::{Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, identification};
+use crate::{
+    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, Surroundings, identification,
+};
+
+/// What is around it.
+const SURROUNDINGS: Surroundings =
+    Surroundings { family: "atv312", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
 
 const RULES: Rules = Rules {
     read_holding: 29,
@@ -209,6 +215,18 @@ impl Atv312 {
     }
 }
 
+impl Atv312 {
+    /// What the drive would make of this word, if it takes it.
+    fn check(&self, address: u16, value: u16) -> Result<u16, Exception> {
+        let parameter = self.bank.row(address).is_some_and(|row| row.storage != Storage::Volatile);
+        if parameter && self.saving.is_some() {
+            return Err(Exception::FAILURE);
+        }
+        self.bank.check(address, value, !self.drive.motor().is_fed())?;
+        interlocks::check(&self.bank, address, value)
+    }
+}
+
 impl Default for Atv312 {
     fn default() -> Self {
         Self::new()
@@ -216,6 +234,10 @@ impl Default for Atv312 {
 }
 
 impl Model for Atv312 {
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
     fn rules(&self) -> &Rules {
         &RULES
     }
@@ -226,17 +248,15 @@ impl Model for Atv312 {
         Ok(self.computed(address).unwrap_or(kept))
     }
 
+    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
+        self.check(aliases::resolve(address), value).map(|_| ())
+    }
+
     fn write(&mut self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
         let address = aliases::resolve(address);
-        let parameter = self.bank.row(address).is_some_and(|row| row.storage != Storage::Volatile);
-        if parameter && self.saving.is_some() {
-            return Err(Exception::FAILURE);
-        }
-        let stopped = !self.drive.motor().is_fed();
-        self.bank.check(address, value, stopped)?;
-        let value = interlocks::check(&self.bank, address, value)?;
+        let value = self.check(address, value)?;
         let before = self.peek(address).unwrap_or(0);
-        self.bank.write(address, value, stopped)?;
+        self.bank.write(address, value, !self.drive.motor().is_fed())?;
         self.act(address, before, value);
         Ok(())
     }
@@ -252,11 +272,14 @@ impl Model for Atv312 {
         }
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        if !on {
+            return self.drive.power(false);
+        }
         self.bank.power_cycle();
         (self.commanded, self.bus_reference, self.saving, self.hottest) = (false, 0, None, 0);
         self.take_settings();
-        self.drive.power_cycle();
+        self.drive.power(true);
     }
 
     fn trip(&mut self, code: u16) {

@@ -19,16 +19,20 @@ mod words;
 use std::time::Duration;
 
 use drive_3g3ev::{
-    ROWS, TIME_OVER,
+    FAULTS, ROWS, TIME_OVER,
     registers::{COMMAND, ENTER, N06, N07, N08, N20, N53, OUTPUTS, REFERENCE},
     words::{BroadcastCommand, Command, Errors, LinkError},
 };
 
 use self::set_up::SetUp;
 use crate::{
-    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Refusal, Rules,
-    Watchdog,
+    Bank, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Refusal, Rules,
+    Surroundings, Watchdog,
 };
+
+/// What is around it.
+const SURROUNDINGS: Surroundings =
+    Surroundings { family: "3g3ev", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
 
 /// Value outside its range (§4.4).
 const OUT_OF_RANGE: Exception = Exception(0x21);
@@ -223,6 +227,10 @@ impl Default for Drive3g3ev {
 }
 
 impl Model for Drive3g3ev {
+    fn surroundings(&self) -> &'static Surroundings {
+        &SURROUNDINGS
+    }
+
     fn rules(&self) -> &Rules {
         &self.rules
     }
@@ -260,13 +268,8 @@ impl Model for Drive3g3ev {
         Ok(())
     }
 
-    fn check_write(&self, block: Block, values: &[u16], cast: Cast) -> Result<(), Exception> {
-        let mut words = (block.first..=u16::MAX).zip(values);
-        // A value outside its range is noted in 0022h by the write that fails.
-        words.try_for_each(|(address, &value)| match self.check(address, value, cast) {
-            Err(OUT_OF_RANGE) if block.quantity == 1 => Ok(()),
-            checked => checked,
-        })
+    fn check_word(&self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+        self.check(address, value, cast)
     }
 
     fn advance(&mut self, elapsed: Duration) {
@@ -282,7 +285,12 @@ impl Model for Drive3g3ev {
         }
     }
 
-    fn power_cycle(&mut self) {
+    fn power(&mut self, on: bool) {
+        self.motor.freewheel();
+        if !on {
+            self.watchdog = Watchdog::default();
+            return;
+        }
         self.bank.power_cycle();
         self.set_up = SetUp::of(&self.bank);
         self.rules = self.set_up.rules();
@@ -291,7 +299,6 @@ impl Model for Drive3g3ev {
         self.link_errors = LinkError::empty();
         self.limit_exceeded = false;
         self.locked = false;
-        self.motor.freewheel();
     }
 
     /// The code is the number of the bit of 0021h, 0 to 15.
@@ -314,6 +321,7 @@ impl Model for Drive3g3ev {
                 self.locked = self.command().contains(Command::RUN);
             }
             Panel::Stop => self.locked = self.command().contains(Command::RUN),
+            Panel::Run | Panel::Reset | Panel::Reference(_) => {}
         }
         self.steer();
     }

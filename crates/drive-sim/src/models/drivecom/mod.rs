@@ -89,12 +89,12 @@ impl Drivecom {
             local: false,
             stopped_by_key: false,
         };
-        drive.power_cycle();
+        drive.power(true);
         drive
     }
 
-    /// Supply off and on: the chart begins anew, the shaft turns on, the faults are remembered.
-    pub fn power_cycle(&mut self) {
+    /// The supply goes or comes: the chart begins anew, the shaft turns on, the faults are remembered.
+    pub fn power(&mut self, on: bool) {
         self.motor.freewheel();
         self.state = if self.settings.starts_enabled {
             ChartState::OperationEnabled
@@ -105,7 +105,12 @@ impl Drivecom {
         (self.no_timeout, self.cause_persists) = (false, false);
         (self.local, self.stopped_by_key) = (false, false);
         self.watchdog.rest();
-        self.watch();
+        if on {
+            self.watch();
+        } else {
+            self.state = ChartState::SwitchOnDisabled;
+            self.watchdog.set_timeout(None);
+        }
     }
 
     /// Parameters have changed.
@@ -223,6 +228,7 @@ impl Drivecom {
             Panel::TakeControl => self.force_local(true),
             Panel::ReleaseControl => self.force_local(false),
             Panel::Stop => self.stop_key(),
+            Panel::Run | Panel::Reset | Panel::Reference(_) => {}
         }
     }
 

@@ -306,7 +306,8 @@ fn a_new_ramp_acts_on_a_motor_that_runs() {
 fn a_power_cycle_ends_the_run_and_remembers_the_faults() {
     let mut drive = running(settings());
     drive.trip(9, Reaction::Freewheel, false);
-    drive.power_cycle();
+    drive.power(false);
+    drive.power(true);
     assert_eq!((drive.state(), drive.present_fault()), (ChartState::SwitchOnDisabled, None));
     assert_eq!(drive.faults().count(), 1);
     assert!(drive.motor().shaft_frequency() > 0, "the shaft turns on");

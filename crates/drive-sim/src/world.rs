@@ -1,0 +1,117 @@
+//! What is around a drive: its terminals, its analog inputs, its panel and its supplies, and the places where its
+//! manual can be read in two ways.
+
+use drive_core::{FaultEntry, Percent, registers::Row};
+
+/// What there is around the drives of a family, by name.
+///
+/// A world is quiet until somebody acts: every logic input is open, every analog input is at 0 %, nobody is at the
+/// panel, both supplies are on, and each switch stands on its first reading. Inputs that are closed in a drive as
+/// delivered are said so by the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Surroundings {
+    /// The family as a person names it, such as `atv312`.
+    pub family: &'static str,
+    /// Its logic inputs, as its manual names them.
+    pub terminals: &'static [&'static str],
+    /// Its analog inputs, as its manual names them.
+    pub analog_inputs: &'static [&'static str],
+    /// What its manual leaves open.
+    pub switches: &'static [Switch],
+    /// The codes that [`trip`](crate::Model::trip) takes, with their mnemonics.
+    pub trips: &'static [FaultEntry],
+    /// Its registers, with their mnemonics.
+    pub rows: &'static [Row],
+}
+
+impl Surroundings {
+    /// Nothing: a drive that stands alone.
+    pub const NONE: Self =
+        Self { family: "drive", terminals: &[], analog_inputs: &[], switches: &[], trips: &[], rows: &[] };
+}
+
+/// A decision that a manual leaves open, as a switch of the simulated drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Switch {
+    /// Its name.
+    pub name: &'static str,
+    /// The names of the readings; a drive begins with the first.
+    pub readings: &'static [&'static str],
+    /// What is open, and where the manual leaves it so.
+    pub question: &'static str,
+}
+
+/// What happens to a drive from outside, beyond what every drive has a method for. The names are those of its
+/// [`Surroundings`], whatever the case in which they were given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// A logic input is closed (`true`) or opened.
+    Terminal(&'static str, bool),
+    /// An analog input takes a level: a share of its full scale, negative on an input for ±10 V.
+    Analog(&'static str, Percent),
+    /// The supply of the power stage comes or goes, while the control is supplied all the time.
+    MotorSupply(bool),
+    /// From now on the drive follows this reading (the second name) of what its manual leaves open (the first).
+    Reading(&'static str, &'static str),
+}
+
+/// A name that the drive's [`Surroundings`] do not have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{family} has no {what} {name:?}: {}", listed(known))]
+pub struct UnknownName {
+    /// The drive's family.
+    pub family: &'static str,
+    /// What was named: a terminal, an analog input, a switch, a reading.
+    pub what: &'static str,
+    /// The name.
+    pub name: String,
+    /// The names that there are.
+    pub known: Vec<&'static str>,
+}
+
+fn listed(known: &[&str]) -> String {
+    if known.is_empty() { "it has none".to_owned() } else { format!("it has {}", known.join(", ")) }
+}
+
+impl Surroundings {
+    /// The act that closes or opens a logic input.
+    ///
+    /// # Errors
+    /// [`UnknownName`] when there is no such input.
+    pub fn terminal(&self, name: &str, closed: bool) -> Result<Act, UnknownName> {
+        Ok(Act::Terminal(self.named("terminal", name, self.terminals.iter().copied())?, closed))
+    }
+
+    /// The act that puts an analog input on a level.
+    ///
+    /// # Errors
+    /// [`UnknownName`] when there is no such input.
+    pub fn analog(&self, name: &str, level: Percent) -> Result<Act, UnknownName> {
+        Ok(Act::Analog(self.named("analog input", name, self.analog_inputs.iter().copied())?, level))
+    }
+
+    /// The act that puts a switch on a reading.
+    ///
+    /// # Errors
+    /// [`UnknownName`] when there is no such switch, or it has no such reading.
+    pub fn reading(&self, name: &str, reading: &str) -> Result<Act, UnknownName> {
+        let name = self.named("switch", name, self.switches.iter().map(|switch| switch.name))?;
+        let of_switch = self.switches.iter().filter(|switch| switch.name == name);
+        let readings = of_switch.flat_map(|switch| switch.readings.iter().copied());
+        Ok(Act::Reading(name, self.named("reading", reading, readings)?))
+    }
+
+    fn named(
+        &self,
+        what: &'static str,
+        name: &str,
+        known: impl Iterator<Item = &'static str> + Clone,
+    ) -> Result<&'static str, UnknownName> {
+        known.clone().find(|known| known.eq_ignore_ascii_case(name)).ok_or_else(|| UnknownName {
+            family: self.family,
+            what,
+            name: name.to_owned(),
+            known: known.collect(),
+        })
+    }
+}
