@@ -27,6 +27,16 @@ const REFERENCE_MODES: &[Choice] = &[
     Choice::new(4, "serial", "serial link"),
     Choice::new(5, "up/down", "up and down inputs"),
 ];
+/// Those that the manual names (§6.2, §8.4, §8.8); the others are in the drive's own.
+const INPUT_FUNCTIONS: &[Choice] = &[
+    Choice::new(0, "none", "no function"),
+    Choice::new(38, "FCHG", "switches to the reference of F207"),
+    Choice::new(48, "SC/LC", "forces local control: the terminals command"),
+    Choice::new(52, "forced", "forced operation: the terminals may change command and reference"),
+    Choice::new(53, "forced run", "forced run: the terminals may change command and reference"),
+];
+/// The highest number of a word.
+const ANY: i32 = 0xFFFF;
 const AUTOMATIC_RAMPS: &[Choice] = &[
     Choice::new(0, "off", "by hand"),
     Choice::new(1, "on", "automatic"),
@@ -36,6 +46,7 @@ const TIME_OUT_REACTIONS: &[Choice] = &[
     Choice::new(0, "freewheel", "freewheel stop, Err5"),
     Choice::new(1, "ramp", "stop along the ramp, Err5"),
     Choice::new(2, "DC", "stop by DC injection, Err5"),
+    Choice::new(4, "factory", "as the drive is delivered; the manual does not explain it"),
 ];
 const WRITE_SLOTS: &[Choice] = &[
     Choice::new(0, "none", "no selection"),
@@ -86,8 +97,13 @@ registers! {
     // §6.2 Control source, p. 12 to 17
     COMMAND_MODE: ReadWrite(0x0003, "CMOD", "command source", Eeprom, Unit::CODE, Range::OneOf(COMMAND_MODES), Factory::Value(0), Elsewhere, "Altivar 21 Modbus §6.2; address as in LinuxCNC vfs11_vfd");
     REFERENCE_MODE: ReadWrite(0x0004, "FMOD", "reference source", Eeprom, Unit::CODE, Range::OneOf(REFERENCE_MODES), Factory::Value(1), Elsewhere, "Altivar 21 Modbus §6.2; address as in LinuxCNC vfs11_vfd");
-    /// 48 forces local control, 38 switches the reference.
-    INPUT_R_FUNCTION: ReadWrite(0x0112, "F112", "function of input R", Eeprom, Unit::CODE, Range::Any, Factory::None, Manual, "Altivar 21 Modbus §6.2 p. 15, 16; address by the rule of Fnnn");
+    /// The manual names it with the functions of the inputs, and no input that it belongs to: it counts as always on.
+    ALWAYS_FUNCTION: ReadWrite(0x0110, "F110", "function that is always on", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31; address by the rule of Fnnn");
+    INPUT_F_FUNCTION: ReadWrite(0x0111, "F111", "function of input F", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31, §8.8 p. 38; address by the rule of Fnnn");
+    INPUT_R_FUNCTION: ReadWrite(0x0112, "F112", "function of input R", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §6.2 p. 15, 16; address by the rule of Fnnn");
+    INPUT_RES_FUNCTION: ReadWrite(0x0113, "F113", "function of input RES", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31, §8.8 p. 38; address by the rule of Fnnn");
+    /// In force only where F109 makes VIA a logic input.
+    INPUT_VIA_FUNCTION: ReadWrite(0x0118, "F118", "function of input VIA", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31, §8.8 p. 38; address by the rule of Fnnn");
     SECOND_REFERENCE: ReadWrite(0x0207, "F207", "reference when FCHG is on", Eeprom, Unit::CODE, Range::Any, Factory::None, Manual, "Altivar 21 Modbus §6.2 p. 16; address by the rule of Fnnn");
 
     // §6.3 Indirect blocks, p. 18
@@ -109,7 +125,6 @@ registers! {
     // §6.4 Communication fault, p. 19
     /// 0: off. It takes effect at once.
     TIME_OUT: ReadWrite(0x0803, "F803", "Modbus time-out", Eeprom, Unit::scaled("s", 0), Range::Within(0, 100), Factory::Value(3), Manual, "Altivar 21 Modbus §6.4 p. 19");
-    /// The manual prints 4 as factory setting and does not explain it: the range ends at 2.
     TIME_OUT_REACTION: ReadWrite(0x0603, "F603", "reaction to a Modbus fault", Eeprom, Unit::CODE, Range::OneOf(TIME_OUT_REACTIONS), Factory::Value(4), Manual, "Altivar 21 Modbus §6.4 p. 19");
 
     // §8.1 The example of the parameter table, and parameters beside it, p. 27

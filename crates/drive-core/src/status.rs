@@ -191,6 +191,9 @@ impl fmt::Display for Status {
 pub struct Measurements {
     /// When the oldest of these values ended on the line; `None` on a port that keeps no time.
     pub at: Option<Instant>,
+    /// The drive has tripped, and what it holds still since then is not the present: such values are `None`, and their
+    /// words, from just before the trip, stand in [`raw`](Self::raw) alone.
+    pub before_trip: bool,
     /// The reference before the ramp.
     pub reference: Option<Setpoint>,
     /// The motor speed.

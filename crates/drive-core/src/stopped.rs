@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use crate::{setpoint::StopMode, status::Status};
+use crate::{
+    setpoint::StopMode,
+    status::{Control, Status},
+};
 
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,13 +17,16 @@ pub struct Stopped {
     /// Why another mode took the place of the one that was asked for, such as a setting that keeps it from acting; `None`
     /// where the mode is the one that was asked for.
     pub instead: Option<&'static str>,
+    /// Who commanded the drive until this stop took the command from him; it is kept until it is released. `None` where
+    /// nothing was taken.
+    pub taken_from: Option<Control>,
 }
 
 impl Stopped {
     /// A stop in the mode that was asked for.
     #[must_use]
     pub const fn by(mode: StopMode, status: Status) -> Self {
-        Self { status, mode, instead: None }
+        Self { status, mode, instead: None, taken_from: None }
     }
 }
 
@@ -29,6 +35,9 @@ impl fmt::Display for Stopped {
         write!(f, "{} stop", self.mode)?;
         if let Some(why) = self.instead {
             write!(f, " ({why})")?;
+        }
+        if let Some(other) = self.taken_from {
+            write!(f, ", command taken from: {other}")?;
         }
         write!(f, ": {}", self.status)
     }
