@@ -85,9 +85,9 @@ impl SimLine {
                 let joins = words.either("join", "cut")?;
                 words.end()?;
                 if joins {
-                    self.join()
+                    self.join();
                 } else {
-                    self.cut()
+                    self.cut();
                 }
                 Ok(done())
             }
