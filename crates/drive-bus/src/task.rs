@@ -1,8 +1,8 @@
 //! The task that owns the port: it writes, reads, waits, and does what the master decides.
 
-use std::{future::poll_fn, io, mem, pin::pin, sync::Arc, task::Poll, time::Duration};
+use std::{future::poll_fn, io, mem, ops::Range, pin::pin, sync::Arc, task::Poll, time::Duration};
 
-use drive_clock::Timer;
+use drive_clock::{Timer, Watch};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     time::{Instant, timeout},
@@ -12,7 +12,7 @@ use crate::{
     config::{Endpoint, LineConfig},
     master::Outcome,
     shared::{Caller, Shared},
-    transport::{BoxedStream, Connector, OpenError, Opening},
+    transport::{BoxedStream, Connector, OpenError, Opening, poll_read_now},
 };
 
 /// How long a frame may wait for room in the system's buffer. A port that takes none for so long is as good as gone.
@@ -26,6 +26,9 @@ pub(crate) struct Task {
     connector: Connector,
     port: Port,
     timer: Timer,
+    watch: Option<Watch>,
+    /// When the answer that is awaited is worth being awake for.
+    awake: Option<Range<Instant>>,
     /// Before the next attempt to open the port. It is shortest again once the port has given a byte, not when it
     /// merely opens: some open and fail for ever.
     backoff: Duration,
@@ -55,6 +58,7 @@ impl Task {
         stream: Option<BoxedStream>,
     ) -> Self {
         let on_descriptor = matches!(config.endpoint, Endpoint::Serial(_) | Endpoint::RtuOverTcp(_));
+        let precise = on_descriptor || config.precise_timer;
         let port = match stream {
             Some(stream) => {
                 shared.master().handle_up(Instant::now());
@@ -66,7 +70,9 @@ impl Task {
             shared,
             connector,
             port,
-            timer: if on_descriptor || config.precise_timer { Timer::precise() } else { Timer::tokio() },
+            timer: if precise { Timer::precise() } else { Timer::tokio() },
+            watch: (precise && config.stay_awake).then(Watch::new),
+            awake: None,
             backoff: REOPEN_BACKOFF.0,
             received: vec![0; 512],
             ended: Vec::new(),
@@ -111,6 +117,7 @@ impl Task {
                 master.handle_timeout(now);
                 let exchange_end = master.exchange_end();
                 let frame = master.poll_transmit(now);
+                self.awake.take_if(|_| !master.is_busy());
                 self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
                 (frame, master.deadline(), master.is_finished(), exchange_end)
             };
@@ -130,11 +137,13 @@ impl Task {
             match write(stream, &frame).await {
                 Ok(()) => {
                     let now = Instant::now();
-                    let deadline = {
+                    let (deadline, due) = {
                         let mut master = self.shared.master();
                         master.handle_sent(now);
-                        master.deadline()
+                        (master.deadline(), master.answer_due())
                     };
+                    let due = self.watch.as_mut().zip(due);
+                    self.awake = due.and_then(|(watch, (due, spread))| watch.plan(now, due, spread));
                     self.shared.tap().take_if(|tap| !tap.sent(now, &frame));
                     return Some(deadline);
                 }
@@ -144,7 +153,7 @@ impl Task {
     }
 
     async fn next_event(&mut self, deadline: Option<Instant>) -> Event {
-        let Self { shared, connector, port, timer, received, .. } = self;
+        let Self { shared, connector, port, timer, watch, awake, received, .. } = self;
         if let Port::Waiting(until) = port
             && *until <= Instant::now()
         {
@@ -152,17 +161,30 @@ impl Task {
         }
         let open_at = if let Port::Waiting(until) = port { Some(*until) } else { None };
         let wake_at = [deadline, open_at].into_iter().flatten().min();
+        let watched = awake.as_ref().map(|awake| awake.start);
+        let watched = watched.filter(|start| wake_at.is_none_or(|wake_at| *start < wake_at));
         tokio::select! {
             biased;
-            event = port_event(port, received) => event,
-            () = shared.wake.notified() => Event::Woken,
-            () = async {
-                match wake_at {
-                    Some(at) => timer.until(at).await,
-                    None => std::future::pending().await,
-                }
-            } => Event::Woken,
+            event = port_event(port, received) => return event,
+            () = shared.wake.notified() => return Event::Woken,
+            () = poll_fn(|context| match (watched, wake_at) {
+                (Some(start), _) => timer.poll_shortly_before(context, start),
+                (None, Some(at)) => timer.poll_until(context, at),
+                (None, None) => Poll::Pending,
+            }) => {}
         }
+        let (Some(watch), Port::Open(stream), Some(_)) = (watch, port, watched) else { return Event::Woken };
+        let began = Instant::now();
+        let event = tokio::select! {
+            biased;
+            () = shared.wake.notified() => Event::Woken,
+            read = read_awake(stream, received, awake.as_ref().map(|awake| awake.end)) => {
+                awake.take_if(|_| read.is_none());
+                read.map_or(Event::Woken, Event::Received)
+            }
+        };
+        watch.ended(began.elapsed(), awake.is_some());
+        event
     }
 
     fn lose(&mut self, reason: &str) {
@@ -211,6 +233,25 @@ async fn give_way() {
         Poll::Pending
     })
     .await;
+}
+
+/// Reads what comes by `end`, without falling asleep meanwhile, and gives way to whatever else wants to run.
+async fn read_awake(
+    stream: &mut BoxedStream,
+    received: &mut [u8],
+    end: Option<Instant>,
+) -> Option<io::Result<usize>> {
+    loop {
+        let read = poll_fn(|context| Poll::Ready(poll_read_now(stream.as_mut(), context, received)));
+        if let Poll::Ready(read) = read.await {
+            return Some(read);
+        }
+        if end.is_none_or(|end| Instant::now() >= end) {
+            return None;
+        }
+        std::thread::yield_now();
+        tokio::task::yield_now().await;
+    }
 }
 
 async fn port_event(port: &mut Port, received: &mut [u8]) -> Event {

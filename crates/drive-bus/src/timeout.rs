@@ -36,6 +36,12 @@ impl LearnedTimeout {
         self.smoothed.map_or(self.ceiling, |(mean, _)| mean)
     }
 
+    /// How long the slave usually takes and by how much that varies, once it has answered.
+    #[must_use]
+    pub const fn learned(&self) -> Option<(Duration, Duration)> {
+        self.smoothed
+    }
+
     /// Another ceiling; what was learned stays.
     pub fn limit(&mut self, ceiling: Duration) {
         self.ceiling = ceiling;

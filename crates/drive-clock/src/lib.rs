@@ -1,49 +1,60 @@
-//! The timer of a serial line.
+//! The timer of a serial line, and how long the line stays awake for an answer.
 //!
 //! A silence of 3.5 characters is 1.75 to 4 ms. tokio's own timer has a wheel of 1 ms and is late by up to 1.4 ms, which
-//! on a line of short frames costs one transaction in ten. [`Timer::precise`] is late by tens of microseconds;
+//! on a line of short frames costs one transaction in ten. [`Timer::precise`] is late by microseconds;
 //! [`Timer::tokio`] is for a paused clock, where tokio's timer is exact, and for tests.
 //!
 //! Both are **late, never early**: a silence that is kept too long costs throughput, one that is too short is a broken
 //! frame.
+//!
+//! A processor that has nothing to do falls asleep and needs 30 to 100 µs to wake up. Where it is known when something
+//! happens, somebody can be awake: [`Timer`] is aimed before its deadline and spins for what is left, and [`Watch`] says
+//! when an answer is worth being awake for. In a process with more than eight precise timers neither happens.
 
 #![forbid(unsafe_code)]
+
+#[cfg(target_os = "linux")]
+#[path = "descriptor.rs"]
+mod alarm;
+#[cfg(not(target_os = "linux"))]
+#[path = "elsewhere.rs"]
+mod alarm;
+mod company;
+mod watch;
 
 use std::{
     fmt,
     future::poll_fn,
     pin::Pin,
-    task::{Context, Poll},
+    task::{Context, Poll, ready},
     time::Duration,
 };
 
 use tokio::time::{Instant, Sleep};
 
-/// Waits longer than this begin on tokio's timer, which is cheap to set and to drop again: most long waits are
-/// response timeouts, and an answer ends them long before they are due.
-const COARSE: Duration = Duration::from_millis(5);
+use crate::{alarm::Alarm, company::Member};
 
-/// How much before a deadline the coarse timer must hand over, so that its own lateness never shows.
-const HANDOVER: Duration = Duration::from_millis(3);
+pub use crate::watch::Watch;
 
-/// How much before the deadline the fine timer is aimed at the most, and with it how long a wait spins at the most. A
-/// processor that has fallen asleep needs 30 to 100 µs to wake up.
+/// How much before the deadline the timer is aimed at the most, and with it how long a wait spins at the most.
 const LONGEST_LEAD: Duration = Duration::from_micros(120);
 
 /// What the lead is more than the usual lateness, so that most waits end on their deadline.
 const MARGIN: Duration = Duration::from_micros(8);
 
 /// One timer, reused for every wait of its owner.
-pub struct Timer {
-    coarse: Pin<Box<Sleep>>,
-    coarse_for: Option<Instant>,
-    fine: Option<Fine>,
+pub struct Timer(Source);
+
+enum Source {
+    Precise(Precise),
+    Tokio { sleep: Pin<Box<Sleep>>, armed_for: Option<Instant> },
 }
 
-struct Fine {
-    timer: async_io::Timer,
+struct Precise {
+    alarm: Alarm,
     armed: Option<Armed>,
     lead: Lead,
+    _member: Member,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +73,10 @@ impl Lead {
         Self(Duration::from_micros(40))
     }
 
+    fn current(self) -> Duration {
+        if company::is_small() { self.0 } else { Duration::ZERO }
+    }
+
     /// The timer was this late behind the time at which it was aimed.
     fn learn(&mut self, late: Duration) {
         self.0 = (self.0 * 7 / 8 + (late + MARGIN) / 8).min(LONGEST_LEAD);
@@ -69,17 +84,15 @@ impl Lead {
 }
 
 impl Timer {
-    /// A timer that is late by tens of microseconds, for a line on a real descriptor. Works inside a tokio runtime
-    /// whose clock is not paused.
+    /// A timer that is late by microseconds, for a line on a real descriptor. Works inside a tokio runtime whose clock is
+    /// not paused. In a process that has no descriptor left it is [`Timer::tokio`].
     ///
     /// # Panics
-    /// Outside a tokio runtime with time enabled, as every tokio timer does.
+    /// Outside a tokio runtime with time and I/O enabled, as tokio's own timers and sockets do.
     #[must_use]
     pub fn precise() -> Self {
-        Self {
-            fine: Some(Fine { timer: async_io::Timer::never(), armed: None, lead: Lead::new() }),
-            ..Self::tokio()
-        }
+        let precise = |alarm| Precise { alarm, armed: None, lead: Lead::new(), _member: Member::new() };
+        Alarm::new().map_or_else(|_| Self::tokio(), |alarm| Self(Source::Precise(precise(alarm))))
     }
 
     /// tokio's own timer: exact under a paused clock, otherwise late by up to 1.4 ms.
@@ -88,7 +101,7 @@ impl Timer {
     /// Outside a tokio runtime with time enabled, as every tokio timer does.
     #[must_use]
     pub fn tokio() -> Self {
-        Self { coarse: Box::pin(tokio::time::sleep(Duration::ZERO)), coarse_for: None, fine: None }
+        Self(Source::Tokio { sleep: Box::pin(tokio::time::sleep(Duration::ZERO)), armed_for: None })
     }
 
     /// Waits until `deadline`: never returns before it, at once when it has passed.
@@ -101,67 +114,56 @@ impl Timer {
 
     /// [`until`](Self::until) for a hand-written future.
     pub fn poll_until(&mut self, context: &mut Context<'_>, deadline: Instant) -> Poll<()> {
-        let Some(fine) = &mut self.fine else { return self.poll_coarse(context, deadline) };
-        let now = Instant::now();
-        if now >= deadline {
-            return Poll::Ready(());
+        ready!(self.poll_shortly_before(context, deadline));
+        while Instant::now() < deadline {
+            std::hint::spin_loop();
         }
-        if deadline - now > COARSE {
-            fine.disarm();
-            if self.poll_coarse(context, deadline - HANDOVER).is_pending() {
-                return Poll::Pending;
-            }
-        }
-        match &mut self.fine {
-            Some(fine) => fine.poll(context, deadline),
-            None => Poll::Ready(()),
-        }
+        Poll::Ready(())
     }
 
-    fn poll_coarse(&mut self, context: &mut Context<'_>, deadline: Instant) -> Poll<()> {
-        if self.coarse_for != Some(deadline) {
-            self.coarse.as_mut().reset(deadline);
-            self.coarse_for = Some(deadline);
+    /// [`until`](Self::until), except that it returns up to 120 µs **before** the deadline instead of spinning: for
+    /// somebody who has better to do in that time.
+    pub fn poll_shortly_before(&mut self, context: &mut Context<'_>, deadline: Instant) -> Poll<()> {
+        match &mut self.0 {
+            Source::Precise(precise) => precise.poll(context, deadline),
+            Source::Tokio { sleep, armed_for } => {
+                if *armed_for != Some(deadline) {
+                    sleep.as_mut().reset(deadline);
+                    *armed_for = Some(deadline);
+                }
+                sleep.as_mut().poll(context)
+            }
         }
-        self.coarse.as_mut().poll(context)
     }
 }
 
 impl fmt::Debug for Timer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.fine.is_some() { "Timer::precise" } else { "Timer::tokio" })
+        f.write_str(match self.0 {
+            Source::Precise(_) => "Timer::precise",
+            Source::Tokio { .. } => "Timer::tokio",
+        })
     }
 }
 
-impl Fine {
-    fn disarm(&mut self) {
-        if self.armed.take().is_some() {
-            self.timer.clear();
-        }
-    }
-
-    /// When it will ring for this deadline.
-    fn arm(&mut self, deadline: Instant) -> Instant {
-        let aimed_at = deadline - self.lead.0;
-        self.timer.set_at(aimed_at.into_std());
-        self.armed = Some(Armed { deadline, aimed_at });
-        aimed_at
-    }
-
+impl Precise {
+    /// Ready within the lead of the deadline.
     fn poll(&mut self, context: &mut Context<'_>, deadline: Instant) -> Poll<()> {
-        let armed = self.armed.filter(|armed| armed.deadline == deadline);
-        let near = deadline.saturating_duration_since(Instant::now()) <= self.lead.0;
-        if armed.is_some() || !near {
-            let aimed_at = armed.map_or_else(|| self.arm(deadline), |armed| armed.aimed_at);
-            if Pin::new(&mut self.timer).poll(context).is_pending() {
-                return Poll::Pending;
+        let now = Instant::now();
+        let armed = match self.armed.filter(|armed| armed.deadline == deadline) {
+            Some(armed) => armed,
+            None => {
+                let aimed_at = deadline.checked_sub(self.lead.current()).unwrap_or(deadline);
+                if now >= aimed_at {
+                    return Poll::Ready(());
+                }
+                self.alarm.set(now, aimed_at);
+                *self.armed.insert(Armed { deadline, aimed_at })
             }
-            self.armed = None;
-            self.lead.learn(Instant::now().saturating_duration_since(aimed_at));
-        }
-        while Instant::now() < deadline {
-            std::hint::spin_loop();
-        }
+        };
+        ready!(self.alarm.poll(context));
+        self.armed = None;
+        self.lead.learn(Instant::now().saturating_duration_since(armed.aimed_at));
         Poll::Ready(())
     }
 }
@@ -205,14 +207,26 @@ mod tests {
     #[tokio::test]
     async fn a_dropped_wait_leaves_nothing_behind_for_the_next() {
         let mut timer = Timer::precise();
-        let far = Instant::now() + Duration::from_secs(3_600);
-        tokio::select! {
-            biased;
-            () = timer.until(far) => panic!("an hour has not passed"),
-            () = tokio::task::yield_now() => {}
+        for dropped in [Duration::from_secs(3_600), Duration::from_micros(300)] {
+            let dropped = Instant::now() + dropped;
+            poll_fn(|context| {
+                let _ = timer.poll_until(context, dropped);
+                Poll::Ready(())
+            })
+            .await;
+            let near = Instant::now() + Duration::from_millis(2);
+            timer.until(near).await;
+            assert!(Instant::now() >= near);
         }
-        let near = Instant::now() + Duration::from_millis(2);
-        timer.until(near).await;
-        assert!(Instant::now() >= near);
+    }
+
+    #[tokio::test]
+    async fn a_deadline_too_far_for_any_clock_is_a_wait_without_end() {
+        let mut timer = Timer::precise();
+        let far = Instant::now() + Duration::from_secs(u32::MAX.into());
+        tokio::select! {
+            () = timer.until(far) => panic!("that is a lifetime"),
+            () = tokio::time::sleep(Duration::from_millis(5)) => {}
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What is sent next, and what follows from its having been sent.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_core::Class;
@@ -207,5 +207,16 @@ impl<C> Master<C> {
         });
         self.exchange.handle_sent(end, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);
+    }
+
+    /// When the last character of the awaited answer usually comes, and by how much that varies. `None`: nothing is
+    /// awaited, or the slave has not answered yet.
+    #[must_use]
+    pub fn answer_due(&self) -> Option<(Instant, Duration)> {
+        let flight = self.flight.as_ref()?;
+        let sent = flight.sent.filter(|sent| sent.unanswered_until.is_none())?;
+        let (response, spread) = self.stations.get(&flight.slave)?.timeout.learned()?;
+        let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
+        Some((sent.end + response + characters, spread))
     }
 }

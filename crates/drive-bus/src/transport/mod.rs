@@ -6,17 +6,20 @@ mod serial;
 pub use low_latency::adapter_latency;
 
 use std::{
+    any::Any,
     io,
     path::PathBuf,
     pin::Pin,
     sync::{Arc, atomic::AtomicBool},
+    task::{Context, Poll},
     time::Duration,
 };
 
 use tokio::{
-    io::{AsyncRead, AsyncWrite},
+    io::{AsyncRead, AsyncWrite, ReadBuf},
     net::TcpStream,
 };
+use tokio_serial::SerialStream;
 
 use crate::{
     config::{Endpoint, LineConfig},
@@ -27,13 +30,30 @@ use crate::{
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 
 /// What a line reads and writes.
-pub(crate) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+pub(crate) trait Stream: AsyncRead + AsyncWrite + Any + Send + Unpin {}
 
-impl<T: AsyncRead + AsyncWrite + Send + Unpin> Stream for T {}
+impl<T: AsyncRead + AsyncWrite + Any + Send + Unpin> Stream for T {}
 
 pub(crate) type BoxedStream = Box<dyn Stream>;
 pub(crate) type Opening<E> = Pin<Box<dyn Future<Output = Result<BoxedStream, E>> + Send>>;
 pub(crate) type Given = Box<dyn FnMut() -> Opening<io::Error> + Send>;
+
+/// What is there to read now, without a wait for the runtime to be told of it: its poll may be in the hands of another
+/// thread, which sleeps.
+pub(crate) fn poll_read_now(
+    stream: &mut dyn Stream,
+    context: &mut Context<'_>,
+    buffer: &mut [u8],
+) -> Poll<io::Result<usize>> {
+    if let Some(port) = (stream as &mut dyn Any).downcast_mut::<SerialStream>() {
+        return match port.try_read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Poll::Pending,
+            read => Poll::Ready(read),
+        };
+    }
+    let mut buffer = ReadBuf::new(buffer);
+    Pin::new(stream).poll_read(context, &mut buffer).map_ok(|()| buffer.filled().len())
+}
 
 /// Why a line could not be opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
