@@ -11,7 +11,7 @@ use crate::{
     masters::saturate,
     report::{Goal, Report, Unit, micros, millis},
     rig::{DRIVES, Rig},
-    simulator::{Order, Plant},
+    simulator::{Counted, Order, Plant},
     usage::{memory_kib, processor_time},
 };
 
@@ -58,12 +58,10 @@ pub(crate) fn measure(report: &mut Report, time: Duration, lines: u16) -> Result
         Ok::<_, Error>(())
     })?;
 
-    let share = |ideal: Duration, time: Duration| ideal.as_secs_f64() / time.as_secs_f64();
     let counted = taken.counted;
     let number = counted.len().max(1);
-    let whole: Vec<f64> = counted.iter().map(|line| share(line.ideal, line.taken)).collect();
-    let without: Vec<f64> =
-        counted.iter().map(|line| share(line.ideal, line.taken.saturating_sub(line.late))).collect();
+    let whole: Vec<f64> = counted.iter().map(Counted::utilisation).collect();
+    let without: Vec<f64> = counted.iter().map(Counted::own_utilisation).collect();
     let mean = |shares: &[f64]| shares.iter().sum::<f64>() / number as f64;
     let least = |shares: &[f64]| shares.iter().copied().fold(f64::INFINITY, f64::min);
     let goal = Goal::AtLeast(GOAL);

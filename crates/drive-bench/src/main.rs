@@ -6,10 +6,15 @@
 mod awake;
 mod cpu;
 mod dead;
+mod far_end;
 mod faults;
+mod growth;
 mod ledger;
 mod lines;
+mod machine;
 mod masters;
+mod peers;
+mod plot;
 mod report;
 mod rig;
 mod simulator;
@@ -19,7 +24,7 @@ mod usage;
 mod utilisation;
 mod virtual_line;
 
-use std::{process::ExitCode, time::Duration};
+use std::{path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{Parser, ValueEnum};
 
@@ -28,7 +33,7 @@ use crate::report::{Report, Unit};
 /// What can be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Section {
-    /// Utilisation and silences of a saturated line of 31 drives, beside the stock tokio-modbus client.
+    /// Utilisation and silences of a saturated line of 31 drives, beside the masters of others.
     Utilisation,
     /// The wait of a Stop behind saturated polling.
     Stop,
@@ -36,14 +41,23 @@ enum Section {
     Dead,
     /// Processor time of one transaction on a pty without pacing.
     Cpu,
-    /// Many lines in one process.
+    /// Many lines in one process, on ptys.
     Lines,
+    /// From one line to a thousand in one process, the drives in the same process.
+    Growth,
     /// Wrong values accepted as right, over every fault of the simulator.
     Faults,
 }
 
-const EVERYTHING: [Section; 6] =
-    [Section::Utilisation, Section::Stop, Section::Dead, Section::Cpu, Section::Lines, Section::Faults];
+const EVERYTHING: [Section; 7] = [
+    Section::Utilisation,
+    Section::Stop,
+    Section::Dead,
+    Section::Cpu,
+    Section::Lines,
+    Section::Growth,
+    Section::Faults,
+];
 
 /// Measures a line of simulated drives.
 #[derive(Debug, Parser)]
@@ -64,6 +78,12 @@ struct Arguments {
     /// How many lines in one process.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..=2_048))]
     lines: u16,
+    /// Up to how many lines the growth is measured.
+    #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u16).range(1..=4_096))]
+    most_lines: u16,
+    /// Where to draw the growth, as an SVG.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// The seed of the faults.
     #[arg(long, default_value_t = 2_026)]
     seed: u64,
@@ -117,6 +137,7 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
         Section::Dead => dead::measure(report, time),
         Section::Cpu => cpu::measure(report, time),
         Section::Lines => lines::measure(report, time, arguments.lines),
+        Section::Growth => growth::measure(report, time, arguments.most_lines, arguments.plot.as_deref()),
         Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
     }
 }

@@ -69,6 +69,25 @@ impl Counted {
             violations: stats.violations,
         }
     }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.requests += other.requests;
+        self.ideal += other.ideal;
+        self.taken += other.taken;
+        self.late += other.late;
+        self.shortest_silence = self.shortest_silence.into_iter().chain(other.shortest_silence).min();
+        self.violations += other.violations;
+    }
+
+    /// The shortest time that the exchanges can take, by the time that they took.
+    pub(crate) fn utilisation(&self) -> f64 {
+        self.ideal.as_secs_f64() / self.taken.as_secs_f64()
+    }
+
+    /// The same without the simulator's own lateness.
+    pub(crate) fn own_utilisation(&self) -> f64 {
+        self.ideal.as_secs_f64() / self.taken.saturating_sub(self.late).as_secs_f64()
+    }
 }
 
 /// One request that a drive took.

@@ -9,7 +9,7 @@ use tokio::time::{Instant, sleep};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
-    Error,
+    Error, machine,
     masters::{READ, saturate},
     report::{Goal, Report, Unit, micros, millis, quantile},
     rig::{DRIVES, QUANTITY, Rig, exchange, runtime, virtual_runtime},
@@ -39,6 +39,7 @@ const ANSWER: usize = 2 + 2 * QUANTITY as usize;
 
 pub(crate) fn measure(report: &mut Report, time: Duration, transactions: u64) -> Result<(), Error> {
     healthy(report, time)?;
+    machine::alone(report, SECTION, LINES, time)?;
     sick(report, transactions)
 }
 

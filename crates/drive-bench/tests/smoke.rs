@@ -7,7 +7,18 @@ use serde_json::Value;
 /// The rows of one run in its smallest form.
 fn rows(section: &str) -> Vec<Value> {
     let output = Command::new(env!("CARGO_BIN_EXE_drive-bench"))
-        .args([section, "--json", "--seconds", "1", "--transactions", "4000", "--lines", "2"])
+        .args([
+            section,
+            "--json",
+            "--seconds",
+            "1",
+            "--transactions",
+            "4000",
+            "--lines",
+            "2",
+            "--most-lines",
+            "3",
+        ])
         .output()
         .unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -46,4 +57,27 @@ fn three_masters_are_measured_on_a_line_without_pacing() {
         let each = row(&rows, &format!("processor time per transaction, {master}"));
         assert!(each["value"].as_f64().is_some_and(|value| value > 0.0));
     }
+}
+
+#[test]
+fn the_growth_is_measured_line_by_line_and_no_silence_is_too_short() {
+    let rows = rows("growth");
+    for lines in [1, 3] {
+        assert_eq!(row(&rows, &format!("{lines} lines: silences too short"))["value"], 0.0);
+        let share = &row(&rows, &format!("{lines} lines: utilisation, mean"))["value"];
+        assert!(share.as_f64().is_some_and(|share| share > 0.0));
+    }
+}
+
+#[test]
+fn our_line_is_measured_beside_the_masters_of_others() {
+    let rows = rows("utilisation");
+    for master in
+        ["this line", "this line, not staying awake", "loop that never sleeps", "stock tokio-modbus"]
+    {
+        let share = &row(&rows, &format!("{master}: utilisation"))["value"];
+        assert!(share.as_f64().is_some_and(|share| share > 0.0), "{master}");
+    }
+    assert_eq!(row(&rows, "this line: silences shorter")["value"], 0.0);
+    assert!(row(&rows, "this line by the best of the others")["value"].as_f64().is_some());
 }

@@ -1,0 +1,138 @@
+//! What a line costs among so many in one process, from one to a thousand.
+
+use std::{fs, path::Path, time::Duration};
+
+use drive_bus::{Line, LineConfig};
+use drive_core::serial::SerialSettings;
+use rustix::process::{Resource, getrlimit, setrlimit};
+use tokio::time::sleep;
+
+use crate::{
+    Error,
+    far_end::{Book, FarEnd},
+    masters::saturate,
+    plot::{Curve, plot},
+    report::{Goal, Report, Unit, micros, millis},
+    rig::DRIVES,
+    simulator::Counted,
+    usage::{memory_kib, processor_time},
+};
+
+const SECTION: &str = "growth";
+
+const COUNTS: [u16; 7] = [1, 3, 10, 30, 100, 300, 1_000];
+
+/// Until the timeouts are learned and every line is in its stride.
+const SETTLE: Duration = Duration::from_secs(2);
+
+/// What a line with 31 polls may hold.
+const MEMORY: Goal = Goal::AtMost(64.0);
+
+/// What so many lines have shown.
+struct Shown {
+    lines: u16,
+    mean: f64,
+    least: f64,
+    processors: f64,
+    each: Duration,
+    memory: f64,
+    counted: Counted,
+}
+
+/// Measures 1 to `most` lines, and draws what was measured into `picture`.
+pub(crate) fn measure(
+    report: &mut Report,
+    time: Duration,
+    most: u16,
+    picture: Option<&Path>,
+) -> Result<(), Error> {
+    allow_descriptors()?;
+    let before = memory_kib()?;
+    let mut all = Vec::new();
+    for lines in COUNTS.into_iter().filter(|lines| *lines < most).chain([most]) {
+        let shown = one(lines, time / 3, before)?;
+        describe(report, &shown, lines == most);
+        all.push(shown);
+    }
+    if let Some(picture) = picture {
+        let curve = |name, most, value: fn(&Shown) -> f64| Curve {
+            name,
+            most,
+            points: all.iter().map(|shown| (f64::from(shown.lines), value(shown))).collect(),
+        };
+        let curves = [
+            curve("utilisation, mean (to 1)", 1.0, |shown| shown.mean),
+            curve("processors in use (to 2)", 2.0, |shown| shown.processors),
+            curve("memory of a line (to 128 KiB)", 128.0, |shown| shown.memory),
+        ];
+        fs::write(picture, plot("lines in one process", &curves))?;
+    }
+    Ok(())
+}
+
+fn one(lines: u16, time: Duration, before: u64) -> Result<Shown, Error> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let _inside = runtime.enter();
+    let config = LineConfig { precise_timer: true, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
+    let books: Vec<Book> = (0..lines).map(|_| Book::default()).collect();
+    let masters: Vec<Line> =
+        books.iter().map(|book| Line::over(FarEnd::new(book.clone()), config.clone())).collect();
+    let polls: Vec<_> = masters
+        .iter()
+        .map(|line| {
+            let line = line.clone();
+            runtime.spawn(async move { saturate(&line, DRIVES, SETTLE + time).await })
+        })
+        .collect();
+    runtime.block_on(sleep(SETTLE));
+    for book in &books {
+        let _while_settling = book.take();
+    }
+    let used = processor_time();
+    runtime.block_on(sleep(time));
+    let used = processor_time().saturating_sub(used);
+    let memory = memory_kib()?.saturating_sub(before) as f64 / f64::from(lines);
+    let counted: Vec<Counted> = books.iter().map(Book::take).collect();
+    runtime.block_on(async {
+        for poll in polls {
+            poll.await??;
+        }
+        for line in masters {
+            line.close().await;
+        }
+        Ok::<_, Error>(())
+    })?;
+    let shares: Vec<f64> = counted.iter().map(Counted::own_utilisation).collect();
+    let mut sum = Counted::default();
+    counted.iter().for_each(|counted| sum.add(counted));
+    Ok(Shown {
+        lines,
+        mean: shares.iter().sum::<f64>() / f64::from(lines),
+        least: shares.iter().copied().fold(f64::INFINITY, f64::min),
+        processors: used.as_secs_f64() / time.as_secs_f64(),
+        each: used / u32::try_from(sum.requests)?.max(1),
+        memory,
+        counted: sum,
+    })
+}
+
+fn describe(report: &mut Report, shown: &Shown, last: bool) {
+    let name = |what: &str| format!("{} lines: {what}", shown.lines);
+    report.note(SECTION, name("utilisation, mean"), Unit::Share, shown.mean);
+    report.note(SECTION, name("utilisation, the least"), Unit::Share, shown.least);
+    report.note(SECTION, name("processors in use, drives included"), Unit::Times, shown.processors);
+    report.note(SECTION, name("processor time per transaction"), Unit::Micros, micros(shown.each));
+    let goal = if last { MEMORY } else { Goal::None };
+    report.row(SECTION, name("memory of a line with 31 polls"), Unit::KiB, shown.memory, goal);
+    let shortest = millis(shown.counted.shortest_silence.unwrap_or_default());
+    let what =
+        format!("silences too short in {} reads (the shortest {shortest:.3} ms)", shown.counted.requests);
+    report.row(SECTION, name(&what), Unit::Count, shown.counted.violations as f64, Goal::AtMost(0.0));
+}
+
+/// Two timers a line are more descriptors than a shell allows.
+fn allow_descriptors() -> Result<(), Error> {
+    let mut limit = getrlimit(Resource::Nofile);
+    limit.current = limit.maximum;
+    Ok(setrlimit(Resource::Nofile, limit)?)
+}
