@@ -104,6 +104,8 @@ registers! {
     INPUT_RES_FUNCTION: ReadWrite(0x0113, "F113", "function of input RES", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31, §8.8 p. 38; address by the rule of Fnnn");
     /// In force only where F109 makes VIA a logic input.
     INPUT_VIA_FUNCTION: ReadWrite(0x0118, "F118", "function of input VIA", Eeprom, Unit::CODE, Range::OneOfOr(INPUT_FUNCTIONS, 0, ANY), Factory::None, Manual, "Altivar 21 Modbus §8.4 p. 31, §8.8 p. 38; address by the rule of Fnnn");
+    /// 0: VIA is an analog input; the manual prints no number for a logic input.
+    VIA_IS_LOGIC: ReadWrite(0x0109, "F109", "VIA as a logic input", Eeprom, Unit::CODE, Range::Any, Factory::None, Manual, "Altivar 21 Modbus §8.8 p. 38; address by the rule of Fnnn");
     SECOND_REFERENCE: ReadWrite(0x0207, "F207", "reference when FCHG is on", Eeprom, Unit::CODE, Range::Any, Factory::None, Manual, "Altivar 21 Modbus §6.2 p. 16; address by the rule of Fnnn");
 
     // §6.3 Indirect blocks, p. 18

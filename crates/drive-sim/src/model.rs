@@ -32,6 +32,15 @@ pub enum Cast {
     Broadcast,
 }
 
+/// What was wrong with a frame that nobody could take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Damage {
+    /// Its check does not fit.
+    Check,
+    /// It is too short or too long to be one.
+    Length,
+}
+
 /// A run of registers that one request names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Block {
@@ -231,6 +240,18 @@ pub trait Model: Send {
     /// itself.
     fn frame_seen(&mut self, cast: Cast) {
         let _ = cast;
+    }
+
+    /// A frame was received that is damaged, and of which nobody can tell whom it was for.
+    fn frame_damaged(&mut self, damage: Damage) {
+        let _ = damage;
+    }
+
+    /// What a master has to leave between the end of this drive's answer, or of a request to all, and the start of the
+    /// next request that concerns it, where that is more than t3.5. A shorter one is recorded as a
+    /// [`Breach::Pause`](crate::Breach::Pause), and answered nevertheless.
+    fn pause(&self) -> Duration {
+        Duration::ZERO
     }
 
     /// The drive is put on a line that speaks this, at this address. A drive that shows its address as a setting, or

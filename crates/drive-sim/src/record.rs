@@ -26,6 +26,16 @@ pub enum Breach {
         /// t3.5.
         required: Duration,
     },
+    /// The master began a request that concerns a slave before the pause that this needs after its answer or after a
+    /// request to all.
+    Pause {
+        /// The slave.
+        slave: u8,
+        /// What was left.
+        kept: Duration,
+        /// What it needs.
+        required: Duration,
+    },
     /// The master left more than t1.5 between two characters of a frame.
     Gap {
         /// How long it paused.

@@ -9,8 +9,9 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use crate::{
-    model::{Cast, Exception, Model, Observation},
+    model::{Cast, Damage, Exception, Model, Observation},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
+    record::Breach,
     unite::{self, LinkCounters},
 };
 
@@ -68,6 +69,8 @@ pub(crate) struct Slave {
     listen_only: bool,
     delimiter: u8,
     turnaround: Option<Duration>,
+    /// The end of its last answer, or of a request to all.
+    pause_from: Option<Instant>,
     connected: bool,
     powered: bool,
     hold: Hold,
@@ -86,6 +89,7 @@ impl Slave {
             listen_only: false,
             delimiter: LINE_FEED,
             turnaround: None,
+            pause_from: None,
             connected: true,
             powered: true,
             hold: Hold::No,
@@ -274,6 +278,23 @@ impl Slave {
     /// The address at which it takes requests: the one that it has given itself, or where it was put.
     pub(crate) fn address(&self) -> u8 {
         self.model.own_address().unwrap_or(self.address)
+    }
+
+    /// Something ended after which the slave needs its pause.
+    pub(crate) const fn pause_from(&mut self, at: Instant) {
+        self.pause_from = Some(at);
+    }
+
+    /// How a frame that began at this moment broke the slave's pause, if it did.
+    pub(crate) fn pause_broken(&self, began: Instant) -> Option<Breach> {
+        let (kept, required) = (began.saturating_duration_since(self.pause_from?), self.model.pause());
+        (kept < required).then(|| Breach::Pause { slave: self.address(), kept, required })
+    }
+
+    pub(crate) fn frame_damaged(&mut self, damage: Damage) {
+        if self.connected && self.powered {
+            self.model.frame_damaged(damage);
+        }
     }
 
     /// Another master writes one word, by the function that the family has for it.

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use crate::{
     fault::Faults,
-    model::Cast,
+    model::{Cast, Damage},
     record::{Breach, KEPT, LineStats, Violation},
     slave::{LineCounters, Slave},
     speech::{Content, Speech},
@@ -25,6 +25,8 @@ pub(crate) struct State {
     pub(crate) faults: Faults,
     pub(crate) stats: LineStats,
     pub(crate) violations: VecDeque<Violation>,
+    /// When the frame that is being received began, on a line where silences count.
+    pub(crate) frame_began: Option<Instant>,
 }
 
 impl State {
@@ -63,6 +65,7 @@ impl State {
         delimiter: Option<u8>,
     ) -> Option<Speech> {
         self.good_frame();
+        self.check_pauses(at, address);
         let sees_end = |slave: &Slave| delimiter.is_none_or(|delimiter| delimiter == slave.delimiter());
         if address == BROADCAST {
             self.stats.broadcasts += 1;
@@ -84,9 +87,32 @@ impl State {
         self.counters.good += 1;
     }
 
-    pub(crate) const fn bad_frame(&mut self) {
+    pub(crate) fn bad_frame(&mut self, damage: Damage) {
         self.stats.bad_frames += 1;
         self.counters.bad += 1;
+        self.slaves.values_mut().for_each(|slave| slave.frame_damaged(damage));
+    }
+
+    /// The last bit of a slave's answer was on the wire.
+    pub(crate) fn answered(&mut self, address: u8, at: Instant) {
+        if let Some(slave) = self.slaves.values_mut().find(|slave| slave.address() == address) {
+            slave.pause_from(at);
+        }
+    }
+
+    /// Whether the request that ends now began too early for those that it concerns.
+    fn check_pauses(&mut self, at: Instant, address: u8) {
+        let Some(began) = self.frame_began else { return };
+        let mut breaches = Vec::new();
+        for slave in self.slaves.values_mut() {
+            if address == BROADCAST || address == slave.address() {
+                breaches.extend(slave.pause_broken(began));
+            }
+            if address == BROADCAST {
+                slave.pause_from(at);
+            }
+        }
+        breaches.into_iter().for_each(|breach| self.breach(began, breach));
     }
 
     pub(crate) fn breach(&mut self, at: Instant, breach: Breach) {

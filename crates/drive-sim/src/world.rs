@@ -41,6 +41,19 @@ pub struct Switch {
     pub question: &'static str,
 }
 
+impl Switch {
+    /// Puts the switch of this name on a reading: `true` for the second of the two that it has.
+    pub(crate) fn choose<'a>(
+        choices: impl IntoIterator<Item = (&'a Self, &'a mut bool)>,
+        name: &str,
+        reading: &str,
+    ) {
+        for (switch, second) in choices.into_iter().filter(|(switch, _)| switch.name == name) {
+            *second = switch.readings.get(1) == Some(&reading);
+        }
+    }
+}
+
 /// What happens to a drive from outside, beyond what every drive has a method for. The names are those of its
 /// [`Surroundings`], whatever the case in which they were given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::Framing;
-use crate::{slave::LINE_FEED, speech::Speech, state::State};
+use crate::{model::Damage, slave::LINE_FEED, speech::Speech, state::State};
 
 const BEGIN: u8 = b':';
 const CARRIAGE_RETURN: u8 = b'\r';
@@ -57,7 +57,7 @@ impl Framing for Ascii {
             (_, BEGIN) => {
                 // A frame that another one cuts short was damaged.
                 if self.stage != Stage::Idle {
-                    line.bad_frame();
+                    line.bad_frame(Damage::Check);
                 }
                 self.stage = Stage::Reception;
                 self.digits.clear();
@@ -79,7 +79,7 @@ impl Framing for Ascii {
 
     fn silence(&mut self, line: &mut State, _: &mut Vec<Speech>) {
         self.stage = Stage::Idle;
-        line.bad_frame();
+        line.bad_frame(Damage::Check);
     }
 
     fn encode(&self, slave: u8, message: &[u8], _: &State) -> Vec<u8> {
@@ -95,7 +95,7 @@ impl Ascii {
                 self.delimiter = delimiter;
                 speech.extend(line.request_ended_by(at, *slave, request, Some(delimiter)));
             }
-            _ => line.bad_frame(),
+            _ => line.bad_frame(Damage::Check),
         }
     }
 }

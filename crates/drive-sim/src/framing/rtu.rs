@@ -7,7 +7,7 @@ use crc::{CRC_16_MODBUS, Crc};
 use tokio::time::Instant;
 
 use super::Framing;
-use crate::{speech::Speech, state::State};
+use crate::{model::Damage, speech::Speech, state::State};
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 /// The longest frame (MODBUS over Serial Line V1.02 p. 13).
@@ -70,15 +70,13 @@ impl Rtu {
     /// Carries out what was received, at the moment of its last bit.
     fn finish(&mut self, line: &mut State, speech: &mut Vec<Speech>) {
         let received = std::mem::take(&mut self.frame);
-        let intact = !std::mem::take(&mut self.too_long) && is_intact(&received);
-        let (Some(at), [slave, request @ .., _, _]) = (self.last, &received[..]) else {
-            line.bad_frame();
-            return;
-        };
-        if intact {
-            speech.extend(line.request(at, *slave, request));
-        } else {
-            line.bad_frame();
+        let too_long = std::mem::take(&mut self.too_long);
+        match (self.last, &received[..]) {
+            (Some(at), [slave, request @ .., _, _]) if !too_long && is_intact(&received) => {
+                speech.extend(line.request(at, *slave, request));
+            }
+            _ if too_long || received.len() < SHORTEST => line.bad_frame(Damage::Length),
+            _ => line.bad_frame(Damage::Check),
         }
         // The room of the last frame serves the next.
         self.frame = received;

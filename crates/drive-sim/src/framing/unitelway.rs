@@ -15,6 +15,7 @@ use tokio::time::Instant;
 
 use super::Framing;
 use crate::{
+    model::Damage,
     speech::{Content, Speech},
     state::State,
     unite::LinkCounters,
@@ -124,11 +125,11 @@ impl Framing for UniTelway {
             }
             // Inside a frame a lone DLE begins another one.
             (Stage::LengthAgain | Stage::DataAgain, STX) => {
-                line.bad_frame();
+                line.bad_frame(Damage::Check);
                 self.begin()
             }
             (Stage::LengthAgain | Stage::DataAgain, ENQ) => {
-                line.bad_frame();
+                line.bad_frame(Damage::Check);
                 Stage::PollAddress
             }
             (Stage::LengthAgain | Stage::DataAgain, _) => self.give_up(line),
@@ -166,7 +167,7 @@ impl UniTelway {
     }
 
     fn give_up(&mut self, line: &mut State) -> Stage {
-        line.bad_frame();
+        line.bad_frame(Damage::Check);
         Stage::Idle
     }
 
@@ -211,7 +212,7 @@ impl UniTelway {
         if intact {
             line.good_frame();
         } else {
-            line.bad_frame();
+            line.bad_frame(Damage::Check);
         }
         let slave = line.slave(address)?;
         if !slave.is_connected(at) || !slave.speaks_unite() {

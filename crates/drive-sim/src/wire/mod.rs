@@ -189,6 +189,8 @@ impl Wire {
         if self.framing.is_between_frames() {
             self.frame_characters = 0;
             self.check_silence(begins, line);
+            let counts = self.framing.keeps_silences() && self.pacing != Pacing::None;
+            line.frame_began = counts.then_some(begins);
         }
         self.frame_characters += 1;
         self.quiet_since = self.quiet_since.max(Some(ends));

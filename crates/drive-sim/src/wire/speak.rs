@@ -140,8 +140,11 @@ impl Wire {
             line.stats.characters_out += count_of(piece.len());
             line.stats.lag += if is_over { now.saturating_duration_since(due) } else { Duration::ZERO };
         }
-        if is_over {
-            self.transmissions.remove(index);
+        if is_over
+            && let Some(transmission) = self.transmissions.remove(index)
+            && !transmission.echo
+        {
+            line.answered(transmission.slave, (transmission.start + wire_time).max(now));
         }
         piece
     }

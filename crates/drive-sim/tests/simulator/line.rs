@@ -366,3 +366,36 @@ fn an_address_that_is_taken_or_is_none_is_refused() {
     assert_eq!(line.add(248, Small::new()).err(), Some(AddressError::OutOfRange(248)));
     assert!(line.slave(2).is_none());
 }
+
+/// Omron 3G3EV at 9600 bit/s: 24 bits and 10 ms, 12.5 ms, between its answer or a request to all and the next request
+/// (VS-606V7 manual p. 92, for §3.3 of the 3G3EV's).
+#[tokio::test(start_paused = true)]
+async fn a_request_that_cuts_a_slaves_pause_short_is_a_breach() {
+    let settings = SerialSettings::new(9_600, CharacterFormat::F8N1).unwrap();
+    let frame_to = |slave: u8, pdu: &[u8]| frame(&[&[slave], pdu].concat());
+    let status = frame_to(1, &[3, 0, 0x2C, 0, 1]);
+    let stop_all = frame_to(0, &[0x10, 0, 1, 0, 1, 2, 0, 0]);
+    let mut broken = Vec::new();
+    for (first, second) in [(&status, &stop_all), (&stop_all, &status), (&status, &status)] {
+        for pause in [5, 20] {
+            let line = SimLine::new(Wiring::rtu(settings));
+            line.add(1, drive_sim::models::drive_3g3ev::Drive3g3ev::new()).unwrap();
+            let mut port = line.in_memory();
+            port.write_all(first).await.unwrap();
+            if first == &status {
+                hear(&mut port, PATIENCE).await.unwrap();
+            } else {
+                tokio::time::sleep(settings.characters(first.len())).await;
+            }
+            tokio::time::sleep(Duration::from_millis(pause)).await;
+            port.write_all(second).await.unwrap();
+            tokio::time::sleep(PATIENCE).await;
+            let pauses = line.violations().into_iter().filter(|violation| {
+                matches!(violation.breach, Breach::Pause { slave: 1, required, .. }
+                    if required == Duration::from_micros(12_500))
+            });
+            broken.push(pauses.count());
+        }
+    }
+    assert_eq!(broken, [1, 0, 1, 0, 1, 0]);
+}

@@ -2,23 +2,17 @@
 
 use std::time::Duration;
 
-use drive_atv21::registers as map;
+use drive_atv21::registers::address as at;
 
-use super::{Atv21, EMERGENCY};
-use crate::{Ramp, Ramps};
+use super::{
+    Atv21, EMERGENCY,
+    inputs::{ANALOG, function},
+};
+use crate::{Panel, Ramp, Ramps};
 
-/// F112: input R reverses; its factory setting.
-pub(super) const R_IS_REVERSE: u16 = 3;
-/// F112: input R forces local control (SC/LC).
-const R_FORCES_LOCAL: u16 = 48;
-/// F112: input R switches to the second reference (FCHG).
-const R_SWITCHES_REFERENCE: u16 = 38;
-/// Inputs of FD06.
-const F: u16 = 1 << 0;
-const R: u16 = 1 << 1;
 /// Bits of FA00.
 const PRESET: u16 = 0x0007;
-const RAMP_2: u16 = 1 << 6;
+pub(super) const RAMP_2: u16 = 1 << 6;
 const DC_BRAKING: u16 = 1 << 7;
 const REVERSE: u16 = 1 << 9;
 const RUN: u16 = 1 << 10;
@@ -26,13 +20,11 @@ const FREEWHEEL: u16 = 1 << 11;
 const EMERGENCY_STOP: u16 = 1 << 12;
 const FAULT_RESET: u16 = 1 << 13;
 const REFERENCE_PRIORITY: u16 = 1 << 14;
-const COMMAND_PRIORITY: u16 = 1 << 15;
+pub(super) const COMMAND_PRIORITY: u16 = 1 << 15;
 /// What forced DC braking injects, in percent of the rated current.
 pub(super) const BRAKING_CURRENT: u16 = 50;
 /// The step from one preset speed to the next, in hundredths of a hertz.
 const PRESET_STEP: u16 = 500;
-/// The highest count of an analog input.
-const ANALOG: u32 = 1_023;
 
 /// FE45.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +32,15 @@ pub(super) enum Source {
     Terminals = 0,
     Keypad = 1,
     Serial = 2,
+}
+
+/// FE46.
+pub(super) mod reference {
+    pub(in crate::models::atv21) const VIA: u16 = 1;
+    pub(in crate::models::atv21) const VIB: u16 = 2;
+    pub(in crate::models::atv21) const KEYPAD: u16 = 3;
+    pub(in crate::models::atv21) const SERIAL: u16 = 4;
+    pub(in crate::models::atv21) const PRESET: u16 = 255;
 }
 
 /// What the source orders.
@@ -57,15 +58,19 @@ impl Atv21 {
         if word & EMERGENCY_STOP != 0 {
             self.trip_with(EMERGENCY);
         }
-        if word & FAULT_RESET != 0 && self.trip.is_some() {
-            self.motor.freewheel();
-            self.start_up(self.restart);
+        let may_reset = !self.readings.only_commander_resets || self.source() == Source::Serial;
+        if word & FAULT_RESET != 0 && may_reset {
+            self.reset();
         }
     }
 
     /// Puts into effect what is ordered now. A trip has its own stop, and a drive that starts up does nothing.
     pub(super) fn obey(&mut self) {
-        if self.trip.is_some() {
+        if !self.powered || self.trip.is_some() {
+            return;
+        }
+        if !self.starting.is_zero() || self.lacks_supply() {
+            self.motor.freewheel();
             return;
         }
         match self.order() {
@@ -78,23 +83,28 @@ impl Atv21 {
         }
     }
 
+    /// What is in force: nothing runs without ST.
     pub(super) fn order(&self) -> Order {
+        if self.released { self.asked() } else { Order::Freewheel }
+    }
+
+    /// What the source asks for.
+    pub(super) fn asked(&self) -> Order {
         let word = self.word();
         match self.source() {
+            _ if self.forced_run => Order::Run { reverse: false },
+            Source::Keypad if self.keypad_runs => Order::Run { reverse: self.keypad_reverse },
             Source::Keypad => Order::Stop,
             Source::Serial if !self.heeds => Order::Stop,
             Source::Serial if word & FREEWHEEL != 0 => Order::Freewheel,
             Source::Serial if word & DC_BRAKING != 0 => Order::Brake,
             Source::Serial if word & RUN != 0 => Order::Run { reverse: word & REVERSE != 0 },
             Source::Serial => Order::Stop,
-            Source::Terminals => {
-                let reverse = self.is_on(R) && self.function_of_r() == R_IS_REVERSE;
-                match (self.is_on(F), reverse) {
-                    (true, false) => Order::Run { reverse: false },
-                    (false, true) => Order::Run { reverse: true },
-                    _ => Order::Stop,
-                }
-            }
+            Source::Terminals => match [function::FORWARD, function::REVERSE].map(|run| self.runs_by(run)) {
+                [true, false] => Order::Run { reverse: false },
+                [false, true] => Order::Run { reverse: true },
+                _ => Order::Stop,
+            },
         }
     }
 
@@ -103,11 +113,11 @@ impl Atv21 {
         if self.local {
             return Source::Keypad;
         }
-        if self.is_forced_local() {
+        if self.is_forced_local() || self.forced_run {
             return Source::Terminals;
         }
-        match self.bank.value(map::COMMAND_MODE.address()) {
-            _ if self.word() & COMMAND_PRIORITY != 0 => Source::Serial,
+        match self.bank.value(at::COMMAND_MODE) {
+            _ if self.word() & COMMAND_PRIORITY != 0 || self.leaves_to_bus() => Source::Serial,
             2 => Source::Serial,
             1 => Source::Keypad,
             _ => Source::Terminals,
@@ -116,35 +126,42 @@ impl Atv21 {
 
     /// FE46.
     pub(super) fn reference_source(&self) -> u16 {
-        let mode = self.bank.value(map::REFERENCE_MODE.address());
+        let mode = self.bank.value(at::REFERENCE_MODE);
+        let prior = self.word() & REFERENCE_PRIORITY != 0;
         if self.local {
-            return 3;
+            return reference::KEYPAD;
         }
         if self.is_forced_local() {
-            return mode;
+            return if mode == reference::SERIAL { reference::VIA } else { mode };
         }
         if self.source() == Source::Serial && self.word() & PRESET != 0 {
-            return 255;
+            return reference::PRESET;
         }
-        if self.function_of_r() == R_SWITCHES_REFERENCE && self.is_on(R) {
-            return self.bank.value(map::SECOND_REFERENCE.address());
+        let gives_way = prior && self.readings.priority_over_fchg;
+        if self.is_on(function::SECOND_REFERENCE) && !gives_way {
+            return self.bank.value(at::SECOND_REFERENCE);
         }
-        if self.word() & REFERENCE_PRIORITY != 0 { 4 } else { mode }
+        if prior || self.leaves_to_bus() { reference::SERIAL } else { mode }
     }
 
     /// The reference before the ramp (FE02), in hundredths of a hertz.
     pub(super) fn reference(&self) -> u16 {
-        let limit = self.bank.value(map::UPPER_LIMIT.address());
+        let limit = self.bank.value(at::UPPER_LIMIT);
+        if self.forced_run {
+            return limit;
+        }
         let analog = |address| {
-            let counts = u32::from(self.bank.value(address)).min(ANALOG);
-            u16::try_from(u32::from(limit) * counts / ANALOG).unwrap_or(limit)
+            let counts = u32::from(self.bank.value(address).min(ANALOG));
+            u16::try_from(u32::from(limit) * counts / u32::from(ANALOG)).unwrap_or(limit)
         };
         let reference = match self.reference_source() {
-            1 => analog(map::ANALOG_INPUT_VIA.address()),
-            2 => analog(map::ANALOG_INPUT_VIB.address()),
-            4 if self.speed_is_reference => self.frequency_of_speed(),
-            4 => self.bank.value(map::FREQUENCY_REFERENCE.address()),
-            255 => (self.word() & PRESET) * PRESET_STEP,
+            reference::VIA if self.bank.value(at::VIA_IS_LOGIC) == 0 => analog(at::ANALOG_INPUT_VIA),
+            reference::VIB => analog(at::ANALOG_INPUT_VIB),
+            reference::KEYPAD => self.keypad_reference,
+            reference::SERIAL if self.speed_counts() => self.frequency_of_speed(),
+            reference::SERIAL => self.bank.value(at::FREQUENCY_REFERENCE),
+            reference::PRESET => (self.word() & PRESET) * PRESET_STEP,
+            // Up and down inputs, whose functions the manual does not number, stay where they are.
             _ => 0,
         };
         reference.min(limit)
@@ -162,9 +179,9 @@ impl Atv21 {
 
     pub(super) fn ramps(&self) -> Ramps {
         let (up, down) = if self.source() == Source::Serial && self.word() & RAMP_2 != 0 {
-            (map::ACCELERATION_2.address(), map::DECELERATION_2.address())
+            (at::ACCELERATION_2, at::DECELERATION_2)
         } else {
-            (map::ACCELERATION.address(), map::DECELERATION.address())
+            (at::ACCELERATION, at::DECELERATION)
         };
         let ramp = |address| Ramp {
             full_scale: super::MAXIMUM_FREQUENCY.into(),
@@ -173,65 +190,55 @@ impl Atv21 {
         Ramps { acceleration: ramp(up), deceleration: ramp(down) }
     }
 
-    /// FD01.
-    pub(super) fn status(&self) -> u16 {
-        let order = self.order();
-        let tripped = self.trip.is_some();
-        let undervoltage = self.bank.value(map::ALARM_CODE.address()) & 0x2020 != 0;
-        let freewheel = order == Order::Freewheel;
-        let ordered = matches!(order, Order::Run { .. }) && !tripped;
-        let runs = ordered || (self.run_until_standstill && self.motor.output_frequency() != 0);
-        let standby = !tripped && !undervoltage && self.starting.is_zero();
-        let reverse = match self.motor.output_frequency() {
-            0 => matches!(order, Order::Run { reverse: true }),
-            frequency => frequency < 0,
-        };
-        let chosen = if self.source() == Source::Serial { self.word() & 0x0070 } else { 0 };
-        let bits = [
-            (0, tripped),
-            (1, tripped),
-            (2, self.bank.value(map::ALARM_CODE.address()) != 0),
-            (3, undervoltage),
-            (7, order == Order::Brake && !tripped),
-            (9, reverse),
-            (10, runs),
-            (11, freewheel),
-            (12, self.trip == Some(EMERGENCY)),
-            (13, standby && !freewheel && runs),
-            (14, standby),
-            (15, self.local || self.is_forced_local()),
-        ];
-        bits.into_iter().filter(|(_, set)| *set).fold(chosen, |word, (bit, _)| word | 1 << bit)
+    /// Somebody is at the keypad, whose LOC/REM key is always active (§6.2 p. 12).
+    pub(super) fn keypad(&mut self, action: Panel) {
+        match action {
+            Panel::TakeControl if !self.local => {
+                let frequency = self.motor.output_frequency();
+                self.keypad_runs = self.readings.local_runs_on && frequency != 0;
+                if self.keypad_runs {
+                    self.keypad_reference = u16::try_from(frequency.unsigned_abs()).unwrap_or(u16::MAX);
+                    self.keypad_reverse = frequency < 0;
+                }
+                self.heeds &= self.readings.remote_resumes;
+                self.local = true;
+            }
+            Panel::TakeControl => {}
+            Panel::ReleaseControl => {
+                self.heeds &= self.readings.remote_resumes;
+                (self.local, self.keypad_runs) = (false, false);
+            }
+            Panel::Stop => (self.keypad_runs, self.heeds) = (false, false),
+            Panel::Run => (self.keypad_runs, self.keypad_reverse) = (self.source() == Source::Keypad, false),
+            Panel::Reset => self.reset(),
+            Panel::Reference(frequency) => {
+                self.keypad_reference = u16::try_from(frequency.centihertz()).unwrap_or(u16::MAX);
+            }
+        }
     }
 
-    /// FD42.
-    pub(super) fn status_2(&self) -> u16 {
-        let second = self.bank.value(map::COMMAND_WORD_2.address());
-        let level = if self.word() & COMMAND_PRIORITY != 0 { second & 0x1000 } else { 0 };
-        let ramp = if self.word() & RAMP_2 != 0 { 0x0100 } else { 0 };
-        (second & 0x0002) | level | ramp
+    pub(super) fn word(&self) -> u16 {
+        self.bank.value(at::COMMAND_WORD)
     }
 
-    fn word(&self) -> u16 {
-        self.bank.value(map::COMMAND_WORD.address())
-    }
-
-    fn is_on(&self, input: u16) -> bool {
-        self.bank.value(map::LOGIC_INPUTS.address()) & input != 0
-    }
-
-    fn function_of_r(&self) -> u16 {
-        self.bank.value(map::INPUT_R_FUNCTION.address())
-    }
-
-    fn is_forced_local(&self) -> bool {
-        self.function_of_r() == R_FORCES_LOCAL && self.is_on(R)
+    /// Whether FA13 counts, and not FA01.
+    fn speed_counts(&self) -> bool {
+        if self.readings.speed_first {
+            self.bank.value(at::SPEED_REFERENCE) != 0
+        } else {
+            self.speed_is_newest
+        }
     }
 
     /// FA13 as a frequency: poles × rpm / 120 Hz.
     fn frequency_of_speed(&self) -> u16 {
-        let rpm = u32::from(self.bank.value(map::SPEED_REFERENCE.address()));
-        let poles = u32::from(self.bank.value(map::MOTOR_POLES.address()));
-        u16::try_from(rpm * poles * 10 / 12).unwrap_or(u16::MAX)
+        let rpm = u32::from(self.bank.value(at::SPEED_REFERENCE));
+        u16::try_from(rpm * self.poles() * 10 / 12).unwrap_or(u16::MAX)
+    }
+
+    /// F856 as a number of poles.
+    pub(super) fn poles(&self) -> u32 {
+        let counted = u32::from(self.bank.value(at::MOTOR_POLES)).max(1);
+        if self.readings.pole_pairs { counted * 2 } else { counted }
     }
 }

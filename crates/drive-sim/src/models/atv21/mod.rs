@@ -1,28 +1,42 @@
 //! The simulated Altivar 21, from the drive's side ("Altivar 21 Modbus, guide d'exploitation", 10/2009).
 //!
-//! What the manual leaves open is decided here, and only here: a lone word of a block does not exist (exception 02), an
-//! empty place of the read block reads 0 and one of the write block takes anything, a broadcast does not feed the
-//! time-out, F603 = 4 coasts, an emergency stop coasts, preset speed n is n times 5 Hz, F856 counts poles, one count of
-//! energy is 0.01 kWh at rated power, FA01 and FA13 hold whichever was written last, 100 % is what is on the plate.
+//! What the manual leaves open and a driver could trip over is a switch ([`Surroundings::switches`]). The rest is decided
+//! here, and only here: a lone word of a block does not exist (exception 02), an empty place of the read block reads 0 and
+//! one of the write block takes anything, a broadcast does not feed the time-out, an emergency stop coasts, preset speed n
+//! is n times 5 Hz, one count of energy is 0.01 kWh at rated power, 100 % is what is on the plate, inputs F, R and RES run
+//! forward, in reverse and reset, the answer to a new address still comes from the old one.
 
 mod control;
+mod inputs;
 mod monitor;
+mod switches;
 #[cfg(test)]
 mod tests;
+mod trips;
 
 use std::{collections::BTreeMap, time::Duration};
 
-use drive_atv21::{FAULTS, ROWS, blocks, registers as map};
+use drive_atv21::{FAULTS, ROWS, blocks, registers::address as at};
 use drive_core::registers::Storage;
 
+use self::{
+    inputs::{ANALOG_INPUTS, TERMINALS, function},
+    switches::{Readings, SWITCHES},
+};
 use crate::{
-    Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Rules, Surroundings, Watchdog,
-    identification,
+    Act, Bank, Block, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Protocol, Rules,
+    Surroundings, Watchdog, identification,
 };
 
 /// What is around it.
-const SURROUNDINGS: Surroundings =
-    Surroundings { family: "atv21", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
+const SURROUNDINGS: Surroundings = Surroundings {
+    family: "atv21",
+    terminals: TERMINALS,
+    analog_inputs: ANALOG_INPUTS,
+    switches: SWITCHES,
+    trips: FAULTS,
+    rows: ROWS,
+};
 
 const RULES: Rules = Rules {
     read_holding: 5,
@@ -45,36 +59,53 @@ const MAXIMUM_FREQUENCY: u16 = 8_000;
 const EMERGENCY: u16 = 17;
 /// Fault Err5.
 const TIME_OUT: u16 = 24;
-/// How long the reaction by DC injection brakes.
-const TRIP_BRAKING: Duration = Duration::from_secs(1);
+/// Fault UP1.
+const UNDERVOLTAGE: u16 = 30;
 /// The rated current of the motor in tenths of an ampere, for 0.75 kW at 200 V.
 const RATED_CURRENT: u32 = 40;
 /// The rated power in 0.01 kW.
 const RATED_POWER: u32 = 75;
+/// The words that show what is at the terminals, with or without supply.
+const AT_THE_TERMINALS: [u16; 3] = [at::LOGIC_INPUTS, at::ANALOG_INPUT_VIA, at::ANALOG_INPUT_VIB];
 
 /// An ATV21H075M3X, with a motor of its size.
 #[derive(Debug, Clone)]
 pub struct Atv21 {
     bank: Bank,
+    readings: Readings,
     /// The slots that were configured at the last reset.
     read_slots: [u16; 5],
     write_slots: [u16; 2],
     motor: Motor,
     watchdog: Watchdog,
     trip: Option<u16>,
+    /// Until a drive that tries again by itself does so.
+    retry: Option<Duration>,
     /// What FD01 and the other words were when it tripped.
     frozen: BTreeMap<u16, u16>,
     /// Monitored words that a test has set: they show that instead of what the drive would compute.
     pinned: BTreeMap<u16, u16>,
     /// LOC/REM: the keypad has control.
     local: bool,
-    /// Whether the order in FA00 is in force: not after somebody at the machine interfered, until it is written anew.
+    keypad_runs: bool,
+    keypad_reverse: bool,
+    keypad_reference: u16,
+    /// Whether the order in FA00 is in force: not after somebody at the keypad interfered, until it is written anew.
     heeds: bool,
-    speed_is_reference: bool,
-    run_until_standstill: bool,
+    /// ST = ON.
+    released: bool,
+    /// Functions 52 or 53 run the motor by themselves.
+    forced_run: bool,
+    /// Inputs that were closed at the start and may not run the motor before they were open.
+    stale: u16,
+    /// FA13 was written after FA01.
+    speed_is_newest: bool,
+    /// The control has a supply, and the power circuit has one.
+    powered: bool,
+    supplied: bool,
     starting: Duration,
     restart: Duration,
-    powered: Duration,
+    powered_for: Duration,
     /// The running time at the last energy reset.
     energy_base: Duration,
 }
@@ -91,35 +122,46 @@ impl Atv21 {
     pub fn new() -> Self {
         let mut bank = Bank::new(ROWS);
         for (register, value) in [
-            (map::DECELERATION.address(), 100),
-            (map::ACCELERATION_2.address(), 100),
-            (map::DECELERATION_2.address(), 100),
-            (map::UPPER_LIMIT.address(), 5_000),
-            (map::MOTOR_POLES.address(), 4),
-            (map::SECOND_REFERENCE.address(), 2),
-            (map::INPUT_R_FUNCTION.address(), control::R_IS_REVERSE),
-            (map::MODEL_CODE.address(), 4),
-            (map::RATED_CURRENT.address(), 40),
-            (map::RATED_VOLTAGE.address(), 2_000),
+            (at::DECELERATION, 100),
+            (at::ACCELERATION_2, 100),
+            (at::DECELERATION_2, 100),
+            (at::UPPER_LIMIT, 5_000),
+            (at::MOTOR_POLES, 4),
+            (at::SECOND_REFERENCE, 2),
+            (at::INPUT_F_FUNCTION, function::FORWARD),
+            (at::INPUT_R_FUNCTION, function::REVERSE),
+            (at::INPUT_RES_FUNCTION, function::RESET),
+            (at::MODEL_CODE, 4),
+            (at::RATED_CURRENT, 40),
+            (at::RATED_VOLTAGE, 2_000),
         ] {
             bank.set_factory(register, value);
         }
         let mut drive = Self {
             bank,
+            readings: Readings::default(),
             read_slots: [0; 5],
             write_slots: [0; 2],
             motor: Motor::new(Nameplate::light(RATED_CURRENT)),
             watchdog: Watchdog::default(),
             trip: None,
+            retry: None,
             frozen: BTreeMap::new(),
             pinned: BTreeMap::new(),
             local: false,
+            keypad_runs: false,
+            keypad_reverse: false,
+            keypad_reference: 0,
             heeds: true,
-            speed_is_reference: false,
-            run_until_standstill: false,
+            released: true,
+            forced_run: false,
+            stale: 0,
+            speed_is_newest: false,
+            powered: true,
+            supplied: true,
             starting: Duration::ZERO,
             restart: RESTART,
-            powered: Duration::ZERO,
+            powered_for: Duration::ZERO,
             energy_base: Duration::ZERO,
         };
         drive.start_up(Duration::ZERO);
@@ -137,82 +179,53 @@ impl Atv21 {
     /// be read both ways.
     #[must_use]
     pub fn running_until_standstill(mut self) -> Self {
-        self.run_until_standstill = true;
+        self.readings.run_until_standstill = true;
         self
     }
 
     /// The same drive with its indirect blocks set up as in the manual's examples, and in effect.
     #[must_use]
     pub fn with_blocks(mut self) -> Self {
-        for (address, slot) in (0x0875..).zip(1..=5).chain([(0x0870, 1), (0x0871, 3)]) {
+        for (address, slot) in
+            (at::READ_SLOT_1..).zip(1..=5).chain([(at::WRITE_SLOT_1, 1), (at::WRITE_SLOT_2, 3)])
+        {
             self.bank.set_factory(address, slot);
         }
         self.start_up(Duration::ZERO);
         self
     }
 
-    /// What happens at power-up and when a trip was reset: the control registers fall back to 0, the block
-    /// configuration and the protocol settings take effect.
-    fn start_up(&mut self, duration: Duration) {
-        for row in ROWS.iter().filter(|row| row.storage == Storage::Volatile && row.access.is_writable()) {
-            self.bank.set(row.address, 0);
+    /// The register that a write goes to: one of the block's own, or the one that its place stands for. `None` for an
+    /// empty place.
+    fn target_of(&self, address: u16) -> Option<u16> {
+        let place = address.checked_sub(blocks::WRITE_BLOCK).map(usize::from);
+        match place.and_then(|place| self.write_slots.get(place)) {
+            Some(&slot) => written_by(slot),
+            None => Some(address),
         }
-        self.read_slots = [0x0875, 0x0876, 0x0877, 0x0878, 0x0879].map(|slot| self.bank.value(slot));
-        self.write_slots = [0x0870, 0x0871].map(|slot| self.bank.value(slot));
-        self.trip = None;
-        self.heeds = true;
-        self.starting = duration;
-        self.watchdog.rest();
-        self.set_time_out();
-    }
-
-    fn set_time_out(&mut self) {
-        let seconds = self.bank.value(map::TIME_OUT.address());
-        self.watchdog.set_timeout((seconds > 0).then(|| Duration::from_secs(seconds.into())));
-    }
-
-    fn trip_with(&mut self, code: u16) {
-        if self.trip.is_some() {
-            return;
-        }
-        self.freeze();
-        let history = [0xFE10, 0xFE11, 0xFE12].map(|address| self.bank.value(address));
-        for (address, code) in (0xFE10..).zip([code].into_iter().chain(history)) {
-            self.bank.set(address, code);
-        }
-        self.trip = Some(code);
-        match (code, self.bank.value(map::TIME_OUT_REACTION.address())) {
-            (TIME_OUT, 1) => self.motor.ramp_to_rest(self.ramps().deceleration),
-            (TIME_OUT, 2) => self.motor.brake(control::BRAKING_CURRENT, Some(TRIP_BRAKING)),
-            _ => self.motor.freewheel(),
-        }
-    }
-
-    /// Whether a register would take a value, without writing it.
-    fn check(&self, address: u16, value: u16) -> Result<(), Exception> {
-        self.bank.check(address, value, !self.motor.is_fed())?;
-        if address == map::FREQUENCY_REFERENCE.address() && value > MAXIMUM_FREQUENCY {
-            return Err(Exception::ILLEGAL_VALUE);
-        }
-        Ok(())
     }
 
     fn take(&mut self, address: u16, value: u16) -> Result<(), Exception> {
-        self.check(address, value)?;
         self.bank.write(address, value, !self.motor.is_fed())?;
         match address {
-            0xFA00 => {
+            at::COMMAND_WORD => {
                 self.heeds = true;
                 self.command(value);
             }
-            0xFA01 => self.speed_is_reference = false,
-            0xFA13 => self.speed_is_reference = true,
-            0xFA20 if value & 0x0002 != 0 => self.energy_base = self.motor.fed_for(),
-            0x0803 => self.set_time_out(),
+            at::FREQUENCY_REFERENCE => self.speed_is_newest = false,
+            at::SPEED_REFERENCE => self.speed_is_newest = true,
+            at::COMMAND_WORD_2 if value & 0x0002 != 0 => self.energy_base = self.motor.fed_for(),
+            at::TIME_OUT => self.set_time_out(),
             _ => {}
         }
-        self.obey();
+        self.follow();
         Ok(())
+    }
+
+    /// Follows whatever has changed.
+    fn follow(&mut self) {
+        self.look_at_inputs();
+        self.obey();
     }
 }
 
@@ -249,25 +262,24 @@ impl Model for Atv21 {
         match block.quantity {
             1 if in_block => Err(Exception::ILLEGAL_ADDRESS),
             1 => Ok(()),
-            2 if block.first == blocks::WRITE_BLOCK && values.len() == 2 => {
-                if self.write_slots.first() == Some(&0) {
-                    return Err(Exception::FAILURE);
-                }
-                let targets = self.write_slots.iter().map(|&slot| written_by(slot));
-                let set = targets.zip(values).filter_map(|(target, &value)| target.map(|at| (at, value)));
-                set.into_iter().try_for_each(|(address, value)| self.check(address, value))
-            }
+            2 if block.first == blocks::WRITE_BLOCK && values.len() == 2 => match self.write_slots {
+                [0, _] => Err(Exception::FAILURE),
+                _ => Ok(()),
+            },
             _ => Err(Exception::ILLEGAL_VALUE),
         }
     }
 
-    fn write(&mut self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
-        // The words of the block come one after the other.
-        let place = address.checked_sub(blocks::WRITE_BLOCK).map(usize::from);
-        match place.and_then(|place| self.write_slots.get(place)) {
-            Some(&slot) => written_by(slot).map_or(Ok(()), |address| self.take(address, value)),
-            None => self.take(address, value),
-        }
+    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
+        let Some(address) = self.target_of(address) else { return Ok(()) };
+        self.bank.check(address, value, !self.motor.is_fed())?;
+        let too_fast = address == at::FREQUENCY_REFERENCE && value > MAXIMUM_FREQUENCY;
+        if too_fast { Err(Exception::ILLEGAL_VALUE) } else { Ok(()) }
+    }
+
+    fn write(&mut self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+        self.check_word(address, value, cast)?;
+        self.target_of(address).map_or(Ok(()), |address| self.take(address, value))
     }
 
     fn other(&mut self, request: &[u8]) -> Result<Vec<u8>, Exception> {
@@ -286,6 +298,15 @@ impl Model for Atv21 {
         }
     }
 
+    fn join(&mut self, address: u8, _: Protocol) {
+        self.bank.set_factory(at::ADDRESS, address.into());
+    }
+
+    /// F802 acts at once (§6.1 p. 11).
+    fn own_address(&self) -> Option<u8> {
+        u8::try_from(self.bank.value(at::ADDRESS)).ok()
+    }
+
     fn listens(&self) -> bool {
         self.starting.is_zero()
     }
@@ -293,27 +314,29 @@ impl Model for Atv21 {
     fn advance(&mut self, elapsed: Duration) {
         let mut left = elapsed;
         while !left.is_zero() {
-            let piece = self.watchdog.remaining().map_or(left, |remaining| remaining.min(left));
-            self.motor.advance(piece);
-            self.powered = self.powered.saturating_add(piece);
-            self.starting = self.starting.saturating_sub(piece);
-            if self.watchdog.advance(piece) {
-                self.trip_with(TIME_OUT);
+            if !self.powered {
+                return self.motor.advance(left);
             }
+            let piece = self.until_change().map_or(left, |change| change.min(left));
+            self.step(piece);
             left = left.saturating_sub(piece);
         }
     }
 
     fn power(&mut self, on: bool) {
+        self.powered = on;
         self.motor.freewheel();
-        if !on {
-            self.watchdog = Watchdog::default();
-            return;
+        if on {
+            let terminals = AT_THE_TERMINALS.map(|address| (address, self.bank.value(address)));
+            self.bank.power_cycle();
+            for (address, value) in terminals {
+                self.bank.set(address, value);
+            }
+            self.pinned.clear();
+            (self.local, self.forced_run) = (false, false);
+            self.start_up(POWER_UP);
+            self.look_at_inputs();
         }
-        self.bank.power_cycle();
-        self.pinned.clear();
-        self.local = false;
-        self.start_up(POWER_UP);
     }
 
     fn trip(&mut self, code: u16) {
@@ -325,14 +348,18 @@ impl Model for Atv21 {
     }
 
     fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.local = true,
-            Panel::ReleaseControl => self.local = false,
-            Panel::Stop | Panel::Run | Panel::Reset | Panel::Reference(_) => {}
+        self.keypad(action);
+        self.follow();
+    }
+
+    fn world(&mut self, act: Act) {
+        match act {
+            Act::Terminal(name, closed) => self.terminal(name, closed),
+            Act::Analog(name, level) => self.analog(name, level),
+            Act::MotorSupply(on) => self.supply(on),
+            Act::Reading(name, reading) => self.readings.choose(name, reading),
         }
-        // Whatever the bus had ordered does not come back by itself.
-        self.heeds = false;
-        self.obey();
+        self.follow();
     }
 
     fn observe(&self) -> Observation {
@@ -343,7 +370,7 @@ impl Model for Atv21 {
             setpoint: self.target(),
             current: self.motor.current(),
             trip: self.trip,
-            local: self.local,
+            local: self.local || self.is_forced_local() || self.forced_run,
             eeprom_writes: self.bank.eeprom_writes(),
         }
     }
@@ -361,20 +388,20 @@ impl Model for Atv21 {
         let kept = self.bank.row(address).is_some_and(|row| row.storage == Storage::Eeprom);
         let found = if kept { self.bank.set_for_good(address, value) } else { self.bank.set(address, value) };
         self.set_time_out();
-        self.obey();
+        self.follow();
         found
     }
 }
 
 /// The register that a word of the write block sets (F870, F871).
 const fn written_by(slot: u16) -> Option<u16> {
-    match slot {
-        1 => Some(0xFA00),
-        2 => Some(0xFA20),
-        3 => Some(0xFA01),
-        4 => Some(0xFA50),
-        5 => Some(0xFA51),
-        6 => Some(0xFA13),
-        _ => None,
-    }
+    Some(match slot {
+        1 => at::COMMAND_WORD,
+        2 => at::COMMAND_WORD_2,
+        3 => at::FREQUENCY_REFERENCE,
+        4 => at::LOGIC_OUTPUT_COMMAND,
+        5 => at::ANALOG_OUTPUT_COMMAND,
+        6 => at::SPEED_REFERENCE,
+        _ => return None,
+    })
 }

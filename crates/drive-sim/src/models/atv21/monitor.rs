@@ -1,49 +1,68 @@
-//! What the simulated Altivar 21 shows of itself (§8.3).
+//! What the simulated Altivar 21 shows of itself (§8.3, §8.6).
 
 use std::time::Duration;
 
-use drive_atv21::registers as map;
+use drive_atv21::registers::address as at;
 
-use super::{Atv21, RATED_CURRENT, RATED_POWER};
+use super::{
+    Atv21, EMERGENCY, RATED_CURRENT, RATED_POWER,
+    control::{COMMAND_PRIORITY, Order, RAMP_2, Source},
+};
 
 const HOUR: u64 = 3_600;
+/// Bits of FA00 that FD01 shows: motor, regulator, ramp.
+const CHOSEN: u16 = 0x0070;
+/// Bits of FA20.
+const ENERGY_RESET: u16 = 1 << 1;
+const STALL_LEVEL: u16 = 1 << 12;
 
 /// The words that are remarked as "value before the trip" and have no address of their own for it.
-const FROZEN: [u16; 11] =
-    [0xFE02, 0xFE05, 0xFE15, 0xFE16, 0xFE20, 0xFE21, 0xFE22, 0xFE26, 0xFE27, 0xFE29, 0xFE30];
+const FROZEN: [u16; 11] = [
+    at::REFERENCE_BEFORE_RAMP,
+    at::OUTPUT_VOLTAGE,
+    at::REFERENCE_AFTER_RAMP,
+    at::ESTIMATED_SPEED,
+    at::TORQUE_CURRENT,
+    at::EXCITATION_CURRENT,
+    at::PID_FEEDBACK,
+    at::MOTOR_LOAD,
+    at::DRIVE_LOAD,
+    at::INPUT_POWER,
+    at::OUTPUT_POWER,
+];
 /// Present words with the address of what they were before the last trip.
 const TWINS: [(u16, u16); 6] = [
-    (0xFD00, 0xFE00),
-    (0xFD01, 0xFE01),
-    (0xFD42, 0xFE42),
-    (0xFD49, 0xFE49),
-    (0xFD06, 0xFE06),
-    (0xFD07, 0xFE07),
+    (at::OUTPUT_FREQUENCY, at::TRIP_OUTPUT_FREQUENCY),
+    (at::STATUS_WORD, at::TRIP_STATUS_WORD),
+    (at::STATUS_WORD_2, at::TRIP_STATUS_WORD_2),
+    (at::STATUS_WORD_3, at::TRIP_STATUS_WORD_3),
+    (at::LOGIC_INPUTS, at::TRIP_LOGIC_INPUTS),
+    (at::LOGIC_OUTPUTS, at::TRIP_LOGIC_OUTPUTS),
 ];
 
 /// The register that a word of the read block shows (F875 to F879).
 pub(super) const fn in_slot(slot: u16) -> Option<u16> {
-    match slot {
-        1 => Some(0xFD01),
-        2 => Some(0xFD00),
-        3 => Some(0xFE03),
-        4 => Some(0xFE05),
-        5 => Some(0xFC91),
-        6 => Some(0xFE22),
-        7 => Some(0xFD06),
-        8 => Some(0xFD07),
-        9 => Some(0xFE35),
-        10 => Some(0xFE36),
-        11 => Some(0xFE90),
-        _ => None,
-    }
+    Some(match slot {
+        1 => at::STATUS_WORD,
+        2 => at::OUTPUT_FREQUENCY,
+        3 => at::OUTPUT_CURRENT,
+        4 => at::OUTPUT_VOLTAGE,
+        5 => at::ALARM_CODE,
+        6 => at::PID_FEEDBACK,
+        7 => at::LOGIC_INPUTS,
+        8 => at::LOGIC_OUTPUTS,
+        9 => at::ANALOG_INPUT_VIA,
+        10 => at::ANALOG_INPUT_VIB,
+        11 => at::OUTPUT_SPEED,
+        _ => return None,
+    })
 }
 
 impl Atv21 {
     /// What stands in a register now.
     pub(super) fn value(&self, address: u16) -> u16 {
         match self.frozen.get(&address) {
-            Some(&value) if self.trip.is_some() => value,
+            Some(&value) if self.trip.is_some() && !self.readings.live_at_trip => value,
             _ => self.live(address),
         }
     }
@@ -59,6 +78,9 @@ impl Atv21 {
     }
 
     fn live(&self, address: u16) -> u16 {
+        if address == at::ALARM_CODE {
+            return self.alarms();
+        }
         let shown = self.pinned.get(&address).copied().or_else(|| self.computed(address));
         shown.unwrap_or_else(|| self.bank.value(address))
     }
@@ -68,40 +90,84 @@ impl Atv21 {
         let motor = &self.motor;
         let frequency = motor.output_frequency().unsigned_abs();
         let percent = |value: u32| word(value * 100);
-        let value = match address {
-            0xFC90 => self.trip.unwrap_or(0),
-            0xFD00 | 0xFE15 => word(frequency),
-            0xFD01 => self.status(),
-            0xFD07 => self.outputs(),
-            0xFD42 => self.status_2(),
-            0xFE02 => self.reference(),
-            0xFE03 => word(motor.current() * 10_000 / RATED_CURRENT),
-            0xFE04 => 10_000,
-            0xFE05 => word((frequency * 2).min(10_000)),
-            0xFE14 => hours(motor.fed_for()),
-            0xFE16 => word(motor.shaft_frequency().unsigned_abs()),
-            0xFE18 | 0xFE20 => percent(motor.torque().unsigned_abs()),
-            0xFE21 if motor.is_fed() => percent(30),
-            0xFE26 | 0xFE27 => word(motor.current() * 100 / RATED_CURRENT),
-            0xFE29 => word(self.power() * 105 / 100),
-            0xFE30 => word(self.power()),
-            0xFE45 => self.source() as u16,
-            0xFE46 => self.reference_source(),
-            0xFE76 => self.energy(105),
-            0xFE77 => self.energy(100),
-            0xFE80 => hours(self.powered),
-            0xFE90 => {
-                let poles = u32::from(self.bank.value(map::MOTOR_POLES.address())).max(1);
+        Some(match address {
+            at::FAULT_CODE => self.trip.unwrap_or(0),
+            at::OUTPUT_FREQUENCY | at::REFERENCE_AFTER_RAMP => word(frequency),
+            at::STATUS_WORD => self.status(),
+            at::LOGIC_OUTPUTS => self.outputs(),
+            at::STATUS_WORD_2 => self.status_2(),
+            at::REFERENCE_BEFORE_RAMP => self.reference(),
+            at::OUTPUT_CURRENT => word(motor.current() * 10_000 / RATED_CURRENT),
+            at::DC_BUS_VOLTAGE => {
+                if self.supplied {
+                    10_000
+                } else {
+                    0
+                }
+            }
+            at::OUTPUT_VOLTAGE => word((frequency * 2).min(10_000)),
+            at::RUNNING_TIME => hours(motor.fed_for()),
+            at::ESTIMATED_SPEED => word(motor.shaft_frequency().unsigned_abs()),
+            at::TORQUE | at::TORQUE_CURRENT => percent(motor.torque().unsigned_abs()),
+            at::EXCITATION_CURRENT if motor.is_fed() => percent(30),
+            at::MOTOR_LOAD | at::DRIVE_LOAD => word(motor.current() * 100 / RATED_CURRENT),
+            at::INPUT_POWER => word(self.power() * 105 / 100),
+            at::OUTPUT_POWER => word(self.power()),
+            at::COMMAND_SOURCE => self.source() as u16,
+            at::REFERENCE_SOURCE => self.reference_source(),
+            at::INPUT_ENERGY => self.energy(105),
+            at::OUTPUT_ENERGY => self.energy(100),
+            at::POWERED_TIME => hours(self.powered_for),
+            at::OUTPUT_SPEED => {
+                let poles = self.poles();
                 word((frequency * 12 + 5 * poles) / (poles * 10))
             }
             _ => return None,
+        })
+    }
+
+    /// FD01 (§8.6 p. 34).
+    fn status(&self) -> u16 {
+        let order = self.order();
+        let tripped = self.trip.is_some();
+        let is_run = |order| matches!(order, Order::Run { .. }) && !tripped;
+        let ordered = is_run(if self.readings.run_needs_st { order } else { self.asked() });
+        let turns = self.readings.run_until_standstill && self.motor.output_frequency() != 0;
+        let standby = !tripped && !self.lacks_supply() && self.starting.is_zero();
+        let reverse = match self.motor.output_frequency() {
+            0 => matches!(order, Order::Run { reverse: true }),
+            frequency => frequency < 0,
         };
-        Some(value)
+        let by_terminals = (self.is_forced_local() || self.forced_run) && !self.readings.local_is_keypad;
+        let chosen = if self.source() == Source::Serial { self.word() & CHOSEN } else { 0 };
+        let bits = [
+            (0, tripped),
+            (1, tripped),
+            (2, self.alarms() != 0),
+            (3, self.lacks_supply()),
+            (7, order == Order::Brake && !tripped),
+            (9, reverse),
+            (10, ordered || turns),
+            (11, order == Order::Freewheel),
+            (12, self.trip == Some(EMERGENCY)),
+            (13, standby && self.released && (is_run(order) || turns)),
+            (14, standby),
+            (15, self.local || by_terminals),
+        ];
+        bits.into_iter().filter(|(_, set)| *set).fold(chosen, |word, (bit, _)| word | 1 << bit)
+    }
+
+    /// FD42 (§8.6 p. 34).
+    fn status_2(&self) -> u16 {
+        let second = self.bank.value(at::COMMAND_WORD_2);
+        let level = if self.word() & COMMAND_PRIORITY != 0 { second & STALL_LEVEL } else { 0 };
+        let ramp = if self.word() & RAMP_2 != 0 { 0x0100 } else { 0 };
+        (second & ENERGY_RESET) | level | ramp
     }
 
     /// FD07: relay RY as FA50 orders it, relay FL at a trip.
     fn outputs(&self) -> u16 {
-        let relay = self.bank.value(map::LOGIC_OUTPUT_COMMAND.address()) & 1;
+        let relay = self.bank.value(at::LOGIC_OUTPUT_COMMAND) & 1;
         relay | if self.trip.is_some() { 1 << 2 } else { 0 }
     }
 

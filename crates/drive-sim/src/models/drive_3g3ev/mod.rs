@@ -3,15 +3,17 @@
 //! What the manual leaves open is chosen here, and any drive of the field may differ:
 //! - reserved registers answer 0 ([`Drive3g3ev::refusing_reserved`]: exception 02), and 0 is in the word of inputs and
 //!   in every parameter that the manual does not name;
-//! - n06 to n08 hold 1, 2 and 3, and no number stands for "fault reset" until
-//!   [`Drive3g3ev::with_fault_reset_function`] says which;
+//! - n06 to n08 hold 1, 2 and 3; what the inputs do is said by the switches of the same names, or by
+//!   [`Drive3g3ev::with_fault_reset_function`], which says what number resets faults;
 //! - 100 % is 60 Hz, both ramps are n20, measured to 60 Hz, n53 counts 0.1 Hz;
 //! - a fault cuts the output and the motor coasts; afterwards, and after the STOP key, a run command acts again when it
 //!   was 0 once;
 //! - RUN stands as long as the output feeds the motor;
 //! - bit 7 of 0020h is always 1, as in the only sample (§4.2.2).
 
+mod control;
 mod set_up;
+mod switches;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -20,19 +22,29 @@ use std::time::Duration;
 
 use drive_3g3ev::{
     FAULTS, ROWS, TIME_OVER,
-    registers::{COMMAND, ENTER, N06, N07, N08, N20, N53, OUTPUTS, REFERENCE},
-    words::{BroadcastCommand, Command, Errors, LinkError},
+    registers::address as at,
+    words::{Errors, LinkError},
 };
 
-use self::set_up::SetUp;
+use self::{
+    control::TERMINALS,
+    set_up::SetUp,
+    switches::{Readings, SWITCHES},
+};
 use crate::{
-    Bank, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Refusal, Rules,
+    Act, Bank, Cast, Damage, Exception, Model, Motor, Nameplate, Observation, Panel, Refusal, Rules,
     Surroundings, Watchdog,
 };
 
 /// What is around it.
-const SURROUNDINGS: Surroundings =
-    Surroundings { family: "3g3ev", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
+const SURROUNDINGS: Surroundings = Surroundings {
+    family: "3g3ev",
+    terminals: TERMINALS,
+    analog_inputs: &[],
+    switches: SWITCHES,
+    trips: FAULTS,
+    rows: ROWS,
+};
 
 /// Value outside its range (§4.4).
 const OUT_OF_RANGE: Exception = Exception(0x21);
@@ -46,8 +58,7 @@ const BROADCAST_FULL: u32 = 30_000;
 /// Nominal current in tenths of an ampere.
 const NOMINAL_CURRENT: u32 = 30;
 /// Settings that the manual does not print, and that have to differ from 0.
-const FACTORY: &[(u16, u16)] =
-    &[(N06.address(), 1), (N07.address(), 2), (N08.address(), 3), (N20.address(), 30), (N53.address(), 15)];
+const FACTORY: &[(u16, u16)] = &[(at::N06, 1), (at::N07, 2), (at::N08, 3), (at::N20, 30), (at::N53, 15)];
 /// The registers that §5.2 calls reserved.
 const RESERVED: &[std::ops::RangeInclusive<u16>] =
     &[0x25..=0x26, 0x29..=0x2A, 0x2E..=0x30, 0x32..=0x3C, 0x3E..=0xFF];
@@ -59,6 +70,7 @@ pub struct Drive3g3ev {
     motor: Motor,
     watchdog: Watchdog,
     rules: Rules,
+    readings: Readings,
     /// The parameters of §2.1 as they were at power-up.
     set_up: SetUp,
     errors: Errors,
@@ -67,7 +79,17 @@ pub struct Drive3g3ev {
     limit_exceeded: bool,
     /// The run command acts again when it was 0 once.
     locked: bool,
+    /// The panel has control.
     local: bool,
+    console_runs: bool,
+    /// In hundredths of a hertz.
+    console_reference: u32,
+    terminals: u16,
+    /// The inputs of n06 to n08 as they were looked at last.
+    inputs_before: [bool; 3],
+    /// The control has a supply, and the motor has one.
+    powered: bool,
+    supplied: bool,
     fault_reset: Option<u16>,
     refuses_reserved: bool,
 }
@@ -89,12 +111,19 @@ impl Drive3g3ev {
             }),
             watchdog: Watchdog::new(set_up.detects_time_over.then_some(TIME_OVER)),
             rules: set_up.rules(),
+            readings: Readings::default(),
             set_up,
             errors: Errors::empty(),
             link_errors: LinkError::empty(),
             limit_exceeded: false,
             locked: false,
             local: false,
+            console_runs: false,
+            console_reference: 0,
+            terminals: 0,
+            inputs_before: [false; 3],
+            powered: true,
+            supplied: true,
             fault_reset: None,
             refuses_reserved: false,
         }
@@ -112,95 +141,10 @@ impl Drive3g3ev {
         Self { refuses_reserved: true, ..self }
     }
 
-    fn command(&self) -> Command {
-        Command::from_bits_retain(self.bank.value(COMMAND.address()))
-    }
-
-    /// What 0001h orders: bits 4 to 6 are the inputs' functions.
-    fn obey_command(&mut self, before: Command) {
-        let command = self.command();
-        if !command.contains(Command::RUN) {
-            self.locked = false;
-        }
-        let risen = command.difference(before);
-        let inputs = [(Command::INPUT_1, N06), (Command::INPUT_2, N07), (Command::INPUT_3, N08)];
-        let resets = inputs.into_iter().any(|(input, function)| {
-            risen.contains(input) && self.fault_reset == Some(self.bank.value(function.address()))
-        });
-        if resets {
-            self.reset();
-        }
-    }
-
-    fn obey_broadcast(&mut self, word: u16) {
-        let command = BroadcastCommand::from_bits_retain(word);
-        let before = self.command();
-        let run = Command::RUN | Command::REVERSE;
-        self.bank.set(COMMAND.address(), word & run.bits());
-        self.obey_command(before);
-        if command.contains(BroadcastCommand::EXTERNAL_FAULT) {
-            self.fault(Errors::EF);
-        } else if command.contains(BroadcastCommand::FAULT_RESET) {
-            self.reset();
-        }
-    }
-
-    fn fault(&mut self, errors: Errors) {
-        self.errors |= errors;
-        self.locked = self.command().contains(Command::RUN);
-        self.motor.freewheel();
-    }
-
-    /// Clears the faults; the run command acts again when it was 0 once.
-    fn reset(&mut self) {
-        self.errors = Errors::empty();
-        self.link_errors = LinkError::empty();
-    }
-
-    /// Steers the motor for what is ordered now.
-    fn steer(&mut self) {
-        if !self.errors.is_empty() {
-            self.motor.freewheel();
-        } else if self.runs() {
-            self.motor.run(self.target(), self.ramps());
-        } else {
-            self.motor.ramp_to_rest(self.ramps().deceleration);
-        }
-    }
-
-    /// Whether a run command acts.
-    fn runs(&self) -> bool {
-        self.run_by_bus() && !self.locked && self.is_ready() && self.command().contains(Command::RUN)
-    }
-
-    fn run_by_bus(&self) -> bool {
-        self.set_up.run_by_bus && !self.local
-    }
-
-    /// The frequency that is ordered, in hundredths of a hertz, negative in reverse.
-    fn target(&self) -> i32 {
-        let frequency = i32::try_from(self.reference()).unwrap_or(0);
-        if self.command().contains(Command::REVERSE) { -frequency } else { frequency }
-    }
-
-    /// The reference in force, in hundredths of a hertz: tenths are all that the drive keeps (§2.1, note 1).
-    fn reference(&self) -> u32 {
-        if !self.set_up.reference_by_bus || self.local {
-            return 0;
-        }
-        self.set_up.frequency(self.bank.value(REFERENCE.address())) / 10 * 10
-    }
-
-    fn ramps(&self) -> Ramps {
-        let time = Duration::from_millis(u64::from(self.bank.value(N20.address())) * 100);
-        let ramp = Ramp { full_scale: MAX_FREQUENCY, time };
-        Ramps { acceleration: ramp, deceleration: ramp }
-    }
-
     /// Whether the drive would take this word.
     fn check(&self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
         if cast == Cast::Broadcast {
-            return if address <= REFERENCE.address() { Ok(()) } else { Err(Exception::ILLEGAL_ADDRESS) };
+            return if address <= at::REFERENCE { Ok(()) } else { Err(Exception::ILLEGAL_ADDRESS) };
         }
         let constant = self.bank.row(address).is_some_and(|row| set_up::is_parameter(row.address));
         if constant && self.errors.intersects(Errors::UV1 | Errors::UV2) {
@@ -211,7 +155,7 @@ impl Drive3g3ev {
             Refusal::ReadOnly | Refusal::Running => NOT_WRITABLE_NOW,
             Refusal::Range => OUT_OF_RANGE,
         })?;
-        let too_fast = address == REFERENCE.address() && self.set_up.frequency(value) > MAX_FREQUENCY;
+        let too_fast = address == at::REFERENCE && self.set_up.frequency(value) > MAX_FREQUENCY;
         if too_fast { Err(OUT_OF_RANGE) } else { Ok(()) }
     }
 
@@ -247,21 +191,18 @@ impl Model for Drive3g3ev {
         let checked = self.check(address, value, cast);
         self.limit_exceeded = checked == Err(OUT_OF_RANGE);
         checked?;
-        let before = self.command();
-        match cast {
-            Cast::Broadcast if address == COMMAND.address() => self.obey_broadcast(value),
-            Cast::Broadcast if address == REFERENCE.address() => {
+        match (cast, address) {
+            (Cast::Broadcast, at::COMMAND) => self.obey_broadcast(value),
+            (Cast::Broadcast, at::REFERENCE) => {
                 let frequency = u32::from(value) * MAX_FREQUENCY / BROADCAST_FULL;
                 self.bank.set(address, self.set_up.word(frequency.min(MAX_FREQUENCY)));
             }
             // 0000h is allowed to a broadcast (§4.4) and described nowhere.
-            Cast::Broadcast => {}
-            Cast::Unicast if address == ENTER.address() => self.bank.save(),
-            Cast::Unicast => {
+            (Cast::Broadcast, _) => {}
+            (Cast::Unicast, at::ENTER) => self.bank.save(),
+            (Cast::Unicast, _) => {
                 self.bank.set(address, value);
-                if address == COMMAND.address() {
-                    self.obey_command(before);
-                }
+                self.look_at_inputs();
             }
         }
         self.steer();
@@ -275,9 +216,10 @@ impl Model for Drive3g3ev {
     fn advance(&mut self, elapsed: Duration) {
         let mut left = elapsed;
         while !left.is_zero() {
-            let piece = self.watchdog.remaining().map_or(left, |remaining| remaining.min(left));
+            let remaining = self.watchdog.remaining().filter(|_| self.powered);
+            let piece = remaining.map_or(left, |remaining| remaining.min(left));
             self.motor.advance(piece);
-            if self.watchdog.advance(piece) {
+            if self.powered && self.watchdog.advance(piece) {
                 self.link_errors |= LinkError::TIME_OVER;
                 self.fault(Errors::BUS);
             }
@@ -286,9 +228,9 @@ impl Model for Drive3g3ev {
     }
 
     fn power(&mut self, on: bool) {
+        self.powered = on;
         self.motor.freewheel();
         if !on {
-            self.watchdog = Watchdog::default();
             return;
         }
         self.bank.power_cycle();
@@ -297,8 +239,10 @@ impl Model for Drive3g3ev {
         self.watchdog = Watchdog::new(self.set_up.detects_time_over.then_some(TIME_OVER));
         self.errors = Errors::empty();
         self.link_errors = LinkError::empty();
-        self.limit_exceeded = false;
-        self.locked = false;
+        (self.limit_exceeded, self.locked, self.local, self.console_runs) = (false, false, false, false);
+        self.supply(self.supplied);
+        self.look_at_inputs();
+        self.steer();
     }
 
     /// The code is the number of the bit of 0021h, 0 to 15.
@@ -314,15 +258,23 @@ impl Model for Drive3g3ev {
     }
 
     fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.local = true,
-            Panel::ReleaseControl => {
-                self.local = false;
-                self.locked = self.command().contains(Command::RUN);
+        self.console(action);
+        self.steer();
+    }
+
+    fn world(&mut self, act: Act) {
+        match act {
+            Act::Terminal(name, closed) => {
+                let bit = TERMINALS.iter().position(|terminal| *terminal == name).unwrap_or(0);
+                self.terminals =
+                    if closed { self.terminals | 1 << bit } else { self.terminals & !(1 << bit) };
             }
-            Panel::Stop => self.locked = self.command().contains(Command::RUN),
-            Panel::Run | Panel::Reset | Panel::Reference(_) => {}
+            // It has no analog input that its manual names.
+            Act::Analog(..) => {}
+            Act::MotorSupply(on) => self.supply(on),
+            Act::Reading(name, reading) => self.readings.choose(name, reading),
         }
+        self.look_at_inputs();
         self.steer();
     }
 
@@ -335,13 +287,28 @@ impl Model for Drive3g3ev {
             setpoint: if self.runs() { self.target() } else { 0 },
             current: self.motor.current(),
             trip,
-            local: self.local,
+            local: self.is_local(),
             eeprom_writes: self.bank.eeprom_writes(),
         }
     }
 
     fn frame_seen(&mut self, _: Cast) {
         self.watchdog.feed();
+        if self.readings.good_frame_clears {
+            self.link_errors = LinkError::empty();
+        }
+    }
+
+    /// 003Dh (§5.2).
+    fn frame_damaged(&mut self, damage: Damage) {
+        self.link_errors |= match damage {
+            Damage::Check => LinkError::CRC,
+            Damage::Length => LinkError::LENGTH,
+        };
+    }
+
+    fn pause(&self) -> Duration {
+        self.set_up.pause()
     }
 
     fn peek(&self, address: u16) -> Option<u16> {
@@ -353,15 +320,12 @@ impl Model for Drive3g3ev {
         if self.computed(address).is_some() {
             return false;
         }
-        let before = self.command();
         let kept = if set_up::is_parameter(address) {
             self.bank.set_for_good(address, value)
         } else {
             self.bank.set(address, value)
         };
-        if kept && address == COMMAND.address() {
-            self.obey_command(before);
-        }
+        self.look_at_inputs();
         self.steer();
         kept
     }

@@ -2,10 +2,7 @@
 
 use std::time::Duration;
 
-use drive_3g3ev::{
-    FrequencyUnit,
-    registers::{N02, N39, N40, N63, N65},
-};
+use drive_3g3ev::{FrequencyUnit, registers::address as at};
 use drive_core::{Frequency, Percent};
 
 use super::MAX_FREQUENCY;
@@ -14,8 +11,8 @@ use crate::{Bank, Rules};
 /// What was set at power-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SetUp {
-    pub(super) run_by_bus: bool,
-    pub(super) reference_by_bus: bool,
+    /// n02.
+    pub(super) mode: u16,
     pub(super) detects_time_over: bool,
     unit: FrequencyUnit,
     baud: u64,
@@ -24,15 +21,24 @@ pub(super) struct SetUp {
 
 impl SetUp {
     pub(super) fn of(bank: &Bank) -> Self {
-        let mode = bank.value(N02.address());
         Self {
-            run_by_bus: matches!(mode, 2 | 5),
-            reference_by_bus: matches!(mode, 4 | 5),
-            detects_time_over: bank.value(N40.address()) == 0,
-            unit: FrequencyUnit::of(bank.value(N39.address())).unwrap_or(FrequencyUnit::Decihertz),
-            baud: 2_400 << bank.value(N63.address()).min(3),
-            wait: Duration::from_millis(u64::from(bank.value(N65.address()))),
+            mode: bank.value(at::N02),
+            detects_time_over: bank.value(at::N40) == 0,
+            unit: FrequencyUnit::of(bank.value(at::N39)).unwrap_or(FrequencyUnit::Decihertz),
+            baud: 2_400 << bank.value(at::N63).min(3),
+            wait: Duration::from_millis(u64::from(bank.value(at::N65))),
         }
+    }
+
+    /// 24 bits and 10 ms between the end of an answer, or of a request to all, and the next request (VS-606V7 manual
+    /// p. 92; the drawing of §3.3 is missing).
+    pub(super) fn pause(self) -> Duration {
+        self.silence() + Duration::from_millis(10)
+    }
+
+    /// 24 bits.
+    fn silence(self) -> Duration {
+        Duration::from_nanos(24 * 1_000_000_000 / self.baud)
     }
 
     /// Functions and limits (§3.1.2). The answer begins 24 bits and n65 after the request (VS-606V7 manual p. 92).
@@ -45,7 +51,7 @@ impl SetUp {
             diagnostics: &[0x00],
             event_counter: false,
             broadcast: &[0x10],
-            turnaround: Duration::from_nanos(24 * 1_000_000_000 / self.baud) + self.wait,
+            turnaround: self.silence() + self.wait,
         }
     }
 
@@ -72,5 +78,5 @@ impl SetUp {
 
 /// Whether this is the address of a parameter, 0100h and its number (§5.4).
 pub(super) fn is_parameter(address: u16) -> bool {
-    (0x0101..=0x0144).contains(&address)
+    (at::N01..=at::N68).contains(&address)
 }

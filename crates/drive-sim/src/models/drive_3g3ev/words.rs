@@ -1,15 +1,11 @@
 //! The words that the drive computes (§5.2), and the mistakes in its settings that it shows (§5.3).
 
 use drive_3g3ev::{
-    registers::{
-        CURRENT, DC_BUS, ERRORS, INPUT_TERMINALS, LINK, LINK_ERROR, N05, N06, N07, N08, N09, N10, N41, N42,
-        N53, N56, N57, N58, OUTPUT_CONTACTS, OUTPUT_FREQUENCY, OUTPUT_VOLTAGE, REFERENCE_SEEN, SIGNALS,
-        STATE,
-    },
+    registers::address as at,
     words::{Command, DriveState, Errors, LinkState, Outputs, Signals},
 };
 
-use super::{Drive3g3ev, MAX_FREQUENCY, OUTPUTS};
+use super::{Drive3g3ev, MAX_FREQUENCY, control::Source};
 use crate::Bank;
 
 /// Bit 7 of 0020h, "unused", is 1 in the sample (§4.2.2).
@@ -25,19 +21,19 @@ impl Drive3g3ev {
     /// A register that the drive computes; `None` for one that is kept.
     pub(super) fn computed(&self, address: u16) -> Option<u16> {
         Some(match address {
-            _ if address == SIGNALS.address() => self.signals().bits() | SAMPLE_BIT,
-            _ if address == ERRORS.address() => self.errors.bits(),
-            _ if address == LINK.address() => self.link_state().bits(),
-            _ if address == REFERENCE_SEEN.address() => self.set_up.word(self.reference()),
-            _ if address == OUTPUT_FREQUENCY.address() => self.set_up.word(self.output()),
-            _ if address == CURRENT.address() => u16::try_from(self.motor.current()).unwrap_or(u16::MAX),
-            _ if address == OUTPUT_VOLTAGE.address() => self.voltage(),
-            _ if address == INPUT_TERMINALS.address() => 0,
-            _ if address == STATE.address() => self.state().bits(),
-            _ if address == OUTPUT_CONTACTS.address() => self.contacts().bits(),
-            _ if address == DC_BUS.address() && self.errors.contains(Errors::UV1) => 0,
-            _ if address == DC_BUS.address() => DC_VOLTAGE,
-            _ if address == LINK_ERROR.address() => self.link_errors.bits(),
+            at::SIGNALS => self.signals().bits() | SAMPLE_BIT,
+            at::ERRORS => self.errors.bits(),
+            at::LINK => self.link_state().bits(),
+            at::REFERENCE_SEEN => self.set_up.word(self.reference()),
+            at::OUTPUT_FREQUENCY => self.set_up.word(self.output()),
+            at::CURRENT => u16::try_from(self.motor.current()).unwrap_or(u16::MAX),
+            at::OUTPUT_VOLTAGE => self.voltage(),
+            at::INPUT_TERMINALS => self.terminals,
+            at::STATE => self.state().bits(),
+            at::OUTPUT_CONTACTS => self.contacts().bits(),
+            at::DC_BUS if !self.supplied || self.errors.contains(Errors::UV1) => 0,
+            at::DC_BUS => DC_VOLTAGE,
+            at::LINK_ERROR => self.link_errors.bits(),
             _ => return None,
         })
     }
@@ -49,13 +45,20 @@ impl Drive3g3ev {
 
     /// OP6: reverse was ordered and n05 forbids it.
     fn reverse_refused(&self) -> bool {
-        let reverse = self.command().contains(Command::RUN | Command::REVERSE);
-        reverse && self.run_by_bus() && self.bank.value(N05.address()) == 1
+        self.ordered() == Some(true) && self.bank.value(at::N05) == 1
+    }
+
+    /// The direction that is asked for at standstill, with or without a run command.
+    fn reverse_selected(&self) -> bool {
+        match self.run_source() {
+            Source::Bus => self.command().contains(Command::REVERSE),
+            Source::Terminals | Source::Console => self.ordered() == Some(true),
+        }
     }
 
     fn signals(&self) -> Signals {
         let turning = self.motor.output_frequency();
-        let reverse = if turning == 0 { self.command().contains(Command::REVERSE) } else { turning < 0 };
+        let reverse = if turning == 0 { self.reverse_selected() } else { turning < 0 };
         let contacts = self.contacts();
         let mut signals = Signals::empty();
         signals.set(Signals::RUN, self.motor.is_fed());
@@ -69,7 +72,7 @@ impl Drive3g3ev {
     }
 
     fn state(&self) -> DriveState {
-        let level = u32::from(self.bank.value(N53.address())) * 10;
+        let level = u32::from(self.bank.value(at::N53)) * 10;
         let mut state = DriveState::empty();
         state.set(DriveState::RUN, self.motor.is_fed());
         state.set(DriveState::ZERO_SPEED, self.output() == 0);
@@ -77,10 +80,10 @@ impl Drive3g3ev {
         state.set(DriveState::BELOW_N53, self.output() <= level);
         state.set(DriveState::ABOVE_N53, self.output() >= level);
         state.set(DriveState::READY, self.is_ready());
-        state.set(DriveState::UNDERVOLTAGE, self.errors.contains(Errors::UV1));
+        state.set(DriveState::UNDERVOLTAGE, !self.supplied || self.errors.contains(Errors::UV1));
         state.set(DriveState::OUTPUT_OFF, !self.motor.is_fed());
-        state.set(DriveState::LOCAL_REFERENCE, !self.set_up.reference_by_bus || self.local);
-        state.set(DriveState::LOCAL_RUN, !self.run_by_bus());
+        state.set(DriveState::LOCAL_REFERENCE, self.reference_source() != Source::Bus);
+        state.set(DriveState::LOCAL_RUN, self.run_source() != Source::Bus);
         state.set(DriveState::OVERTORQUE, self.errors.contains(Errors::OL3));
         state.set(DriveState::MAJOR_FAULT, !self.errors.is_empty());
         state.set(DriveState::LINK_FAULT, self.errors.contains(Errors::BUS));
@@ -93,10 +96,10 @@ impl Drive3g3ev {
 
     /// The outputs that 0009h commands.
     fn contacts(&self) -> Outputs {
-        let ordered = Outputs::from_bits_retain(self.bank.value(OUTPUTS.address()));
+        let ordered = Outputs::from_bits_retain(self.bank.value(at::OUTPUTS));
         let mut contacts = Outputs::empty();
-        for (output, function) in [(Outputs::OUTPUT_1, N09), (Outputs::OUTPUT_2, N10)] {
-            let by_bus = self.bank.value(function.address()) == BY_BUS;
+        for (output, function) in [(Outputs::OUTPUT_1, at::N09), (Outputs::OUTPUT_2, at::N10)] {
+            let by_bus = self.bank.value(function) == BY_BUS;
             contacts.set(output, by_bus && ordered.contains(output));
         }
         contacts
@@ -115,9 +118,9 @@ impl Drive3g3ev {
 
 /// OP1, OP4 and OP5. OP2 and OP3 hang on rules and ratings that the manual does not give.
 fn has_mistake(bank: &Bank) -> bool {
-    let [n06, n07, n08] = [N06, N07, N08].map(|register| bank.value(register.address()));
+    let [n06, n07, n08] = [at::N06, at::N07, at::N08].map(|register| bank.value(register));
     let equal_inputs = n06 == n07 || n07 == n08 || n06 == n08;
-    let limits = bank.value(N41.address()) < bank.value(N42.address());
-    let skips = [N56, N57, N58].map(|register| bank.value(register.address()));
+    let limits = bank.value(at::N41) < bank.value(at::N42);
+    let skips = [at::N56, at::N57, at::N58].map(|register| bank.value(register));
     equal_inputs || limits || !skips.is_sorted_by(|higher, lower| higher >= lower)
 }

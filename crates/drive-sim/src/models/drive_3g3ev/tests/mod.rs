@@ -1,5 +1,7 @@
 //! The simulated drive against its manual. The printed frames are in the tests of the family's crate, byte for byte.
 
+mod world;
+
 use super::*;
 use crate::pdu;
 
@@ -9,7 +11,7 @@ const RESET: u16 = 77;
 
 fn drive() -> Drive3g3ev {
     let mut drive = Drive3g3ev::new().with_fault_reset_function(RESET);
-    drive.poke(N07.address(), RESET);
+    drive.poke(at::N07, RESET);
     drive
 }
 

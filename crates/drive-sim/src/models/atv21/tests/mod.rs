@@ -1,6 +1,8 @@
 //! The simulated Altivar 21 against its manual, section by section. The printed frames are in the tests of
 //! `drive-atv21`.
 
+mod world;
+
 use std::time::Duration;
 
 use super::Atv21;
