@@ -64,6 +64,10 @@ impl<C> Master<C> {
             if last_slave.is_some_and(|last| last != entry.slave) {
                 at += config.slave_change_gap;
             }
+            if entry.slave == 0 {
+                // Every slave listens, so that each has its pause.
+                at = stations.values().filter_map(|station| station.ready_at).fold(at, Instant::max);
+            }
             let request = &entry.work.request;
             let mut takes = config.response_timeout;
             let mut long = None;
