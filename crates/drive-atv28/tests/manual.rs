@@ -123,6 +123,8 @@ async fn the_sample_of_function_03_is_what_a_status_sends_first() {
     let (line, other_end) = scripted(&[
         ("02 03 01C2 0007", "02 03 0E 01F4 FE0C 1234 002A 0FA3 0037 0028"),
         ("02 03 01C9 0004", "02 03 08 0000 8627 4010 0000"),
+        // Whether it runs or comes down, CMD tells.
+        ("02 03 0190 0001", "02 03 02 080F"),
     ]);
     let mut drive = Atv28::new(line.slave(2), slave(2));
     let status = drive.status().await.unwrap();

@@ -1,40 +1,42 @@
 //! Who commands the drive: giving control to the bus when asked, and giving it back.
 
 use drive_core::{
-    Class, Command, Control, Effect, Error, Port, Result, Status,
-    drivecom::{self, CONFIRMING_READS, Drivecom},
+    Class, Command, Confirming, Control, Effect, Error, Port, Result, Status,
+    drivecom::{self, Drivecom},
     registers::{Register, access::WriteStopped},
 };
 
 use crate::{
     Atv312,
-    registers::{CCS, CD1, CD2, CHCF, DCI, FR1, FR2, FST, LAC, LRS3, RFC},
-    settings::{CD13, CD14, REFERENCE_BY_MODBUS},
-    status::FastWords,
+    reading::FastWords,
+    registers::{CCS, CD1, CD2, CHCF, DCI, FR1, FR2, FST, LAC, LFR, LRS3, PS2, PS4, RFC, SA2},
+    settings::{CD13, CD14, COMMAND_BY_MODBUS, REFERENCE_1, REFERENCE_BY_MODBUS, SEPARATE},
     words::{AccessLevel, ExtendedStatus3},
 };
 
 /// `LAC` = L3.
 const L3: u16 = 2;
-/// `CHCF` = SEP.
-const SEPARATE: u16 = 2;
-/// `rFC` = Fr1.
-const REFERENCE_1: u16 = 96;
 /// `CCS` = Cd1.
 const COMMAND_1: u16 = 98;
-/// `Cd1`, `Cd2` = Mdb.
-const COMMAND_BY_MODBUS: u16 = 10;
 /// `Cd1`, `Cd2` = tEr.
 const COMMAND_BY_TERMINALS: u16 = 1;
 /// `Fr1`, `Fr2` = AI1.
 const REFERENCE_BY_AI1: u16 = 1;
+/// `SA2` as the drive leaves the factory (p. 15).
+const AI2: u16 = 2;
+/// `PS2` as the drive leaves the factory.
+const LI3: u16 = 131;
+/// `PS4` as the drive leaves the factory.
+const LI4: u16 = 132;
 /// A function that is not assigned.
 const UNASSIGNED: u16 = 0;
 
 impl<P: Port> Atv312<P> {
     /// Sets the drive up for command and reference by Modbus: `LAC` = L3, `CHCF` = SEP, `Cd1` = `Fr1` = Mdb, both
-    /// selected, and, as far as nothing else is assigned, `FSt` = Cd14 and `dCI` = Cd13, so that the control word keeps
-    /// all its stops (BBV51701 p. 11, 16, 35–37, 40). What is set that way already is not written. Nothing of it
+    /// selected; `FSt` = Cd14 and `dCI` = Cd13, as far as nothing else is assigned, so that the control word keeps
+    /// all its stops; and `SA2`, `PS4` and `PS2` to nO, where they are as the drive leaves the factory, so that neither AI2
+    /// nor LI3 and LI4 change the setpoint (BBV51701 p. 11, 15, 16, 35–37, 40, 42). What is set that way already is not
+    /// written, and what is changed is remembered: [`release`](drive_core::Drive::release) puts it back. Nothing of it
     /// survives a power cycle until [`persist`](drive_core::Drive::persist).
     ///
     /// **Going to L3 returns `Fr1`, `Cd1`, `CHCF` and `tCC` to their factory setting, and only a return to factory
@@ -48,7 +50,11 @@ impl<P: Port> Atv312<P> {
         self.check_standing(COMMAND).await?;
         // The control word that was written last acts as soon as the channel is ours.
         self.write_control(Class::Command, drivecom::DISABLE_VOLTAGE, Effect::Level).await?;
-        self.change(LAC, L3).await?;
+        // What L3 returns to the factory setting is put back as it was.
+        let reference = self.registers.at(Class::Background).read(FR1).await?;
+        if self.change(LAC, L3).await? {
+            self.remember(FR1, reference);
+        }
         for (register, value) in [
             (CHCF, SEPARATE),
             (CCS, COMMAND_1),
@@ -56,42 +62,64 @@ impl<P: Port> Atv312<P> {
             (RFC, REFERENCE_1),
             (FR1, REFERENCE_BY_MODBUS),
         ] {
-            self.change(register, value).await?;
+            self.set_up(register, value, None).await?;
         }
-        for (register, value) in [(FST, CD14), (DCI, CD13)] {
-            if self.registers.at(Class::Background).read(register).await? == UNASSIGNED {
-                self.change(register, value).await?;
-            }
+        for (register, from, to) in [
+            (FST, UNASSIGNED, CD14),
+            (DCI, UNASSIGNED, CD13),
+            (SA2, AI2, UNASSIGNED),
+            (PS4, LI4, UNASSIGNED),
+            (PS2, LI3, UNASSIGNED),
+        ] {
+            self.set_up(register, to, Some(from)).await?;
         }
         self.until_control(COMMAND, |control| control == Control::Bus).await
     }
 
-    /// Gives the command channel in use to the terminals. See [`release`](drive_core::Drive::release).
+    /// Puts back what was set up, and gives the channels that are then still the bus's to the terminals and AI1. See
+    /// [`release`](drive_core::Drive::release).
     pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
         const COMMAND: Command = Command::Release;
         let words = self.check_standing(COMMAND).await?;
-        if words.state_words().control() != Control::Bus {
+        if words.state_words().control() != Control::Bus && self.set_up_before.is_empty() {
             return self.fast_status(Class::Command).await;
         }
-        if self.control_settings(Class::Command).await?.level != AccessLevel::L3 {
+        self.read_settings(Class::Command).await?;
+        if self.known.settings.level() != Some(AccessLevel::L3) {
             return Err(Error::Unsupported {
                 what: "release",
                 reason: "at access level L1 or L2 the drive chooses its channel itself; set it up for L3",
             });
         }
+        if let Some(reason) = self.terminals_ask_for_run().await? {
+            return Err(self.refused(COMMAND, reason));
+        }
         self.write_control(Class::Command, drivecom::DISABLE_VOLTAGE, Effect::Level).await?;
+        // Whoever gives the bus its channels again finds no setpoint of before.
+        self.registers.at(Class::Command).write(LFR, 0).await.map_err(Error::after_write)?;
+        while let Some(&(register, value)) = self.set_up_before.last() {
+            self.change(register, value).await.map_err(Error::after_write)?;
+            self.set_up_before.pop();
+        }
+        self.give_channels_to_terminals().await.map_err(Error::after_write)?;
+        self.until_control(COMMAND, |control| control != Control::Bus).await
+    }
+
+    /// The reference first: no run command of the terminals is to find a setpoint of the bus.
+    async fn give_channels_to_terminals(&mut self) -> Result<()> {
         let mut calls = self.registers.at(Class::Background);
         let separate = calls.read(CHCF).await? == SEPARATE;
         let selection = ExtendedStatus3::from_bits_retain(calls.read(LRS3).await?);
-        let second = selection.contains(ExtendedStatus3::COMMAND_2);
-        let (register, value) = match (separate, second) {
-            (true, false) => (CD1, COMMAND_BY_TERMINALS),
-            (true, true) => (CD2, COMMAND_BY_TERMINALS),
-            (false, false) => (FR1, REFERENCE_BY_AI1),
-            (false, true) => (FR2, REFERENCE_BY_AI1),
-        };
-        self.change(register, value).await?;
-        self.until_control(COMMAND, |control| control != Control::Bus).await
+        let pick = |second, pair: [Register<WriteStopped>; 2]| pair[usize::from(second)];
+        let reference = pick(selection.contains(ExtendedStatus3::REFERENCE_2), [FR1, FR2]);
+        let command = pick(selection.contains(ExtendedStatus3::COMMAND_2), [CD1, CD2]);
+        if calls.read(reference).await? == REFERENCE_BY_MODBUS {
+            self.change(reference, REFERENCE_BY_AI1).await?;
+        }
+        if separate && self.registers.at(Class::Background).read(command).await? == COMMAND_BY_MODBUS {
+            self.change(command, COMMAND_BY_TERMINALS).await?;
+        }
+        Ok(())
     }
 
     /// A fresh look whether the settings may be changed.
@@ -103,23 +131,44 @@ impl<P: Port> Atv312<P> {
         }
     }
 
+    /// Changes a setting of the channels, if it is what `from` says, and remembers what it was, also where it is not known
+    /// whether the write arrived.
+    async fn set_up(
+        &mut self,
+        register: Register<WriteStopped>,
+        value: u16,
+        from: Option<u16>,
+    ) -> Result<()> {
+        let before = self.registers.at(Class::Background).read(register).await?;
+        if before == value || from.is_some_and(|from| from != before) {
+            return Ok(());
+        }
+        self.remember(register, before);
+        self.change(register, value).await.map(drop)
+    }
+
+    fn remember(&mut self, register: Register<WriteStopped>, before: u16) {
+        let known = self.set_up_before.iter().any(|(known, _)| known.address() == register.address());
+        if !known {
+            self.set_up_before.push((register, before));
+        }
+    }
+
     /// Writes a setting that differs, and remembers that it is not saved.
     pub(crate) async fn change(&mut self, register: Register<WriteStopped>, value: u16) -> Result<bool> {
         Ok(self.write_row(register.row(), value).await?.changed)
     }
 
     async fn until_control(&mut self, command: Command, reached: fn(Control) -> bool) -> Result<Status> {
-        let mut status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
-        for _ in 1..CONFIRMING_READS {
+        let mut confirming = Confirming::begin();
+        loop {
+            let status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
             if status.control.is_some_and(reached) {
                 return Ok(status);
             }
-            status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
-        }
-        if status.control.is_some_and(reached) {
-            Ok(status)
-        } else {
-            Err(self.not_confirmed(command, status))
+            if !confirming.again().await {
+                return Err(self.not_confirmed(command, status, None));
+            }
         }
     }
 }

@@ -4,53 +4,61 @@
 use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress, State, Status,
-    StopMode,
-    drivecom::{self, ChartState, Drivecom, StatusWords},
-    registers::Register,
+    StopMode, Stopped,
+    drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
+    registers::{Register, access::ReadWrite},
 };
 
 use crate::{
     Atv312,
-    registers::{CMD, ETA, LFRD, LFT},
-    status::{FIRST, FastWords, raw_command},
+    reading::{FIRST, FastWords, raw_command},
+    registers::{CMD, ETA, IOLR, LFRD, LFT, RRS, TCC},
+    settings::{Controls, Known},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
 };
 
+/// What decides the reference where the drive follows another one than the bus and does not tell which.
+pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
+    by: "another reference (FrH is not the reference of the bus)",
+    remedy: "see which inputs and channels are in use (Fr1, Fr2, rFC, SA2, SA3, PS2 to PS16, JOG, PIF)",
+};
+
 impl<P: Port> Atv312<P> {
-    /// Stops, by one write where the settings that it depends on are known; [`start`](drive_core::Drive::start) reads
-    /// them. A fast stop and a freewheel stop depend on none: the quick stop and the disabled voltage of the chart act
-    /// at every access level.
-    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        let word = self.stop_word(mode).await?;
-        let shows = |status: &Status| FastWords::in_status(status).state_words().shows_stop(word);
-        let stopped = drivecom::stop(self, mode, word.bits(), shows).await;
+    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Stopped> {
+        let stopped = drivecom::stop(self, mode).await;
         if matches!(stopped, Err(Error::NotConfirmed { .. })) {
-            // The settings may have been changed at the drive: the next attempt reads them, or does without them.
-            self.known.control = None;
+            // The settings may have been changed at the drive: the next attempt does without them, and reads them.
+            self.known.settings = Known::default().settings;
         }
         stopped
     }
 
-    async fn stop_word(&mut self, mode: StopMode) -> Result<ControlWord> {
-        const QUICK_STOP: ControlWord = ControlWord::from_bits_retain(drivecom::QUICK_STOP);
-        let Some(enabled) = ControlWord::enabled_stop(mode) else {
-            return Ok(ControlWord::from_bits_retain(drivecom::DISABLE_VOLTAGE));
-        };
-        if mode == StopMode::Fast {
-            // 400Fh takes a run command at once afterwards, the quick stop does not; but only the latter is sure to
-            // act without a look at the settings.
-            let has_bit = self.known.control.is_some_and(|settings| settings.lacks(mode).is_none());
-            return Ok(if has_bit { enabled } else { QUICK_STOP });
+    /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel.
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+        let unsupported = |reason| Err(Error::Unsupported { what: "withdrawal of the run command", reason });
+        self.read_settings(Class::Command).await?;
+        let held = self.read_controls(Class::Command).await?.command;
+        let status = self.fast_status(Class::Command).await?;
+        let settings = &self.known.settings;
+        if !settings.meaning(held).is_run() {
+            return Ok(status);
         }
-        // A stop does not fail for a reading that fails.
-        let Ok(settings) = self.control_settings(Class::Stop).await else { return Ok(QUICK_STOP) };
-        match settings.lacks(mode) {
-            None => Ok(enabled),
-            Some(reason) if mode == StopMode::Ramp => {
-                Err(Error::Unsupported { what: "a stop along the ramp", reason })
-            }
-            Some(reason) => Err(Error::Unsupported { what: "a stop by DC injection", reason }),
+        if settings.others().contains(ControlWord::STOP) {
+            return unsupported(
+                "a function is assigned to bit 12 of CMD, and no other bit ends a run command alone",
+            );
         }
+        let words = FastWords::in_status(&status).state_words();
+        let manages_channels = settings.level() != Some(AccessLevel::L3);
+        if let Some(reason) = words.refuses_withdrawal().filter(|_| manages_channels) {
+            return unsupported(reason);
+        }
+        self.held = None;
+        self.registers.at(Class::Command).write(CMD, held | ControlWord::STOP.bits()).await?;
+        let held = self.read_controls(Class::Command).await.map_err(Error::after_write)?.command;
+        let status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
+        let stands = self.known.settings.meaning(held).is_run();
+        if stands { Err(self.not_confirmed(Command::Withdraw, status, None)) } else { Ok(status) }
     }
 
     /// Reads the fast words in a class, without making a status of them.
@@ -60,63 +68,112 @@ impl<P: Port> Atv312<P> {
 
     /// The fast set as a status.
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
-        let resolution = self.resolution(class).await?;
+        self.registers.begin_snapshot();
         let words = self.fast_words(class).await?;
         // A stop that was just written may not show yet.
-        let fresh = |command: ControlWord| class == Class::Stop && command.is_stop();
-        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
-        self.command = self.command.filter(held);
-        Ok(words.status(resolution, self.command))
+        let settings = &self.known.settings;
+        let held = |&held: &u16| {
+            let command = settings.meaning(held);
+            class == Class::Command && command.is_stop() || words.state_words().can_hold(command)
+        };
+        self.held = self.held.filter(held);
+        self.control = Some(words.state_words().control());
+        Ok(self.status_of(&words))
+    }
+
+    fn status_of(&self, words: &FastWords) -> Status {
+        let command = self.held.map(|held| self.known.settings.meaning(held));
+        Status { at: self.registers.snapshot_time(), ..words.status(self.known.resolution, command) }
+    }
+
+    /// The fast set for whoever watches: one exchange, and a second one, for the control variables, where these words alone
+    /// do not tell the frequency or whether a run command is in force. Once a status was told, each further one reads one
+    /// more of the settings, until all are known, so that a stop waits for none of them.
+    pub(crate) async fn watch(&mut self) -> Result<Status> {
+        let mut status = self.fast_status(Class::Status).await?;
+        let words = FastWords::in_status(&status);
+        if self.needs_controls(words.state_words(), &status) {
+            // The status is good without them.
+            if self.read_controls(Class::Status).await.is_ok() {
+                status = self.status_of(&words);
+            }
+        } else if self.known.seen {
+            self.read_a_setting(Class::Status).await;
+        }
+        self.known.seen = true;
+        Ok(status)
+    }
+
+    /// Whether only `CMD` tells what the drive does: a motor that slows down to stop looks like one that slows down to a
+    /// lower setpoint, and one that stands at a setpoint of zero, or after `tLS`, like a stopped one.
+    fn needs_controls(&self, words: StatusWords, status: &Status) -> bool {
+        let by_bus = words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus;
+        let slows_down = !words.is_turning() || words.eti.contains(ExtendedStatus::DECELERATING);
+        let unclear = match self.held.map(|held| self.known.settings.meaning(held)) {
+            None => true,
+            Some(command) => command.is_run() && slows_down,
+        };
+        by_bus && unclear || status.output_frequency.is_none()
     }
 
     pub(crate) fn refused(&self, command: Command, reason: Refusal) -> Error {
         Error::Refused { slave: self.registers.slave(), command, reason }
     }
 
-    pub(crate) fn not_confirmed(&self, command: Command, status: Status) -> Error {
-        Error::NotConfirmed {
-            slave: self.registers.slave(),
-            command,
-            status: Box::new(status),
-            because: None,
-        }
+    pub(crate) fn not_confirmed(&self, command: Command, status: Status, because: Option<Refusal>) -> Error {
+        let (slave, status) = (self.registers.slave(), Box::new(status));
+        Error::NotConfirmed { slave, command, status, because }
+    }
+
+    /// Remembers what the drive holds.
+    pub(crate) fn hold(&mut self, word: u16) {
+        self.held = Some(word);
+        self.high_bits = word & self.known.settings.assignable();
     }
 
     /// Whose command the drive is under, for a start.
-    fn refuses_control(words: StatusWords, level: AccessLevel) -> Option<Refusal> {
+    fn refuses_control(&self, words: StatusWords) -> Option<Refusal> {
         let control = words.control();
-        let not_ours = Some(Refusal::NotInControl(control)).filter(|_| control != Control::Bus);
-        if !words.eta.contains(StatusWord::NOT_FORCED_LOCAL) {
-            return not_ours;
-        }
-        match level {
-            // At L1 and L2 the terminals command from power-up on until a command comes by the bus; a motor that
-            // somebody else has running is not taken away from him, nor is what the remote terminal was given.
-            AccessLevel::L1 | AccessLevel::L2 if control == Control::Local && !words.is_turning() => None,
-            AccessLevel::L1 | AccessLevel::L2 | AccessLevel::L3 => not_ours,
-            AccessLevel::Unknown(_) => {
-                Some(Refusal::Settings("the access level LAC is none that the manual lists"))
-            }
+        match self.known.settings.level() {
+            Some(AccessLevel::L1 | AccessLevel::L2) => words.refuses_to_take_over(),
+            Some(AccessLevel::L3) => (control != Control::Bus).then_some(Refusal::NotInControl(control)),
+            _ => Some(Refusal::Settings("the access level LAC is none that the manual lists")),
         }
     }
 
     /// What the control variables forbid: a lock, or a sign that would turn the direction round.
-    async fn refuses_variables(&mut self) -> Result<Option<Refusal>> {
-        const SIGN: Refusal =
-            Refusal::Settings("the reference on the bus is negative: give a setpoint before the start");
-        let mut calls = self.registers.at(Class::Command);
-        // CMD, LFr, PISP, CMI.
-        let [_, hertz, _, cmi] = calls.read_array(CMD.address()).await?;
-        let rpm = calls.read(LFRD).await?;
-        let cmi = ExtendedControl::from_bits_retain(cmi);
-        self.learn_resolution(cmi);
-        Ok(if cmi.contains(ExtendedControl::NO_CONSISTENCY_CHECK) {
+    async fn refuses_variables(&mut self, controls: Controls) -> Result<Option<Refusal>> {
+        let rpm = self.registers.at(Class::Command).read(LFRD).await?;
+        Ok(if controls.cmi.contains(ExtendedControl::NO_CONSISTENCY_CHECK) {
             Some(Refusal::Settings("CMI bit 15: no consistency check, and locked on standstill"))
-        } else if cmi.contains(ExtendedControl::LOCK) {
+        } else if controls.cmi.contains(ExtendedControl::LOCK) {
             Some(Refusal::Settings("CMI bit 13: locked on standstill"))
+        } else if controls.reference.cast_signed() < 0 || rpm.cast_signed() < 0 {
+            Some(Refusal::Settings("the reference on the bus is negative: give a setpoint before the start"))
         } else {
-            (hertz.cast_signed() < 0 || rpm.cast_signed() < 0).then_some(SIGN)
+            None
         })
+    }
+
+    /// A run command of the terminals that acts as soon as they command, because the level of their inputs counts and not an
+    /// edge (`tCC`, `tCt`, p. 33).
+    pub(crate) async fn terminals_ask_for_run(&mut self) -> Result<Option<Refusal>> {
+        const TWO_WIRE: u16 = 0;
+        const TRANSITION: u16 = 1;
+        const LI1: u16 = 129;
+        const ASKED: Refusal = Refusal::Overridden {
+            by: "a run command of the terminals (LI1, or the input of rrS)",
+            remedy: "open the input first, or set tCt to trn",
+        };
+        let mut calls = self.registers.at(Class::Command);
+        let [tcc, tct] = calls.read_array(TCC.address()).await?;
+        if tcc != TWO_WIRE || tct == TRANSITION {
+            return Ok(None);
+        }
+        let reverse = calls.read(RRS).await?.checked_sub(LI1).filter(|&input| input < 6);
+        let inputs = calls.read(IOLR).await?;
+        let closed = inputs & 1 == 1 || reverse.is_some_and(|input| inputs >> input & 1 == 1);
+        Ok(closed.then_some(ASKED))
     }
 }
 
@@ -131,61 +188,125 @@ impl<P: Port> Drivecom for Atv312<P> {
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let mut status = self.fast_status(class).await?;
         // One word more for a tripped drive, so that the refusal names the fault.
-        if status.state == State::Fault && class == Class::Command {
+        if status.state == State::Fault {
             status.fault_code = Some(self.registers.at(class).read(LFT).await?);
         }
         Ok(status)
     }
 
+    /// The bits that have another function in this drive stay as it holds them, and the channels with the bus.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
+        let word = word | self.known.settings.kept(self.high_bits);
         // Not known while the outcome is not known.
-        self.command = None;
+        self.held = None;
         let mut calls = self.registers.at(class);
-        if effect == Effect::Edge {
-            calls = calls.edge();
+        match (class, effect) {
+            // What a stop has done is read as a command.
+            (Class::Stop, _) => calls.write_word(CMD.address(), word).await?,
+            (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
+            (_, Effect::Level) => calls.write(CMD, word).await?,
         }
-        calls.write(CMD, word).await?;
-        self.command = Some(ControlWord::from_bits_retain(word));
+        self.hold(word);
         Ok(())
     }
 
     async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>> {
+        self.read_settings(Class::Command).await?;
+        let controls = self.read_controls(Class::Command).await?;
         let words = FastWords::in_status(status).state_words();
-        let settings = self.control_settings(Class::Command).await?;
-        if let Some(reason) = Self::refuses_control(words, settings.level) {
+        let settings = &self.known.settings;
+        let restart = settings.self_restart().filter(|_| !self.accepts_restart).map(Refusal::RestartsItself);
+        let reverse = if direction == Direction::Reverse { settings.refuses_reverse() } else { None };
+        if let Some(reason) = self.refuses_control(words).or(reverse).or(restart) {
             return Ok(Some(reason));
         }
         // A motor that direct current brakes shows no output frequency, and would coast without voltage.
-        if words.chart() == Some(ChartState::QuickStopActive) && words.is_driving() {
+        if words.is_driving() && words.chart() == Some(ChartState::QuickStopActive) {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
-        if direction == Direction::Reverse
-            && let Some(reason) = settings.refuses_reverse()
-        {
-            return Ok(Some(reason));
+        match self.refuses_variables(controls).await? {
+            None => self.other_reference().await,
+            refusal => Ok(refusal),
         }
-        self.refuses_variables().await
     }
 
-    /// The run command shows by the control word that the drive holds, by the control source, and by the direction that
-    /// the reference asks for where there is a reference.
-    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
-        let held = self.registers.at(Class::Command).read(CMD).await?;
-        self.command = Some(ControlWord::from_bits_retain(held));
-        status.raw.push(raw_command(held));
+    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<RunShown> {
         let words = FastWords::in_status(status);
+        self.frequency_limits().await?;
+        let mut controls = self.read_controls(Class::Command).await?;
+        let mut follows = self.follows_frequency(&words, controls.reference).await?;
+        if !follows {
+            follows = self.follows_speed().await?;
+            // The last thing that is read: a stop of somebody else that came before shows in it.
+            controls = self.read_controls(Class::Command).await?;
+        }
+        let fault_code = status.fault_code;
+        *status = Status { fault_code, ..self.status_of(&words) };
+        status.raw.push(raw_command(controls.command));
+        if controls.command != word | self.known.settings.kept(self.high_bits) {
+            return Ok(RunShown::NotYet);
+        }
         let reverse = ControlWord::from_bits_retain(word).contains(ControlWord::REVERSE);
-        let asked = words.state_words().eti.contains(ExtendedStatus::REVERSE_REQUESTED);
-        let directed = words.word(crate::registers::FRH) == 0 || asked == reverse;
-        Ok(held == word && words.state_words().control() == Control::Bus && directed)
+        let direction = if reverse { Direction::Reverse } else { Direction::Forward };
+        let shown = words.state_words().shows_run(direction, words.reference());
+        Ok(if follows { shown } else { RunShown::NotYet })
+    }
+
+    async fn prevents_run(&mut self, status: &Status) -> Option<Refusal> {
+        let words = FastWords::in_status(status);
+        if let Some(reason) = words.state_words().prevents_run() {
+            return Some(reason);
+        }
+        let controls = self.read_controls(Class::Command).await.ok()?;
+        let other = self.other_reference().await.ok()?;
+        let follows = self.follows_frequency(&words, controls.reference).await.ok()?
+            || self.follows_speed().await.ok()?;
+        other.or((!follows).then_some(OTHER_REFERENCE))
+    }
+
+    async fn refuses_reset(&mut self, _: &Status) -> Result<Option<Refusal>> {
+        self.read_settings(Class::Command).await?;
+        self.terminals_ask_for_run().await
+    }
+
+    async fn read_control(&mut self) -> Result<u16> {
+        self.read_controls(Class::Command).await.map(|controls| controls.command)
+    }
+
+    fn last_control(&self) -> Option<Control> {
+        self.control
+    }
+
+    fn stop_word(&self, mode: StopMode) -> StopWord {
+        self.known.settings.stop(mode)
+    }
+
+    async fn corrects_stop(&mut self) -> bool {
+        let before = self.known.settings.kept(self.high_bits);
+        while !self.known.settings.knows_stop() {
+            if self.read_setting(Class::Command).await.is_err() {
+                return false;
+            }
+        }
+        self.known.settings.kept(self.high_bits) != before
+    }
+
+    fn shows_stop(&self, stop: &StopWord, status: &Status) -> bool {
+        FastWords::in_status(status).state_words().shows_stop(ControlWord::from_bits_retain(stop.word))
+    }
+
+    fn defies_stop(&self, status: &Status) -> Option<Refusal> {
+        let words = FastWords::in_status(status).state_words();
+        let forced_local = !words.eta.contains(StatusWord::NOT_FORCED_LOCAL);
+        let fixed = forced_local || self.known.settings.level() == Some(AccessLevel::L3);
+        (fixed && words.is_driving() && words.control() != Control::Bus)
+            .then(|| Refusal::NotInControl(words.control()))
     }
 }
 
 /// The word that stops every drive of this family at once, for the stops that no setting changes: the others would
 /// enable a drive that is merely ready.
-pub(crate) const fn broadcast_word(
-    mode: StopMode,
-) -> Option<(Register<drive_core::registers::access::ReadWrite>, u16)> {
+pub(crate) const fn broadcast_word(mode: StopMode) -> Option<(Register<ReadWrite>, u16)> {
     match mode {
         StopMode::Fast => Some((CMD, drivecom::QUICK_STOP)),
         StopMode::Freewheel => Some((CMD, drivecom::DISABLE_VOLTAGE)),

@@ -10,11 +10,11 @@ use tokio_modbus::prelude::ReadCode;
 
 use crate::{
     Atv312, FAULTS, PastFault, WARNINGS,
+    reading::Resolution,
     registers::{
         ARE, DP1, EP1, ERRD, ETI, FRH, FRHD, INV, IOLR, LCR, LFT, LRS1, NCV, OPR, OTR, RFRD, RTH, TDM, THD,
         THR, TSP, UDP, ULN, VCAL,
     },
-    status::Resolution,
     words::{ExtendedStatus, ExtendedStatus1, FaultState, LogicIo, StatusWord},
 };
 
@@ -22,6 +22,7 @@ impl<P: Port> Atv312<P> {
     /// Six requests: no list of the manual has the words between these.
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
         let resolution = self.resolution(Class::Background).await?;
+        self.registers.begin_snapshot();
         let mut raw = Vec::new();
         // W3206 ETI lies between and is shown by the status.
         self.collect(&mut raw, &[FRH.row(), LCR.row(), OTR.row(), ETI.row(), ULN.row()]).await?;
@@ -52,6 +53,7 @@ impl<P: Port> Atv312<P> {
             inputs: Some((io - outputs).bits()),
             outputs: Some((io & outputs).bits()),
             raw,
+            at: self.registers.snapshot_time(),
             ..Measurements::default()
         })
     }

@@ -3,23 +3,23 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog, WatchdogCapability,
-    Written,
-    drivecom::CONFIRMING_READS,
+    Class, Command, Confirming, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog,
+    WatchdogCapability, Written,
+    drivecom::ChartState,
     registers::{Access, Storage, refuse_commands},
 };
 
 use crate::{
     Atv312,
-    registers::{CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, SCS, SLL, TTO, TUN},
+    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN},
     settings::Known,
     words::{ExtendedControl, ExtendedStatus},
 };
 
 /// What the EEPROM takes in its life (p. 20).
 const EEPROM_LIFE: u32 = 1_000_000;
-/// Saving goes on while nothing else is read, so it is waited for longer than a state of the chart.
-const SAVING_READS: usize = 10 * CONFIRMING_READS;
+/// How long a save may take. The manual prints no time; the word is written where the supply is good, or never.
+const SAVED_WITHIN: Duration = Duration::from_secs(10);
 /// `tUn` = YES: auto-tuning "as soon as possible" (p. 30).
 const TUNE_NOW: u16 = 112;
 /// One count of `ttO`.
@@ -37,13 +37,29 @@ pub(crate) const WATCHDOG: WatchdogCapability = WatchdogCapability {
 
 impl<P: Port> Atv312<P> {
     /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs, and so is
-    /// `CMI`, whose bits give the held reference another unit and a stopped drive its lock.
+    /// `CMI`, whose bits give the held reference another unit and a stopped drive its lock. `AdC` is refused while operation
+    /// is enabled.
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        const INJECTS: Refusal = Refusal::Settings(
+            "AdC injects current into a motor at rest without a run command (p. 41): disable operation first, by a freewheel stop",
+        );
         refuse_orders(row, word)?;
-        if row.access == Access::WriteStopped || row.address == CMI.address() {
-            self.check_standing(Command::WriteParameter(row.address)).await?;
+        let command = Command::WriteParameter(row.address);
+        if row.access == Access::WriteStopped || [CMI.address(), ADC.address()].contains(&row.address) {
+            let words = self.check_standing(command).await?.state_words();
+            if row.address == ADC.address() && words.chart() == Some(ChartState::OperationEnabled) {
+                return Err(self.refused(command, INJECTS));
+            }
         }
-        self.write_row(row, word).await
+        match self.write_row(row, word).await {
+            // It falls back to nO as soon as the time is reset (p. 55).
+            Err(Error::NotConfirmed { status, .. })
+                if row.address == RPR.address() && status.raw(RPR.address()) == Some(0) =>
+            {
+                Ok(Written { changed: true, storage: row.storage })
+            }
+            written => written,
+        }
     }
 
     /// Writes a row that differs. What was read once may be otherwise then, also when it is not known whether the write
@@ -58,7 +74,7 @@ impl<P: Port> Atv312<P> {
         };
         if may_have_changed {
             self.known = Known::default();
-            self.command = None;
+            self.held = None;
             self.unsaved |= matches!(row.storage, Storage::RamUntilSaved | Storage::Unknown);
         }
         outcome
@@ -80,7 +96,8 @@ impl<P: Port> Atv312<P> {
             _ => self.saves = self.saves.saturating_add(1),
         }
         let mut seen = edge.is_ok();
-        for _ in 0..SAVING_READS {
+        let mut confirming = Confirming::within(SAVED_WITHIN);
+        loop {
             let mut calls = self.registers.at(Class::Background);
             let cmi = calls.read(CMI).await.map_err(Error::after_write)?;
             let eti = calls.read(ETI).await.map_err(Error::after_write)?;
@@ -94,12 +111,15 @@ impl<P: Port> Atv312<P> {
                 }
                 return if seen { Ok(self.saves) } else { edge.map(|()| self.saves) };
             }
+            if !confirming.again().await {
+                break;
+            }
         }
         // Refused by the drive, as with too low a supply: the order must not stay and act later.
         let withdrawn = self.registers.at(Class::Background).write(CMI, cmi.bits()).await;
         withdrawn.map_err(Error::after_write)?;
         let status = self.fast_status(Class::Background).await?;
-        Err(self.not_confirmed(Command::Persist, status))
+        Err(self.not_confirmed(Command::Persist, status, None))
     }
 
     /// What `CMI` holds, without the two orders: one that still waits there is not given again with what is written back.
@@ -147,7 +167,7 @@ impl<P: Port> Atv312<P> {
             return Ok(armed);
         }
         let status = self.fast_status(Class::Background).await?;
-        Err(self.not_confirmed(Command::ArmWatchdog, status))
+        Err(self.not_confirmed(Command::ArmWatchdog, status, None))
     }
 
     fn time_out_counts(&self, timeout: Duration) -> Result<u16> {

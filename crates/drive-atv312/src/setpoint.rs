@@ -1,34 +1,78 @@
 //! Setpoints: `LFr` in hertz, `LFRD` in rpm, both as magnitudes. The direction is the run command's.
 
 use drive_core::{
-    Class, Command, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed, drivecom,
+    Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
+    drivecom::{self, ChartState, follows_frequency},
 };
 
 use crate::{
     Atv312,
+    command::OTHER_REFERENCE,
+    reading::{FastWords, Resolution},
     registers::{LFR, LFRD},
-    status::Resolution,
+    words::ControlWord,
 };
 
 impl<P: Port> Atv312<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        let settings = self.control_settings(Class::Command).await?;
-        if let Some(reason) = settings.refuses_reference() {
+        self.read_settings(Class::Command).await?;
+        if let Some(reason) = self.known.settings.refuses_reference() {
             return Err(self.refused(Command::Setpoint(setpoint), reason));
         }
+        // A run command may stand from before, of which nothing but CMD tells.
+        if self.held.is_none() {
+            self.read_controls(Class::Command).await?;
+        }
         let resolution = self.resolution(Class::Command).await?;
+        let (register, word) = match setpoint {
+            Setpoint::Frequency(frequency) => (LFR, self.frequency_word(frequency, resolution).await?),
+            // No speed is no frequency too, and FRHD would not tell it from a speed that nobody gave.
+            Setpoint::Speed(speed) => match self.speed_word(speed, resolution).await? {
+                0 => (LFR, 0),
+                word => (LFRD, word),
+            },
+        };
         // Both are images of the one reference of the bus, so a later setpoint of either kind takes the place of one
         // that still waits.
-        match setpoint {
-            Setpoint::Frequency(frequency) => {
-                let word = self.frequency_word(frequency, resolution).await?;
-                self.registers.at(Class::Command).replacing(LFR.address()).write(LFR, word).await
+        self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
+        let frequency = (register.address() == LFR.address()).then(|| resolution.frequency(word));
+        self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
+    }
+
+    /// Sees the setpoint in force: the motor that runs by a command of the bus follows it; one that does not will, as far as
+    /// nothing tells of another reference.
+    async fn see_setpoint(&mut self, setpoint: Setpoint, frequency: Option<Frequency>) -> Result<()> {
+        let mut confirming = Confirming::begin();
+        loop {
+            let status = self.fast_status(Class::Command).await?;
+            let words = FastWords::in_status(&status);
+            let running = self.runs_by_bus(&words);
+            let follows = match frequency {
+                _ if !running => false,
+                Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
+                None => self.follows_speed().await?,
+            };
+            if follows {
+                return Ok(());
             }
-            Setpoint::Speed(speed) => {
-                let word = self.speed_word(speed, resolution).await?;
-                self.registers.at(Class::Command).replacing(LFR.address()).write(LFRD, word).await
+            if running && confirming.again().await {
+                continue;
             }
+            let other = self.other_reference().await?;
+            let because = if running { other.or(Some(OTHER_REFERENCE)) } else { other };
+            return match because {
+                None => Ok(()),
+                because => Err(self.not_confirmed(Command::Setpoint(setpoint), status, because)),
+            };
         }
+    }
+
+    /// Whether a run command of the bus is in force.
+    fn runs_by_bus(&self, words: &FastWords) -> bool {
+        let words = words.state_words();
+        let held = self.held.map(|held| self.known.settings.meaning(held));
+        let runs = held.map_or(words.is_turning(), ControlWord::is_run);
+        runs && words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus
     }
 
     async fn frequency_word(&mut self, frequency: Frequency, resolution: Resolution) -> Result<u16> {

@@ -1,147 +1,420 @@
-//! Settings that are read once, before what depends on them, and forgotten with
-//! [`forget`](drive_core::Drive::forget): what the control word's bits do, where the reference comes from, the limits.
+//! The settings that decide what a command means in this drive. They are read once, block by block, and forgotten with
+//! [`forget`](drive_core::Drive::forget): what the control word's bits do, where command and reference come from, what
+//! replaces a reference, the limits.
 
-use drive_core::{Class, Frequency, Port, Refusal, Result, Speed, StopMode, drivecom};
+use drive_core::{
+    Class, Error, ErrorKind, Frequency, Port, Refusal, Result, SelfRestart, Speed, StopMode,
+    drivecom::{self, StopWord},
+    registers::{Register, access::Kind},
+};
 
 use crate::{
     Atv312,
-    registers::{CCS, CHP, CMI, ETF, FR1, FR2, LAC, LC2, PR2, PR4, PS2, PS16, RFC, RPS, SMIL, STT, TFR},
-    status::Resolution,
-    words::{AccessLevel, ExtendedControl, StopType},
+    reading::Resolution,
+    registers::{
+        ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
+    },
+    words::{AccessLevel, ControlWord, ExtendedControl},
 };
 
 /// `Fr1`, `Fr2` = Mdb.
 pub(crate) const REFERENCE_BY_MODBUS: u16 = 164;
-/// Cd11 in the functions' assignments; Cd12 to Cd15 follow.
+/// `Cd1`, `Cd2` = Mdb.
+pub(crate) const COMMAND_BY_MODBUS: u16 = 10;
+/// `CHCF` = SEP.
+pub(crate) const SEPARATE: u16 = 2;
+/// `rFC` = Fr1.
+pub(crate) const REFERENCE_1: u16 = 96;
+/// `rFC` = Fr2.
+const REFERENCE_2: u16 = 97;
+/// Cd11, bit 11 of the control word, in the functions' assignments; Cd12 to Cd15 follow.
 const CD11: u16 = 171;
-/// C111 (bit 11 of the Modbus control word) in `rFC` and `CCS`; C112 to C115 follow.
+/// C111, bit 11 of the Modbus control word, in `rFC` and `CCS`; C112 to C115 follow.
 const C111: u16 = 187;
-/// Cd13 and Cd14: bits 13 and 14.
+/// LI1 in every assignment; LI2 to LI6 follow.
+const LI1: u16 = 129;
+/// Cd13: bit 13 in the functions' assignments.
 pub(crate) const CD13: u16 = CD11 + 2;
 /// Cd14.
 pub(crate) const CD14: u16 = CD11 + 3;
 
+/// A block of consecutive settings, and when it counts.
+type Block = (u16, u16, When);
+
+/// When a setting counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum When {
+    Always,
+    /// At access level L3.
+    AtL3,
+    /// At access level L3, where a bit of the control word switches the command channel.
+    Switched,
+}
+use When::{Always, AtL3, Switched};
+
+/// Every setting that is read, those that decide a stop first. No list of the manual has the words between the blocks.
+const BLOCKS: &[Block] = &[
+    (address::LAC, 1, Always),
+    // Stt, nSt, dCI, FSt.
+    (address::STT, span(address::STT, address::FST), Always),
+    (address::CCS, 1, AtL3),
+    (address::CD1, span(address::CD1, address::CD2), Switched),
+    (address::CHCF, 1, Switched),
+    (address::RFC, 1, AtL3),
+    (address::FR1, span(address::FR1, address::FR2), AtL3),
+    (address::RPS, 1, AtL3),
+    (address::LC2, 1, AtL3),
+    (address::ETF, 1, AtL3),
+    (address::CHP, 1, AtL3),
+    (address::PR2, span(address::PR2, address::PR4), AtL3),
+    (address::PS2, span(address::PS2, address::PS16), Always),
+    (address::SA2, span(address::SA2, address::SA3), Always),
+    (address::PIF, 1, Always),
+    (address::JOG, 1, Always),
+    (address::ATR, 1, Always),
+];
+/// The blocks that decide a stop: at L1 and L2, and at L3, where any bit above the chart's may have got another meaning.
+const FOR_A_STOP: (usize, usize) = (2, 13);
+/// The functions that a bit of the control word can be assigned to, besides the stops.
+const FUNCTIONS: [u16; 10] = [
+    address::RPS,
+    address::LC2,
+    address::ETF,
+    address::CHP,
+    address::PR2,
+    address::PR4,
+    address::PS2,
+    address::PS4,
+    address::PS8,
+    address::PS16,
+];
+
 /// Everything that is read once.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Known {
     pub(crate) resolution: Option<Resolution>,
-    pub(crate) control: Option<ControlSettings>,
+    pub(crate) settings: Settings,
     pub(crate) frequencies: Option<(Frequency, Frequency)>,
     pub(crate) speeds: Option<(Speed, Speed)>,
+    /// Whether a status was read since, so that the next one has time for a setting.
+    pub(crate) seen: bool,
 }
 
-/// What the control word does on this drive, and where its reference comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ControlSettings {
-    pub(crate) level: AccessLevel,
-    stop_type: StopType,
-    dc_injection: u16,
-    fast_stop: u16,
-    /// Bits 11 to 15, at level L3: whether a function is assigned to them.
-    assigned: [bool; 5],
-    reference_by_bus: bool,
+/// The settings, as far as they were read.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Settings {
+    words: Vec<(u16, u16)>,
+    /// Blocks that were read, or passed over.
+    blocks: usize,
+    /// The drive has refused one: it is asked for again only by a command that needs it.
+    refused: bool,
 }
 
-impl ControlSettings {
-    /// Why the drive, as it is set up, cannot stop this way; `None` when it can.
-    pub(crate) fn lacks(&self, mode: StopMode) -> Option<&'static str> {
-        let standard = match self.level {
-            AccessLevel::L1 | AccessLevel::L2 => true,
-            AccessLevel::L3 => false,
-            AccessLevel::Unknown(_) => return Some("the access level LAC is none that the manual lists"),
-        };
-        match mode {
-            StopMode::Freewheel => None,
-            StopMode::Ramp if !standard && self.assigned_bit(12) => {
-                Some("a function is assigned to bit 12 of CMD, so 100Fh does not stop")
-            }
-            StopMode::Ramp => match self.stop_type {
-                StopType::Ramp => None,
-                StopType::Fast => Some("Stt makes the normal stop a fast stop"),
-                StopType::Freewheel => Some("Stt makes the normal stop a freewheel stop"),
-                StopType::DcInjection => Some("Stt makes the normal stop a DC injection stop"),
-                StopType::Unknown(_) => Some("Stt holds a stop type that the manual does not list"),
-            },
-            StopMode::Fast => (!standard && self.fast_stop != CD14)
-                .then_some("with LAC = L3 bit 14 of CMD stops only where FSt is set to Cd14"),
-            StopMode::DcInjection => (!standard && self.dc_injection != CD13)
-                .then_some("with LAC = L3 bit 13 of CMD brakes only where dCI is set to Cd13"),
+impl Settings {
+    pub(crate) fn word<A: Kind>(&self, register: Register<A>) -> u16 {
+        self.at(register.address()).unwrap_or(0)
+    }
+
+    fn at(&self, address: u16) -> Option<u16> {
+        self.words.iter().find(|(at, _)| *at == address).map(|&(_, word)| word)
+    }
+
+    pub(crate) fn level(&self) -> Option<AccessLevel> {
+        self.at(address::LAC).map(AccessLevel::from)
+    }
+
+    pub(crate) fn is_complete(&self) -> bool {
+        self.next_block().is_none()
+    }
+
+    fn next_block(&self) -> Option<(usize, Block)> {
+        let at_l3 = self.level() == Some(AccessLevel::L3);
+        let switched = self.word(CCS).checked_sub(C111).is_some_and(|bit| bit < 5);
+        let mut left = (0..).zip(BLOCKS.iter().copied()).skip(self.blocks);
+        left.find(|(_, (_, _, when))| match when {
+            Always => true,
+            AtL3 => at_l3,
+            Switched => at_l3 && switched,
+        })
+    }
+
+    /// Whether the words that stop are known.
+    pub(crate) fn knows_stop(&self) -> bool {
+        match self.level() {
+            None => false,
+            Some(AccessLevel::L1 | AccessLevel::L2) => self.blocks >= FOR_A_STOP.0,
+            Some(AccessLevel::L3) => self.blocks >= FOR_A_STOP.1,
+            Some(AccessLevel::Unknown(_)) => true,
         }
+    }
+
+    /// What stops this drive in a mode, by the control word without the bits that have another function.
+    pub(crate) fn stop(&self, mode: StopMode) -> StopWord {
+        const UNREAD: &str = "the settings that decide what the control word does were not read yet";
+        let by = |word: ControlWord, mode, instead| StopWord { word: word.bits(), mode, instead };
+        let fast = |instead| {
+            let word = if self.acts(ControlWord::FAST_STOP) {
+                ControlWord::enabled_stop(StopMode::Fast)
+            } else {
+                None
+            };
+            let word = word.unwrap_or(ControlWord::from_bits_retain(drivecom::QUICK_STOP));
+            by(word, StopMode::Fast, instead)
+        };
+        let Some(enabled) = ControlWord::enabled_stop(mode) else {
+            return by(ControlWord::from_bits_retain(drivecom::DISABLE_VOLTAGE), mode, None);
+        };
+        if mode == StopMode::Fast {
+            return fast(None);
+        }
+        if !self.knows_stop() {
+            return fast(Some(UNREAD));
+        }
+        if mode == StopMode::DcInjection && self.acts(ControlWord::DC_INJECTION) {
+            return by(enabled, mode, None);
+        }
+        let normal = ControlWord::run(drive_core::Direction::Forward) | ControlWord::STOP;
+        match self.normal_stop() {
+            Ok((selected, _)) if selected == mode => by(normal, mode, None),
+            // Injection takes the place of no other stop.
+            Ok((StopMode::DcInjection, why)) => fast(Some(why)),
+            Ok((selected, why)) => {
+                let lacks = "with LAC = L3 bit 13 of CMD brakes only where dCI is set to Cd13";
+                by(normal, selected, Some(if mode == StopMode::DcInjection { lacks } else { why }))
+            }
+            Err(why) => fast(Some(why)),
+        }
+    }
+
+    /// What bit 12 does, and the words for it where that is no ramp; or why it does nothing.
+    fn normal_stop(&self) -> Result<(StopMode, &'static str), &'static str> {
+        if matches!(self.level(), None | Some(AccessLevel::Unknown(_))) {
+            return Err("the access level LAC is none that the manual lists");
+        }
+        if self.others().contains(ControlWord::STOP) {
+            return Err("a function is assigned to bit 12 of CMD, so 100Fh does not stop");
+        }
+        Ok(match self.word(STT) {
+            0 => (StopMode::Ramp, "Stt makes the normal stop a ramp"),
+            1 => (StopMode::Fast, "Stt makes the normal stop a fast stop"),
+            2 => (StopMode::Freewheel, "Stt makes the normal stop a freewheel stop"),
+            3 => (StopMode::DcInjection, "Stt makes the normal stop a DC injection stop"),
+            _ => return Err("Stt holds a stop type that the manual does not list"),
+        })
+    }
+
+    /// Whether the fast stop or the injection acts by its bit.
+    fn acts(&self, bit: ControlWord) -> bool {
+        let assigned = if bit == ControlWord::FAST_STOP { (FST, CD14) } else { (DCI, CD13) };
+        match self.level() {
+            _ if !self.knows_stop() => false,
+            Some(AccessLevel::L1 | AccessLevel::L2) => true,
+            Some(AccessLevel::L3) => self.word(assigned.0) == assigned.1 && !self.others().contains(bit),
+            _ => false,
+        }
+    }
+
+    /// The bits 11 to 15 that do something else than to reverse and to stop by bits 12, 13 and 14: at L3 only.
+    pub(crate) fn others(&self) -> ControlWord {
+        // A stop by another bit than the usual one.
+        let stops = [(FST, CD14), (DCI, CD13)].map(|(stop, usual)| (self.word(stop), usual));
+        let stops = stops.into_iter().filter(|(bit, usual)| bit != usual).map(|(bit, _)| bit);
+        self.bits(CD11, stops) | self.functions()
+    }
+
+    /// The bits that have another function than the usual one, or may have as long as that was not read.
+    pub(crate) fn assignable(&self) -> u16 {
+        const ABOVE_THE_CHART: u16 = 0xF800;
+        if self.knows_stop() { self.functions().bits() } else { ABOVE_THE_CHART }
+    }
+
+    /// The bits that a function or a switch between channels is assigned to.
+    fn functions(&self) -> ControlWord {
+        let switches = [RFC, CCS].into_iter().map(|switch| self.word(switch));
+        self.bits(CD11, FUNCTIONS.iter().filter_map(|&function| self.at(function)))
+            | self.bits(C111, switches)
+    }
+
+    fn bits(&self, bit_11: u16, sources: impl Iterator<Item = u16>) -> ControlWord {
+        let assigned = sources.filter_map(|source| source.checked_sub(bit_11)).filter(|&bit| bit < 5);
+        let bits = assigned.fold(0, |bits, bit| bits | 1 << (11 + bit));
+        ControlWord::from_bits_retain(if self.level() == Some(AccessLevel::L3) { bits } else { 0 })
+    }
+
+    /// The bits with another function that a control word must carry, so that it does only what its name says: as the drive
+    /// holds them, and those that switch the channels towards the bus.
+    pub(crate) fn kept(&self, held: u16) -> u16 {
+        match self.level() {
+            Some(AccessLevel::L1 | AccessLevel::L2) => return 0,
+            Some(AccessLevel::L3) if self.knows_stop() => {}
+            _ => return held,
+        }
+        let mut kept = held & self.functions().bits();
+        let command = if self.word(CHCF) == SEPARATE {
+            self.towards_bus(CCS, [CD1, CD2], COMMAND_BY_MODBUS)
+        } else {
+            None
+        };
+        let reference = self.towards_bus(RFC, [FR1, FR2], REFERENCE_BY_MODBUS);
+        for (bit, set) in [reference, command].into_iter().flatten() {
+            kept = if set { kept | bit } else { kept & !bit };
+        }
+        kept
+    }
+
+    /// The bit that switches between two channels of which one is the bus, and its value for the bus.
+    fn towards_bus<A: Kind, B: Kind>(
+        &self,
+        switch: Register<A>,
+        channels: [Register<B>; 2],
+        bus: u16,
+    ) -> Option<(u16, bool)> {
+        let bit = self.word(switch).checked_sub(C111).filter(|&bit| bit < 5)?;
+        let [first, second] = channels.map(|channel| self.word(channel) == bus);
+        (first != second).then_some((1 << (11 + bit), second))
+    }
+
+    /// A control word as it would be at level L1: without the bits that have another function here.
+    pub(crate) fn meaning(&self, held: u16) -> ControlWord {
+        ControlWord::from_bits_retain(held) - self.others()
     }
 
     /// Why the drive, as it is set up, cannot be reversed by the control word.
     pub(crate) fn refuses_reverse(&self) -> Option<Refusal> {
-        (self.level == AccessLevel::L3 && self.assigned_bit(11))
+        self.others()
+            .contains(ControlWord::REVERSE)
             .then_some(Refusal::Settings("a function is assigned to bit 11 of CMD, so it does not reverse"))
     }
 
-    /// Why a reference from the bus would have no effect.
+    /// Why a reference of the bus has no effect, whatever the inputs say.
     pub(crate) fn refuses_reference(&self) -> Option<Refusal> {
-        (self.level == AccessLevel::L3 && !self.reference_by_bus)
-            .then_some(Refusal::Settings("with LAC = L3 the reference channel Fr1 (Fr2) must be Mdb"))
+        const REMEDY: &str = "set Fr1 to Mdb and rFC to Fr1";
+        if self.word(PIF) != 0 {
+            return Some(Refusal::Overridden {
+                by: "the PI regulator (PIF)",
+                remedy: "set PIF to nO, or regulate by PISP",
+            });
+        }
+        let by_bus = [FR1, FR2].map(|channel| self.word(channel) == REFERENCE_BY_MODBUS);
+        let (usable, by) = match (self.level(), self.word(RFC)) {
+            (Some(AccessLevel::L3), REFERENCE_1) => {
+                (by_bus[0], "the reference channel Fr1, which is not Mdb,")
+            }
+            (Some(AccessLevel::L3), REFERENCE_2) => {
+                (by_bus[1], "the reference channel Fr2, which is not Mdb,")
+            }
+            (Some(AccessLevel::L3), _) => {
+                (by_bus.contains(&true), "a reference channel, Fr1 or Fr2, of which none is Mdb,")
+            }
+            _ => (true, ""),
+        };
+        (!usable).then_some(Refusal::Overridden { by, remedy: REMEDY })
     }
 
-    fn assigned_bit(&self, bit: usize) -> bool {
-        bit.checked_sub(11).and_then(|index| self.assigned.get(index)).copied().unwrap_or(false)
+    /// Whether `rFC` selects Fr2 for good.
+    pub(crate) fn has_second_reference(&self) -> bool {
+        self.level() == Some(AccessLevel::L3) && self.word(RFC) == REFERENCE_2
+    }
+
+    /// Whether `rFC` leaves the selection to an input or a bit.
+    pub(crate) fn switches_reference(&self) -> bool {
+        ![REFERENCE_1, REFERENCE_2].contains(&self.word(RFC))
+    }
+
+    /// Whether the reference channel that is active, by bit 0 of `LRS3`, is the bus.
+    pub(crate) fn refuses_channel(&self, second: bool) -> Option<Refusal> {
+        let (channel, by) = if second {
+            (FR2, "the reference channel Fr2, selected by rFC (LRS3 bit 0),")
+        } else {
+            (FR1, "the reference channel Fr1, selected by rFC (LRS3 bit 0),")
+        };
+        (self.level() == Some(AccessLevel::L3) && self.word(channel) != REFERENCE_BY_MODBUS).then_some(
+            Refusal::Overridden { by, remedy: "set rFC so that the channel which is Mdb is selected" },
+        )
+    }
+
+    /// Whether an input or a bit of the control word is assigned to a preset speed or to jog operation.
+    pub(crate) fn has_presets(&self) -> bool {
+        self.presets().any(|(_, source)| source != 0)
+    }
+
+    /// The preset speed or jog operation that is selected, by the logic inputs and the held control word.
+    pub(crate) fn selected_preset(&self, inputs: u16, held: u16) -> Option<Refusal> {
+        let is_on = |source: u16| {
+            let bit = |first: u16, count: u16| source.checked_sub(first).filter(|&bit| bit < count);
+            bit(LI1, 6).is_some_and(|bit| inputs >> bit & 1 == 1)
+                || bit(CD11, 5).is_some_and(|bit| held >> (11 + bit) & 1 == 1)
+        };
+        let (function, _) = self.presets().find(|&(_, source)| is_on(source))?;
+        Some(if function == address::JOG {
+            Refusal::Overridden {
+                by: "jog operation (JOG) by its input",
+                remedy: "open the input, or set JOG to nO",
+            }
+        } else {
+            Refusal::Overridden {
+                by: "a preset speed (PS2 to PS16) by its input",
+                remedy: "open the input, or set PS2 to PS16 to nO",
+            }
+        })
+    }
+
+    fn presets(&self) -> impl Iterator<Item = (u16, u16)> {
+        let functions = [address::PS2, address::PS4, address::PS8, address::PS16, address::JOG];
+        functions.into_iter().map(|function| (function, self.at(function).unwrap_or(0)))
+    }
+
+    /// What is summed to reference 1.
+    pub(crate) fn summed(&self) -> [u16; 2] {
+        [SA2, SA3].map(|input| self.word(input))
+    }
+
+    /// The automatic restart, where it is switched on.
+    pub(crate) fn self_restart(&self) -> Option<SelfRestart> {
+        (self.word(ATR) != 0).then_some(SelfRestart {
+            code: "Atr",
+            meaning: "resets its fault and starts the motor again by itself, for as long as tAr says",
+        })
     }
 }
 
 impl<P: Port> Atv312<P> {
     /// Bit 9 of `CMI`: one exchange once.
     pub(crate) async fn resolution(&mut self, class: Class) -> Result<Resolution> {
-        if let Some(resolution) = self.known.resolution {
-            return Ok(resolution);
+        match self.known.resolution {
+            Some(resolution) => Ok(resolution),
+            None => Ok(self.read_controls(class).await?.resolution()),
         }
-        let cmi = ExtendedControl::from_bits_retain(self.registers.at(class).read(CMI).await?);
-        Ok(self.learn_resolution(cmi))
     }
 
-    pub(crate) const fn learn_resolution(&mut self, cmi: ExtendedControl) -> Resolution {
-        let high = cmi.contains(ExtendedControl::HIGH_RESOLUTION);
-        let resolution = if high { Resolution::High } else { Resolution::Normal };
-        self.known.resolution = Some(resolution);
-        resolution
+    /// Reads what is not known yet of the settings.
+    pub(crate) async fn read_settings(&mut self, class: Class) -> Result<()> {
+        while !self.known.settings.is_complete() {
+            match self.read_setting(class).await {
+                // Of so many readings one may be lost without the drive being so.
+                Err(error) if error.kind() == ErrorKind::NoAnswer => self.read_setting(class).await?,
+                read => read?,
+            }
+        }
+        Ok(())
     }
 
-    /// What the control word does: two exchanges once, at level L3 nine more, because there any of its bits 11 to 15
-    /// may have got another meaning.
-    pub(crate) async fn control_settings(&mut self, class: Class) -> Result<ControlSettings> {
-        if let Some(settings) = self.known.control {
-            return Ok(settings);
+    /// Reads one block of the settings, for whoever has time; the drive is asked no more once it has refused one.
+    pub(crate) async fn read_a_setting(&mut self, class: Class) {
+        if !self.known.settings.refused
+            && let Err(Error::Exception { .. }) = self.read_setting(class).await
+        {
+            self.known.settings.refused = true;
         }
-        let mut calls = self.registers.at(class);
-        let level = AccessLevel::from(calls.read(LAC).await?);
-        // Stt, nSt, dCI, FSt.
-        let [stt, _, dc_injection, fast_stop] = calls.read_array(STT.address()).await?;
-        let mut settings = ControlSettings {
-            level,
-            stop_type: StopType::from(stt),
-            dc_injection,
-            fast_stop,
-            assigned: [false; 5],
-            reference_by_bus: false,
-        };
-        if level == AccessLevel::L3 {
-            let mut functions = vec![settings.dc_injection, settings.fast_stop];
-            for (first, count) in [
-                (RPS.address(), 1),
-                (LC2.address(), 1),
-                (ETF.address(), 1),
-                (CHP.address(), 1),
-                (PS2.address(), span(PS2.address(), PS16.address())),
-                (PR2.address(), span(PR2.address(), PR4.address())),
-            ] {
-                functions.extend(calls.read_words(first, count).await?);
-            }
-            let switching = [calls.read(RFC).await?, calls.read(CCS).await?];
-            let references = calls.read_words(FR1.address(), span(FR1.address(), FR2.address())).await?;
-            for (bit, assigned) in (0..).zip(&mut settings.assigned) {
-                *assigned = functions.contains(&(CD11 + bit)) || switching.contains(&(C111 + bit));
-            }
-            settings.reference_by_bus = references.contains(&REFERENCE_BY_MODBUS);
-        }
-        self.known.control = Some(settings);
-        Ok(settings)
+    }
+
+    pub(crate) async fn read_setting(&mut self, class: Class) -> Result<()> {
+        let Some((index, (first, count, _))) = self.known.settings.next_block() else { return Ok(()) };
+        let words = self.registers.at(class).read_words(first, count).await?;
+        let settings = &mut self.known.settings;
+        settings.words.extend((first..=u16::MAX).zip(words));
+        settings.blocks = index + 1;
+        Ok(())
     }
 
     /// `LSP` to `HSP`, both within `tFr`: the three follow each other, one exchange once.
@@ -164,6 +437,31 @@ impl<P: Port> Atv312<P> {
         let limits = drivecom::speed_limits(&mut self.registers.at(Class::Command), SMIL).await?;
         self.known.speeds = Some(limits);
         Ok(limits)
+    }
+
+    /// `CMD`, `LFr`, `PISP` and `CMI` in one exchange.
+    pub(crate) async fn read_controls(&mut self, class: Class) -> Result<Controls> {
+        let [command, reference, _, cmi] = self.registers.at(class).read_array(CMD.address()).await?;
+        self.hold(command);
+        let controls = Controls { command, reference, cmi: ExtendedControl::from_bits_retain(cmi) };
+        self.known.resolution = Some(controls.resolution());
+        Ok(controls)
+    }
+}
+
+/// The control variables.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Controls {
+    pub(crate) command: u16,
+    /// `LFr`.
+    pub(crate) reference: u16,
+    pub(crate) cmi: ExtendedControl,
+}
+
+impl Controls {
+    pub(crate) const fn resolution(&self) -> Resolution {
+        let high = self.cmi.contains(ExtendedControl::HIGH_RESOLUTION);
+        if high { Resolution::High } else { Resolution::Normal }
     }
 }
 

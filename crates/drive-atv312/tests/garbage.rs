@@ -8,11 +8,10 @@ use drive_testing::{babble::Babble, bench};
 /// Words that are plausible somewhere, so that the ladder is climbed and not only refused.
 const PLAUSIBLE: &[u16] = &[0x0240, 0x0221, 0x0223, 0x0227, 0x0227, 0x4000, 0, 0, 0, 1, 2, 0x0008];
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn whatever_the_drive_says_setting_it_up_writes_no_other_control_words_than_the_manuals() {
-    /// BBV51701 p. 10 and 12.
-    const ALLOWED: [u16; 10] =
-        [0x0000, 0x0002, 0x0006, 0x0007, 0x000F, 0x080F, 0x0080, 0x100F, 0x200F, 0x400F];
+    /// BBV51701 p. 10 and 12. The bits above are the drive's own, where it has given them a function.
+    const ALLOWED: [u16; 6] = [0x0000, 0x0002, 0x0006, 0x0007, 0x000F, 0x0080];
     for seed in 0..3_000 {
         let mut drive = Atv312::new(Babble::new(&CAPABILITIES, PLAUSIBLE, seed), bench::address(1));
         let _ = drive.past_faults().await;
@@ -24,12 +23,12 @@ async fn whatever_the_drive_says_setting_it_up_writes_no_other_control_words_tha
         }
         let _ = drive.release().await;
         for command in drive.into_port().written(8501) {
-            assert!(ALLOWED.contains(&command), "{command:04X}h was written");
+            assert!(ALLOWED.contains(&(command & 0x07FF)), "{command:04X}h was written");
         }
     }
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn a_torque_of_which_the_sign_is_not_printed_is_left_raw() {
     let mut kinds = [false; 2];
     for seed in 0..100 {

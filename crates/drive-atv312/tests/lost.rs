@@ -50,7 +50,7 @@ impl Client for Lost {
     }
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn a_write_that_cannot_be_read_back_is_unknown_and_never_called_not_sent() {
     let slave = 1.try_into().unwrap();
     let port = Lost { answers_write: false, written: false };
@@ -101,7 +101,7 @@ impl Client for Silent {
     }
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn a_drive_that_does_not_tell_its_settings_is_stopped_all_the_same() {
     for mode in [StopMode::Ramp, StopMode::DcInjection] {
         let port = Silent::default();

@@ -1,92 +1,46 @@
-//! Start, stop, reset, setpoint: what is written to `CMD` and `W401`, and how it is seen to act.
+//! Start, stop, reset: what is written to `CMD`, and how it is seen to act.
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Direction, Effect, Error, Frequency, Port, RawWord, Refusal, Result, Setpoint, SetpointProblem,
-    SlaveAddress, Status, StopMode,
-    drivecom::{self, ChartState, Drivecom},
+    Class, Direction, Effect, Error, Frequency, Port, RawWord, Refusal, Result, SlaveAddress, Status,
+    StopMode,
+    drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
 
 use crate::{
-    Atv58, Atv58Map,
+    Atv58,
+    reading::Words,
     registers::{CMD, W401, W458, W483},
-    status::Words,
+};
+
+/// What decides the reference where the drive does not follow the bus.
+pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
+    by: "another reference (the mapped reference is not that of W401)",
+    remedy: "see which input gives it, or correct the map of the words",
 };
 
 impl<P: Port> Atv58<P> {
-    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
-        let bit = match direction {
-            Direction::Forward => 0,
-            Direction::Reverse if self.map.reverse_command != 0 => self.map.reverse_command,
-            Direction::Reverse => {
-                return Err(Error::Unsupported {
-                    what: "start in reverse",
-                    reason: "the drive's map names no bit of the control word for it",
-                });
+    pub(crate) const fn run_word(&self, direction: Direction) -> Result<u16> {
+        match direction {
+            Direction::Forward => Ok(drivecom::ENABLE_OPERATION),
+            Direction::Reverse if self.map.reverse_command != 0 => {
+                Ok(drivecom::ENABLE_OPERATION | self.map.reverse_command)
             }
-        };
-        drivecom::start(self, direction, drivecom::ENABLE_OPERATION | bit).await
-    }
-
-    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        let word = self.stop_word(mode).ok_or(match mode {
-            StopMode::DcInjection => Error::Unsupported {
-                what: "stop by DC injection",
-                reason: "the manual names no bit of the control word for it",
-            },
-            _ => Error::Unsupported {
-                what: "stop by ramp",
-                reason: "the drive's map names no control word for it",
-            },
-        })?;
-        let map = self.map;
-        drivecom::stop(self, mode, word, |status| shows_stop(&map, status, mode)).await
-    }
-
-    pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        let Setpoint::Frequency(frequency) = setpoint else {
-            return Err(Error::Unsupported {
-                what: "a setpoint in rpm",
-                reason: "the manual names a frequency reference only",
-            });
-        };
-        let slave = self.registers.slave();
-        let scaled = u64::from(frequency.centihertz()) * u64::from(self.map.reference_counts_per_hertz);
-        if !scaled.is_multiple_of(100) {
-            let problem = SetpointProblem::Resolution("one count of W401");
-            return Err(Error::Setpoint { slave, setpoint, problem });
+            Direction::Reverse => Err(Error::Unsupported {
+                what: "start in reverse",
+                reason: "the drive's map names no bit of the control word for it",
+            }),
         }
-        let count = i16::try_from(scaled / 100);
-        let count =
-            count.map_err(|_| Error::Setpoint { slave, setpoint, problem: SetpointProblem::TooLarge })?;
-        if let Some((low, high)) = self.speed_limits().await?
-            && (frequency < low || frequency > high)
-        {
-            let problem = SetpointProblem::OutsideFrequencyLimits { low, high };
-            return Err(Error::Setpoint { slave, setpoint, problem });
-        }
-        let mut calls = self.registers.at(Class::Command).replacing(W401.address());
-        calls.write(W401, count.cast_unsigned()).await
     }
 
     /// The control word of a stop; `None` where there is none.
-    pub(crate) const fn stop_word(&self, mode: StopMode) -> Option<u16> {
+    pub(crate) const fn word_of(&self, mode: StopMode) -> Option<u16> {
         match mode {
             StopMode::Ramp => self.map.ramp_stop,
             StopMode::Fast => Some(drivecom::QUICK_STOP),
             StopMode::Freewheel => Some(drivecom::DISABLE_VOLTAGE),
             StopMode::DcInjection => None,
         }
-    }
-
-    async fn speed_limits(&mut self) -> Result<Option<(Frequency, Frequency)>> {
-        let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
-        if self.limits.is_none() {
-            let words = Words::read(&mut self.registers.at(Class::Command), false, &[low, high]).await?;
-            let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
-            self.limits = frequency(low).zip(frequency(high));
-        }
-        Ok(self.limits)
     }
 }
 
@@ -104,7 +58,10 @@ impl<P: Port> Drivecom for Atv58<P> {
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let map = self.map;
-        let fast = [Some(map.status), map.output_frequency, map.current];
+        self.registers.begin_snapshot();
+        // A command is confirmed by the reference too.
+        let reference = map.reference.filter(|_| class == Class::Command);
+        let fast = [Some(map.status), map.output_frequency, map.current, reference];
         let addresses: Vec<u16> = fast.into_iter().flatten().collect();
         let mut calls = self.registers.at(class);
         let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
@@ -113,16 +70,22 @@ impl<P: Port> Drivecom for Atv58<P> {
         }
         // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
         // that it holds tells the stop from the run.
-        if class == Class::Stop && words.chart(&map) == Some(ChartState::OperationEnabled) {
+        if self.stops_by_ramp && words.chart(&map) == Some(ChartState::OperationEnabled) {
             words.append(&mut calls, false, CMD.address(), 1).await?;
         }
-        Ok(words.status(&map))
+        let at = self.registers.snapshot_time();
+        Ok(Status { at, ..words.status(&map) })
     }
 
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
-        let calls = self.registers.at(class);
-        let mut calls = if effect == Effect::Edge { calls.edge() } else { calls };
-        calls.write(CMD, word).await
+        self.stops_by_ramp = Some(word) == self.map.ramp_stop;
+        let mut calls = self.registers.at(class);
+        match (class, effect) {
+            // What a stop has done is read as a command.
+            (Class::Stop, _) => calls.write_word(CMD.address(), word).await,
+            (_, Effect::Edge) => calls.edge().write(CMD, word).await,
+            (_, Effect::Level) => calls.write(CMD, word).await,
+        }
     }
 
     async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
@@ -134,38 +97,91 @@ impl<P: Port> Drivecom for Atv58<P> {
         Ok(negative.then_some(Refusal::Settings("the reference W401 is negative: give a setpoint first")))
     }
 
-    /// The drive shows a run command by holding it in the state "operation enabled", and not in forced local mode.
-    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<bool> {
-        let value = self.registers.at(Class::Command).read(CMD).await?;
+    /// The drive shows a run command by holding it in the state "operation enabled", not in forced local mode, with a motor
+    /// that turns that way, and by following the reference of the bus, as far as the map names the words for it.
+    async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<RunShown> {
+        let follows = self.follows(status).await?;
+        // The last thing that is read: a stop of somebody else that came before shows in it.
+        let value = self.read_control().await?;
         status.raw.push(RawWord { address: CMD.address(), code: CMD.row().code, value });
-        Ok(value == word && status.control.is_none())
-    }
-}
-
-/// Whether the drive itself shows that no run command is in force. In forced local mode the control word that it holds
-/// does not act, and tells nothing.
-fn shows_stop(map: &Atv58Map, status: &Status, mode: StopMode) -> bool {
-    match status.raw(map.status).and_then(ChartState::of) {
-        None | Some(ChartState::NotReadyToSwitchOn) => false,
-        Some(ChartState::OperationEnabled) => {
-            mode == StopMode::Ramp && status.control.is_none() && status.raw(CMD.address()) == map.ramp_stop
+        if value != word || status.control.is_some() || !follows {
+            return Ok(RunShown::NotYet);
         }
-        Some(ChartState::QuickStopActive) => mode != StopMode::Freewheel,
-        Some(_) => true,
+        let stands = status.output_frequency == Some(Frequency::ZERO);
+        let reverse = self.map.reverse_command & word != 0;
+        let asked = if reverse { Direction::Reverse } else { Direction::Forward };
+        Ok(match status.direction {
+            _ if stands && self.asks_for_nothing(status) => RunShown::InForce,
+            _ if stands => RunShown::NotYet,
+            Some(direction) if direction != asked => RunShown::TurningRound,
+            _ => RunShown::InForce,
+        })
+    }
+
+    async fn prevents_run(&mut self, status: &Status) -> Option<Refusal> {
+        if let Some(control) = status.control {
+            return Some(Refusal::NotInControl(control));
+        }
+        (self.follows(status).await == Ok(false)).then_some(OTHER_REFERENCE)
+    }
+
+    async fn read_control(&mut self) -> Result<u16> {
+        self.registers.at(Class::Command).read(CMD).await
+    }
+
+    fn stop_word(&self, mode: StopMode) -> StopWord {
+        let fast = StopWord { word: drivecom::QUICK_STOP, mode: StopMode::Fast, instead: None };
+        let ramp = self.map.ramp_stop.map(|word| StopWord { word, mode: StopMode::Ramp, instead: None });
+        let no_ramp = Some("the drive's map names no control word for a ramp stop");
+        match mode {
+            StopMode::Fast => fast,
+            StopMode::Freewheel => StopWord { word: drivecom::DISABLE_VOLTAGE, mode, instead: None },
+            StopMode::Ramp => ramp.unwrap_or(StopWord { instead: no_ramp, ..fast }),
+            StopMode::DcInjection => {
+                let instead = Some("the manual names no bit of the control word for DC injection");
+                StopWord { instead, ..ramp.unwrap_or(fast) }
+            }
+        }
+    }
+
+    /// In forced local mode the control word that the drive holds does not act, and tells nothing.
+    fn shows_stop(&self, stop: &StopWord, status: &Status) -> bool {
+        match status.raw(self.map.status).and_then(ChartState::of) {
+            None | Some(ChartState::NotReadyToSwitchOn) => false,
+            Some(ChartState::OperationEnabled) => {
+                stop.mode == StopMode::Ramp
+                    && status.control.is_none()
+                    && status.raw(CMD.address()) == self.map.ramp_stop
+            }
+            Some(ChartState::QuickStopActive) => stop.mode != StopMode::Freewheel,
+            Some(_) => true,
+        }
+    }
+
+    fn defies_stop(&self, status: &Status) -> Option<Refusal> {
+        let turns = status.output_frequency.is_none_or(|frequency| frequency != Frequency::ZERO);
+        let enabled =
+            status.raw(self.map.status).and_then(ChartState::of) == Some(ChartState::OperationEnabled);
+        status.control.filter(|_| turns && enabled).map(Refusal::NotInControl)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use drive_testing::words::Words;
+
+    use crate::{Atv58Map, CAPABILITIES};
+
     use super::*;
 
     #[test]
     fn the_held_control_word_shows_no_stop_while_local_control_is_forced() {
-        let map = Atv58Map::default();
+        let drive = Atv58::new(Words::new(&CAPABILITIES, &[]), SlaveAddress::try_from(1).unwrap());
+        let stop = drive.stop_word(StopMode::Ramp);
         let stopping = |eta, control| {
             let raw = |address, value| RawWord { address, code: "", value };
-            let raw = vec![raw(map.status, eta), raw(CMD.address(), drivecom::SWITCH_ON)];
-            shows_stop(&map, &Status { control, raw, ..Status::default() }, StopMode::Ramp)
+            let raw = vec![raw(Atv58Map::default().status, eta), raw(CMD.address(), drivecom::SWITCH_ON)];
+            drive.shows_stop(&stop, &Status { control, raw, ..Status::default() })
         };
         assert!(stopping(0x0227, None));
         assert!(!stopping(0x0027, Some(drive_core::Control::Local)));

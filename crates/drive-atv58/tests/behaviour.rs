@@ -86,12 +86,10 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn what_the_map_leaves_out_is_unsupported_and_stops_nothing() {
-    let map = Atv58Map { ramp_stop: None, reverse_command: 0, ..Atv58Map::default() };
+async fn what_the_map_leaves_out_is_unsupported_and_asks_nothing() {
+    let map = Atv58Map { reverse_command: 0, ..Atv58Map::default() };
     let (mut drive, machine, _line) = rig_with(map);
     for error in [
-        drive.stop(StopMode::Ramp).await.unwrap_err(),
-        drive.stop(StopMode::DcInjection).await.unwrap_err(),
         drive.start(Direction::Reverse).await.unwrap_err(),
         drive.set_setpoint(Speed::from_rpm(100).into()).await.unwrap_err(),
         drive.release().await.unwrap_err(),

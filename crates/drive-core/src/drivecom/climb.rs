@@ -32,6 +32,11 @@ impl Climb {
         rung(state).map(|(height, _)| Self { height, written: None })
     }
 
+    /// The drive has not taken the last word: it is given again.
+    pub(super) const fn forget_written(&mut self) {
+        self.written = None;
+    }
+
     /// What to do, now that the drive shows this state.
     pub(super) fn next(&mut self, state: ChartState) -> Next {
         if state.is_fault() {

@@ -1,12 +1,32 @@
-//! The limits of a setpoint in rpm, as the Altivar 28 and 312 hold them.
+//! The limits of a setpoint in rpm, as the Altivar 28 and 312 hold them, and whether the drive follows a setpoint.
 
 use crate::{
     access::Calls,
     error::{Result, SetpointProblem},
     port::Port,
     registers::{Register, access::Readable},
-    units::Speed,
+    units::{Frequency, Speed},
 };
+
+/// The word `FrH` counts tenths of a hertz, whatever the reference counts.
+const FRH_STEP: u32 = 10;
+/// Two rounded images of one speed, of which one was a frequency of 0.1 Hz on the way, differ by no more rpm than that.
+const SPEED_STEP: u16 = 3;
+
+/// Whether the reference before the ramp, `FrH`, is what the bus asks for, which the drive keeps between its limits.
+#[must_use]
+pub fn follows_frequency(frh: Frequency, asked: Frequency, (low, high): (Frequency, Frequency)) -> bool {
+    let asked = asked.max(low).min(high);
+    frh.centihertz().abs_diff(asked.centihertz()) <= FRH_STEP
+}
+
+/// Whether the speed reference at the ramp's input, `FRHD`, is the one that the bus asks for, `LFRD`. An `LFRD` of zero is
+/// also that of a drive which was never given a speed, and shows nothing.
+#[must_use]
+pub const fn follows_speed(frhd: u16, lfrd: u16) -> bool {
+    let [follows, asked] = [frhd.cast_signed().unsigned_abs(), lfrd.cast_signed().unsigned_abs()];
+    asked != 0 && follows.abs_diff(asked) <= SPEED_STEP
+}
 
 /// Reads `SMIL` and `SMAL`, which are `LSP` and `HSP` in rpm: four words from `smil` on, each limit with its low word
 /// first (BBV51701 p. 18).
@@ -36,6 +56,19 @@ pub fn speed_word(speed: Speed, (low, high): (Speed, Speed)) -> Result<u16, Setp
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_reference_of_somebody_else_is_told_from_that_of_the_bus() {
+        let hertz = Frequency::from_hertz;
+        let limits = (hertz(10), hertz(50));
+        assert!(follows_frequency(hertz(30), hertz(30), limits));
+        assert!(follows_frequency(hertz(10), hertz(0), limits), "kept at LSP");
+        assert!(!follows_frequency(hertz(50), hertz(30), limits));
+        assert!(!follows_frequency(Frequency::from_centihertz(3_020), hertz(30), limits));
+        assert!(follows_speed((-898_i16).cast_unsigned(), 900));
+        assert!(!follows_speed(300, 900));
+        assert!(!follows_speed(0, 0));
+    }
 
     #[test]
     fn a_speed_is_its_own_word_within_the_limits_and_the_sign() {

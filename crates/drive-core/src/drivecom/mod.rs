@@ -4,7 +4,7 @@
 //!
 //! The chart's control word is a level, so a write whose answer was lost may be repeated; the one edge is the fault
 //! reset. A start writes each word once, because a drive that does not follow may have been stopped; a stop is written
-//! until it shows.
+//! until it shows. What shows a command is what the drive does, never that the word reads back.
 
 mod chart;
 mod climb;
@@ -15,6 +15,6 @@ mod words;
 pub use chart::{
     ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, QUICK_STOP, SHUTDOWN, SWITCH_ON,
 };
-pub use ladder::{CONFIRMING_READS, Drivecom, reset_fault, start, stop};
-pub use limits::{speed_limits, speed_word};
+pub use ladder::{Drivecom, RunShown, StopWord, reset_fault, start, stop};
+pub use limits::{follows_frequency, follows_speed, speed_limits, speed_word};
 pub use words::{ControlWord, ExtendedStatus, StatusWord, StatusWords};

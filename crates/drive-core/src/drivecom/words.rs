@@ -4,10 +4,15 @@
 
 use bitflags::bitflags;
 
-use super::chart::{ChartState, ENABLE_OPERATION};
+use super::{
+    chart::{ChartState, ENABLE_OPERATION},
+    ladder::RunShown,
+};
 use crate::{
+    error::Refusal,
     setpoint::{Direction, StopMode},
     status::{Control, State, Status},
+    units::Frequency,
 };
 
 bitflags! {
@@ -217,7 +222,7 @@ impl StatusWords {
     /// setpoint, nor a stopped one from one that runs at a setpoint of zero.
     #[must_use]
     pub fn state(self, command: Option<ControlWord>) -> State {
-        self.chart().map_or(State::Unknown, |chart| chart.state(self.is_turning(), self.enabled(command)))
+        self.chart().map_or(State::Unknown, |chart| chart.state(self.is_driving(), self.enabled(command)))
     }
 
     /// Whether a drive that shows these words can still hold `command`. A chart that has left operation enabled holds no
@@ -245,6 +250,63 @@ impl StatusWords {
         }
     }
 
+    /// How a run command in this direction shows, the bus being the source of the reference too. A reference of zero asks
+    /// for no direction.
+    #[must_use]
+    pub fn shows_run(self, direction: Direction, reference: Frequency) -> RunShown {
+        let asked = self.eti.contains(ExtendedStatus::REVERSE_REQUESTED);
+        if self.control() != Control::Bus || self.chart() != Some(ChartState::OperationEnabled) {
+            RunShown::NotYet
+        } else if reference == Frequency::ZERO {
+            RunShown::InForce
+        } else if !self.is_turning() || asked != (direction == Direction::Reverse) {
+            RunShown::NotYet
+        } else if self.eta.direction() != direction {
+            RunShown::TurningRound
+        } else {
+            RunShown::InForce
+        }
+    }
+
+    /// What keeps a run command of the bus from acting, as far as these words tell it.
+    #[must_use]
+    pub fn prevents_run(self) -> Option<Refusal> {
+        const STOP: Refusal = Refusal::Overridden {
+            by: "a stop at the drive, by an input or a key,",
+            remedy: "release it, and start again",
+        };
+        let stops = ExtendedStatus::FAST_STOP.union(ExtendedStatus::DC_INJECTION);
+        match self.control() {
+            Control::Bus if self.eti.intersects(stops) || self.eta.contains(StatusWord::STOP_KEY) => {
+                Some(STOP)
+            }
+            Control::Bus => None,
+            somebody => Some(Refusal::NotInControl(somebody)),
+        }
+    }
+
+    /// Why the bus does not take command of a drive that manages the priorities of its channels itself (p. 11): it takes
+    /// command from the terminals of a motor at rest, not of one that they have running, not in forced local mode, and not
+    /// from a remote terminal, which only has it where somebody gave it (p. 38).
+    #[must_use]
+    pub fn refuses_to_take_over(self) -> Option<Refusal> {
+        let free = match self.control() {
+            Control::Bus => true,
+            Control::Local => self.eta.contains(StatusWord::NOT_FORCED_LOCAL) && !self.is_turning(),
+            _ => false,
+        };
+        (!free).then(|| Refusal::NotInControl(self.control()))
+    }
+
+    /// Why a run command of this side cannot be withdrawn without doing more than that: a drive that manages the priorities
+    /// of its channels itself gives command to the bus by any command, also from somebody who has the motor running.
+    #[must_use]
+    pub fn refuses_withdrawal(self) -> Option<&'static str> {
+        let forced = !self.eta.contains(StatusWord::NOT_FORCED_LOCAL);
+        (self.control() != Control::Bus && !forced && self.is_driving())
+            .then_some("any command by the bus would take the motor from whoever has it running")
+    }
+
     /// Whether the drive itself shows that no run command acts after the stop `word`: it has left "operation enabled",
     /// or there, where the word keeps it, the motor stands, or the bus commands and the motor slows down or is braked:
     /// one that somebody else has running obeys no word of ours, and slows down for reasons of his. A quick stop still
@@ -268,7 +330,7 @@ impl StatusWords {
         let command = command.filter(|_| self.control() == Control::Bus);
         let stopping = self.eti.intersects(ExtendedStatus::FAST_STOP.union(ExtendedStatus::DC_INJECTION))
             || command.is_some_and(ControlWord::is_stop);
-        match (self.is_turning(), command) {
+        match (self.is_driving(), command) {
             (true, _) if stopping => State::Stopping,
             (true, _) => State::Running,
             // At a setpoint of zero a run command is in force and nothing turns.
@@ -323,6 +385,27 @@ mod tests {
         assert_eq!(held(0x0223, 0x4000), [false, true, true], "switched on");
         assert_eq!(held(0x0027, 0x4010), [false, true, true], "forced local");
         assert_eq!(held(0x0227, 0x0010), [false, true, true], "by the terminals");
+    }
+
+    #[test]
+    fn a_motor_that_direct_current_brakes_has_not_come_to_a_stop() {
+        let injection = StatusWords::new(0x0627, 0x4020);
+        let [run, stop] = [0x000F, 0x200F].map(|word| Some(ControlWord::from_bits_retain(word)));
+        assert_eq!([None, run, stop].map(|held| injection.state(held)), [State::Stopping; 3]);
+        assert!(injection.shows_stop(ControlWord::from_bits_retain(0x200F)));
+    }
+
+    #[test]
+    fn a_run_command_shows_in_the_direction_of_the_motor_and_not_of_the_reference_alone() {
+        let fifty = Frequency::from_hertz(50);
+        let shown = |eta, eti| StatusWords::new(eta, eti).shows_run(Direction::Reverse, fifty);
+        assert_eq!(shown(0x0227, 0xC410), RunShown::TurningRound, "forward, slowing down");
+        assert_eq!(shown(0x8227, 0xC210), RunShown::InForce);
+        assert_eq!(shown(0x8227, 0x4210), RunShown::NotYet, "the reference asks for forward");
+        assert_eq!(shown(0x0227, 0xC000), RunShown::NotYet, "the motor stands");
+        assert_eq!(shown(0x8227, 0x8210), RunShown::NotYet, "the terminals command");
+        let stands = StatusWords::new(0x0627, 0x4002).shows_run(Direction::Reverse, Frequency::ZERO);
+        assert_eq!(stands, RunShown::InForce, "at a reference of zero");
     }
 
     #[test]

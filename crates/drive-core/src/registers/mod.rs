@@ -157,7 +157,7 @@ macro_rules! registers {
         )*
 
         /// The addresses of the registers by their names, for patterns.
-        #[allow(unused_imports)]
+        #[allow(unused_imports, unreachable_pub, dead_code)]
         $visibility mod address {
             use super::*;
 

@@ -113,13 +113,21 @@ impl FastWords {
 
     /// The status. `command` is the control word that the drive was last seen to hold, if any: see
     /// [`StatusWords::state`].
-    pub(crate) fn status(&self, resolution: Resolution, command: Option<ControlWord>) -> Status {
+    pub(crate) fn status(&self, resolution: Option<Resolution>, command: Option<ControlWord>) -> Status {
+        let output = self.word(RFR);
+        // Zero is zero at any resolution.
+        let resolution = resolution.or_else(|| (output == 0).then_some(Resolution::Normal));
         Status {
-            output_frequency: Some(resolution.frequency(self.word(RFR))),
+            output_frequency: resolution.map(|resolution| resolution.frequency(output)),
             current: Some(Current::from_deciamperes(u32::from(self.word(LCR)))),
             raw: self.raw(),
             ..self.state_words().status(command)
         }
+    }
+
+    /// The reference before the ramp, which no bit gives another unit.
+    pub(crate) fn reference(&self) -> Frequency {
+        Frequency::from_decihertz(self.word(FRH))
     }
 
     fn raw(&self) -> Vec<RawWord> {
@@ -142,7 +150,7 @@ mod tests {
     #[test]
     fn every_word_of_the_block_is_kept() {
         for eta in 0..=u16::MAX {
-            let status = FastWords::of([eta, 0, 0, 0, 0, 0xFFFF, 0]).status(Resolution::Normal, None);
+            let status = FastWords::of([eta, 0, 0, 0, 0, 0xFFFF, 0]).status(None, None);
             assert_eq!(status.state == State::Unknown, ChartState::of(eta).is_none(), "{eta:04X}h");
             assert_eq!(status.raw(3201), Some(eta));
         }

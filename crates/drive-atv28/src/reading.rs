@@ -75,6 +75,11 @@ impl FastWords {
         }
     }
 
+    /// The reference before the ramp.
+    pub(crate) fn reference(&self) -> Frequency {
+        Frequency::from_decihertz(self.word(FRH))
+    }
+
     pub(crate) fn raw(&self) -> Vec<RawWord> {
         Self::first_block(&self.words)
     }

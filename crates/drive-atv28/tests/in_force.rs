@@ -1,0 +1,101 @@
+//! What counts as done, on words as the manuals give them: in force, and never only written.
+
+use drive_atv28::{Atv28, CAPABILITIES};
+use drive_core::{
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Setpoint, State, StopMode,
+};
+use drive_testing::words::{Asked, Words};
+
+const CMD: u16 = 400;
+const THIRTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(30));
+/// `LFr`, `HSP`, `ETA`, `ETI`: at rest in "operation enabled", commanded by Modbus.
+const STANDS: [(u16, u16); 4] = [(401, 300), (250, 500), (458, 0x0627), (459, 0x4002)];
+/// Runs forward at 30 Hz by our command.
+const RUNS: [(u16, u16); 6] = [(401, 300), (250, 500), (CMD, 0x000F), (450, 300), (451, 300), (459, 0x4012)];
+
+fn drive(words: &[&[(u16, u16)]]) -> Atv28<Words> {
+    Atv28::new(Words::new(&CAPABILITIES, &words.concat()), 1.try_into().unwrap())
+}
+
+fn because(error: &Error) -> Option<Refusal> {
+    match error {
+        Error::Refused { reason, .. } => Some(*reason),
+        Error::NotConfirmed { because, .. } => *because,
+        _ => None,
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_the_remote_terminal_commands_is_not_taken_from_it() {
+    let mut drive = drive(&[&STANDS, &[(459, 0x2002)]]);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Panel)));
+    assert_eq!(drive.into_port().written(), []);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_and_a_setpoint_are_confirmed_only_by_the_reference_of_the_bus() {
+    let mut drive = drive(&[&STANDS, &RUNS]);
+    drive.start(Direction::Forward).await.unwrap();
+    drive.set_setpoint(THIRTY).await.unwrap();
+    let mut drive = self::drive(&[&STANDS, &RUNS, &[(450, 500)]]);
+    for error in
+        [drive.start(Direction::Forward).await.unwrap_err(), drive.set_setpoint(THIRTY).await.unwrap_err()]
+    {
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+        assert!(matches!(because(&error), Some(Refusal::Overridden { .. })), "{error}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_does_not_turn_is_not_called_started() {
+    let mut drive = drive(&[&STANDS, &RUNS, &[(459, 0x5002), (451, 0)]]);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(
+        matches!(because(&error), Some(Refusal::Overridden { by, .. }) if by.contains("stop")),
+        "{error}"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_first_status_tells_a_run_command_of_before_and_a_stop_under_way() {
+    for (words, state) in [
+        (&[(CMD, 0x000F)][..], State::Running),
+        (&[(CMD, 0x100F)], State::Ready),
+        (&[(CMD, 0x100F), (451, 200), (459, 0x4412)], State::Stopping),
+        (&[(CMD, 0x200F), (459, 0x4022)], State::Stopping),
+    ] {
+        assert_eq!(drive(&[&STANDS, words]).status().await.unwrap().state, state, "{words:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn only_the_write_of_a_stop_travels_as_a_stop_and_forced_local_mode_is_told_at_once() {
+    let local = [(458, 0x0427), (451, 300), (459, 0x0012)];
+    let mut drive = drive(&[&STANDS, &local]);
+    let error = drive.stop(StopMode::Ramp).await.unwrap_err();
+    assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+    let asked = drive.into_port().asked;
+    assert_eq!(asked[0], Asked::Write(Class::Stop, CMD, vec![0x100F]));
+    assert!(asked[1..].iter().all(|asked| matches!(asked, Asked::Read(Class::Command, ..))), "{asked:?}");
+    assert_eq!(asked.len(), 3);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_command_is_withdrawn_in_forced_local_mode_and_not_where_it_would_take_the_motor() {
+    let runs = [(451, 300), (459, 0x0012), (CMD, 0x000F)];
+    let mut drive = drive(&[&STANDS, &runs, &[(458, 0x0427)]]);
+    drive.withdraw().await.unwrap();
+    assert_eq!(drive.into_port().written(), [(CMD, 0x100F)]);
+    let mut drive = self::drive(&[&STANDS, &runs]);
+    assert_eq!(drive.withdraw().await.unwrap_err().kind(), ErrorKind::Unsupported);
+    assert_eq!(drive.into_port().written(), []);
+}
+
+#[tokio::test(start_paused = true)]
+async fn no_fault_is_reset_while_the_terminals_ask_for_a_run() {
+    let mut drive = drive(&[&STANDS, &[(458, 0x0208), (459, 0x0006), (478, 1)]]);
+    let error = drive.reset_faults().await.unwrap_err();
+    assert!(matches!(because(&error), Some(Refusal::Overridden { .. })), "{error}");
+    assert_eq!(drive.into_port().written(), []);
+}

@@ -1,0 +1,344 @@
+//! What counts as done, on words as the manual gives them: in force, and never only written.
+
+use drive_atv312::{Atv312, CAPABILITIES};
+use drive_core::{
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Row, Setpoint, State, StopMode,
+};
+use drive_testing::words::{Asked, Words};
+
+const CMD: u16 = 8501;
+const LFR: u16 = 8502;
+const THIRTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(30));
+
+/// The settings of a drive for the bus (p. 11, 35–37, 40), `tFr`, `HSP`, and a setpoint of 30 Hz.
+const FOR_THE_BUS: [(u16, u16); 12] = [
+    (3006, 2),
+    (3103, 600),
+    (3104, 500),
+    (8401, 2),
+    (8411, 96),
+    (8413, 164),
+    (8421, 98),
+    (8423, 10),
+    (8424, 10),
+    (11203, 173),
+    (11204, 174),
+    (LFR, 300),
+];
+/// "Switch on disabled", commanded by Modbus.
+const STANDS: [(u16, u16); 2] = [(3201, 0x0240), (3206, 0x4002)];
+/// Runs forward at 30 Hz by our command (p. 10, 21, 22).
+const RUNS: [(u16, u16); 5] = [(3201, 0x0627), (3202, 300), (3203, 300), (3206, 0x4012), (CMD, 0x000F)];
+
+fn drive(words: &[&[(u16, u16)]]) -> Atv312<Words> {
+    Atv312::new(Words::new(&CAPABILITIES, &words.concat()), 1.try_into().unwrap())
+}
+
+/// The same, once it has been watched for a while.
+async fn watched(words: &[&[(u16, u16)]]) -> Atv312<Words> {
+    let mut drive = drive(words);
+    for _ in 0..20 {
+        drive.status().await.unwrap();
+    }
+    drive
+}
+
+fn row(code: &str) -> &'static Row {
+    Row::find(drive_atv312::ROWS, code).unwrap()
+}
+
+fn commands(drive: Atv312<Words>) -> Vec<u16> {
+    drive.into_port().written().into_iter().filter(|(at, _)| *at == CMD).map(|(_, word)| word).collect()
+}
+
+fn because(error: &Error) -> Option<Refusal> {
+    match error {
+        Error::Refused { reason, .. } => Some(*reason),
+        Error::NotConfirmed { because, .. } => *because,
+        _ => None,
+    }
+}
+
+fn overridden_by(error: &Error, what: &str) -> bool {
+    matches!(because(error), Some(Refusal::Overridden { by, .. }) if by.contains(what))
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_the_settings_lack_is_replaced_and_always_written() {
+    for (settings, asked, word, used) in [
+        // Stt, p. 40: fast, freewheel, injection, unknown.
+        (&[(11201, 0)][..], StopMode::Ramp, 0x100F, StopMode::Ramp),
+        (&[(11201, 1)], StopMode::Ramp, 0x100F, StopMode::Fast),
+        (&[(11201, 2)], StopMode::Ramp, 0x100F, StopMode::Freewheel),
+        (&[(11201, 3)], StopMode::Ramp, 0x400F, StopMode::Fast),
+        (&[(11201, 9)], StopMode::Ramp, 0x400F, StopMode::Fast),
+        // A function on bit 12 (p. 42), and no fast stop on a bit.
+        (&[(11401, 172)], StopMode::Ramp, 0x400F, StopMode::Fast),
+        (&[(11401, 172), (11204, 0)], StopMode::Ramp, 0x0002, StopMode::Fast),
+        (&[(11204, 0)], StopMode::Fast, 0x0002, StopMode::Fast),
+        // No injection on a bit: what Stt says, and never what the others lack.
+        (&[(11203, 0)], StopMode::DcInjection, 0x100F, StopMode::Ramp),
+        (&[(11203, 0), (11201, 3)], StopMode::DcInjection, 0x100F, StopMode::DcInjection),
+        (&[(11203, 0), (11401, 172)], StopMode::DcInjection, 0x400F, StopMode::Fast),
+        (&[], StopMode::DcInjection, 0x200F, StopMode::DcInjection),
+        (&[(11201, 3)], StopMode::Freewheel, 0x0000, StopMode::Freewheel),
+        // An access level that the manual does not list.
+        (&[(3006, 7)], StopMode::Ramp, 0x0002, StopMode::Fast),
+    ] {
+        let mut drive = watched(&[&FOR_THE_BUS, &STANDS, settings]).await;
+        let stopped = drive.stop(asked).await.unwrap();
+        assert_eq!(stopped.mode, used, "{settings:?}, {asked}");
+        assert_eq!(stopped.instead.is_some(), asked != used, "{settings:?}, {asked}");
+        assert_eq!(commands(drive), [word], "{settings:?}, {asked}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_was_never_read_is_stopped_before_anything_is_read() {
+    for (mode, word) in [
+        (StopMode::Ramp, 0x0002),
+        (StopMode::Fast, 0x0002),
+        (StopMode::DcInjection, 0x0002),
+        (StopMode::Freewheel, 0x0000),
+    ] {
+        let mut drive = drive(&[&FOR_THE_BUS, &STANDS]);
+        drive.stop(mode).await.unwrap();
+        let asked = drive.into_port().asked;
+        assert_eq!(asked[0], Asked::Write(Class::Stop, CMD, vec![word]), "{mode}");
+        let stops = asked
+            .iter()
+            .filter(|asked| matches!(asked, Asked::Write(Class::Stop, ..) | Asked::Read(Class::Stop, ..)));
+        assert_eq!(stops.count(), 1, "{mode}: the readings are commands");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_bit_13_selects_the_command_channel_it_stays_with_the_bus() {
+    // CCS = C113, Cd1 = tEr, Cd2 = Mdb (p. 37): the bus commands while bit 13 is 1.
+    let switched = [(8421, 189), (8423, 1), (8424, 10), (11203, 0), (CMD, 0x200F)];
+    for (mode, word) in [(StopMode::Ramp, 0x300F), (StopMode::Fast, 0x600F), (StopMode::Freewheel, 0x2000)] {
+        let mut drive = watched(&[&FOR_THE_BUS, &STANDS, &switched]).await;
+        drive.stop(mode).await.unwrap();
+        assert_eq!(commands(drive), [word], "{mode}");
+    }
+    // Never read: at once a word that stops, then the one that takes the channel back.
+    let terminals = [(3206, 0x0002)];
+    let mut drive = drive(&[&FOR_THE_BUS, &STANDS, &switched, &terminals]);
+    drive.stop(StopMode::Ramp).await.unwrap();
+    assert_eq!(commands(drive), [0x0002, 0x2002]);
+    // Read before a reconnect: bit 13 as it was known.
+    let mut drive = watched(&[&FOR_THE_BUS, &RUNS, &switched]).await;
+    drive.forget();
+    let _ = drive.stop(StopMode::Freewheel).await;
+    assert_eq!(commands(drive)[0], 0x2000);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_to_a_motor_that_no_word_of_the_bus_reaches_is_told_at_once() {
+    // Forced local, turning: ETA bit 9 is 0.
+    let local = [(3201, 0x0427), (3202, 300), (3206, 0x0012)];
+    let mut drive = watched(&[&FOR_THE_BUS, &local]).await;
+    let begun = tokio::time::Instant::now();
+    let error = drive.stop(StopMode::Ramp).await.unwrap_err();
+    assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+    assert_eq!(begun.elapsed(), std::time::Duration::ZERO);
+    assert_eq!(commands(drive), [0x100F], "and written all the same");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_under_direct_current_has_not_come_to_a_stop() {
+    // p. 20: stopped is ETI.4 = ETI.5 = 0.
+    let braked = [(3201, 0x0627), (3206, 0x4022), (CMD, 0x200F)];
+    let status = drive(&[&FOR_THE_BUS, &braked]).status().await.unwrap();
+    assert_eq!(status.state, State::Stopping);
+    assert!(!status.is_standstill());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_command_of_before_shows_at_once_also_where_nothing_turns() {
+    // After tLS (p. 28), or at a setpoint of zero.
+    let waits = [(3201, 0x0627), (3206, 0x4002), (CMD, 0x000F)];
+    let status = drive(&[&FOR_THE_BUS, &waits]).status().await.unwrap();
+    assert_eq!(status.state, State::Running);
+    let stopped = [(3201, 0x0627), (3206, 0x4002), (CMD, 0x100F)];
+    assert_eq!(drive(&[&FOR_THE_BUS, &stopped]).status().await.unwrap().state, State::Ready);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_first_status_behind_a_stop_of_another_program_says_stopping() {
+    let comes_down = [(3201, 0x0227), (3202, 200), (3206, 0x4412), (CMD, 0x100F)];
+    let status = drive(&[&FOR_THE_BUS, &comes_down]).status().await.unwrap();
+    assert_eq!(status.state, State::Stopping);
+    assert_eq!(status.output_frequency, Some(Frequency::from_hertz(20)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_first_status_is_one_exchange_and_the_settings_follow_one_by_one() {
+    let mut drive = drive(&[&FOR_THE_BUS, &STANDS]);
+    drive.status().await.unwrap();
+    for _ in 0..30 {
+        drive.status().await.unwrap();
+    }
+    let asked = drive.into_port().asked;
+    assert_eq!(asked[..2], [Asked::Read(Class::Status, 3201, 7), Asked::Read(Class::Status, 3201, 7)]);
+    let settings = asked.len() - 31;
+    assert_eq!(settings, 15, "each block once");
+    let apart =
+        asked.windows(2).all(|pair| pair.iter().any(|asked| matches!(asked, Asked::Read(_, 3201, 7))));
+    assert!(apart, "never two behind one status");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_is_confirmed_only_by_the_reference_of_the_bus() {
+    let mut drive = drive(&[&FOR_THE_BUS, &RUNS]);
+    drive.start(Direction::Forward).await.unwrap();
+    // FrH (p. 21) is another one, and nothing says whose.
+    let mut drive = self::drive(&[&FOR_THE_BUS, &RUNS, &[(3203, 500)]]);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    assert!(overridden_by(&error, "FrH"), "{error}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_at_which_something_else_would_decide_the_speed_is_refused_with_its_name() {
+    for (settings, by) in [
+        (&[(11901, 1)][..], "PIF"),
+        (&[(8411, 97), (8414, 1)], "Fr2"),
+        (&[(8413, 1)], "Fr1"),
+        // rFC by LI5, which has selected Fr2 = AI1: LRS3 bit 0.
+        (&[(8411, 133), (8414, 1), (3252, 1)], "Fr2"),
+        // PS2 on LI3, PS4 on bit 15 of CMD, JOG on LI4, and these are on.
+        (&[(11401, 131), (5240, 0b100)], "preset"),
+        (&[(11402, 175), (CMD, 0x8000)], "preset"),
+        (&[(11110, 132), (5240, 0b1000)], "jog"),
+        // AI2 at 4 V is summed to Fr1; so is AI1 at -1 V, and Modbus itself.
+        (&[(11801, 2), (5243, 4_000)], "SA2"),
+        (&[(11802, 1), (5242, 0xFC18)], "SA3"),
+        (&[(11801, 164)], "SA2"),
+    ] {
+        let mut drive = drive(&[&FOR_THE_BUS, &STANDS, settings]);
+        let error = drive.start(Direction::Forward).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
+        assert!(overridden_by(&error, by), "{error}");
+        let error = drive.set_setpoint(THIRTY).await.unwrap_err();
+        assert!(overridden_by(&error, by), "{error}");
+        assert_eq!(commands(drive), [], "{by}");
+    }
+    // Assigned and silent: nothing decides instead.
+    let silent = [(11401, 131), (11801, 2), (5243, 3), (8411, 133)];
+    let mut drive = drive(&[&FOR_THE_BUS, &RUNS, &silent]);
+    drive.start(Direction::Forward).await.unwrap();
+    drive.set_setpoint(THIRTY).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_to_a_running_motor_is_confirmed_by_frh() {
+    let mut drive = drive(&[&FOR_THE_BUS, &RUNS]);
+    drive.set_setpoint(THIRTY).await.unwrap();
+    let error = drive.set_setpoint(Frequency::from_hertz(20).into()).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed, "these words do not follow");
+    assert!(overridden_by(&error, "FrH"), "{error}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_the_other_way_says_in_which_direction_the_motor_still_turns() {
+    // Forward, slowing down, reverse requested (ETI bit 15).
+    let turning_round = [(3201, 0x0227), (3202, 100), (3203, 300), (3206, 0xC412), (CMD, 0x000F)];
+    let mut drive = drive(&[&FOR_THE_BUS, &turning_round]);
+    let status = drive.start(Direction::Reverse).await.unwrap();
+    assert_eq!(status.direction, Some(Direction::Forward));
+    // A motor that does not think of it.
+    let mut drive = self::drive(&[&FOR_THE_BUS, &RUNS]);
+    assert_eq!(drive.start(Direction::Reverse).await.unwrap_err().kind(), ErrorKind::NotConfirmed);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_starts_again_by_itself_is_started_only_where_that_is_accepted_by_name() {
+    let mut drive = drive(&[&FOR_THE_BUS, &RUNS, &[(7122, 1)]]);
+    assert_eq!(drive.self_restarts().await.unwrap()[0].code, "Atr");
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(
+        matches!(because(&error), Some(Refusal::RestartsItself(restart)) if restart.code == "Atr"),
+        "{error}"
+    );
+    drive.accept_self_restart(&["other"]);
+    assert!(drive.start(Direction::Forward).await.is_err());
+    drive.accept_self_restart(&["Atr"]);
+    drive.start(Direction::Forward).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_command_is_withdrawn_by_the_stop_of_bit_12_alone() {
+    // Somebody has forced local mode and runs the motor.
+    let local = [(3201, 0x0427), (3202, 300), (3206, 0x0012), (CMD, 0x000F)];
+    let mut drive = drive(&[&FOR_THE_BUS, &local]);
+    drive.withdraw().await.unwrap();
+    assert_eq!(commands(drive), [0x100F]);
+    // A function on bit 12, and access level L1, where any command would take the motor from him.
+    for settings in [&[(11401, 172)][..], &[(3006, 0), (3201, 0x0627)]] {
+        let mut drive = self::drive(&[&FOR_THE_BUS, &local, settings]);
+        assert_eq!(drive.withdraw().await.unwrap_err().kind(), ErrorKind::Unsupported);
+        assert_eq!(commands(drive), []);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn release_puts_back_what_was_set_up_and_leaves_no_setpoint_behind() {
+    // As it leaves the factory (p. 15), but Fr1 by AI3.
+    let factory = [(8401, 1), (8413, 3), (8423, 1), (8424, 10), (8411, 96), (8421, 98)];
+    let functions = [(11401, 131), (11402, 132), (11801, 2), (11102, 1), (LFR, 300)];
+    let mut drive = drive(&[&STANDS, &factory, &functions]);
+    drive.set_up_bus_control().await.unwrap();
+    // These words name the bus for ever; what counts is what was written.
+    let error = drive.release().await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    let words = drive.into_port().words;
+    for (register, before) in
+        [(8413, 3), (8423, 1), (8401, 1), (11401, 131), (11402, 132), (11801, 2), (11203, 0), (LFR, 0)]
+    {
+        assert_eq!(words.get(&register).copied().unwrap_or(0), before, "{register}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn set_up_leaves_neither_ai2_nor_li3_and_li4_beside_the_setpoint() {
+    let mut drive = drive(&[&STANDS, &[(11401, 131), (11402, 132), (11801, 2), (11403, 133)]]);
+    drive.set_up_bus_control().await.unwrap();
+    let words = drive.into_port().words;
+    assert_eq!([11401, 11402, 11801].map(|register| words[&register]), [0; 3]);
+    assert_eq!(words[&11403], 133, "what its owner has assigned is for him to change");
+}
+
+#[tokio::test(start_paused = true)]
+async fn nothing_is_released_or_reset_while_a_level_at_the_terminals_would_start_the_motor() {
+    // tCC = 2C and tCt = LEL (p. 33), LI1 closed; then rrS on LI2.
+    for inputs in [&[(5240, 0b01)][..], &[(5240, 0b10), (11105, 130)]] {
+        let mut drive = drive(&[&FOR_THE_BUS, &STANDS, inputs]);
+        assert!(overridden_by(&drive.release().await.unwrap_err(), "terminals"));
+        assert_eq!(drive.into_port().written(), []);
+        let mut drive = self::drive(&[&FOR_THE_BUS, &[(3201, 0x0208), (3206, 0x0006)], inputs]);
+        assert!(overridden_by(&drive.reset_faults().await.unwrap_err(), "terminals"));
+        assert_eq!(drive.into_port().written(), []);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_injection_at_standstill_is_set_only_where_no_current_can_flow() {
+    // p. 41: it injects "even if a run command has not been sent".
+    let enabled = [(3201, 0x0627), (3206, 0x4002)];
+    let mut drive = drive(&[&FOR_THE_BUS, &enabled]);
+    let error = drive.write_parameter(row("AdC"), 2).await.unwrap_err();
+    assert!(matches!(because(&error), Some(Refusal::Settings(why)) if why.contains("AdC")), "{error}");
+    assert_eq!(drive.into_port().written(), []);
+    let mut drive = self::drive(&[&FOR_THE_BUS, &STANDS]);
+    assert!(drive.write_parameter(row("AdC"), 2).await.unwrap().changed);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_reset_of_the_operating_time_is_done_when_it_has_fallen_back() {
+    // p. 55: "automatically falls back to nO as soon as the reset to zero is performed".
+    let mut words = Words::new(&CAPABILITIES, &[FOR_THE_BUS.as_slice(), &STANDS].concat());
+    words.deaf = true;
+    let mut drive = Atv312::new(words, 1.try_into().unwrap());
+    assert!(drive.write_parameter(row("rPr"), 2).await.unwrap().changed);
+}

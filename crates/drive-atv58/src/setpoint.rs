@@ -1,0 +1,88 @@
+//! Setpoints: `W401`, in counts of the map.
+
+use drive_core::{
+    Class, Command, Confirming, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem, Status,
+    drivecom::{ChartState, Drivecom, ENABLE_OPERATION, follows_frequency},
+};
+
+use crate::{Atv58, command::OTHER_REFERENCE, reading::Words, registers::W401};
+
+impl<P: Port> Atv58<P> {
+    pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        let Setpoint::Frequency(frequency) = setpoint else {
+            return Err(Error::Unsupported {
+                what: "a setpoint in rpm",
+                reason: "the manual names a frequency reference only",
+            });
+        };
+        let slave = self.registers.slave();
+        let scaled = u64::from(frequency.centihertz()) * u64::from(self.map.reference_counts_per_hertz);
+        if !scaled.is_multiple_of(100) {
+            let problem = SetpointProblem::Resolution("one count of W401");
+            return Err(Error::Setpoint { slave, setpoint, problem });
+        }
+        let count = i16::try_from(scaled / 100);
+        let count =
+            count.map_err(|_| Error::Setpoint { slave, setpoint, problem: SetpointProblem::TooLarge })?;
+        if let Some((low, high)) = self.speed_limits().await?
+            && (frequency < low || frequency > high)
+        {
+            let problem = SetpointProblem::OutsideFrequencyLimits { low, high };
+            return Err(Error::Setpoint { slave, setpoint, problem });
+        }
+        let mut calls = self.registers.at(Class::Command).replacing(W401.address());
+        calls.write(W401, count.cast_unsigned()).await?;
+        self.see_setpoint(setpoint).await.map_err(Error::after_write)
+    }
+
+    /// Sees the setpoint in force: a motor that runs follows it. What one that stands will follow, the drive does not tell;
+    /// its start sees that.
+    async fn see_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        let mut confirming = Confirming::begin();
+        loop {
+            let status = self.read_status(Class::Command).await?;
+            let enabled =
+                status.raw(self.map.status).and_then(ChartState::of) == Some(ChartState::OperationEnabled);
+            let turns = status.output_frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
+            let runs = enabled && turns && self.read_control().await? & ENABLE_OPERATION == ENABLE_OPERATION;
+            if !runs || self.follows(&status).await? {
+                return Ok(());
+            }
+            if !confirming.again().await {
+                let (slave, command) = (self.registers.slave(), Command::Setpoint(setpoint));
+                let because = status.control.map(Refusal::NotInControl).or(Some(OTHER_REFERENCE));
+                return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because });
+            }
+        }
+    }
+
+    /// Whether the drive follows the reference of the bus, as far as the map names the word that tells.
+    pub(crate) async fn follows(&mut self, status: &Status) -> Result<bool> {
+        let Some(reference) = self.reference(status) else { return Ok(true) };
+        let counts =
+            u64::from(self.registers.at(Class::Command).read(W401).await?.cast_signed().unsigned_abs());
+        let asked = (counts * 100).checked_div(u64::from(self.map.reference_counts_per_hertz)).unwrap_or(0);
+        let asked = Frequency::from_centihertz(u32::try_from(asked).unwrap_or(u32::MAX));
+        let limits = self.speed_limits().await?.unwrap_or((asked, asked));
+        Ok(follows_frequency(reference, asked, limits))
+    }
+
+    /// Whether the reference before the ramp is zero, so that nothing turns.
+    pub(crate) fn asks_for_nothing(&self, status: &Status) -> bool {
+        self.reference(status).is_none_or(|reference| reference == Frequency::ZERO)
+    }
+
+    fn reference(&self, status: &Status) -> Option<Frequency> {
+        status.raw(self.map.reference?).map(Frequency::from_decihertz)
+    }
+
+    async fn speed_limits(&mut self) -> Result<Option<(Frequency, Frequency)>> {
+        let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
+        if self.limits.is_none() {
+            let words = Words::read(&mut self.registers.at(Class::Command), false, &[low, high]).await?;
+            let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
+            self.limits = frequency(low).zip(frequency(high));
+        }
+        Ok(self.limits)
+    }
+}
