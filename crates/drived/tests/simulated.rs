@@ -243,18 +243,18 @@ fn a_scan_says_how_long_it_takes_then_names_who_answers_and_how_to_go_on() {
 
 #[test]
 fn lines_on_standard_input_act_on_the_world_of_the_simulated_drives() {
-    let mut sim = Sim::serve("world", &["atv312@1", "3g3ev@2"]);
+    let mut sim = Sim::serve("world", &["atv312@1", "atv21@2"]);
     sim.say("help", "DRIVE terminal NAME on | off");
-    sim.say("drives", "3g3ev@2");
+    sim.say("drives", "atv21@2");
     sim.say("atv312@1 trip OCF", "done");
     let status = sim.on("atv312@1", &["status"]);
     assert!(status.assert_done().contains("fault"), "{status:?}");
-    sim.say("3g3ev@2 power off", "done");
-    sim.on("3g3ev@2", &["status"]).assert_refused(1, "3g3ev@2 does not answer");
+    sim.say("atv21@2 power off", "done");
+    sim.on("atv21@2", &["status"]).assert_refused(1, "atv21@2 does not answer");
     let refused = sim.say("atv312@2 power on", "refused:");
-    assert!(refused.contains("\"atv312@2\" is no drive of this line: it has atv312@1, 3g3ev@2"), "{refused}");
-    sim.say("3g3ev@2 power on", "done");
-    sim.on("3g3ev@2", &["status"]).assert_done();
+    assert!(refused.contains("\"atv312@2\" is no drive of this line: it has atv312@1, atv21@2"), "{refused}");
+    sim.say("atv21@2 power on", "done");
+    sim.on("atv21@2", &["status"]).assert_done();
     sim.say("line cut", "done");
-    sim.on("3g3ev@2", &["status"]).assert_refused(1, "3g3ev@2 does not answer");
+    sim.on("atv21@2", &["status"]).assert_refused(1, "atv21@2 does not answer");
 }
