@@ -117,9 +117,7 @@ impl Motor {
 
     /// Injects direct current of `percent` of the nominal current, for a time or until something else is ordered.
     pub fn brake(&mut self, percent: u16, time: Option<Duration>) {
-        if !matches!(self.stage, Stage::Brakes { .. }) {
-            self.set_stage(Stage::Brakes { percent, remaining: time });
-        }
+        self.set_stage(Stage::Brakes { percent, remaining: time });
     }
 
     /// Sets the load at the shaft in percent of nominal torque. It always works against the movement.
@@ -272,7 +270,7 @@ impl Motor {
     }
 
     /// The time until slope, torque or stage change by themselves.
-    fn until_change(&self) -> Option<Duration> {
+    pub(crate) fn until_change(&self) -> Option<Duration> {
         let shaft = self.shaft();
         let later = |time: Duration| (!time.is_zero()).then_some(time);
         match self.stage {

@@ -3,32 +3,23 @@
 //! It behaves as the Altivar 312 does at access level L1, which is "interchangeable with ATV28" (p. 35): at power-up the
 //! terminals command and the drive is in "operation enabled". Where the documents are silent it does the least: `CMI`
 //! is a word without effect, `ETI2` and W452 read 0, no silence of the line trips it, and each parameter that is written
-//! goes to EEPROM at once.
+//! goes to EEPROM at once. The inputs have the twin's factory functions; a standing current, a restart and a summing input
+//! that cannot be set over its bus are left out.
 
 mod parameters;
 
 use std::time::Duration;
 
-use drive_atv28::{
-    FAULTS, ROWS,
-    registers::{
-        AC2, ACC, ADD, BFR, BRA, CMD, CMDD, COD, CRH3, CRL3, CTD, DE2, DEC, DP1, DP2, DP3, DP4, ERRD, ETA,
-        ETAD, ETI, FBS, FRH, FRHD, FRS, FTD, HSP, IDC, INV, IOLR, IPL, ITH, JGF, LCR, LFR, LFRD, LFT, LSP,
-        NRD, OPL, OPR, OTR, RFR, RFRD, RIG, RPG, RTH, SFR, SMAL_HIGH, SMAL_LOW, SMIL_HIGH, SMIL_LOW, SP2,
-        SP3, SP4, SP5, SP6, SP7, SPAL_LOW, SPAT, SPDL_LOW, SPDT, TFR, THD, THR, TTD, UFT, ULN, UNS,
-    },
-};
+use drive_atv28::{FAULTS, ROWS, registers::address::*};
 use drive_core::registers::Access;
 
-use super::drivecom::{Drivecom, Reaction, centihertz, profile_code, rpm, word};
-use crate::{
-    Bank, Cast, Exception, Model, Nameplate, Observation, Panel, Rules, Surroundings,
-    models::atv28::parameters::settings,
+use self::parameters::settings;
+use super::drivecom::{
+    self, Commander, Settings, centihertz,
+    family::{Family, TWO_WIRES, Unit},
+    profile_code, rpm, word,
 };
-
-/// What is around it.
-const SURROUNDINGS: Surroundings =
-    Surroundings { family: "atv28", trips: FAULTS, rows: ROWS, ..Surroundings::NONE };
+use crate::{Bank, Rules, world::Surroundings};
 
 const RULES: Rules = Rules {
     read_holding: 7,
@@ -50,55 +41,78 @@ const CONSISTENCY_CHECK: u16 = 0x0002;
 /// `IOLR` bit 8: relay R1, energised without a fault.
 const R1: u16 = 0x0100;
 
+/// `IOLR` bits 0 to 5: LI1 to LI6.
+const INPUTS: u16 = 0x003F;
+/// Line undervoltage.
+const USF: u16 = 22;
+
+/// LI1 to LI4 with the functions that the twin has from the factory (p. 15), AI1 and AI2 likewise.
+const SURROUNDINGS: Surroundings = Surroundings {
+    family: "atv28",
+    terminals: &["LI1", "LI2", "LI3", "LI4"],
+    analog_inputs: &["AI1", "AI2"],
+    switches: &[
+        drivecom::PRIORITY,
+        drivecom::BUS_REFERENCE,
+        drivecom::GIVEN_BACK,
+        drivecom::RESET,
+        drivecom::MOTOR_RUNNING,
+        drivecom::DISABLE_OPERATION,
+        drivecom::TERMINAL_REFERENCE,
+        TWO_WIRES,
+    ],
+    trips: FAULTS,
+    rows: ROWS,
+};
+
 /// Settings as they are when the drive leaves the factory; those of the twins, where they have one.
 const FACTORY: &[(u16, u16)] = &[
-    (COD.address(), 0),
-    (CRL3.address(), 40),
-    (CRH3.address(), 200),
-    (ADD.address(), 1),
-    (BFR.address(), 0),
-    (SFR.address(), 40),
-    (TFR.address(), 600),
-    (FRS.address(), 500),
-    (UNS.address(), 400),
-    (NRD.address(), 1),
-    (UFT.address(), 2),
-    (BRA.address(), 1),
-    (OPL.address(), 1),
-    (IPL.address(), 1),
-    (HSP.address(), 500),
-    (ACC.address(), 30),
-    (DEC.address(), 30),
-    (ITH.address(), NOMINAL_CURRENT),
-    (AC2.address(), 50),
-    (DE2.address(), 50),
-    (JGF.address(), 100),
-    (SP2.address(), 100),
-    (SP3.address(), 150),
-    (SP4.address(), 200),
-    (SP5.address(), 250),
-    (SP6.address(), 300),
-    (SP7.address(), 350),
-    (IDC.address(), 26),
-    (RPG.address(), 100),
-    (RIG.address(), 100),
-    (FBS.address(), 10),
-    (CTD.address(), NOMINAL_CURRENT),
-    (TTD.address(), 100),
-    (FTD.address(), 500),
-    (INV.address(), NOMINAL_CURRENT),
-    (SPAL_LOW.address(), 1_500),
-    (SPAT.address(), 3),
-    (SPDL_LOW.address(), 1_500),
-    (SPDT.address(), 3),
+    (COD, 0),
+    (CRL3, 40),
+    (CRH3, 200),
+    (ADD, 1),
+    (BFR, 0),
+    (SFR, 40),
+    (TFR, 600),
+    (FRS, 500),
+    (UNS, 400),
+    (NRD, 1),
+    (UFT, 2),
+    (BRA, 1),
+    (OPL, 1),
+    (IPL, 1),
+    (HSP, 500),
+    (ACC, 30),
+    (DEC, 30),
+    (ITH, NOMINAL_CURRENT),
+    (AC2, 50),
+    (DE2, 50),
+    (JGF, 100),
+    (SP2, 100),
+    (SP3, 150),
+    (SP4, 200),
+    (SP5, 250),
+    (SP6, 300),
+    (SP7, 350),
+    (IDC, 26),
+    (RPG, 100),
+    (RIG, 100),
+    (FBS, 10),
+    (CTD, NOMINAL_CURRENT),
+    (TTD, 100),
+    (FTD, 500),
+    (INV, NOMINAL_CURRENT),
+    (SPAL_LOW, 1_500),
+    (SPAT, 3),
+    (SPDL_LOW, 1_500),
+    (SPDT, 3),
 ];
 
 /// A simulated Altivar 28.
 #[derive(Debug, Clone)]
 pub struct Atv28 {
-    bank: Bank,
-    drive: Drivecom,
-    /// Whether the line has given a command since power-up; until then the terminals have control.
+    unit: Unit,
+    /// Whether the bus commands; the terminals do until it has given a command.
     commanded: bool,
 }
 
@@ -110,74 +124,23 @@ impl Atv28 {
         for &(address, value) in FACTORY {
             bank.set_factory(address, value);
         }
-        let plate = Nameplate::light(u32::from(NOMINAL_CURRENT));
-        let drive = Drivecom::new(plate, settings(&bank, false));
-        Self { bank, drive, commanded: false }
+        let settings = settings(&bank, false);
+        Self { unit: Unit::new(bank, NOMINAL_CURRENT, settings), commanded: false }
     }
 
-    fn take_settings(&mut self) {
-        self.drive.set_settings(settings(&self.bank, self.commanded));
+    /// Whether the keys of the remote terminal command (LCC, p. 38).
+    fn by_remote_terminal(&self) -> bool {
+        self.unit.bank.value(LCC) == 1
     }
 
-    /// A register that the drive computes; `None` for one that is kept.
-    fn computed(&self, address: u16) -> Option<u16> {
-        let motor = self.drive.motor();
-        let fault = |index| self.drive.faults().nth(index).map_or(0, |fault| fault.code);
-        let output = motor.output_frequency();
-        let target = self.drive.target();
-        Some(match address {
-            _ if address == FRH.address() => word(target.abs() / 10),
-            _ if address == RFR.address() => word(output / 10),
-            _ if address == LCR.address() => u16::try_from(motor.current()).unwrap_or(u16::MAX),
-            _ if address == ULN.address() => LINE_VOLTAGE,
-            // Heat sink and windings warm up together here.
-            _ if address == THR.address() || address == THD.address() => motor.thermal_state(),
-            _ if address == LFT.address() => fault(0),
-            _ if address == ETA.address() || address == ETAD.address() => self.drive.eta(),
-            _ if address == ETI.address() => self.drive.eti() | CONSISTENCY_CHECK,
-            _ if address == DP1.address() => fault(1),
-            _ if address == DP2.address() => fault(2),
-            _ if address == DP3.address() => fault(3),
-            _ if address == DP4.address() => fault(4),
-            _ if address == OTR.address() => word(motor.torque()),
-            _ if address == OPR.address() => word(motor.power()),
-            _ if address == RTH.address() => {
-                u16::try_from(motor.fed_for().as_secs() / 3_600).unwrap_or(u16::MAX)
-            }
-            _ if address == ERRD.address() => profile_code(fault(0)),
-            _ if address == CMDD.address() => self.bank.value(CMD.address()),
-            _ if address == FRHD.address() => word(rpm(target)),
-            _ if address == RFRD.address() => word(rpm(output)),
-            // Low and high speed once more, in rpm: two words each, the high one always 0 here.
-            _ if address == SMIL_LOW.address() => word(rpm(i32::from(self.bank.value(LSP.address())) * 10)),
-            _ if address == SMAL_LOW.address() => word(rpm(i32::from(self.bank.value(HSP.address())) * 10)),
-            _ if address == SMIL_HIGH.address() || address == SMAL_HIGH.address() => 0,
-            _ => return None,
-        })
-    }
-
-    /// What a write does beyond being kept.
-    fn act(&mut self, address: u16, value: u16) {
-        if address == CMD.address() || address == CMDD.address() {
-            self.bank.set(CMD.address(), value);
-            self.commanded = true;
-            self.take_settings();
-            self.drive.command(value);
-        } else if address == LFR.address() {
-            self.drive.reference(i32::from(value.cast_signed()) * 10);
-        } else if address == LFRD.address() {
-            self.drive.reference(centihertz(i32::from(value.cast_signed())));
-        } else if address == SMIL_LOW.address() || address == SMAL_LOW.address() {
-            let limit = if address == SMIL_LOW.address() { LSP.address() } else { HSP.address() };
-            self.bank.set_for_good(limit, word(centihertz(i32::from(value)) / 10));
-            self.take_settings();
-        } else {
-            let locks = self.bank.row(address).is_some_and(|row| row.access == Access::WriteStopped);
-            self.take_settings();
-            if locks {
-                self.drive.configuration_written();
-            }
+    /// AI1, or the preset speed that LI3 and LI4 choose (p. 15, 42), plus AI2.
+    fn first_reference(&self, asked: i32) -> i32 {
+        let around = &self.unit.around;
+        let preset = u16::from(around.is_on(3)) + 2 * u16::from(around.is_on(4));
+        if preset > 0 && !self.three_wires() {
+            return i32::from(self.unit.bank.value(SP2 - 1 + preset)) * 10;
         }
+        asked + around.analog(2) * i32::from(self.unit.bank.value(HSP)) / 1_000
     }
 }
 
@@ -187,80 +150,130 @@ impl Default for Atv28 {
     }
 }
 
-impl Model for Atv28 {
-    fn surroundings(&self) -> &'static Surroundings {
-        &SURROUNDINGS
+impl Family for Atv28 {
+    const RULES: Rules = RULES;
+    const SURROUNDINGS: &'static Surroundings = &SURROUNDINGS;
+    const SUPPLY_FAULT: Option<u16> = Some(USF);
+
+    fn unit(&self) -> &Unit {
+        &self.unit
     }
 
-    fn rules(&self) -> &Rules {
-        &RULES
+    fn unit_mut(&mut self) -> &mut Unit {
+        &mut self.unit
     }
 
-    fn read(&mut self, address: u16) -> Result<u16, Exception> {
-        let kept = self.bank.read(address)?;
-        let outputs = if self.drive.present_fault().is_none() { R1 } else { 0 };
-        Ok(match self.computed(address) {
-            Some(computed) => computed,
-            None if address == IOLR.address() => kept | outputs,
-            None => kept,
+    fn computed(&self, address: u16) -> Option<u16> {
+        let Unit { bank, drive, around, .. } = &self.unit;
+        let motor = drive.motor();
+        let fault = |index| drive.faults().nth(index).map_or(0, |fault| fault.code);
+        let output = motor.output_frequency();
+        let target = drive.target();
+        Some(match address {
+            FRH => word(target.abs() / 10),
+            RFR => word(output / 10),
+            LCR => u16::try_from(motor.current()).unwrap_or(u16::MAX),
+            ULN if !around.motor_supply => 0,
+            ULN => LINE_VOLTAGE,
+            // Heat sink and windings warm up together here.
+            THR | THD => motor.thermal_state(),
+            LFT => fault(0),
+            ETA | ETAD => drive.eta(),
+            ETI => drive.eti() | CONSISTENCY_CHECK,
+            DP1 => fault(1),
+            DP2 => fault(2),
+            DP3 => fault(3),
+            DP4 => fault(4),
+            IOLR => {
+                let relay = if drive.present_fault().is_none() { R1 } else { 0 };
+                bank.value(IOLR) & !INPUTS | around.inputs & INPUTS | relay
+            }
+            OTR => word(motor.torque()),
+            OPR => word(motor.power()),
+            RTH => u16::try_from(motor.fed_for().as_secs() / 3_600).unwrap_or(u16::MAX),
+            ERRD => profile_code(fault(0)),
+            CMDD => bank.value(CMD),
+            FRHD => word(rpm(target)),
+            RFRD => word(rpm(output)),
+            // Low and high speed once more, in rpm: two words each, the high one always 0 here.
+            SMIL_LOW => word(rpm(i32::from(bank.value(LSP)) * 10)),
+            SMAL_LOW => word(rpm(i32::from(bank.value(HSP)) * 10)),
+            SMIL_HIGH | SMAL_HIGH => 0,
+            _ => return None,
         })
     }
 
-    fn write(&mut self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
-        let stopped = !self.drive.motor().is_fed();
-        self.bank.write(address, value, stopped)?;
-        self.act(address, value);
-        Ok(())
-    }
-
-    fn check_word(&self, address: u16, value: u16, _: Cast) -> Result<(), Exception> {
-        Ok(self.bank.check(address, value, !self.drive.motor().is_fed())?)
-    }
-
-    fn advance(&mut self, elapsed: Duration) {
-        self.drive.advance(elapsed);
-    }
-
-    fn power(&mut self, on: bool) {
-        if !on {
-            return self.drive.power(false);
+    fn act(&mut self, address: u16, value: u16) {
+        let count = i32::from(value.cast_signed());
+        match address {
+            CMD | CMDD => {
+                self.unit.bank.set(CMD, value);
+                self.commanded = true;
+                let (commander, _) = self.commander();
+                self.unit.drive.handed_over_by_word(commander);
+                self.refresh();
+                return self.unit.drive.command(value);
+            }
+            LFR => self.unit.bus_reference = count * 10,
+            LFRD => self.unit.bus_reference = centihertz(count),
+            SMIL_LOW | SMAL_LOW => {
+                let limit = if address == SMIL_LOW { LSP } else { HSP };
+                self.unit.bank.set_for_good(limit, word(centihertz(i32::from(value)) / 10));
+            }
+            _ => {}
         }
-        self.bank.power_cycle();
+        self.refresh();
+        if self.unit.bank.row(address).is_some_and(|row| row.access == Access::WriteStopped) {
+            self.unit.drive.configuration_written();
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        settings(&self.unit.bank, self.unit.by_level)
+    }
+
+    fn commander(&self) -> (Commander, bool) {
+        let forced = self.unit.around.forced_local;
+        let keypad = self.unit.bank.value(TCC) == 2;
+        match (self.by_remote_terminal(), self.commanded && !forced) {
+            (true, _) => (Commander::RemoteTerminal, true),
+            (_, true) => (Commander::Bus, false),
+            (_, false) => (Commander::Terminals, keypad),
+        }
+    }
+
+    fn reference(&self) -> i32 {
+        let Unit { around, bus_reference, .. } = self.unit;
+        let readings = self.unit.readings();
+        match self.commander().0 {
+            Commander::RemoteTerminal if readings.terminal_shares_reference => bus_reference,
+            Commander::RemoteTerminal => around.key_reference,
+            Commander::Bus if readings.bus_as_reference_1 => self.first_reference(bus_reference),
+            Commander::Bus => bus_reference,
+            _ if around.forced_local => self.unit.analog_reference(),
+            _ => self.first_reference(self.unit.analog_reference()),
+        }
+    }
+
+    /// It has none of its own.
+    fn choose(&mut self, _: &str, _: &str) {}
+
+    fn three_wires(&self) -> bool {
+        self.unit.bank.value(TCC) == 1
+    }
+
+    fn key_reverses(&self) -> bool {
+        self.unit.bank.value(ROT) == 1
+    }
+
+    fn powered_up(&mut self) {
         self.commanded = false;
-        self.take_settings();
-        self.drive.power(true);
     }
 
-    fn trip(&mut self, code: u16) {
-        self.drive.trip(code, Reaction::Freewheel, false);
-    }
-
-    fn set_load(&mut self, percent: u16) {
-        self.drive.set_load(percent);
-    }
-
-    fn panel(&mut self, action: Panel) {
-        self.drive.panel(action);
-    }
-
-    fn observe(&self) -> Observation {
-        self.drive.observe(self.bank.eeprom_writes())
-    }
-
-    fn frame_seen(&mut self, _: Cast) {
-        self.drive.frame_seen();
-    }
-
-    fn peek(&self, address: u16) -> Option<u16> {
-        self.bank.peek(address).map(|kept| self.computed(address).unwrap_or(kept))
-    }
-
-    fn poke(&mut self, address: u16, value: u16) -> bool {
-        let kept = self.computed(address).is_none() && self.bank.set(address, value);
-        if kept {
-            self.take_settings();
+    fn run_by_terminals(&mut self) {
+        if self.unit.readings().newest_commands {
+            self.commanded = false;
         }
-        kept
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use drive_atv28::registers::{ACC, DEC, FRS, HSP, IDC, INV, LSP};
+use drive_atv28::registers::address::*;
 
 use crate::{
     Bank, Ramp, Ramps,
-    models::drivecom::{CommandBits, LinkWatch, Reaction, Settings, Stop},
+    models::drivecom::{CommandBits, Injection, LinkWatch, Reaction, Settings, Standstill, Stop},
 };
 
 /// Fault of the Modbus link, SLF.
@@ -17,25 +17,28 @@ const FAST_STOP_DIVIDER: u32 = 4;
 const INJECTION_TIME: Duration = Duration::from_millis(500);
 /// The settings that the registers make. A count of a ramp is taken for 0.1 s, as on the twin; direct current for a
 /// share of the nominal one.
-pub(super) fn settings(bank: &Bank, commanded: bool) -> Settings {
-    let full_scale = u32::from(bank.value(FRS.address())) * 10;
+pub(super) fn settings(bank: &Bank, runs_by_level: bool) -> Settings {
+    let full_scale = u32::from(bank.value(FRS)) * 10;
     let ramp =
         |address| Ramp { full_scale, time: Duration::from_millis(u64::from(bank.value(address)) * 100) };
-    let deceleration = ramp(DEC.address());
-    let nominal = bank.value(INV.address()).max(1);
+    let deceleration = ramp(DEC);
+    let nominal = bank.value(INV).max(1);
+    let percent = |address| bank.value(address).saturating_mul(100) / nominal;
+    let low_speed_time = Duration::from_millis(u64::from(bank.value(TLS)) * 100);
     Settings {
-        starts_enabled: true,
-        bus_commands: commanded,
-        bus_reference: true,
         bits: CommandBits::BASIC,
-        ramps: Ramps { acceleration: ramp(ACC.address()), deceleration },
+        runs_by_level,
+        ramps: Ramps { acceleration: ramp(ACC), deceleration },
         fast_stop: Ramp { time: deceleration.time / FAST_STOP_DIVIDER, ..deceleration },
         stop: Stop::Ramp,
-        injection_current: u16::try_from(u32::from(bank.value(IDC.address())) * 100 / u32::from(nominal))
-            .unwrap_or(u16::MAX),
+        injection_current: percent(IDC),
+        injection_limit: percent(ITH) / 2,
         injection_time: INJECTION_TIME,
-        low_speed: u32::from(bank.value(LSP.address())) * 10,
-        high_speed: u32::from(bank.value(HSP.address())) * 10,
+        standstill: (Standstill::No, [Injection::default(); 2]),
+        low_speed: u32::from(bank.value(LSP)) * 10,
+        high_speed: u32::from(bank.value(HSP)) * 10,
+        low_speed_time: Some(low_speed_time).filter(|time| !time.is_zero()),
+        restarts: None,
         // No document says that a silent line trips an Altivar 28.
         link: LinkWatch { timeout: None, reaction: Reaction::Ignore, code: LINK_FAULT },
     }

@@ -1,119 +1,129 @@
 //! What the manual prints of values that exclude each other, and of settings that a write changes besides its own.
 
-use super::{factory::NOMINAL_CURRENT, settings::L3};
+use drive_atv312::registers::address::*;
+
+use super::{factory::NOMINAL_CURRENT, routing::L3};
 use crate::{Bank, Exception};
 
 /// Outputs of `IOLR` that can be written, with the register of their function: R1, R2, LO (p. 20).
-const OUTPUTS: [(u16, u16); 3] = [(1 << 8, 5001), (1 << 9, 5002), (1 << 10, 5031)];
+const OUTPUTS: [(u16, u16); 3] = [(1 << 8, R1), (1 << 9, R2), (1 << 10, DO)];
 /// Functions that a logic input can be assigned to, and that `tCC` therefore puts back (p. 33).
 const INPUT_FUNCTIONS: [u16; 25] = [
-    7124, 7125, 7131, 8011, 8411, 8421, 9010, 9202, 9608, 11105, 11110, 11202, 11203, 11204, 11401, 11402,
-    11403, 11404, 11501, 11502, 11601, 11602, 11909, 11910, 8431,
+    RSF, INH, ETF, CHP, RFC, CCS, RPS, LC2, TUN, RRS, JOG, NST, DCI, FST, PS2, PS4, PS8, PS16, USP, DSP, LAF,
+    LAR, PR2, PR4, FLO,
 ];
 
 /// The value as the drive takes it, beyond the range of the row.
 pub(super) fn check(bank: &Bank, address: u16, value: u16) -> Result<u16, Exception> {
-    let level = bank.value(3006);
+    let level = bank.value(LAC);
     let level_3 = level == L3;
-    let level_wire = bank.value(11101) == 0 && matches!(bank.value(11102), 0 | 2);
+    let level_wire = bank.value(TCC) == 0 && matches!(bank.value(TCT), 0 | 2);
     if matches!(value, 171..=175) && INPUT_FUNCTIONS.contains(&address) && !level_3 {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    // The PI regulator excludes summing and preset speeds; who comes first stays (p. 14, 45).
+    let excluded = match address {
+        PIF => [SA2, SA3, PS2].iter().any(|&other| bank.value(other) != 0),
+        SA2 | SA3 | PS2 => bank.value(PIF) != 0,
+        _ => false,
+    };
+    if excluded && value != 0 {
         return Err(Exception::ILLEGAL_VALUE);
     }
     let allowed = match address {
         // Back to a lower level only by a factory setting (p. 35).
-        3006 => !level_3 || value == L3,
-        3104 => (bank.value(3105)..=bank.value(3103)).contains(&value),
-        3105 => value <= bank.value(3104),
-        8401 | 8402 | 8432 => level_3,
-        8413 | 8414 | 11801 | 11802 => match value {
+        LAC => !level_3 || value == L3,
+        HSP => (bank.value(LSP)..=bank.value(TFR)).contains(&value),
+        LSP => value <= bank.value(HSP),
+        CHCF | COP | FLOC => level_3,
+        FR1 | FR2 | SA2 | SA3 => match value {
             160 | 161 => level > 0,
             163 | 164 | 167 => level_3,
             _ => true,
         },
-        7131 if value >= 171 => bank.value(7090) == 1,
-        8411 | 8421 if value >= 187 => level_3,
+        ETF if value >= 171 => bank.value(LET) == 1,
+        RFC | CCS if value >= 187 => level_3,
         // Brake, second current limit, second motor, limit switches (p. 47–50).
-        10001 | 9202 | 8011 | 11601 | 11602 if level == 0 => value == 0,
-        11402 => value == 0 || bank.value(11401) != 0,
-        11403 => value == 0 || bank.value(11402) != 0,
-        11404 => value == 0 || bank.value(11403) != 0,
-        11910 => value == 0 || bank.value(11909) != 0,
-        11501 | 11502 => value == 0 || (level > 0 && [8413, 8414].iter().any(|&fr| bank.value(fr) == 160)),
-        64003 => value == 0 || !level_3,
-        11101 => value != 2 || !level_3,
+        BLC | LC2 | CHP | LAF | LAR if level == 0 => value == 0,
+        PS4 => value == 0 || bank.value(PS2) != 0,
+        PS8 => value == 0 || bank.value(PS4) != 0,
+        PS16 => value == 0 || bank.value(PS8) != 0,
+        PR4 => value == 0 || bank.value(PR2) != 0,
+        USP | DSP => value == 0 || (level > 0 && [FR1, FR2].iter().any(|&fr| bank.value(fr) == 160)),
+        LCC_KEYS => value == 0 || !level_3,
+        TCC => value != 2 || !level_3,
         // Automatic restart and catching a spinning motor need 2-wire level control (p. 14, 51, 52).
-        7122 => value == 0 || level_wire,
-        3110 => value == 0 || (level_wire && bank.value(10401) != 2),
-        7003 => value != 0 || bank.value(4444) >= bank.value(4434),
-        8001 | 8002 => !(11..=14).contains(&value),
-        9001 | 9002 | 9012 | 9013 => value >= if bank.value(9020) == 0 { 5 } else { 1 },
-        9006 => value <= 100 - bank.value(9005).min(100),
-        9008 => value <= 100 - bank.value(9007).min(100),
-        9201 | 9203 => shares(25, 150, value),
-        9603 | 9703 => shares(25, 150, value),
-        9622 => shares(20, 150, value),
-        10003 => value == u16::MAX || value <= bank.value(3105),
-        10006 => shares(0, 136, value),
-        10403 | 10405 => shares(0, 120, value),
-        11001 => shares(0, 150, value),
-        11210 => shares(0, 100, value),
+        ATR => value == 0 || level_wire,
+        FLR => value == 0 || (level_wire && bank.value(ADC) != 2),
+        LFL => value != 0 || bank.value(CRH3) >= bank.value(CRL3),
+        SCS | FCS => !(11..=14).contains(&value),
+        ACC | DEC | AC2 | DE2 => value >= if bank.value(INR) == 0 { 5 } else { 1 },
+        TA2 => value <= 100 - bank.value(TA1).min(100),
+        TA4 => value <= 100 - bank.value(TA3).min(100),
+        CLI | CL2 => shares(25, 150, value),
+        NCR | NCR2 => shares(25, 150, value),
+        ITH => shares(20, 150, value),
+        BEN => value == u16::MAX || value <= bank.value(LSP),
+        IBR => shares(0, 136, value),
+        SDC1 | SDC2 => shares(0, 120, value),
+        CTD => shares(0, 150, value),
+        IDC => shares(0, 100, value),
         // An N4: 100 to 500 V, and at most 14 V/Hz (p. 28, 29).
-        9601 => value <= 500 && volts_per_hertz(value, bank.value(9602)),
-        9602 => volts_per_hertz(bank.value(9601), value),
-        9701 => value <= 500 && volts_per_hertz(value, bank.value(9702)),
-        9702 => volts_per_hertz(bank.value(9701), value),
-        11410..=11424 => value <= bank.value(3104),
-        5261 => bank.value(5031) == 0,
+        UNS => value <= 500 && volts_per_hertz(value, bank.value(FRS)),
+        FRS => volts_per_hertz(bank.value(UNS), value),
+        UNS2 => value <= 500 && volts_per_hertz(value, bank.value(FRS2)),
+        FRS2 => volts_per_hertz(bank.value(UNS2), value),
+        AO1R => bank.value(DO) == 0,
         _ => true,
     };
     if !allowed {
         return Err(Exception::ILLEGAL_VALUE);
     }
-    Ok(if address == 5240 { outputs(bank, value) } else { value })
+    Ok(if address == IOLR { outputs(bank, value) } else { value })
 }
 
 /// What a write changes besides its own register.
 pub(super) fn follow(bank: &mut Bank, address: u16) {
     let value = bank.value(address);
     let set: &[(u16, u16)] = match (address, value) {
-        (3006, L3) => &[(8413, 1), (8423, 1), (8401, 1), (11101, 0)],
-        (3015, 0) => &[(3103, 600), (3104, 500), (9602, 500), (11003, 500)],
-        (3015, _) => &[(3103, 720), (3104, 600), (9602, 600), (11003, 600)],
-        (9607, _) => &[(9623, 20)],
-        (9707, _) => &[(9723, 20)],
-        (9643, 0) => &[],
-        (9643, 1) => &[(9608, 115), (7012, 1)],
-        (9643, _) => &[(7012, 1)],
+        (LAC, L3) => &[(FR1, 1), (CD1, 1), (CHCF, 1), (TCC, 0)],
+        (BFR, 0) => &[(TFR, 600), (HSP, 500), (FRS, 500), (FTD, 500)],
+        (BFR, _) => &[(TFR, 720), (HSP, 600), (FRS, 600), (FTD, 600)],
+        (UFT, _) => &[(UFR, 20)],
+        (UFT2, _) => &[(UFR2, 20)],
+        (RSC, 0) => &[],
+        (RSC, 1) => &[(TUN, 115), (TNL, 1)],
+        (RSC, _) => &[(TNL, 1)],
         // A motor parameter after auto-tuning (p. 30).
-        (9601 | 9602 | 9603 | 9604 | 9606, _) => &[(9608, 0)],
-        (10001, 1..) => &[(3110, 0), (9003, 0), (9611, 1)],
-        (9611, 2) => &[(10001, 0)],
+        (UNS | FRS | NCR | NSP | COS, _) => &[(TUN, 0)],
+        (BLC, 1..) => &[(FLR, 0), (BRA, 0), (OPL, 1)],
+        (OPL, 2) => &[(BLC, 0)],
         _ => &[],
     };
     for &(other, value) in set {
         bank.set(other, value);
     }
     match address {
-        11101 => follow_wiring(bank),
+        TCC => follow_wiring(bank),
         // LSP, HSP and tFr stay in this order.
-        3103 => {
-            bank.set(3104, bank.value(3104).min(value));
-            bank.set(3105, bank.value(3105).min(value));
+        TFR => {
+            bank.set(HSP, bank.value(HSP).min(value));
+            bank.set(LSP, bank.value(LSP).min(value));
         }
-        9020 if value == 0 => {
-            for ramp in [9001, 9002, 9012, 9013] {
+        INR if value == 0 => {
+            for ramp in [ACC, DEC, AC2, DE2] {
                 bank.set(ramp, bank.value(ramp).max(5));
             }
         }
-        4434 | 4444 if bank.value(4444) < bank.value(4434) => {
-            bank.set(7003, 1);
+        CRL3 | CRH3 if bank.value(CRH3) < bank.value(CRL3) => {
+            bank.set(LFL, 1);
         }
         // The limits in rpm are the limits in hertz (p. 18): 3 rpm are 0.1 Hz.
-        8607 => {
-            bank.set(3105, (value / 3).min(bank.value(3104)));
+        SMIL => {
+            bank.set(LSP, (value / 3).min(bank.value(HSP)));
         }
-        8609 => {
-            bank.set(3104, (value / 3).max(bank.value(3105)).min(bank.value(3103)));
+        SMAL => {
+            bank.set(HSP, (value / 3).max(bank.value(LSP)).min(bank.value(TFR)));
         }
         _ => {}
     }
@@ -121,11 +131,11 @@ pub(super) fn follow(bank: &mut Bank, address: u16) {
 
 /// `tCC` puts back every function of a logic input, some of them to a value of its own (p. 33, 42, 43, 45).
 pub(super) fn follow_wiring(bank: &mut Bank) {
-    let wiring = bank.value(11101);
-    bank.restore_factory(|row| INPUT_FUNCTIONS.contains(&row.address) || row.address == 11102);
+    let wiring = bank.value(TCC);
+    bank.restore_factory(|row| INPUT_FUNCTIONS.contains(&row.address) || row.address == TCT);
     let own: &[(u16, u16)] = match wiring {
-        1 => &[(11105, 131), (11110, 132), (11401, 0), (11402, 0)],
-        2 => &[(11105, 0)],
+        1 => &[(RRS, 131), (JOG, 132), (PS2, 0), (PS4, 0)],
+        2 => &[(RRS, 0)],
         _ => &[],
     };
     for &(address, value) in own {
@@ -135,10 +145,8 @@ pub(super) fn follow_wiring(bank: &mut Bank) {
 
 /// `CFG` = StS differs from the factory configuration in its inputs and outputs (p. 32).
 pub(super) fn choose_configuration(bank: &mut Bank) {
-    if bank.value(3052) == 0 {
-        for (address, value) in
-            [(11401, 0), (11402, 0), (5002, 0), (5031, 0), (11801, 0), (11802, 0), (5001, 1)]
-        {
+    if bank.value(CFG) == 0 {
+        for (address, value) in [(PS2, 0), (PS4, 0), (R2, 0), (DO, 0), (SA2, 0), (SA3, 0), (R1, 1)] {
             bank.set(address, value);
         }
     }
@@ -157,7 +165,7 @@ pub(super) fn restore(bank: &mut Bank, backup: &Bank) {
 fn outputs(bank: &Bank, value: u16) -> u16 {
     let free = OUTPUTS.into_iter().filter(|&(_, function)| bank.value(function) == 0);
     let mask = free.fold(0, |mask, (bit, _)| mask | bit);
-    (bank.value(5240) & !mask) | (value & mask)
+    (bank.value(IOLR) & !mask) | (value & mask)
 }
 
 /// Whether a current lies between two percentages of the nominal drive current.

@@ -1,76 +1,112 @@
-//! From the registers to what acts on chart and motor.
+//! From the registers to the parameters of chart and motor.
 
 use std::time::Duration;
 
-use drive_atv312::words::ExtendedControl;
+use drive_atv312::{registers::address::*, words::ExtendedControl};
 
-use super::{CMI, factory::NOMINAL_CURRENT};
+use super::{factory::NOMINAL_CURRENT, routing::Routing};
 use crate::{
     Bank, Ramp, Ramps,
-    models::drivecom::{CommandBits, LinkWatch, Reaction, Settings, Stop, centihertz},
+    models::drivecom::{
+        CommandBits, Injection, LinkWatch, Reaction, Restarts, Settings, Standstill, Stop, centihertz,
+    },
 };
 
-/// Access level L3 in `LAC`.
-pub(super) const L3: u16 = 2;
+/// The faults after which `Atr` restarts the drive (p. 51): SLF, EPF, LFF, OHF, OLF, ObF, OSF, OPF, PHF, COF.
+const RESTARTED: &[u16] = &[5, 8, 13, 16, 17, 18, 19, 20, 21, 33, 34];
 
-/// The settings in force, with this control word.
-pub(super) fn settings(bank: &Bank, commanded: bool, word: u16) -> Settings {
-    let level_3 = bank.value(3006) == L3;
-    let commands = if level_3 { commands_by_modbus(bank, word) } else { commanded && bank.value(64003) == 0 };
-    let (acceleration, deceleration) = if second_ramps(bank, word) { (9012, 9013) } else { (9001, 9002) };
+/// The parameters in force.
+pub(super) fn settings(routing: &Routing<'_>) -> Settings {
+    let bank = routing.bank;
+    let tenths = |address| Duration::from_millis(u64::from(bank.value(address)) * 100);
+    let percent = |address| bank.value(address).saturating_mul(100) / NOMINAL_CURRENT;
+    let (acceleration, deceleration) = if routing.second_ramps() { (AC2, DE2) } else { (ACC, DEC) };
     let deceleration = ramp(bank, deceleration);
     // 0 stands for the shortest ramp (p. 40).
-    let divided = deceleration.time.checked_div(u32::from(bank.value(11230))).unwrap_or(Duration::ZERO);
-    let high_speed = bank.value(3104).min(bank.value(3103));
+    let divided = deceleration.time.checked_div(u32::from(bank.value(DCF))).unwrap_or(Duration::ZERO);
+    let standstill = match bank.value(ADC) {
+        1 => Standstill::Timed,
+        2 => Standstill::Continuous,
+        _ => Standstill::No,
+    };
+    let injections = [(SDC1, TDC1), (SDC2, TDC2)];
     Settings {
-        starts_enabled: !(level_3 && commands),
-        bus_commands: commands,
-        bus_reference: !level_3 || reference_channel(bank, word) == 164,
-        bits: bits(bank, level_3),
+        bits: bits(bank, routing.level_3()),
+        runs_by_level: by_level(bank),
         ramps: Ramps { acceleration: ramp(bank, acceleration), deceleration },
         fast_stop: Ramp { time: divided, ..deceleration },
-        stop: match bank.value(11201) {
+        stop: match bank.value(STT) {
             1 => Stop::Fast,
             2 => Stop::Freewheel,
             3 => Stop::DcInjection,
             _ => Stop::Ramp,
         },
-        injection_current: bank.value(11210).saturating_mul(100) / NOMINAL_CURRENT,
-        injection_time: Duration::from_millis(u64::from(bank.value(11211)) * 100),
-        low_speed: u32::from(bank.value(3105)) * 10,
-        high_speed: u32::from(high_speed) * 10,
-        link: LinkWatch {
-            timeout: Some(Duration::from_millis(u64::from(bank.value(6005)) * 100)),
-            reaction: reaction(bank.value(7010)),
-            code: 5,
-        },
+        injection_current: percent(IDC),
+        injection_limit: percent(ITH) / 2,
+        injection_time: tenths(TDC),
+        standstill: (
+            standstill,
+            injections.map(|(current, time)| Injection { percent: percent(current), time: tenths(time) }),
+        ),
+        low_speed: u32::from(bank.value(LSP)) * 10,
+        high_speed: u32::from(bank.value(HSP).min(bank.value(TFR))) * 10,
+        low_speed_time: Some(tenths(TLS)).filter(|time| !time.is_zero()),
+        restarts: restarts(bank),
+        link: LinkWatch { timeout: Some(tenths(TTO)), reaction: reaction(bank.value(SLL)), code: super::SLF },
     }
 }
 
-/// `EPL`, `OHL`, `OLL`, `SLL` and `COL` (p. 52–53).
-pub(super) const fn reaction(value: u16) -> Reaction {
-    match value {
-        0 => Reaction::Ignore,
-        6 => Reaction::Ramp,
-        7 => Reaction::Fast,
+/// Whether a run command counts by its level: `tCC` = 2C and `tCt` = LEL or PFO.
+pub(super) fn by_level(bank: &Bank) -> bool {
+    bank.value(TCC) == 0 && bank.value(TCT) != 1
+}
+
+/// `Atr` and `tAr` (p. 51).
+fn restarts(bank: &Bank) -> Option<Restarts> {
+    let minutes = match bank.value(TAR) {
+        0 => Some(5),
+        1 => Some(10),
+        2 => Some(30),
+        3 => Some(60),
+        4 => Some(120),
+        5 => Some(180),
+        _ => None,
+    };
+    let limit = minutes.map(|minutes| Duration::from_secs(minutes * 60));
+    (bank.value(ATR) == 1 && by_level(bank)).then_some(Restarts { after: RESTARTED, limit })
+}
+
+/// What a fault of this code does (`LFL`, `EPL`, `OHL`, `OLL`, `SLL`, `COL`, `IPL`, `OPL`, `StP`; p. 52–54).
+pub(super) fn reaction_to(bank: &Bank, code: u16) -> Reaction {
+    match code {
+        8 => reaction(bank.value(EPL)),
+        13 => reaction(bank.value(LFL)),
+        16 => reaction(bank.value(OHL)),
+        17 => reaction(bank.value(OLL)),
+        5 => reaction(bank.value(SLL)),
+        34 => reaction(bank.value(COL)),
+        // A fast stop, or nothing.
+        21 if bank.value(IPL) == 0 => Reaction::Ignore,
+        21 => Reaction::Fast,
+        // OAC trips no more than nO does.
+        20 | 33 if bank.value(OPL) != 1 => Reaction::Ignore,
+        22 => match bank.value(STP) {
+            0 => Reaction::Freewheel,
+            3 => Reaction::Fast,
+            _ => Reaction::Ramp,
+        },
         _ => Reaction::Freewheel,
     }
 }
 
-/// The preset speed that bits of the control word or logic inputs choose, in hundredths of a hertz (p. 42–44).
-pub(super) fn preset(bank: &Bank, word: u16) -> Option<i32> {
-    let choice: u16 = [(11401, 1), (11402, 2), (11403, 4), (11404, 8)]
-        .into_iter()
-        .filter(|&(function, _)| is_on(bank, bank.value(function), word))
-        .map(|(_, weight)| weight)
-        .sum();
-    (choice > 0).then(|| i32::from(bank.value(11409 + choice)) * 10)
-}
-
-/// Whether the bit or input of `EtF` reports an external fault (p. 52).
-pub(super) fn external_fault(bank: &Bank, word: u16) -> bool {
-    let assigned = bank.value(7131);
-    assigned != 0 && is_on(bank, assigned, word) == (bank.value(7090) == 1)
+/// A loss of the 4–20 mA answered by a speed (`LFL` 4, 5) is no fault.
+const fn reaction(value: u16) -> Reaction {
+    match value {
+        0 | 4 | 5 => Reaction::Ignore,
+        6 => Reaction::Ramp,
+        7 => Reaction::Fast,
+        _ => Reaction::Freewheel,
+    }
 }
 
 /// `LFr` as hundredths of a hertz: 0.1 Hz a count, or 32767 for 600 Hz (p. 19).
@@ -96,51 +132,6 @@ pub(super) fn counts(centihertz: i32, cmi: ExtendedControl) -> i32 {
     }
 }
 
-/// Whether `AC2` and `dE2` are in force (p. 20, 39). The threshold `Frt` is left out.
-pub(super) fn second_ramps(bank: &Bank, word: u16) -> bool {
-    let switched = ExtendedControl::from_bits_retain(bank.value(CMI)).contains(ExtendedControl::RAMP_SWITCH);
-    switched || is_on(bank, bank.value(9010), word)
-}
-
-/// Whether the reference comes by `Fr2` (p. 36).
-pub(super) fn by_reference_2(bank: &Bank, word: u16) -> bool {
-    let switch = bank.value(8411);
-    switch == 97 || is_on(bank, switch, word)
-}
-
-/// Whether the command comes by channel 2: with `CHCF` = SIM the one of the reference (p. 36, 37).
-pub(super) fn by_command_2(bank: &Bank, word: u16) -> bool {
-    if bank.value(8401) != 2 {
-        return by_reference_2(bank, word);
-    }
-    let switch = bank.value(8421);
-    switch == 99 || is_on(bank, switch, word)
-}
-
-fn reference_channel(bank: &Bank, word: u16) -> u16 {
-    bank.value(if by_reference_2(bank, word) { 8414 } else { 8413 })
-}
-
-fn commands_by_modbus(bank: &Bank, word: u16) -> bool {
-    match (bank.value(8401), by_command_2(bank, word)) {
-        (2, false) => bank.value(8423) == 10,
-        (2, true) => bank.value(8424) == 10,
-        _ => reference_channel(bank, word) == 164,
-    }
-}
-
-/// Whether what a function is assigned to is at 1: a logic input (129–134), or a bit of the control word (Cd11–Cd15 are
-/// 171–175, C111–C115 are 187–191).
-fn is_on(bank: &Bank, assigned: u16, word: u16) -> bool {
-    let (source, bit) = match assigned {
-        129..=134 => (bank.value(5240), assigned - 129),
-        171..=175 => (word, assigned - 160),
-        187..=191 => (word, assigned - 176),
-        _ => return false,
-    };
-    source & 1 << bit != 0
-}
-
 /// At L3 a bit that has got a function has lost its own (p. 19).
 fn bits(bank: &Bank, level_3: bool) -> CommandBits {
     if !level_3 {
@@ -148,30 +139,26 @@ fn bits(bank: &Bank, level_3: bool) -> CommandBits {
     }
     let of = |function| match bank.value(function) {
         assigned @ 171..=175 => 1 << (assigned - 160),
-        _ => 0,
-    };
-    let functions = [9010, 9202, 7131, 8011, 11401, 11402, 11403, 11404, 11909, 11910, 11203, 11204];
-    let taken = functions.into_iter().fold(0_u16, |taken, function| taken | of(function));
-    let switches = [8411, 8421].map(|switch| match bank.value(switch) {
         assigned @ 187..=191 => 1 << (assigned - 176),
         _ => 0,
-    });
-    let taken = switches.into_iter().fold(taken, |taken: u16, bit: u16| taken | bit);
+    };
+    let functions = [RPS, LC2, ETF, CHP, PS2, PS4, PS8, PS16, PR2, PR4, DCI, FST, RFC, CCS];
+    let taken = functions.into_iter().fold(0_u16, |taken, function| taken | of(function));
     CommandBits {
         reverse: CommandBits::LEVEL_3.reverse & !taken,
         stop: CommandBits::LEVEL_3.stop & !taken,
-        injection: of(11203),
-        fast_stop: of(11204),
+        injection: of(DCI),
+        fast_stop: of(FST),
     }
 }
 
 /// A ramp from 0 to `FrS`, in counts of `Inr` (p. 38, 39).
 fn ramp(bank: &Bank, address: u16) -> Ramp {
-    let count = match bank.value(9020) {
+    let count = match bank.value(INR) {
         0 => 10,
         1 => 100,
         _ => 1_000,
     };
     let time = Duration::from_millis(u64::from(bank.value(address)) * count);
-    Ramp { full_scale: u32::from(bank.value(9602)) * 10, time }
+    Ramp { full_scale: u32::from(bank.value(FRS)) * 10, time }
 }

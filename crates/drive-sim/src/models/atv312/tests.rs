@@ -1,3 +1,9 @@
+mod channels;
+mod faults;
+mod stops;
+
+use drive_core::Percent;
+
 use super::*;
 use crate::Block;
 
@@ -9,6 +15,27 @@ fn write(drive: &mut Atv312, address: u16, value: u16) -> Result<(), Exception> 
 
 fn state(drive: &mut Atv312) -> u16 {
     drive.read(3201).unwrap() & 0x6F
+}
+
+fn terminal(drive: &mut Atv312, name: &'static str, closed: bool) {
+    drive.world(Act::Terminal(name, closed));
+}
+
+fn analog(drive: &mut Atv312, name: &'static str, percent: i16) {
+    drive.world(Act::Analog(name, Percent::from_percent(percent)));
+}
+
+fn read_as(drive: &mut Atv312, name: &'static str, reading: &'static str) {
+    assert!(drive.surroundings().reading(name, reading).is_ok());
+    drive.world(Act::Reading(name, reading));
+}
+
+/// Up the chart, with a reference in tenths of a hertz.
+fn start(drive: &mut Atv312, reference: u16) {
+    write(drive, LFR, reference).unwrap();
+    for word in [0x0006, 0x0007, 0x000F] {
+        write(drive, CMD, word).unwrap();
+    }
 }
 
 /// Set up for the bus, climbed up the chart, at 50 Hz.
@@ -346,4 +373,24 @@ fn any_word_at_any_register_leaves_a_drive_that_answers() {
         }
     }
     assert!(drive.check_read(Block { function: 3, first: 3201, quantity: 7 }).is_ok());
+}
+
+// p. 20: a block with one word that is refused writes nothing; one word of it may allow the next (p. 43).
+#[test]
+fn no_block_is_half_written() {
+    let mut drive = Atv312::under_bus_control();
+    let mut block = |first: u16, values: &[u16]| {
+        let mut request = vec![0x10];
+        for word in [first, values.len() as u16] {
+            request.extend(word.to_be_bytes());
+        }
+        request.push(values.len() as u8 * 2);
+        request.extend(values.iter().flat_map(|value| value.to_be_bytes()));
+        (crate::pdu::answer(&mut drive, &request, Cast::Unicast).map(|_| ()), drive.bank.value(first))
+    };
+    assert_eq!(block(ACC, &[50, 0]), (Err(Exception::ILLEGAL_VALUE), 30));
+    assert_eq!(block(CMD, &[0x0006, 100, 1_001]), (Err(Exception::ILLEGAL_VALUE), 0));
+    assert_eq!(block(PS4, &[0, 0]), (Ok(()), 0));
+    assert_eq!(block(PS2, &[0, 0]), (Ok(()), 0));
+    assert_eq!(block(PS2, &[131, 132]), (Ok(()), 131));
 }

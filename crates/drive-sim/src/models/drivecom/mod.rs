@@ -2,24 +2,42 @@
 //! a motor in between (BBV51701 p. 10–13, 19–22).
 //!
 //! A family keeps its registers; it tells a [`Drivecom`] what was written ([`command`](Drivecom::command),
-//! [`reference`](Drivecom::reference), [`set_settings`](Drivecom::set_settings) …) and reads back
-//! [`eta`](Drivecom::eta), [`eti`](Drivecom::eti), the [`motor`](Drivecom::motor) and the
+//! [`set_settings`](Drivecom::set_settings) …) and what is asked from outside ([`situate`](Drivecom::situate)), and
+//! reads back [`eta`](Drivecom::eta), [`eti`](Drivecom::eti), the [`motor`](Drivecom::motor) and the
 //! [`faults`](Drivecom::faults).
+//!
+//! A drive that the bus does not command follows the chart by itself: it is in "operation enabled" unless something
+//! locks it (p. 11).
 
 mod counts;
+pub(super) mod family;
+mod faults;
+mod orders;
+mod readings;
 mod settings;
+mod situation;
+mod surroundings;
+mod time;
+mod wiring;
 mod words;
 
-use std::{collections::VecDeque, time::Duration};
+use std::collections::VecDeque;
 
-pub use settings::{CommandBits, LinkWatch, Reaction, Settings, Stop};
+pub use faults::PastFault;
+pub use settings::{CommandBits, Injection, LinkWatch, Reaction, Restarts, Settings, Standstill, Stop};
+pub use situation::{Commander, Run, Situation, StopInputs};
+pub use wiring::{RunInputs, Terminals, Wiring};
 
-pub(super) use self::counts::{centihertz, profile_code, rpm, word};
-use self::words::Order;
-use crate::{Motor, Nameplate, Observation, Panel, Watchdog};
-
-/// Faults that a drive remembers: the last and four past ones (LFt, DP1–DP4).
-const REMEMBERED: usize = 5;
+pub(super) use self::{
+    counts::{centihertz, profile_code, rpm, word},
+    readings::{
+        BUS_REFERENCE, DISABLE_OPERATION, GIVEN_BACK, MOTOR_RUNNING, PRESETS, PRIORITY, RESET, RESTART,
+        Readings, STOP_RELEASED, TERMINAL_REFERENCE,
+    },
+    surroundings::{ANALOG_INPUTS, Around, TERMINALS},
+};
+use self::{orders::Order, time::Timers};
+use crate::{Motor, Nameplate, Observation, Watchdog};
 
 /// A state of the chart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -40,77 +58,72 @@ pub enum ChartState {
     Fault,
 }
 
-/// A fault as the drive remembers it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct PastFault {
-    /// The family's code.
-    pub code: u16,
-    /// The state when it came, as the words EP1–EP4 show it (BBV51701 p. 25).
-    pub status: u16,
-}
-
 /// A drive with the DRIVECOM chart.
 #[derive(Debug, Clone)]
 pub struct Drivecom {
     settings: Settings,
+    readings: Readings,
+    situation: Situation,
     state: ChartState,
     /// The last control word; `None` until there is one.
     word: Option<u16>,
-    /// Whether the order in the control word is in force: not after somebody at the machine took control.
+    /// Whether the order in the control word is in force: not after somebody else had control.
     obeys: bool,
+    /// Whether the run command that stands has to be given anew.
+    spent: bool,
     order: Order,
-    reference: i32,
     motor: Motor,
     watchdog: Watchdog,
     no_timeout: bool,
+    timers: Timers,
     cause_persists: bool,
     /// The latest first.
     faults: VecDeque<PastFault>,
-    local: bool,
     stopped_by_key: bool,
 }
 
 impl Drivecom {
     /// A drive that was just powered up.
     #[must_use]
-    pub fn new(plate: Nameplate, settings: Settings) -> Self {
+    pub fn new(plate: Nameplate, settings: Settings, situation: Situation) -> Self {
         let mut drive = Self {
             settings,
+            readings: Readings::default(),
+            situation,
             state: ChartState::SwitchOnDisabled,
             word: None,
             obeys: true,
+            spent: false,
             order: Order::Nothing,
-            reference: 0,
             motor: Motor::new(plate),
             watchdog: Watchdog::default(),
             no_timeout: false,
+            timers: Timers::default(),
             cause_persists: false,
             faults: VecDeque::new(),
-            local: false,
             stopped_by_key: false,
         };
-        drive.power(true);
+        drive.power_up(settings, situation);
         drive
     }
 
-    /// The supply goes or comes: the chart begins anew, the shaft turns on, the faults are remembered.
-    pub fn power(&mut self, on: bool) {
+    /// The supply goes: the shaft turns on, the faults are remembered, all else is forgotten.
+    pub fn power_off(&mut self) {
         self.motor.freewheel();
-        self.state = if self.settings.starts_enabled {
-            ChartState::OperationEnabled
-        } else {
-            ChartState::SwitchOnDisabled
-        };
-        (self.word, self.obeys, self.order, self.reference) = (None, true, Order::Nothing, 0);
-        (self.no_timeout, self.cause_persists) = (false, false);
-        (self.local, self.stopped_by_key) = (false, false);
+        self.state = ChartState::SwitchOnDisabled;
+        (self.word, self.obeys, self.spent, self.order) = (None, true, false, Order::Nothing);
+        (self.no_timeout, self.cause_persists, self.stopped_by_key) = (false, false, false);
+        self.timers = Timers::default();
         self.watchdog.rest();
-        if on {
-            self.watch();
-        } else {
-            self.state = ChartState::SwitchOnDisabled;
-            self.watchdog.set_timeout(None);
-        }
+        self.watchdog.set_timeout(None);
+    }
+
+    /// The supply comes, and finds this: the chart begins anew.
+    pub fn power_up(&mut self, settings: Settings, situation: Situation) {
+        self.power_off();
+        (self.settings, self.situation) = (settings, situation);
+        self.watch();
+        self.follow();
     }
 
     /// Parameters have changed.
@@ -128,27 +141,59 @@ impl Drivecom {
         &self.settings
     }
 
+    /// From now on the drive follows these readings of its manual.
+    pub(super) fn set_readings(&mut self, readings: Readings) {
+        self.readings = readings;
+        self.obey();
+    }
+
+    pub(super) const fn readings(&self) -> &Readings {
+        &self.readings
+    }
+
+    /// What is asked from outside has changed.
+    pub fn situate(&mut self, situation: Situation) {
+        let before = std::mem::replace(&mut self.situation, situation);
+        let stops = situation.stops;
+        if before.run != situation.run && situation.run.is_none() {
+            self.spent = false;
+        }
+        if before.commander != situation.commander {
+            (self.obeys, self.spent) = (self.readings.standing_word_acts, false);
+            let enabled = self.state == ChartState::OperationEnabled;
+            if let Some(word) =
+                self.word.filter(|_| situation.commander == Commander::Bus && enabled && self.obeys)
+            {
+                self.state = words::next(self.state, word);
+            }
+        }
+        if stops.fast || stops.lock {
+            let stands = situation.run.is_some() || situation.commander == Commander::Bus;
+            self.spent |= stands && !self.restarts_after_a_stop();
+        }
+        self.follow();
+    }
+
     /// The control word (CMD) was written. Its levels move the chart at each write; bit 7 resets a fault when it
     /// rises (BBV51701 p. 12).
     pub fn command(&mut self, word: u16) {
         let reset_rises = word & words::FAULT_RESET != 0 && self.word.unwrap_or(0) & words::FAULT_RESET == 0;
         self.word = Some(word);
-        self.obeys = true;
-        if self.local || !self.settings.bus_commands {
-            return;
-        }
-        if reset_rises && self.state == ChartState::Fault {
+        let commands = self.situation.commander == Commander::Bus;
+        if reset_rises && self.state == ChartState::Fault && (commands || self.readings.any_word_resets) {
             self.reset();
             return;
         }
-        self.state = words::next(self.state, word);
-        self.obey();
+        if commands {
+            (self.obeys, self.spent) = (true, false);
+            self.state = words::next(self.state, word);
+            self.follow();
+        }
     }
 
-    /// The frequency reference was written, in hundredths of a hertz, negative in reverse.
-    pub fn reference(&mut self, centihertz: i32) {
-        self.reference = centihertz;
-        self.obey();
+    /// The control word that is about to be written makes this channel the commander: no word stands over.
+    pub(super) const fn handed_over_by_word(&mut self, commander: Commander) {
+        self.situation.commander = commander;
     }
 
     /// The bit NTO (no time-out) of the extended control word was written.
@@ -160,75 +205,22 @@ impl Drivecom {
     /// A configuration parameter (R/WS) was written with the motor stopped: the drive locks itself
     /// (BBV51701 p. 11, transitions 7, 9, 10, 12).
     pub fn configuration_written(&mut self) {
-        if !matches!(self.state, ChartState::Fault | ChartState::FaultReactionActive) {
-            self.state = ChartState::SwitchOnDisabled;
-            self.obey();
-        }
+        self.lock();
     }
 
     /// A valid frame for this drive came.
-    pub const fn frame_seen(&mut self) {
+    pub fn frame_seen(&mut self) {
         self.watchdog.feed();
-    }
-
-    /// The drive trips and does what the fault asks on the way. While `cause_persists`, no reset clears it
-    /// ([`cause_gone`](Self::cause_gone)).
-    pub fn trip(&mut self, code: u16, reaction: Reaction, cause_persists: bool) {
-        if reaction == Reaction::Ignore {
-            return;
+        if self.present_fault() == Some(self.settings.link.code) {
+            self.cause_gone();
         }
-        let status = self.fault_status();
-        self.faults.push_front(PastFault { code, status });
-        self.faults.truncate(REMEMBERED);
-        self.cause_persists = cause_persists;
-        self.state = ChartState::FaultReactionActive;
-        match reaction {
-            Reaction::Ignore | Reaction::Freewheel => self.motor.freewheel(),
-            Reaction::Ramp => self.motor.ramp_to_rest(self.settings.ramps.deceleration),
-            Reaction::Fast => self.motor.ramp_to_rest(self.settings.fast_stop),
-        }
-        self.order = Order::Nothing;
-        self.settle();
     }
 
-    /// The cause of the present fault is gone.
-    pub const fn cause_gone(&mut self) {
-        self.cause_persists = false;
-    }
-
-    /// Resets the fault, if its cause is gone; whether it did.
-    pub fn reset(&mut self) -> bool {
-        let resets = self.is_resettable();
-        if resets {
-            self.state = ChartState::SwitchOnDisabled;
-        }
-        resets
-    }
-
-    /// Somebody forces the drive to local control, or gives it back to the bus. The order that the bus had given does
-    /// not come back with it: the bus has to write it again.
-    pub fn force_local(&mut self, local: bool) {
-        self.local = local;
-        self.obeys = false;
-        self.obey();
-    }
-
-    /// Somebody presses the STOP key of the terminal (BBV51701 p. 11, transitions 9 and 12).
+    /// Somebody presses the STOP key, which has priority (BBV51701 p. 11, transitions 9 and 12).
     pub fn stop_key(&mut self) {
         if matches!(self.state, ChartState::OperationEnabled | ChartState::QuickStopActive) {
-            self.state = ChartState::SwitchOnDisabled;
             self.stopped_by_key = true;
-            self.obey();
-        }
-    }
-
-    /// Somebody does something at the panel.
-    pub fn panel(&mut self, action: Panel) {
-        match action {
-            Panel::TakeControl => self.force_local(true),
-            Panel::ReleaseControl => self.force_local(false),
-            Panel::Stop => self.stop_key(),
-            Panel::Run | Panel::Reset | Panel::Reference(_) => {}
+            self.lock();
         }
     }
 
@@ -237,22 +229,16 @@ impl Drivecom {
         self.motor.set_load(percent);
     }
 
-    /// Lets time pass. A watchdog that runs out within it trips the drive at its own moment.
-    pub fn advance(&mut self, elapsed: Duration) {
-        let first = self.watchdog.remaining().map_or(elapsed, |remaining| remaining.min(elapsed));
-        self.motor.advance(first);
-        if self.watchdog.advance(first) {
-            let LinkWatch { code, reaction, .. } = self.settings.link;
-            self.trip(code, reaction, false);
-        }
-        self.motor.advance(elapsed - first);
-        self.settle();
-    }
-
     /// The state of the chart.
     #[must_use]
     pub const fn state(&self) -> ChartState {
         self.state
+    }
+
+    /// What acts on the drive.
+    #[must_use]
+    pub const fn situation(&self) -> &Situation {
+        &self.situation
     }
 
     /// The motor.
@@ -261,24 +247,14 @@ impl Drivecom {
         &self.motor
     }
 
-    /// The code of the fault that is present.
-    #[must_use]
-    pub fn present_fault(&self) -> Option<u16> {
-        let present = matches!(self.state, ChartState::Fault | ChartState::FaultReactionActive);
-        self.faults.front().filter(|_| present).map(|fault| fault.code)
-    }
-
-    /// The remembered faults, the latest first.
-    pub fn faults(&self) -> impl Iterator<Item = PastFault> {
-        self.faults.iter().copied()
-    }
-
     /// The reference in force in hundredths of a hertz, negative in reverse: what was asked within LSP and HSP.
     #[must_use]
     pub fn target(&self) -> i32 {
-        let settings = &self.settings;
-        let asked = if settings.bus_reference { self.reference } else { 0 };
-        let reversed = self.word.is_some_and(|word| word & settings.bits.reverse != 0);
+        let (asked, settings) = (self.situation.reference, &self.settings);
+        let reversed = match (self.situation.commander, self.situation.run) {
+            (Commander::Bus, _) => self.word.is_some_and(|word| word & settings.bits.reverse != 0),
+            (_, run) => run == Some(Run::Reverse),
+        };
         let size =
             asked.unsigned_abs().clamp(settings.low_speed.min(settings.high_speed), settings.high_speed);
         let size = i32::try_from(size).unwrap_or(i32::MAX);
@@ -295,59 +271,37 @@ impl Drivecom {
             setpoint: self.target(),
             current: self.motor.current(),
             trip: self.present_fault(),
-            local: self.local,
+            local: self.situation.forced_local,
             eeprom_writes,
         }
     }
 
-    const fn is_resettable(&self) -> bool {
-        matches!(self.state, ChartState::Fault) && !self.cause_persists
+    /// Whether a run command that stands acts again when an input no longer stops (BBV51701 p. 8, 40, 41).
+    fn restarts_after_a_stop(&self) -> bool {
+        let by_bus = self.situation.commander == Commander::Bus;
+        self.settings.runs_by_level || by_bus && self.readings.stop_release_restarts
     }
 
-    /// Carries out what state and control word ask of the motor. A stop acts once, when it is ordered: an injection
-    /// that is over does not begin again because the same word is written again.
-    fn obey(&mut self) {
-        let order = self.ordered();
-        let is_new = order != self.order;
-        self.order = order;
-        match order {
-            Order::Nothing => {}
-            Order::Run => {
-                self.stopped_by_key = false;
-                self.motor.run(self.target(), self.settings.ramps);
+    /// The motor coasts, and the way up the chart begins anew; a run command that stands has to be given anew.
+    fn lock(&mut self) {
+        if !matches!(self.state, ChartState::Fault | ChartState::FaultReactionActive) {
+            self.state = ChartState::SwitchOnDisabled;
+            self.motor.freewheel();
+            self.spent = self.situation.run.is_some();
+            self.follow();
+        }
+    }
+
+    /// Takes the chart where it goes by itself, and obeys.
+    fn follow(&mut self) {
+        if !matches!(self.state, ChartState::Fault | ChartState::FaultReactionActive) {
+            if self.situation.stops.lock {
+                self.state = ChartState::SwitchOnDisabled;
+            } else if self.situation.commander != Commander::Bus {
+                self.state = ChartState::OperationEnabled;
             }
-            Order::Lock => self.motor.freewheel(),
-            Order::Stop(_) if !is_new => {}
-            Order::Stop(Stop::Ramp) => self.motor.ramp_to_rest(self.settings.ramps.deceleration),
-            Order::Stop(Stop::Fast) => self.motor.ramp_to_rest(self.settings.fast_stop),
-            Order::Stop(Stop::Freewheel) => self.motor.freewheel(),
-            Order::Stop(Stop::DcInjection) => {
-                self.motor.brake(self.settings.injection_current, Some(self.settings.injection_time));
-            }
         }
-    }
-
-    fn ordered(&self) -> Order {
-        match self.state {
-            ChartState::Fault | ChartState::FaultReactionActive => Order::Nothing,
-            ChartState::SwitchOnDisabled | ChartState::ReadyToSwitchOn => Order::Lock,
-            // From operation enabled, 0007h stops as Stt says; the manual does not tell.
-            ChartState::SwitchedOn => Order::Stop(self.settings.stop),
-            ChartState::QuickStopActive => Order::Stop(Stop::Fast),
-            ChartState::OperationEnabled => match self.word {
-                Some(word) if self.obeys && self.settings.bus_commands && !self.local => {
-                    Order::of(word, &self.settings)
-                }
-                _ => Order::Stop(self.settings.stop),
-            },
-        }
-    }
-
-    /// Follows what happens by itself once the motor stands.
-    fn settle(&mut self) {
-        if self.state == ChartState::FaultReactionActive && !self.motor.is_fed() {
-            self.state = ChartState::Fault;
-        }
+        self.obey();
     }
 
     fn watch(&mut self) {

@@ -61,18 +61,44 @@ impl CommandBits {
     pub const LEVEL_3: Self = Self { injection: 0, fast_stop: 0, ..Self::BASIC };
 }
 
+/// Direct current that is injected by itself at standstill (AdC, BBV51701 p. 41).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Standstill {
+    /// None.
+    #[default]
+    No,
+    /// At the end of a ramp, for the two times.
+    Timed,
+    /// As long as the motor stands and operation is enabled, whether or not there ever was a run command.
+    Continuous,
+}
+
+/// One of the two currents at standstill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Injection {
+    /// In percent of the motor's nominal current (SdC1, SdC2).
+    pub percent: u16,
+    /// For how long (tdC1, tdC2); zero: it is left out.
+    pub time: Duration,
+}
+
+/// The automatic restart after a fault (Atr, BBV51701 p. 51).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Restarts {
+    /// The codes after which it is tried.
+    pub after: &'static [u16],
+    /// After how long it is given up (tAr); `None`: never.
+    pub limit: Option<Duration>,
+}
+
 /// The parameters that act on chart and motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Settings {
-    /// Whether the drive comes up in operation enabled, ready to take 000Fh without the chart (LAC = L1 or L2,
-    /// BBV51701 p. 11).
-    pub starts_enabled: bool,
-    /// Whether orders come from the bus; if not, the control word is kept and does nothing.
-    pub bus_commands: bool,
-    /// Whether the reference comes from the bus; if not, it is 0 here.
-    pub bus_reference: bool,
     /// The meanings of the control word's high bits.
     pub bits: CommandBits,
+    /// Whether a run command of the terminals counts by its level (tCC = 2C with tCt = LEL or PFO), so that what
+    /// stands runs again when a stop ends (BBV51701 p. 40, 41).
+    pub runs_by_level: bool,
     /// Acceleration and deceleration in force (ACC and dEC, or AC2 and dE2).
     pub ramps: Ramps,
     /// The shortened ramp of fast and quick stop (dEC divided by dCF).
@@ -81,12 +107,20 @@ pub struct Settings {
     pub stop: Stop,
     /// Current of the DC injection in percent of the motor's nominal current (IdC).
     pub injection_current: u16,
-    /// Time of the DC injection (tdC).
+    /// What the current is lowered to after 5 s (half of ItH, BBV51701 p. 40), in percent of the nominal current.
+    pub injection_limit: u16,
+    /// Time of the DC injection as the normal stop (tdC).
     pub injection_time: Duration,
+    /// Direct current at standstill (AdC), first and second.
+    pub standstill: (Standstill, [Injection; 2]),
     /// Low speed in hundredths of a hertz (LSP): a smaller reference is raised to it.
     pub low_speed: u32,
     /// High speed in hundredths of a hertz (HSP): a greater reference is lowered to it.
     pub high_speed: u32,
+    /// The time at low speed after which the motor is stopped until a greater reference comes (tLS).
+    pub low_speed_time: Option<Duration>,
+    /// The automatic restart.
+    pub restarts: Option<Restarts>,
     /// The communication watchdog.
     pub link: LinkWatch,
 }

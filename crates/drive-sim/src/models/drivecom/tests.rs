@@ -1,3 +1,5 @@
+use std::time::Duration;
+
 use super::*;
 use crate::{Ramp, Ramps};
 
@@ -10,30 +12,49 @@ fn ramp(time: Duration) -> Ramp {
 
 const fn settings() -> Settings {
     let three = Ramp { full_scale: 5_000, time: Duration::from_secs(3) };
+    let none = Injection { percent: 0, time: Duration::ZERO };
     Settings {
-        starts_enabled: false,
-        bus_commands: true,
-        bus_reference: true,
         bits: CommandBits::LEVEL_3,
+        runs_by_level: false,
         ramps: Ramps { acceleration: three, deceleration: three },
         fast_stop: Ramp { full_scale: 5_000, time: Duration::from_millis(750) },
         stop: Stop::Ramp,
         injection_current: 70,
+        injection_limit: 50,
         injection_time: Duration::from_millis(500),
+        standstill: (Standstill::No, [none; 2]),
         low_speed: 0,
         high_speed: 5_000,
+        low_speed_time: None,
+        restarts: None,
         link: LinkWatch { timeout: Some(Duration::from_secs(10)), reaction: Reaction::Freewheel, code: SLF },
     }
 }
 
+fn basic() -> Settings {
+    Settings { bits: CommandBits::BASIC, ..settings() }
+}
+
+/// Commanded by the bus.
 fn drive(settings: Settings) -> Drivecom {
-    Drivecom::new(Nameplate::light(20), settings)
+    let by_bus = Situation { commander: Commander::Bus, ..Situation::default() };
+    Drivecom::new(Nameplate::light(20), settings, by_bus)
+}
+
+fn situate(drive: &mut Drivecom, change: impl FnOnce(&mut Situation)) {
+    let mut situation = *drive.situation();
+    change(&mut situation);
+    drive.situate(situation);
+}
+
+fn refer(drive: &mut Drivecom, reference: i32) {
+    situate(drive, |asked| (asked.reference, asked.bus_reference) = (reference, reference));
 }
 
 /// Up the ladder and at 50 Hz.
 fn running(settings: Settings) -> Drivecom {
     let mut drive = drive(settings);
-    drive.reference(5_000);
+    refer(&mut drive, 5_000);
     for word in [0x0006, 0x0007, 0x000F] {
         drive.command(word);
     }
@@ -79,7 +100,7 @@ fn every_transition_of_the_chart_has_its_control_word() {
 fn the_status_word_reads_as_the_manual_prints_it() {
     let mut drive = drive(settings());
     assert_eq!(drive.eta(), 0x0240);
-    drive.reference(5_000);
+    refer(&mut drive, 5_000);
     for (word, eta) in [(0x0006, 0x0221), (0x0007, 0x0223), (0x000F, 0x0227)] {
         drive.command(word);
         drive.advance(SECOND);
@@ -110,7 +131,7 @@ fn each_stop_takes_its_own_way_to_standstill() {
         }
         time.as_millis().div_ceil(10)
     };
-    let basic = Settings { bits: CommandBits::BASIC, ..settings() };
+    let basic = basic();
     assert_eq!(stop_time(basic, 0x100F), 300, "Stt");
     assert_eq!(stop_time(basic, 0x400F), 75, "fast stop");
     assert_eq!(stop_time(basic, 0x0002), 75, "quick stop");
@@ -131,22 +152,53 @@ fn bits_that_level_3_does_not_assign_do_nothing() {
     }
 }
 
+// BBV51701 p. 40: "braking is activated when the logic state of the input or control word bit is at 1"; tdC belongs to the
+// normal stop mode (p. 41). After 5 s the current is lowered.
 #[test]
-fn an_injection_that_is_over_is_not_begun_again_by_the_same_word() {
-    let mut drive = running(Settings { bits: CommandBits::BASIC, ..settings() });
+fn an_injection_lasts_as_long_as_its_bit_is_1() {
+    let mut drive = running(basic());
     drive.command(0x200F);
-    assert_eq!(drive.eti() & 0x0020, 0x0020);
-    drive.advance(SECOND);
+    drive.advance(4_999 * SECOND / 1_000);
+    assert_eq!((drive.eti() & 0x0020, drive.motor().current()), (0x0020, 14));
+    drive.advance(3_600 * SECOND);
+    assert_eq!((drive.eti() & 0x0020, drive.motor().current()), (0x0020, 10));
     drive.command(0x200F);
-    assert!(!drive.motor().is_fed());
+    assert!(drive.motor().is_braking());
     drive.command(0x000F);
-    assert!(drive.motor().is_fed(), "a run order is taken at once");
+    assert!(drive.motor().is_fed() && !drive.motor().is_braking(), "a run order is taken at once");
+}
+
+// p. 40, 41: as the normal stop mode (Stt = dCI) it lasts for tdC.
+#[test]
+fn an_injection_as_the_normal_stop_ends_by_itself_and_does_not_begin_again() {
+    let mut drive = running(Settings { stop: Stop::DcInjection, ..basic() });
+    drive.command(0x100F);
+    drive.advance(Duration::from_millis(499));
+    assert!(drive.motor().is_braking());
+    drive.advance(Duration::from_millis(1));
+    drive.command(0x100F);
+    assert!(!drive.motor().is_fed());
+}
+
+// p. 20, 22: whether ETI bit 4 is 1 while direct current is injected is not said.
+#[test]
+fn eti_shows_an_injection_with_or_without_a_running_motor() {
+    for (apart, shown) in [(false, 0x0030), (true, 0x0020)] {
+        let mut drive = running(basic());
+        drive.set_readings(Readings { injection_is_not_running: apart, ..Readings::default() });
+        drive.command(0x200F);
+        drive.advance(SECOND);
+        assert_eq!(drive.eti() & 0x0030, shown);
+    }
 }
 
 #[test]
 fn with_the_basic_levels_the_drive_starts_without_the_chart() {
-    let mut drive = drive(Settings { starts_enabled: true, bits: CommandBits::BASIC, ..settings() });
-    drive.reference(5_000);
+    let mut drive = drive(basic());
+    situate(&mut drive, |asked| asked.commander = Commander::Terminals);
+    assert_eq!((drive.state(), drive.motor().is_fed()), (ChartState::OperationEnabled, false));
+    drive.handed_over_by_word(Commander::Bus);
+    refer(&mut drive, 5_000);
     assert_eq!((drive.state(), drive.motor().is_fed()), (ChartState::OperationEnabled, false));
     drive.command(0x000F);
     drive.advance(3 * SECOND);
@@ -158,7 +210,7 @@ fn the_reference_is_held_between_low_and_high_speed_and_said_to_be_exceeded() {
     let mut drive = running(settings());
     drive.set_settings(Settings { low_speed: 500, high_speed: 4_500, ..settings() });
     for (asked, target, exceeded) in [(5_000, 4_500, true), (3_000, 3_000, false), (-100, -500, true)] {
-        drive.reference(asked);
+        refer(&mut drive, asked);
         assert_eq!(drive.target(), target);
         assert_eq!(drive.eta() & 0x0800 != 0, exceeded, "{asked}");
     }
@@ -248,20 +300,27 @@ fn without_a_time_out_or_a_reaction_a_silent_line_trips_nobody() {
     }
 }
 
+// p. 37, 55: what the standing word does when control comes back is not said.
 #[test]
-fn forced_local_stops_the_motor_and_giving_back_does_not_restart_it() {
-    let mut drive = running(settings());
-    drive.force_local(true);
-    assert_eq!(drive.eta() & 0x0200, 0);
-    assert_eq!(drive.eti() & 0x6000, 0);
-    drive.command(0x000F);
-    drive.advance(3 * SECOND);
-    assert!(!drive.motor().is_fed());
-    drive.force_local(false);
-    drive.advance(SECOND);
-    assert!(!drive.motor().is_fed());
-    drive.command(0x000F);
-    assert!(drive.motor().is_fed());
+fn giving_control_back_restarts_a_standing_run_word_or_waits_for_a_new_one() {
+    for acts in [false, true] {
+        let mut drive = running(settings());
+        drive.set_readings(Readings { standing_word_acts: acts, ..Readings::default() });
+        let local = |drive: &mut Drivecom, forced_local: bool| {
+            let commander = if forced_local { Commander::Terminals } else { Commander::Bus };
+            situate(drive, |asked| (asked.commander, asked.forced_local) = (commander, forced_local));
+        };
+        local(&mut drive, true);
+        assert_eq!((drive.eta() & 0x0200, drive.eti() & 0x6000), (0, 0));
+        drive.command(0x000F);
+        drive.advance(3 * SECOND);
+        assert!(!drive.motor().is_fed());
+        local(&mut drive, false);
+        drive.advance(SECOND);
+        assert_eq!(drive.motor().is_fed(), acts);
+        drive.command(0x000F);
+        assert!(drive.motor().is_fed());
+    }
 }
 
 #[test]
@@ -283,13 +342,22 @@ fn a_configuration_write_locks_the_drive() {
     assert_eq!(drive.state(), ChartState::SwitchOnDisabled);
 }
 
+// p. 11: commanded by its terminals a drive is in operation enabled by itself.
 #[test]
 fn orders_do_nothing_when_another_channel_commands() {
-    let mut drive = drive(Settings { bus_commands: false, ..settings() });
-    for word in [0x0006, 0x0007, 0x000F] {
+    let mut drive = drive(settings());
+    situate(&mut drive, |asked| asked.commander = Commander::Terminals);
+    for word in [0x0006, 0x0000, 0x0006, 0x0007, 0x000F] {
         drive.command(word);
+        assert_eq!((drive.state(), drive.eti() & 0x6000), (ChartState::OperationEnabled, 0));
+        assert!(!drive.motor().is_fed());
     }
-    assert_eq!((drive.state(), drive.eti() & 0x6000), (ChartState::SwitchOnDisabled, 0));
+    situate(&mut drive, |asked| asked.commander = Commander::RemoteTerminal);
+    assert_eq!(drive.eti() & 0x6000, 0x2000);
+    situate(&mut drive, |asked| asked.run = Some(Run::Reverse));
+    refer(&mut drive, 1_000);
+    drive.advance(3 * SECOND);
+    assert_eq!(drive.motor().output_frequency(), -1_000);
 }
 
 #[test]
@@ -297,7 +365,7 @@ fn a_new_ramp_acts_on_a_motor_that_runs() {
     let mut drive = running(settings());
     let slow = ramp(Duration::from_secs(30));
     drive.set_settings(Settings { ramps: Ramps { acceleration: slow, deceleration: slow }, ..settings() });
-    drive.reference(0);
+    refer(&mut drive, 0);
     drive.advance(3 * SECOND);
     assert_eq!(drive.motor().output_frequency(), 4_500);
 }
@@ -306,8 +374,8 @@ fn a_new_ramp_acts_on_a_motor_that_runs() {
 fn a_power_cycle_ends_the_run_and_remembers_the_faults() {
     let mut drive = running(settings());
     drive.trip(9, Reaction::Freewheel, false);
-    drive.power(false);
-    drive.power(true);
+    drive.power_off();
+    drive.power_up(settings(), *drive.situation());
     assert_eq!((drive.state(), drive.present_fault()), (ChartState::SwitchOnDisabled, None));
     assert_eq!(drive.faults().count(), 1);
     assert!(drive.motor().shaft_frequency() > 0, "the shaft turns on");

@@ -1,6 +1,6 @@
 //! The words of a DRIVECOM drive: what the control word asks, and what the status words say.
 
-use super::{ChartState, Drivecom, Settings, Stop};
+use super::{ChartState, Commander, Drivecom, Stop, orders::Order};
 
 /// Bit 7 of the control word: resets a fault when it rises.
 pub(super) const FAULT_RESET: u16 = 0x0080;
@@ -13,35 +13,6 @@ const ENABLE_OPERATION: u16 = 0x0008;
 
 /// Motor thermal state from which the drive warns, in percent.
 const THERMAL_ALARM: u16 = 100;
-
-/// What is asked of the motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
-    /// Leave it as it is.
-    Nothing,
-    /// Run at the reference.
-    Run,
-    /// Block the output.
-    Lock,
-    /// Stop so.
-    Stop(Stop),
-}
-
-impl Order {
-    /// The order of a control word in operation enabled; of several stops the fastest.
-    pub(super) const fn of(word: u16, settings: &Settings) -> Self {
-        let bits = settings.bits;
-        if word & bits.fast_stop != 0 {
-            Self::Stop(Stop::Fast)
-        } else if word & bits.injection != 0 {
-            Self::Stop(Stop::DcInjection)
-        } else if word & bits.stop != 0 {
-            Self::Stop(settings.stop)
-        } else {
-            Self::Run
-        }
-    }
-}
 
 /// The state after a control word (BBV51701 p. 12). Faults are not left this way.
 pub(super) const fn next(state: ChartState, word: u16) -> ChartState {
@@ -74,14 +45,14 @@ impl Drivecom {
             ChartState::FaultReactionActive => 0x000F,
             ChartState::Fault => 0x0008,
         };
-        let asked = if self.settings.bus_reference { self.reference.unsigned_abs() } else { 0 };
+        let asked = self.situation.bus_reference.unsigned_abs();
         let exceeded = asked > self.settings.high_speed || asked < self.settings.low_speed;
         // 0627h is also what a drive at rest after a normal stop shows (BBV51701 p. 21).
-        let reached =
-            self.motor.is_at_target() || (self.state == ChartState::OperationEnabled && !self.motor.is_fed());
+        let steers = self.motor.is_fed() && !self.motor.is_braking();
+        let reached = self.motor.is_at_target() || (self.state == ChartState::OperationEnabled && !steers);
         state
             | bit(7, self.thermal_alarm())
-            | bit(9, !self.local)
+            | bit(9, !self.situation.forced_local)
             | bit(10, reached)
             | bit(11, exceeded)
             | bit(14, self.stopped_by_key)
@@ -92,16 +63,20 @@ impl Drivecom {
     #[must_use]
     pub fn eti(&self) -> u16 {
         let fast = matches!(self.order, Order::Stop(Stop::Fast)) && self.motor.is_stopping();
+        let commander = self.situation.commander;
+        let injects = self.motor.is_braking();
+        let runs = self.motor.is_fed() && !(injects && self.readings.injection_is_not_running);
         let transient = self.motor.is_accelerating() || self.motor.is_decelerating();
         bit(2, self.is_resettable())
-            | bit(4, self.motor.is_fed())
-            | bit(5, self.motor.is_braking())
+            | bit(4, runs)
+            | bit(5, injects)
             | bit(6, transient)
             | bit(7, self.thermal_alarm())
             | bit(9, self.motor.is_accelerating())
             | bit(10, self.motor.is_decelerating())
             | bit(12, fast)
-            | bit(14, self.settings.bus_commands && !self.local)
+            | bit(13, matches!(commander, Commander::RemoteTerminal | Commander::CanOpen))
+            | bit(14, matches!(commander, Commander::Bus | Commander::CanOpen))
             | bit(15, self.target() < 0)
     }
 
