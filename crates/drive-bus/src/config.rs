@@ -200,8 +200,9 @@ impl LineConfig {
             _ if self.is_mbap() => Duration::ZERO,
             Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
             Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
+            // Its slaves are waited for while others are served.
             Protocol::UniTelway(settings) => {
-                unitelway::overtime(self.serial, settings, self.chunk_gap, request, answer)
+                return unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
             }
         };
         self.characters(request) + timeout + self.characters(answer) + overtime

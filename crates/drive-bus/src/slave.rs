@@ -15,6 +15,7 @@ use crate::{
     protocol::Protocol,
     schedule::Ticket,
     shared::{Caller, Handle},
+    unite::LinkCounters,
 };
 
 /// One slave of a [`Line`](crate::Line): a tokio-modbus [`Client`] and a drive's [`Port`]. Cheap to clone; each clone has
@@ -52,6 +53,10 @@ impl Slave {
 
     pub(crate) fn speaks_unite(&self) -> bool {
         matches!(self.handle.shared.master().config().protocol, Protocol::UniTelway(_))
+    }
+
+    pub(crate) fn note_link_counters(&self, counters: LinkCounters) {
+        self.handle.shared.master().note_link_counters(self.address, counters);
     }
 
     /// This slave under other terms.

@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, time::Duration};
 
 use drive_core::Class;
 
+use crate::unite::LinkCounters;
+
 /// Buckets of an octave.
 const SUB: usize = 8;
 
@@ -139,6 +141,8 @@ pub struct Outcomes {
     pub damaged: u64,
     /// With an answer that did not fit the request.
     pub mismatches: u64,
+    /// Refused by the slave for as long as its line repeats it (UNI-TELWAY's NAK).
+    pub busy: u64,
     /// Expired in the queue.
     pub expired: u64,
     /// Replaced in the queue by a later request.
@@ -169,6 +173,9 @@ pub struct SlaveStats {
     pub offline: bool,
     /// The response timeout that holds now.
     pub response_timeout: Duration,
+    /// What its own link had counted when it was last read, by
+    /// [`link_counters`](crate::unite::UniTe::link_counters) on a UNI-TELWAY line.
+    pub link: Option<LinkCounters>,
     /// From the end of a request to the first character of its answer, as computed from the answer's end and length.
     pub response: Histogram,
 }

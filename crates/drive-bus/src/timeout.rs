@@ -30,6 +30,12 @@ impl LearnedTimeout {
         learned.max(self.floor).saturating_mul(1 << self.doubled.min(16)).min(self.ceiling)
     }
 
+    /// The longest that it can become.
+    #[must_use]
+    pub const fn ceiling(&self) -> Duration {
+        self.ceiling
+    }
+
     /// How long the slave usually takes; the ceiling when nothing is known.
     #[must_use]
     pub fn typical(&self) -> Duration {

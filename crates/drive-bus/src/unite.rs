@@ -127,17 +127,22 @@ impl UniTe {
         if reply.get(1..) == Some(data) { Ok(()) } else { Err(misfit("not the data that were sent")) }
     }
 
-    /// Request A2h: the counters of the slave's link.
+    /// Request A2h: the counters of the slave's link. They stand in the line's statistics from then on.
     pub async fn link_counters(&mut self) -> Result<LinkCounters, UniTeError> {
         let reply = self.ask(code::READ_COUNTERS, &[]).await?;
         let [sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused] =
             words(&reply, 1)?;
-        Ok(LinkCounters { sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused })
+        let counters =
+            LinkCounters { sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused };
+        self.slave.note_link_counters(counters);
+        Ok(counters)
     }
 
     /// Request A4h: sets the counters to 0.
     pub async fn clear_link_counters(&mut self) -> Result<(), UniTeError> {
-        self.ask(code::CLEAR_COUNTERS, &[]).await.map(drop)
+        self.ask(code::CLEAR_COUNTERS, &[]).await?;
+        self.slave.note_link_counters(LinkCounters::default());
+        Ok(())
     }
 
     /// Request F2h: writes control word, reference and ramps, and reads reference, status, faults and current back, in

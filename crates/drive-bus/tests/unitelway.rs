@@ -32,12 +32,13 @@ fn simplified(category: u8) -> UniTelwaySettings {
 /// A machine that knows slave 1 to hold nothing.
 fn settled() -> Script<UniTelway> {
     let mut script = script(UniTelwaySettings::default());
-    assert_eq!(script.ask(1, &READ), poll(1));
-    assert_eq!(script.hear(EOT), Step::More);
-    send(&mut script);
+    let mark = script.ask(1, &READ);
+    assert_eq!(give_mark_back(&mut script, &mark), reply(&[0x04, 0x07, 0x90, 0x01]));
     acknowledge(&mut script);
-    assert_eq!(script.hear(&reply(&[0x34, 0, 0])), sends(ACK));
-    assert!(matches!(script.wait(), Step::Done(Ok(Ok(_)))));
+    assert_eq!(
+        take(&mut script, &reply(&[0x34, 0, 0])),
+        Step::Done(Ok(Ok(Response::ReadHoldingRegisters(vec![0]))))
+    );
     script
 }
 
@@ -53,10 +54,55 @@ fn send(script: &mut Script<UniTelway>) -> Bytes {
     }
 }
 
+/// The line is free for others until the exchange goes on; what is sent then.
+fn go_on(script: &mut Script<UniTelway>, step: Step) -> Bytes {
+    let Step::Wait(until) = step else { panic!("{step:?}") };
+    assert!(until > script.now);
+    script.resume(1, until)
+}
+
 /// The slave acknowledges the request and is polled.
 fn acknowledge(script: &mut Script<UniTelway>) {
     assert_eq!(script.hear(ACK), Step::More);
     assert_eq!(send(script), poll(1));
+}
+
+/// The slave says something that is none of what it was asked for; it is told that we have it, and the exchange goes on.
+fn dropped(script: &mut Script<UniTelway>, said: &[u8]) -> Bytes {
+    assert_eq!(script.hear(said), Step::More);
+    assert_eq!(*send(script), *ACK, "{said:02X?}");
+    let step = script.wait();
+    go_on(script, step)
+}
+
+/// The slave says its reply, is told that we have it, and has nothing more to say.
+fn take(script: &mut Script<UniTelway>, said: &[u8]) -> Step {
+    assert_eq!(script.hear(said), Step::More);
+    closed(script)
+}
+
+fn closed(script: &mut Script<UniTelway>) -> Step {
+    assert_eq!(*send(script), *ACK);
+    assert_eq!(script.wait(), Step::More);
+    send(script);
+    script.hear(EOT)
+}
+
+/// A slave mirrors the number that it is asked to; what it is asked then.
+fn give_mark_back(script: &mut Script<UniTelway>, mark: &[u8]) -> Bytes {
+    assert_eq!(script.hear(ACK), Step::More);
+    send(script);
+    let mirrored = mirrored(mark);
+    dropped(script, &mirrored)
+}
+
+/// The reply to a mirror request, which has 4 bytes.
+fn mirrored(mark: &[u8]) -> Bytes {
+    let (slave, message) = (&mark[2], &mark[4..mark.len() - 1]);
+    let (header, asked) = message.split_at(message.len() - 6);
+    assert_eq!(asked[0], 0xFA, "a mirror request: {mark:02X?}");
+    let number = &asked[2..];
+    data_frame(*slave, &[header, &[0xFB], number].concat())
 }
 
 /// A reply of slave 1 with the standard header.
@@ -151,13 +197,17 @@ fn the_test_vectors_go_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
         let mut script = script(settings);
         for round in 0..3 {
             let opening = script.ask(slave, &request);
-            if round == 0 {
-                assert_eq!(opening, poll(slave), "nothing is known of the slave yet");
-                script.hear(EOT);
-                assert_eq!(send(&mut script), sent);
+            let asked = if round == 0 {
+                script.hear(ACK);
+                send(&mut script);
+                script.hear(&mirrored(&opening));
+                send(&mut script);
+                let Step::Wait(until) = script.wait() else { panic!() };
+                script.resume(slave, until)
             } else {
-                assert_eq!(opening, sent);
-            }
+                opening
+            };
+            assert_eq!(asked, sent);
             assert_eq!(script.hear(ACK), Step::More);
             assert_eq!(send(&mut script), poll(slave));
             let step = match round {
@@ -165,115 +215,180 @@ fn the_test_vectors_go_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
                 1 => script.hear_one_by_one(reply),
                 _ => script.hear(&[reply, reply].concat()),
             };
-            assert_eq!(step, sends(ACK), "{request:?}");
-            assert_eq!(script.wait(), Step::Done(Ok(Ok(answer.clone()))));
+            assert_eq!(step, Step::More, "{request:?}");
+            assert_eq!(closed(&mut script), Step::Done(Ok(Ok(answer.clone()))));
         }
     }
 }
 
 #[test]
 fn a_damaged_vector_is_refused_and_polled_for_again_and_never_taken_for_another_answer() {
-    for Vector { settings, slave, request, reply, answer, .. } in vectors() {
-        for at in 0..reply.len() {
-            for bit in 0..8 {
-                let mut damaged = reply.to_vec();
-                damaged[at] ^= 1 << bit;
-                let mut script = script(settings);
-                script.ask(slave, &request);
-                script.hear(EOT);
-                send(&mut script);
-                script.hear(ACK);
-                send(&mut script);
-                let mut step = script.hear(&damaged);
-                if step == Step::More {
-                    step = script.wait_for_step();
-                }
-                if step == sends(NAK) {
-                    assert_eq!(send(&mut script), poll(slave));
-                    assert_eq!(script.hear(reply), sends(ACK), "after {damaged:02X?}");
-                    assert_eq!(script.wait(), Step::Done(Ok(Ok(answer.clone()))));
-                } else {
-                    // No beginning of a frame was left, or the beginning of another slave's.
-                    assert_eq!(step, Step::Done(Err(Failure::Timeout)), "{damaged:02X?}");
-                }
+    let reply = reply(&[0x66, 0x07, 0xF4, 0x01, 0x10, 0x00]);
+    let read = Request::ReadHoldingRegisters(250, 2);
+    for at in 0..reply.len() {
+        for bit in 0..8 {
+            let mut damaged = reply.to_vec();
+            damaged[at] ^= 1 << bit;
+            let mut script = settled();
+            script.ask(1, &read);
+            acknowledge(&mut script);
+            script.hear(&damaged);
+            let mut step = script.wait_for_step();
+            if step == sends(NAK) {
+                step = script.wait();
             }
+            // Refused, or no beginning of a frame was left, or that of another slave's.
+            assert_eq!(go_on(&mut script, step), poll(1), "after {damaged:02X?}");
+            let answer = Response::ReadHoldingRegisters(vec![500, 16]);
+            assert_eq!(take(&mut script, &reply), Step::Done(Ok(Ok(answer))));
         }
     }
 }
 
 #[test]
-fn a_slave_that_has_nothing_to_say_yet_is_polled_again_until_its_time_is_over() {
+fn a_slave_that_has_nothing_to_say_yet_or_says_nothing_is_polled_again_until_its_time_is_over() {
+    for says in [EOT, &[]] {
+        let mut script = settled();
+        script.ask(1, &WRITE);
+        let asked = script.now;
+        acknowledge(&mut script);
+        let not_yet = |script: &mut Script<UniTelway>| {
+            if says.is_empty() { script.wait() } else { script.hear(says) }
+        };
+        for _ in 0..2 {
+            let step = not_yet(&mut script);
+            assert_eq!(go_on(&mut script, step), poll(1));
+        }
+        assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+
+        let mark = script.ask(1, &WRITE);
+        if says.is_empty() {
+            // What it said last may have been the answer to an earlier poll.
+            give_mark_back(&mut script, &mark);
+        }
+        acknowledge(&mut script);
+        let step = loop {
+            match not_yet(&mut script) {
+                step @ Step::Wait(_) => assert_eq!(go_on(&mut script, step), poll(1)),
+                step => break step,
+            }
+        };
+        assert_eq!(step, Step::Done(Err(Failure::Timeout)));
+        assert!(script.now - asked >= PATIENCE);
+    }
+}
+
+#[test]
+fn the_polls_of_a_slave_that_needs_long_become_rarer() {
     let mut script = settled();
     script.ask(1, &WRITE);
-    let asked = script.now;
     acknowledge(&mut script);
-    for _ in 0..3 {
-        assert_eq!(script.hear(EOT), Step::More);
-        assert_eq!(send(&mut script), poll(1));
+    let mut polls = 0;
+    while let step @ Step::Wait(_) = script.hear(EOT) {
+        go_on(&mut script, step);
+        polls += 1;
     }
-    assert_eq!(script.hear(&reply(&[0xFE])), sends(ACK));
+    assert!((10..25).contains(&polls), "{polls} polls in {PATIENCE:?}");
+}
+
+#[test]
+fn a_slave_is_known_to_hold_nothing_only_once_it_has_said_so_behind_its_last_reply() {
+    let mut script = settled();
+    script.ask(1, &WRITE);
+    acknowledge(&mut script);
+    script.hear(&reply(&[0xFE]));
+    assert_eq!(*send(&mut script), *ACK);
+    script.wait();
+    assert_eq!(send(&mut script), poll(1));
+    // It has not heard our acknowledgement, and then nothing is heard of it.
+    let again = dropped(&mut script, &reply(&[0xFE]));
+    assert_eq!(again, poll(1));
     assert_eq!(script.wait(), Step::Done(Ok(Ok(WRITTEN))));
 
-    script.ask(1, &WRITE);
-    acknowledge(&mut script);
-    let step = loop {
-        match script.hear(EOT) {
-            Step::More => assert_eq!(send(&mut script), poll(1)),
-            step => break step,
-        }
-    };
-    assert_eq!(step, Step::Done(Err(Failure::Timeout)));
-    assert!(script.now - asked >= PATIENCE);
+    let mark = script.ask(1, &WRITE);
+    assert!(mark.windows(2).any(|bytes| bytes == [0xFA, 0x07]), "{mark:02X?}");
+    assert_eq!(script.hear(ACK), Step::More);
+    send(&mut script);
+    script.strays();
+    assert_eq!(dropped(&mut script, &reply(&[0xFE])), poll(1));
+    assert_eq!(script.strays(), [Stray::Frame { slave: 1, function: 0xFE }]);
+    let request = dropped(&mut script, &mirrored(&mark));
+    assert_eq!(request, reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
 }
 
 #[test]
-fn what_an_earlier_exchange_left_in_a_slave_is_taken_before_its_next_request() {
-    let mut script = settled();
-    script.ask(1, &WRITE);
-    acknowledge(&mut script);
-    assert_eq!(script.wait_for_step(), Step::Done(Err(Failure::Timeout)));
+fn two_marks_are_never_the_same() {
+    let mut script = script(UniTelwaySettings::default());
+    let first = script.ask(1, &READ);
+    script.machine.abandon();
+    let second = script.ask(1, &READ);
+    assert_ne!(first, second);
+    script.hear(ACK);
+    send(&mut script);
+    assert_eq!(dropped(&mut script, &mirrored(&first)), poll(1), "an earlier one is no proof");
+}
 
-    assert_eq!(script.ask(1, &READ), poll(1));
-    script.strays();
-    assert_eq!(script.hear(&reply(&[0xFE])), sends(ACK));
-    assert_eq!(script.strays(), [Stray::Frame { slave: 1, function: 0xFE }]);
-    assert_eq!(send(&mut script), poll(1));
+#[test]
+fn a_slave_that_cannot_mirror_has_to_have_nothing_more_to_say() {
+    let mut script = script(UniTelwaySettings::default());
+    script.ask(1, &READ);
+    script.hear(ACK);
+    send(&mut script);
+    let step = script.hear(EOT);
+    go_on(&mut script, step);
+    for left in [&[0x34, 1, 2][..], &[0xFD, 0x01], &[0xFD]] {
+        assert_eq!(dropped(&mut script, &reply(left)), poll(1));
+    }
     assert_eq!(script.hear(EOT), Step::More);
     assert_eq!(send(&mut script), reply(&[0x04, 0x07, 0x90, 0x01]));
-    acknowledge(&mut script);
-    assert_eq!(script.hear(&reply(&[0x34, 0x06, 0x00])), sends(ACK));
-    assert_eq!(script.wait(), Step::Done(Ok(Ok(Response::ReadHoldingRegisters(vec![6])))));
 }
 
 #[test]
-fn a_slave_that_says_nothing_to_the_first_poll_is_asked_all_the_same() {
+fn the_first_write_of_a_stop_is_sent_at_once_and_its_confirmation_is_taken_only_where_it_proves_something() {
     let mut script = script(UniTelwaySettings::default());
-    assert_eq!(script.ask(1, &WRITE), poll(1));
-    assert_eq!(send(&mut script), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
+    assert_eq!(script.ask_at_once(1, &WRITE), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
     acknowledge(&mut script);
-    assert_eq!(script.hear(&reply(&[0xFE])), sends(ACK));
-    assert_eq!(script.wait(), Step::Done(Ok(Ok(WRITTEN))));
+    assert!(matches!(take(&mut script, &reply(&[0xFE])), Step::Done(Err(Failure::Doubted(_)))));
+    let mark = script.ask(1, &WRITE);
+    give_mark_back(&mut script, &mark);
+    acknowledge(&mut script);
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+    script.ask_at_once(1, &WRITE);
+    acknowledge(&mut script);
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
 }
 
 #[test]
-fn a_slave_that_used_to_say_something_is_not_asked_when_it_says_nothing_until_the_second_time() {
-    let mut script = settled();
-    script.ask(1, &WRITE);
-    assert_eq!(script.wait(), Step::Done(Err(Failure::Timeout)));
-    assert_eq!(script.ask(1, &READ), poll(1));
-    assert_eq!(script.wait(), Step::Done(Err(Failure::Timeout)), "what it holds may come late");
-    assert_eq!(script.ask(1, &WRITE), poll(1));
-    assert_eq!(send(&mut script), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
-}
-
-#[test]
-fn a_refused_request_is_sent_again_and_then_given_up_as_not_carried_out() {
+fn a_refused_request_is_sent_again_once_what_the_slave_holds_is_taken() {
     let mut script = settled();
     let request = script.ask(1, &WRITE);
     assert_eq!(script.hear(NAK), Step::More);
-    assert_eq!(send(&mut script), request);
-    assert!(matches!(script.hear(NAK), Step::Done(Err(Failure::Refused(_)))));
-    assert_eq!(script.ask(1, &WRITE), request, "it holds nothing of it");
+    assert_eq!(send(&mut script), poll(1));
+    assert_eq!(dropped(&mut script, &reply(&[0x34, 1, 2])), request);
+    acknowledge(&mut script);
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+}
+
+#[test]
+fn a_slave_that_goes_on_refusing_is_asked_after_pauses_and_given_up_as_busy() {
+    let mut script = settled();
+    let request = script.ask(1, &WRITE);
+    let (asked, mut refused) = (script.now, 0);
+    let step = loop {
+        refused += 1;
+        match script.hear(NAK) {
+            Step::More => {}
+            step => break step,
+        }
+        assert_eq!(send(&mut script), poll(1));
+        let step = script.hear(EOT);
+        // The first may have been refused for the damage that it took.
+        let again = if step == Step::More { send(&mut script) } else { go_on(&mut script, step) };
+        assert_eq!(again, request);
+    };
+    assert!(matches!(step, Step::Done(Err(Failure::Refused(_)))), "{step:?}");
+    assert!(script.now - asked >= UniTelwaySettings::default().busy_timeout);
+    assert!((5..30).contains(&refused), "{refused} frames");
 }
 
 #[test]
@@ -300,8 +415,9 @@ fn a_reply_that_stays_damaged_is_given_up_and_one_that_breaks_off_is_damaged() {
     acknowledge(&mut script);
     let good = reply(&[0x34, 1, 2]);
     assert_eq!(script.hear(&good[..7]), Step::More);
-    assert_eq!(script.wait(), sends(NAK));
-    assert_eq!(send(&mut script), poll(1));
+    assert_eq!(script.wait_for_step(), sends(NAK));
+    let step = script.wait();
+    assert_eq!(go_on(&mut script, step), poll(1));
     let mut damaged = good.to_vec();
     damaged[9] ^= 1;
     assert_eq!(script.hear(&damaged), Step::Done(Err(Failure::Damaged("BCC"))));
@@ -313,14 +429,19 @@ fn a_reply_to_another_request_is_taken_from_the_slave_and_is_no_answer() {
     script.ask(1, &READ);
     acknowledge(&mut script);
     for unfit in [&[0xFE][..], &[0x34, 1], &[0x66, 7, 1, 2], &[]] {
-        assert_eq!(script.hear(&reply(unfit)), sends(ACK), "{unfit:02X?}");
-        assert_eq!(send(&mut script), poll(1));
+        assert_eq!(dropped(&mut script, &reply(unfit)), poll(1), "{unfit:02X?}");
     }
-    assert_eq!(script.hear(&data_frame(1, &[0x55, 0x34, 1, 2])), sends(ACK), "an unknown header");
-    assert_eq!(send(&mut script), poll(1));
+    assert_eq!(dropped(&mut script, &data_frame(1, &[0x55, 0x34, 1, 2])), poll(1), "an unknown header");
     // Another slave's frame is not ours to acknowledge.
     assert_eq!(script.hear(&data_frame(2, &[0, 0x34, 1, 2])), Step::More);
-    assert!(matches!(script.wait_for_step(), Step::Done(Err(Failure::Mismatch(_)))));
+    let step = loop {
+        match script.wait() {
+            Step::More => {}
+            step @ Step::Wait(_) => assert_eq!(go_on(&mut script, step), poll(1)),
+            step => break step,
+        }
+    };
+    assert!(matches!(step, Step::Done(Err(Failure::Mismatch(_)))), "{step:?}");
 }
 
 #[test]
@@ -328,35 +449,43 @@ fn a_negative_reply_is_an_exception_and_so_is_what_the_network_cannot_deliver() 
     let mut script = settled();
     for (answer, exception) in [
         (reply(&[0xFD]), ExceptionCode::IllegalDataValue),
+        (reply(&[0xFD, 0x06]), ExceptionCode::IllegalDataValue),
         (data_frame(1, &[0x22, 0, 0xFE, 0, 0, 0]), ExceptionCode::GatewayPathUnavailable),
     ] {
         script.ask(1, &WRITE);
         acknowledge(&mut script);
-        assert_eq!(script.hear(&answer), sends(ACK));
-        assert_eq!(script.wait(), Step::Done(Ok(Err(exception))));
+        assert_eq!(take(&mut script, &answer), Step::Done(Ok(Err(exception))));
     }
 }
 
 #[test]
 fn an_adapter_that_echoes_is_recognised_in_every_step() {
     let mut script = script(UniTelwaySettings::default());
-    let first = script.ask(1, &READ);
-    assert_eq!(script.hear(&first), Step::More);
+    let mark = script.ask(1, &READ);
+    assert_eq!(script.hear(&mark), Step::More);
     assert!(script.machine.echoes());
-    script.hear(EOT);
-    let request = reply(&[0x04, 0x07, 0x90, 0x01]);
-    assert_eq!(send(&mut script), request);
+    script.hear(ACK);
+    send(&mut script);
+    assert_eq!(script.hear(&[&poll(1)[..], &mirrored(&mark)].concat()), Step::More);
+    assert_eq!(*send(&mut script), *ACK);
+    let step = script.hear(ACK);
+    let mut request = go_on(&mut script, step);
+    assert_eq!(request, reply(&[0x04, 0x07, 0x90, 0x01]));
     for _ in 0..2 {
         assert_eq!(script.hear(&request), Step::More);
         assert_eq!(script.hear(ACK), Step::More);
         assert_eq!(send(&mut script), poll(1));
-        assert_eq!(script.hear(&[&poll(1)[..], &reply(&[0x34, 6, 0])].concat()), sends(ACK));
-        // The next request waits for the echo of this acknowledgement, or it would be acknowledged by it.
+        assert_eq!(script.hear(&[&poll(1)[..], &reply(&[0x34, 6, 0])].concat()), Step::More);
+        assert_eq!(*send(&mut script), *ACK);
+        // The next poll waits for the echo of this acknowledgement, or that would be taken for something.
+        assert_eq!(script.hear(ACK), Step::More);
+        assert_eq!(send(&mut script), poll(1));
         let answer = Step::Done(Ok(Ok(Response::ReadHoldingRegisters(vec![6]))));
-        assert_eq!(script.hear(ACK), answer);
-        assert_eq!(script.ask(1, &READ), request);
+        assert_eq!(script.hear(&[&poll(1)[..], EOT].concat()), answer);
+        request = script.ask(1, &READ);
+        assert_eq!(request, reply(&[0x04, 0x07, 0x90, 0x01]));
     }
-    assert_eq!(script.strays().iter().filter(|stray| **stray == Stray::Echo).count(), 7);
+    assert_eq!(script.strays().iter().filter(|stray| **stray == Stray::Echo).count(), 3 + 2 * 4);
 }
 
 #[test]

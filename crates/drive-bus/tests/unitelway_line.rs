@@ -41,11 +41,20 @@ impl Peer {
         self.0.write_all(bytes).await.unwrap();
     }
 
-    /// Takes the first poll, and acknowledges the request that follows it.
-    async fn takes_request(&mut self) -> Vec<u8> {
+    /// Mirrors the number that it is asked to; the request that follows.
+    async fn mirrors(&mut self) -> Vec<u8> {
+        let mark = self.hears().await;
+        assert_eq!(mark[10..12], [0xFA, 7], "{mark:02X?}");
+        self.says(ACK).await;
         assert_eq!(self.hears().await, *poll(1));
-        self.says(EOT).await;
-        let request = self.hears().await;
+        self.says(&reply(&[&[0xFB], &mark[12..16]].concat())).await;
+        assert_eq!(self.hears().await, ACK);
+        self.hears().await
+    }
+
+    /// Mirrors a number and acknowledges the request that follows.
+    async fn takes_request(&mut self) -> Vec<u8> {
+        let request = self.mirrors().await;
         self.says(ACK).await;
         request
     }
@@ -54,6 +63,8 @@ impl Peer {
         assert_eq!(self.hears().await, *poll(1));
         self.says(&reply(unite)).await;
         assert_eq!(self.hears().await, ACK);
+        assert_eq!(self.hears().await, *poll(1));
+        self.says(EOT).await;
     }
 }
 
@@ -70,18 +81,14 @@ async fn an_edge_whose_acknowledgement_is_lost_has_an_unknown_outcome_and_is_sen
     let slave = line.slave(1);
     let mut edge = slave.clone().with_terms(Terms::of(Class::Command).within(Duration::from_secs(9)).edge());
     let call = tokio::spawn(async move { edge.call(WRITE).await });
-    assert_eq!(peer.hears().await, *poll(1));
-    peer.says(EOT).await;
-    peer.hears().await;
+    peer.mirrors().await;
     let lost = PortError::from_modbus(call.await.unwrap().unwrap_err());
     assert_eq!(lost, PortError::OutcomeUnknown("no answer"));
 
     // A level is sent again, after the late window and once the slave holds nothing any more.
     let mut level = slave.with_terms(Terms::of(Class::Command).within(Duration::from_secs(9)));
     let call = tokio::spawn(async move { level.call(WRITE).await });
-    assert_eq!(peer.hears().await, *poll(1));
-    peer.says(EOT).await;
-    let first = peer.hears().await;
+    let first = peer.mirrors().await;
     assert_eq!(peer.takes_request().await, first);
     peer.gives_reply(&[0xFE]).await;
     assert_eq!(call.await.unwrap().unwrap(), Ok(WRITTEN));
@@ -123,6 +130,7 @@ async fn a_slave_says_who_it_is_and_what_its_link_has_counted() {
     peer.gives_reply(&[0xD2, 1, 0, 2, 0, 3, 0, 0xFF, 0x7F]).await;
     let counters = call.await.unwrap().unwrap();
     assert_eq!((counters.sent_not_acknowledged, counters.received_refused), (1, 0x7FFF));
+    assert_eq!(line.stats().slaves[&1].link, Some(counters));
 }
 
 #[tokio::test(start_paused = true)]
@@ -150,26 +158,90 @@ async fn a_stop_waits_no_longer_than_the_line_says_behind_an_exchange_where_ever
     let bound = line.worst_case_stop();
     let (mut slave, mut stop) = (line.slave(1), line.slave(2).with_terms(Terms::of(Class::Stop)));
     let read = tokio::spawn(async move { slave.call(READ).await });
-    assert_eq!(peer.hears().await, *poll(1));
+    let request = peer.mirrors().await;
     let called = tokio::time::Instant::now();
     let stopped = tokio::spawn(async move { stop.call(WRITE).await });
-    // Two leftovers, a refused request, a damaged reply, and nothing at the end.
-    for word in [1, 2] {
-        peer.says(&reply(&[0x34, word, 0])).await;
-        assert_eq!(peer.hears().await, ACK);
-        peer.hears().await;
-    }
-    peer.says(NAK).await;
-    peer.hears().await;
+    // Slow words, and our acknowledgement of the reply is not heard.
     tokio::time::sleep(90 * MS).await;
     peer.says(ACK).await;
-    assert_eq!(peer.hears().await, *poll(1));
-    tokio::time::sleep(90 * MS).await;
-    peer.says(&[0x10, 0x02, 1, 2, 0, 0, 0]).await;
-    assert_eq!(peer.hears().await, NAK);
-    assert_eq!(peer.hears().await, *poll(1));
-    assert_eq!(peer.hears().await, *poll(2), "the stop's exchange begins");
+    for _ in 0..2 {
+        assert_eq!(peer.hears().await, *poll(1));
+        tokio::time::sleep(90 * MS).await;
+        peer.says(&reply(&[0x34, 1, 2])).await;
+        assert_eq!(peer.hears().await, ACK);
+    }
+    let sent = peer.hears().await;
+    assert_eq!(sent[..3], [0x10, 0x02, 2], "the stop itself, behind {request:02X?}");
     assert!(called.elapsed() <= bound, "{:?} of {bound:?}", called.elapsed());
-    assert!(read.await.unwrap().is_err());
     stopped.abort();
+    // The read has its answer all the same.
+    assert_eq!(peer.hears().await, *poll(1));
+    peer.says(EOT).await;
+    assert!(read.await.unwrap().is_ok());
+}
+
+#[tokio::test(start_paused = true)]
+async fn while_one_slave_is_not_ready_the_others_are_served() {
+    let (line, mut peer) = line(|config| config);
+    let (mut slow, mut quick) = (line.slave(1), line.slave(2));
+    let waiting = tokio::spawn(async move { slow.call(READ).await });
+    peer.takes_request().await;
+    let read = tokio::spawn(async move { quick.call(READ).await });
+    assert_eq!(peer.hears().await, *poll(1));
+    peer.says(EOT).await;
+    assert_eq!(peer.hears().await[..3], [0x10, 0x02, 2], "the other one's turn");
+    assert_eq!(peer.hears().await, *poll(1), "the other one is dead, and this one is asked again");
+    peer.says(EOT).await;
+    peer.gives_reply(&[0x34, 6, 0]).await;
+    assert!(waiting.await.unwrap().is_ok());
+    read.abort();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_goes_at_once_to_a_slave_that_owes_a_reply_and_is_sent_again_behind_a_number() {
+    let (line, mut peer) = line(|config| config);
+    let mut read = line.slave(1);
+    let read = tokio::spawn(async move { read.call(READ).await });
+    peer.takes_request().await;
+    assert_eq!(peer.hears().await, *poll(1));
+    let mut stop = line.slave(1).with_terms(Terms::of(Class::Stop));
+    let stop = tokio::spawn(async move { stop.call(WRITE).await });
+    tokio::time::sleep(MS).await;
+    peer.says(EOT).await;
+    let written = peer.hears().await;
+    assert_eq!(written, *reply(&[0x14, 7, 0x90, 1, 6, 0]));
+    peer.says(ACK).await;
+    // What comes first is the answer to the read.
+    assert_eq!(peer.hears().await, *poll(1));
+    peer.says(&reply(&[0x34, 1, 2])).await;
+    assert_eq!(peer.hears().await, ACK);
+    peer.gives_reply(&[0xFE]).await;
+    assert_eq!(peer.takes_request().await, written);
+    peer.gives_reply(&[0xFE]).await;
+    assert_eq!(stop.await.unwrap().unwrap(), Ok(WRITTEN));
+    read.abort();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_slave_that_does_nothing_but_refuse_is_busy_and_then_off_line() {
+    let (line, mut peer) = line(|config| config);
+    let mut slave = line.slave(1);
+    let read = tokio::spawn(async move { slave.call(READ).await });
+    let mut frames = 0;
+    while !read.is_finished() {
+        let heard = tokio::time::timeout(200 * MS, peer.hears()).await;
+        match heard {
+            Ok(heard) if heard[1] == 0x02 => {
+                frames += 1;
+                peer.says(NAK).await;
+            }
+            Ok(_) => peer.says(EOT).await,
+            Err(_) => {}
+        }
+    }
+    let refused = PortError::from_modbus(read.await.unwrap().unwrap_err());
+    assert!(matches!(refused, PortError::Busy(_)), "{refused}");
+    assert!((15..100).contains(&frames), "{frames} frames in three seconds");
+    let stats = &line.stats().slaves[&1];
+    assert_eq!((stats.outcomes.busy, stats.outcomes.damaged, stats.offline), (3, 0, true));
 }

@@ -139,6 +139,9 @@ pub enum PortError {
     /// A write was sent and nothing valid came back: it may or may not have been carried out. Read it back.
     #[error("the outcome of the write is unknown ({0})")]
     OutcomeUnknown(&'static str),
+    /// The slave has refused the request for as long as the line repeated it: it is busy. Nothing of it was carried out.
+    #[error("the slave is too busy to take the request ({0})")]
+    Busy(&'static str),
     /// The lifetime ran out before the request was sent. Nothing was sent.
     #[error("expired before it was sent")]
     Expired,
@@ -177,7 +180,7 @@ impl PortError {
             Self::Damaged(_) | Self::Mismatch(_) => io::ErrorKind::InvalidData,
             Self::Offline { .. } => io::ErrorKind::HostUnreachable,
             Self::Superseded => io::ErrorKind::Interrupted,
-            Self::QueueFull(_) => io::ErrorKind::ResourceBusy,
+            Self::QueueFull(_) | Self::Busy(_) => io::ErrorKind::ResourceBusy,
             Self::LineDown(_) | Self::Closed => io::ErrorKind::NotConnected,
             Self::NotCarried(_) => io::ErrorKind::Unsupported,
             Self::Other(_) => io::ErrorKind::Other,
@@ -185,13 +188,14 @@ impl PortError {
         io::Error::new(kind, self)
     }
 
-    /// Whether nothing of the request can have reached the slave.
+    /// Whether nothing of the request was carried out, because it did not reach the slave or was not taken.
     #[must_use]
     pub const fn nothing_sent(&self) -> bool {
         matches!(
             self,
             Self::Expired
                 | Self::Superseded
+                | Self::Busy(_)
                 | Self::Offline { .. }
                 | Self::QueueFull(_)
                 | Self::LineDown(_)

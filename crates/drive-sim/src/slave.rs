@@ -9,6 +9,7 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use crate::{
+    habits::LinkHabits,
     model::{Cast, Damage, Exception, Model, Observation},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
     record::Breach,
@@ -71,6 +72,8 @@ pub(crate) struct Slave {
     turnaround: Option<Duration>,
     /// The end of its last answer, or of a request to all.
     pause_from: Option<Instant>,
+    habits: LinkHabits,
+    busy_until: Option<Instant>,
     connected: bool,
     powered: bool,
     hold: Hold,
@@ -90,6 +93,8 @@ impl Slave {
             delimiter: LINE_FEED,
             turnaround: None,
             pause_from: None,
+            habits: LinkHabits::default(),
+            busy_until: None,
             connected: true,
             powered: true,
             hold: Hold::No,
@@ -313,6 +318,22 @@ impl Slave {
             pdu::answer(&mut *self.model, &request, Cast::Unicast)?;
         }
         Ok(())
+    }
+
+    pub(crate) const fn habits(&self) -> LinkHabits {
+        self.habits
+    }
+
+    pub(crate) const fn set_habits(&mut self, habits: LinkHabits) {
+        self.habits = habits;
+    }
+
+    pub(crate) fn is_busy(&self, now: Instant) -> bool {
+        self.busy_until.is_some_and(|until| now < until)
+    }
+
+    pub(crate) const fn busy_until(&mut self, until: Instant) {
+        self.busy_until = Some(until);
     }
 
     pub(crate) const fn set_turnaround(&mut self, turnaround: Option<Duration>) {

@@ -1,4 +1,4 @@
-//! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
+//! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
 //! and the settings that the drives on it share.
 
 use std::{fmt, str::FromStr, time::Duration};
@@ -12,8 +12,8 @@ use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, Seria
 use crate::drive_spec::DriveName;
 
 /// What a line is, for the help of `--line`.
-pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; PROTOCOL is \
-     rtu, ascii or unitelway";
+pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; \
+     PROTOCOL is rtu, ascii or unitelway, such as unitelway,header=simplified,link-timeout=200ms";
 
 /// A line as a person names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -146,8 +146,8 @@ fn check_serial(
 ) -> Result<(), LineSpecError> {
     for name in drives {
         let spoken = name.family.protocols();
-        if !spoken.contains(&protocol.to_string().as_str()) {
-            let problem = format!("it speaks {} and not {protocol}", spoken.join(", "));
+        if !spoken.contains(&protocol.name()) {
+            let problem = format!("it speaks {} and not {}", spoken.join(", "), protocol.name());
             return Err(LineSpecError::Drive(*name, problem));
         }
         let checked = name.family.capabilities().check_line(name.slave, settings);
@@ -177,7 +177,7 @@ fn agreed<T: PartialEq + fmt::Display>(
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum LineSpecError {
     #[error(
-        "expected PATH[,BAUD[,FORMAT[,PROTOCOL]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT"
+        "expected PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT"
     )]
     Form,
     #[error("{0:?} is not HOST:PORT, such as gateway.local:502 or [::1]:502")]
@@ -236,7 +236,7 @@ impl FromStr for LineSpec {
     }
 }
 
-/// It is written `BAUD[,FORMAT[,PROTOCOL]]`.
+/// It is written `BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]`.
 impl FromStr for SerialSpec {
     type Err = LineSpecError;
 
@@ -248,7 +248,7 @@ impl FromStr for SerialSpec {
     }
 }
 
-/// Format and protocol, as `FORMAT[,PROTOCOL]`.
+/// Format and protocol, as `FORMAT[,PROTOCOL[,SETTING=VALUE]...]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct CharacterSpec {
     pub(crate) format: Option<CharacterFormat>,
@@ -325,6 +325,7 @@ mod tests {
             "COM3,9600,8N1",
             "COM3,9600,7E1,ascii",
             "COM3,19200,8O1,unitelway",
+            "COM3,19200,8O1,unitelway,header=simplified,link-timeout=200ms",
             "rtu+tcp://plant:4001,9600,8N1",
             "tcp://plant:502",
         ] {
@@ -366,6 +367,8 @@ mod tests {
             ("/dev/ttyUSB0,fast", "is not a speed"),
             ("/dev/ttyUSB0,0", "0 bit/s is not a serial speed"),
             ("/dev/ttyUSB0,19200,8X1", "is not a character format"),
+            ("COM3,19200,8O1,unitelway,header=short", "expected simplified, standard"),
+            ("COM3,19200,8O1,unitelway,timeout=1s", "expected NAME=VALUE with one of header, category"),
             ("tcp://plant", "is not HOST:PORT"),
             ("tcp://:502", "is not HOST:PORT"),
             ("tcp://plant:99999", "is not HOST:PORT"),

@@ -8,7 +8,7 @@ pub mod mbap;
 pub mod rtu;
 pub mod unitelway;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_core::Class;
@@ -27,6 +27,8 @@ pub enum Step {
     More,
     /// These bytes sent now; the exchange goes on. [`Exchange::handle_sent`] **must** follow.
     Send(Bytes),
+    /// The line is free for other slaves until this time, when [`Exchange::resume`] goes on.
+    Wait(Instant),
     /// Nothing: it is over.
     Done(Result<Answer, Failure>),
 }
@@ -40,8 +42,10 @@ pub enum Failure {
     Damaged(&'static str),
     /// No answer came in time, but an intact frame of the slave that does not fit the request. The answer may still come.
     Mismatch(String),
-    /// The slave has refused the frame, so that nothing of it was carried out.
+    /// The slave has refused the frame for as long as it was repeated, so that nothing of it was carried out.
     Refused(&'static str),
+    /// A confirmation came that may belong to an earlier request.
+    Doubted(&'static str),
 }
 
 /// What came in and was no part of the exchange.
@@ -78,6 +82,34 @@ pub trait Exchange: Send {
 
     /// Begins an exchange and gives the bytes that open it. `pdu` is the request, encoded.
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes;
+
+    /// The same for the first write of a stop: nothing that makes sure of its answer goes first.
+    fn start_at_once(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
+        self.start(slave, request, pdu)
+    }
+
+    /// Whether a slave that is not ready is put aside.
+    fn frees_the_line(&self) -> bool {
+        false
+    }
+
+    /// Goes on with the exchange with this slave that [`Step::Wait`] has put aside, and gives the bytes to be sent; as after
+    /// [`start`](Self::start).
+    fn resume(&mut self, slave: u8) -> Option<Bytes> {
+        let _ = slave;
+        None
+    }
+
+    /// Gives up the exchange with this slave that was put aside.
+    fn forsake(&mut self, slave: u8) {
+        let _ = slave;
+    }
+
+    /// How long the slave took for the answer that came last, where that is not the time since the request without the
+    /// characters.
+    fn took(&self) -> Option<Duration> {
+        None
+    }
 
     /// The bytes that [`start`](Self::start) or [`Step::Send`] gave have been written; their last bit ends at `end`. The
     /// first character of the answer, and as many more as the answer likely has, are due at `answer_by`, which is

@@ -5,33 +5,48 @@
 //! poll       : 10 05 address
 //! yes, no, nothing to say : 06, 15, 04
 //!
-//! master : data            poll                     ACK
-//! slave  :       ACK             data (or EOT: later)
+//! master : data            poll                     ACK       poll
+//! slave  :       ACK             data (or EOT: later)              EOT
 //! ```
 //!
-//! One exchange is a request, its acknowledgement, as many polls as the slave needs, the reply and its acknowledgement.
-//! The time that a slave may take for all of it is the line's response timeout, learned as in every protocol. Inside it
-//! [`UniTelwaySettings`] has the link's own times.
+//! One exchange is a request, its acknowledgement, as many polls as the slave needs, the reply and its acknowledgement,
+//! and one more poll. The time that a slave may take for its reply is the line's response timeout, learned as in every
+//! protocol. Inside it [`UniTelwaySettings`] has the link's own times.
 //!
-//! # When something is lost
-//! - A request that the slave refuses (NAK) was not carried out. It is sent again, [`UniTelwaySettings::repeats`] times.
+//! # Which request a reply belongs to
+//! A reply says nothing of it. Slaves do different things with a reply whose acknowledgement they have not heard: they
+//! send it again at the next poll, keep it and answer later requests behind it, refuse any request until it is taken,
+//! or forget it. So a request is sent only to a slave that holds nothing:
+//! - It has answered the last poll of its last exchange by EOT, and every reply that it owed has come.
+//! - Else it is asked first to mirror a number of ours (request FAh). What comes before that number is dropped; behind
+//!   it, nothing older can come, because a slave answers in the order in which it was asked. One that refuses to mirror
+//!   has to have nothing more to say.
+//! - The first write of a stop waits for neither. Where it is not known what the slave holds, no confirmation of it is
+//!   taken: its outcome is unknown, and the line sends it again behind a number that was mirrored.
+//!
+//! # When something is lost, and when a slave is slow
+//! - EOT and silence both mean "not yet" to a poll for a reply: the slave is polled again until its time is over, and
+//!   the line serves others between the polls.
+//! - A request that the slave refuses (NAK) was not carried out. What the slave may hold is taken, the request is sent
+//!   again at once, then after pauses in which others are served, for [`UniTelwaySettings::busy_timeout`].
 //! - A request that the slave does not acknowledge may have been carried out. The exchange fails, a write's outcome is
 //!   unknown, and whether it is sent again is for the line to decide: an edge never is.
-//! - A reply that is damaged is refused and polled for again; nothing is carried out twice by that. A poll that is not
-//!   answered at all ends the exchange: the slave may only be late, and would answer a second poll too.
-//! - A reply says nothing of the request that it belongs to. So a slave whose last exchange did not end with its reply, or
-//!   of which nothing is known yet, is polled before its next request, and what it still holds is taken and dropped; and
-//!   after a timeout it gets no request of any kind in the line's late window, the write of a stop excepted.
+//! - A reply that is damaged is refused and polled for again; nothing is carried out twice by that.
 //!
 //! The line has no broadcast here: the card's manual names none for this protocol.
+//!
+//! # What remains
+//! A slave that can neither mirror nor say EOT is asked as soon as it has been silent once: a reply of its that comes
+//! later than the line's late window and has the shape of a later one is taken for it.
 //!
 //! # Sources
 //! The card's manual (VVDED397054 p. 11–13/35–37) prints the UNI-TE requests and leaves the link to the "UNI-TELWAY
 //! reference manual". The frames here are those of public implementations of the slave's side. **Not confirmed on a
-//! card**: the network header, what a slave with nothing to say answers (04 and silence are both taken for it), all
-//! times, and whether a slave that has not heard our acknowledgement gives its reply up when it gets a new request.
+//! card**: the network header, what a slave with nothing to say answers, all times, and what becomes of a reply whose
+//! acknowledgement the slave has not heard.
 
 mod frame;
+mod known;
 mod network;
 mod receive;
 mod request;
@@ -39,7 +54,13 @@ mod send;
 mod settings;
 mod stage;
 
-use std::{collections::BTreeSet, mem, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    hash::{BuildHasher, RandomState},
+    mem,
+    sync::Arc,
+    time::Duration,
+};
 
 use bytes::Bytes;
 use drive_core::{Class, serial::SerialSettings};
@@ -48,6 +69,7 @@ use tokio_modbus::Request;
 
 use self::{
     frame::{MAX_FRAME, Receiver},
+    known::Known,
     network::MAX_MESSAGE,
     request::{encode, is_specific},
     stage::{Current, Next, Stage},
@@ -56,7 +78,7 @@ pub use self::{
     frame::{data as data_frame, len as frame_len, poll},
     network::NetworkHeader,
     request::UNITE,
-    settings::{UniTelwaySettings, overtime},
+    settings::{UniTelwaySettings, longest},
 };
 pub(crate) use self::{
     request::code,
@@ -72,15 +94,16 @@ pub struct UniTelway {
     serial: SerialSettings,
     turnaround: Duration,
     chunk_gap: Duration,
-    /// Slaves that are known to hold no reply.
-    empty: BTreeSet<u8>,
-    /// Slaves that have said before that they have nothing to say, so that their silence does not mean it.
-    outspoken: BTreeSet<u8>,
-    /// Those of them that kept silent all the same when they were polled last.
-    silent: BTreeSet<u8>,
+    known: BTreeMap<u8, Known>,
     current: Option<Current>,
+    /// The exchanges that wait for their slaves.
+    aside: BTreeMap<u8, Current>,
+    /// The number that was mirrored last. Where it begins nobody knows, so that none is taken for an earlier run's.
+    marks: u32,
     receiver: Receiver,
     last_byte: Option<Instant>,
+    /// How long the slave took for the last answer.
+    took: Option<Duration>,
     /// What was sent last and has not come back as an echo.
     sent: Bytes,
     echoes: bool,
@@ -96,12 +119,13 @@ impl UniTelway {
             serial,
             turnaround: serial.bits(settings.turnaround_bits),
             chunk_gap: chunk_gap.max(serial.t3_5()),
-            empty: BTreeSet::new(),
-            outspoken: BTreeSet::new(),
-            silent: BTreeSet::new(),
+            known: BTreeMap::new(),
             current: None,
+            aside: BTreeMap::new(),
+            marks: RandomState::new().hash_one(()) as u32,
             receiver: Receiver::default(),
             last_byte: None,
+            took: None,
             sent: Bytes::new(),
             echoes: false,
             strays: Vec::new(),
@@ -110,10 +134,35 @@ impl UniTelway {
 
     /// Whether something that a slave may send now has begun to come.
     fn is_receiving(&self) -> bool {
-        self.receiver.is_open()
-            && self.current.as_ref().is_some_and(|current| {
-                matches!(current.stage, Stage::Emptying | Stage::Requesting | Stage::Polling)
-            })
+        self.receiver.is_open() && self.current.as_ref().is_some_and(Current::is_listening)
+    }
+
+    fn open(&mut self, slave: u8, request: Arc<Request<'static>>, at_once: bool) -> Bytes {
+        // What has no form was refused by `carries`.
+        let unite = encode(&request, self.settings.category).unwrap_or_default();
+        let is_empty = self.known.entry(slave).or_default().is_empty();
+        self.current = Some(Current {
+            slave,
+            frame: frame::data(slave, &self.settings.header.message(&unite)),
+            mark: (!is_empty && !at_once).then(|| self.new_mark(slave)),
+            is_proven: is_empty,
+            stage: Stage::Before(Next::Ask),
+            due: None,
+            patience: Duration::ZERO,
+            reply_by: None,
+            reply: self.serial.characters(reply_len(answer::likely_len(&request))),
+            request,
+            requested: None,
+            waiting_since: None,
+            refusals: 0,
+            damaged: 0,
+            leftovers: 0,
+            unanswered: 0,
+            result: None,
+            misfit: None,
+        });
+        self.took = None;
+        self.begin(Next::Ask)
     }
 }
 
@@ -137,30 +186,11 @@ impl Exchange for UniTelway {
     }
 
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, _: &Bytes) -> Bytes {
-        // What has no form was refused by `carries`.
-        let unite = encode(&request, self.settings.category).unwrap_or_default();
-        let frame = frame::data(slave, &self.settings.header.message(&unite));
-        let reply = self.serial.characters(reply_len(answer::likely_len(&request)));
-        let mut current = Current {
-            slave,
-            request,
-            frame,
-            stage: Stage::Before(Next::Request),
-            due: None,
-            patience: Duration::ZERO,
-            reply_by: None,
-            reply,
-            answer: None,
-            leftovers: 0,
-            refusals: 0,
-            damaged: 0,
-            misfit: None,
-        };
-        let is_empty = self.empty.remove(&slave);
-        let bytes = current.begin(if is_empty { Next::Request } else { Next::Empty });
-        self.current = Some(current);
-        self.prepare(&bytes);
-        bytes
+        self.open(slave, request, false)
+    }
+
+    fn start_at_once(&mut self, slave: u8, request: Arc<Request<'static>>, _: &Bytes) -> Bytes {
+        self.open(slave, request, true)
     }
 
     fn handle_sent(&mut self, end: Instant, answer_by: Instant) {
@@ -171,16 +201,16 @@ impl Exchange for UniTelway {
             current.reply_by = Some(answer_by);
         }
         current.due = Some(match current.stage {
-            Stage::Requesting => {
+            Stage::Asking => {
                 let reply_by = end + current.patience;
                 current.reply_by = Some(reply_by);
+                current.requested = Some(end);
                 reply_by.min(end + link_timeout + self.serial.characters(1))
             }
-            Stage::Emptying | Stage::Polling => end + link_timeout + current.reply,
-            Stage::Answering(_) => end + self.turnaround,
+            Stage::Polling(_) => end + link_timeout + current.reply,
             // The echo of an acknowledgement must not be taken for one of the next request.
-            Stage::Ending if self.echoes => end + self.chunk_gap,
-            Stage::Ending | Stage::Before(_) => end,
+            Stage::Answering(_) if self.echoes => end + self.chunk_gap,
+            Stage::Answering(_) | Stage::Before(_) => end,
         });
     }
 
@@ -213,7 +243,7 @@ impl Exchange for UniTelway {
             }
         }
         let over = self.current.as_ref().and_then(|current| current.due).is_some_and(|due| now >= due);
-        if over { self.overdue() } else { Step::More }
+        if over { self.overdue(now) } else { Step::More }
     }
 
     fn deadline(&self) -> Option<Instant> {
@@ -231,12 +261,31 @@ impl Exchange for UniTelway {
         self.current = None;
     }
 
+    fn frees_the_line(&self) -> bool {
+        true
+    }
+
+    fn resume(&mut self, slave: u8) -> Option<Bytes> {
+        let current = self.aside.remove(&slave)?;
+        let Stage::Before(next) = current.stage else { return None };
+        self.current = Some(current);
+        Some(self.begin(next))
+    }
+
+    fn forsake(&mut self, slave: u8) {
+        self.aside.remove(&slave);
+    }
+
     fn reset(&mut self) {
         self.current = None;
+        self.aside.clear();
         self.receiver = Receiver::default();
         self.sent.clear();
-        self.empty.clear();
-        self.silent.clear();
+        self.known.clear();
+    }
+
+    fn took(&self) -> Option<Duration> {
+        self.took
     }
 
     fn take_strays(&mut self) -> Vec<Stray> {

@@ -58,9 +58,11 @@ impl<C> Master<C> {
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
         let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
         let characters = self.config.characters(self.config.answer_len(expected));
+        let took = self.exchange.took();
         let station = self.station(flight.slave);
         if let Some(sent) = flight.sent {
-            let after = now.saturating_duration_since(sent.end).saturating_sub(characters);
+            let elapsed = || now.saturating_duration_since(sent.end).saturating_sub(characters);
+            let after = took.unwrap_or_else(elapsed);
             station.timeout.answered(after);
             station.stats.response.record(after);
         }
@@ -68,9 +70,13 @@ impl<C> Master<C> {
             Ok(_) => station.stats.outcomes.answered += 1,
             Err(_) => station.stats.outcomes.exceptions += 1,
         }
-        if station.answered(now) {
-            self.offline.remove(&flight.slave);
-            tracing::info!(slave = flight.slave, "slave answers again");
+        self.note_alive(now, flight.slave);
+    }
+
+    fn note_alive(&mut self, now: Instant, slave: u8) {
+        if self.station(slave).answered(now) {
+            self.offline.remove(&slave);
+            tracing::info!(slave, "slave answers again");
         }
     }
 
@@ -83,8 +89,22 @@ impl<C> Master<C> {
         }
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
-            Failure::Damaged(_) | Failure::Refused(_) => {
+            Failure::Damaged(_) => {
                 station.stats.outcomes.damaged += 1;
+                return;
+            }
+            // It answers, and its next exchange will prove something.
+            Failure::Doubted(_) => {
+                station.stats.outcomes.mismatches += 1;
+                self.note_alive(now, flight.slave);
+                return;
+            }
+            // Nothing of it can still come. One that does nothing but refuse is as good as away.
+            Failure::Refused(_) => {
+                station.stats.outcomes.busy += 1;
+                if station.missed(now, &self.config) {
+                    self.go_offline(now, flight.slave);
+                }
                 return;
             }
             Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
@@ -126,10 +146,21 @@ impl<C> Master<C> {
     }
 
     /// An attempt has failed: once more, or the end.
-    fn fail(&mut self, now: Instant, mut entry: Entry<Job<C>>, failure: Failure, waited: Duration) {
+    pub(super) fn fail(
+        &mut self,
+        now: Instant,
+        mut entry: Entry<Job<C>>,
+        failure: Failure,
+        waited: Duration,
+    ) {
         let write = entry.work.is_write;
         let error = match failure {
-            Failure::Refused(why) => PortError::NotCarried(why.to_owned()),
+            Failure::Refused(why) => match entry.work.last.take() {
+                // An earlier attempt may have been carried out.
+                Some(unknown @ PortError::OutcomeUnknown(_)) => unknown,
+                _ => PortError::Busy(why),
+            },
+            Failure::Doubted(why) => PortError::OutcomeUnknown(why),
             Failure::Timeout if write => PortError::OutcomeUnknown("no answer"),
             Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
             Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),
@@ -179,13 +210,20 @@ impl<C> Master<C> {
         self.outcomes.push_back((entry.work.caller, confirmation));
     }
 
-    /// The port is lost with an exchange under way. A read waits for the next port; a write has an unknown outcome and
+    /// The port is lost with exchanges under way. A read waits for the next port; a write has an unknown outcome and
     /// is never sent again.
     pub(super) fn fail_flight(&mut self, now: Instant, reason: &str) {
         self.to_send = None;
-        let Some(flight) = self.flight.take() else { return };
-        self.fear_late_answer(now, &flight);
-        let Purpose::Call(Some(mut entry)) = flight.purpose else { return };
+        let aside = std::mem::take(&mut self.aside).into_values().map(|aside| aside.flight);
+        let flights: Vec<_> = self.flight.take().into_iter().chain(aside).collect();
+        for flight in flights {
+            self.fear_late_answer(now, &flight);
+            self.fail_call(now, flight.purpose, reason);
+        }
+    }
+
+    fn fail_call(&mut self, now: Instant, purpose: Purpose<C>, reason: &str) {
+        let Purpose::Call(Some(mut entry)) = purpose else { return };
         if entry.work.is_write {
             self.outcomes.push_back((entry.work.caller, Err(PortError::OutcomeUnknown("the line was lost"))));
         } else if self.may_retry(now, &entry) {

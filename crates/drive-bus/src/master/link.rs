@@ -59,7 +59,7 @@ impl<C> Master<C> {
 
     /// Whether the line is closed and nothing is under way any more.
     #[must_use]
-    pub const fn is_finished(&self) -> bool {
-        self.closing && self.flight.is_none()
+    pub fn is_finished(&self) -> bool {
+        self.closing && self.flight.is_none() && self.aside.is_empty()
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Inputs are named `handle_…`, `submit`, `withdraw`; outputs `poll_…`. The task feeds it and acts.
 
+mod aside;
 mod finish;
 mod link;
 mod send;
@@ -26,8 +27,10 @@ use crate::{
     protocol::Protocol,
     schedule::{Entry, Rules, Schedule, Ticket},
     stats::Stats,
+    unite::LinkCounters,
 };
 
+use aside::Aside;
 use link::Link;
 use station::Station;
 
@@ -56,6 +59,10 @@ pub struct Master<C> {
     /// Those that do not answer: they are probed.
     offline: BTreeSet<u8>,
     flight: Option<Flight<C>>,
+    /// Exchanges whose slaves are not ready yet.
+    aside: BTreeMap<u8, Aside<C>>,
+    /// The last exchange that was sent was one of those: the next turn is another's.
+    resumed: bool,
     to_send: Option<Bytes>,
     /// How many characters the port was given whose sending is not confirmed yet.
     sending: Option<usize>,
@@ -139,6 +146,8 @@ impl<C> Master<C> {
             stations: BTreeMap::new(),
             offline: BTreeSet::new(),
             flight: None,
+            aside: BTreeMap::new(),
+            resumed: false,
             to_send: None,
             sending: None,
             outcomes: VecDeque::new(),
@@ -270,8 +279,11 @@ impl<C> Master<C> {
             self.station(entry.slave).stats.outcomes.withdrawn += 1;
             return;
         }
-        if let Some(Flight { purpose: Purpose::Call(call), .. }) = &mut self.flight {
-            call.take_if(|entry| entry.ticket == ticket);
+        let aside = self.aside.values_mut().map(|aside| &mut aside.flight);
+        for flight in self.flight.iter_mut().chain(aside) {
+            if let Purpose::Call(call) = &mut flight.purpose {
+                call.take_if(|entry| entry.ticket == ticket);
+            }
         }
     }
 
@@ -326,6 +338,7 @@ impl<C> Master<C> {
                     self.to_send = Some(bytes);
                 }
             }
+            Step::Wait(at) => self.put_aside(now, at),
             Step::Done(_) if unanswered => {}
             Step::Done(result) => self.finish(now, result),
         }
@@ -354,6 +367,11 @@ impl<C> Master<C> {
     #[must_use]
     pub const fn exchange_end(&self) -> Instant {
         self.exchange_end
+    }
+
+    /// A slave has said what its link has counted.
+    pub(crate) fn note_link_counters(&mut self, slave: u8, counters: LinkCounters) {
+        self.station(slave).stats.link = Some(counters);
     }
 
     /// What was counted so far, at `now`.

@@ -26,7 +26,11 @@ impl<C> Master<C> {
 
     fn next_exchange(&mut self, now: Instant) -> Option<Bytes> {
         self.choose_at = None;
-        if self.flight.is_some() || !matches!(self.link, Link::Up) || self.closing {
+        if self.flight.is_some() || !matches!(self.link, Link::Up) {
+            return None;
+        }
+        let aside = self.next_aside();
+        if self.closing && aside.is_none() {
             return None;
         }
         let free_at = self.free_at();
@@ -36,8 +40,13 @@ impl<C> Master<C> {
         let probe = self.next_probe().filter(|_| stop_at.is_none());
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
-            self.choose_at = (!self.schedule.is_empty() || probe.is_some()).then_some(soonest);
+            let waits = !self.schedule.is_empty() || probe.is_some() || aside.is_some();
+            self.choose_at = waits.then_some(soonest);
             return None;
+        }
+        let due = aside.filter(|(at, _)| stop_at.is_none() && *at <= now);
+        if let Some((_, slave)) = due.filter(|_| !self.resumed || self.closing) {
+            return self.resume(now, slave);
         }
         if let Some((slave, at)) = probe {
             if at <= now {
@@ -46,18 +55,20 @@ impl<C> Master<C> {
             }
             self.choose_at = Some(at);
         }
-        match self.choose(now, free_at, stop_at) {
-            Choice::Send(entry) => self.begin(now, entry),
-            Choice::Wait(at) => {
-                self.choose_at = Some(self.choose_at.map_or(at, |probe| probe.min(at)));
-                None
-            }
+        let at = match self.choose(now, free_at, stop_at) {
+            Choice::Send(entry) => return self.begin(now, entry),
+            Choice::Wait(at) => Some(at),
             Choice::Idle => None,
+        };
+        if let Some((_, slave)) = due {
+            return self.resume(now, slave);
         }
+        self.choose_at = [self.choose_at, at, aside.map(|(at, _)| at)].into_iter().flatten().min();
+        None
     }
 
     fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Job<C>> {
-        let Self { schedule, stations, config, last_slave, exchange, offline_stop_at, .. } = self;
+        let Self { schedule, stations, aside, config, last_slave, exchange, offline_stop_at, .. } = self;
         schedule.choose(now, |entry| {
             let stop = entry.terms.class == Class::Stop;
             let mut at = stop_at.filter(|_| stop).unwrap_or(free_at);
@@ -74,6 +85,8 @@ impl<C> Master<C> {
             if let Some(station) = stations.get(&entry.slave) {
                 at = at.max(station.ready_at.unwrap_or(at));
                 long = station.held_until(now, exchange.as_ref(), entry, *offline_stop_at);
+                let aside = aside.get(&entry.slave).and_then(|aside| aside.holds(now, entry));
+                long = long.max(aside);
                 at = at.max(long.unwrap_or(at));
                 takes = station.timeout.typical();
             }
@@ -85,9 +98,11 @@ impl<C> Master<C> {
 
     /// Whether a Stop has to wait for longer than its slave's pause, so that the line is free for others meanwhile.
     fn waits_long(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
-        self.stations.get(&entry.slave).is_some_and(|station| {
-            station.held_until(now, self.exchange.as_ref(), entry, self.offline_stop_at).is_some()
-        })
+        let aside = self.aside.get(&entry.slave);
+        aside.is_some_and(|aside| aside.holds(now, entry).is_some())
+            || self.stations.get(&entry.slave).is_some_and(|station| {
+                station.held_until(now, self.exchange.as_ref(), entry, self.offline_stop_at).is_some()
+            })
     }
 
     /// When the silence before any request is over.
@@ -114,6 +129,7 @@ impl<C> Master<C> {
         let (slave, at) = self
             .offline
             .iter()
+            .filter(|slave| !self.aside.contains_key(slave))
             .filter_map(|slave| Some((*slave, self.stations.get(slave)?.wanted_probe_at()?)))
             .min_by_key(|(_, at)| *at)?;
         Some((slave, self.probe_free_at.map_or(at, |free| free.max(at))))
@@ -134,8 +150,14 @@ impl<C> Master<C> {
             self.station(slave).stats.retries += 1;
         }
         self.note_start(now, slave, entry.arrived);
+        self.forsake(now, slave);
         let request = Arc::clone(&entry.work.request);
-        let bytes = self.exchange.start(slave, Arc::clone(&request), &entry.work.pdu);
+        let first = entry.work.attempts == 0 && entry.work.is_write && entry.terms.class == Class::Stop;
+        let bytes = if first {
+            self.exchange.start_at_once(slave, Arc::clone(&request), &entry.work.pdu)
+        } else {
+            self.exchange.start(slave, Arc::clone(&request), &entry.work.pdu)
+        };
         Some(self.fly(now, slave, Purpose::Call(Some(entry)), request, bytes))
     }
 
@@ -172,6 +194,7 @@ impl<C> Master<C> {
         request: Arc<Request<'static>>,
         bytes: Bytes,
     ) -> Bytes {
+        self.resumed = false;
         self.flight = Some(Flight { purpose, slave, request, started: now, sent: None });
         bytes
     }
@@ -200,7 +223,12 @@ impl<C> Master<C> {
             Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
         });
         station.stats.sent += 1;
-        let timeout = station.timeout.current();
+        // What waits while others are served may wait as long as it was configured.
+        let timeout = if self.exchange.frees_the_line() {
+            station.timeout.ceiling()
+        } else {
+            station.timeout.current()
+        };
         let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
         let answer_by = end + timeout + characters;
         flight.sent = Some(Sent {

@@ -6,6 +6,7 @@ pub(crate) mod by_hand;
 pub(crate) mod rig;
 pub(crate) mod script;
 pub(crate) mod server;
+pub(crate) mod telway;
 pub(crate) mod unitelway;
 
 use std::time::Duration;

@@ -6,15 +6,19 @@
 //! poll       : 10 05 address
 //! ```
 //!
-//! The BCC is the sum of all bytes before it. What a slave without anything to say answers to a poll is not printed;
-//! here it is 04h (EOT), so a master has to take both that and silence.
+//! The BCC is the sum of all bytes before it. What a slave without anything to say answers to a poll is not printed, nor
+//! what it does with a reply that nobody has acknowledged: [`LinkHabits`] are switches for it.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    time::Duration,
+};
 
 use tokio::time::Instant;
 
 use super::Framing;
 use crate::{
+    habits::{HeaderForm, LinkHabits, Unacknowledged},
     model::Damage,
     speech::{Content, Speech},
     state::State,
@@ -70,8 +74,8 @@ struct Frame {
 /// What a slave remembers of its link.
 #[derive(Debug, Default)]
 struct Station {
-    /// The message that it will send when polled, until it is acknowledged.
-    pending: Option<Vec<u8>>,
+    /// The messages that it will send when polled, until they are acknowledged, each from its time on.
+    pending: VecDeque<(Instant, Vec<u8>)>,
     /// The network header of the request that it answers.
     header: Vec<u8>,
     counters: LinkCounters,
@@ -148,9 +152,9 @@ impl Framing for UniTelway {
         self.stage = self.give_up(line);
     }
 
-    fn release(&mut self, slave: u8, message: Vec<u8>, _: Instant) -> Option<Speech> {
+    fn release(&mut self, slave: u8, message: Vec<u8>, now: Instant) -> Option<Speech> {
         let station = self.stations.entry(slave).or_default();
-        station.pending = Some([&station.header[..], &message].concat());
+        station.pending.push_back((now, [&station.header[..], &message].concat()));
         None
     }
 
@@ -177,19 +181,30 @@ impl UniTelway {
         if !slave.is_connected(at) || !slave.speaks_unite() {
             return None;
         }
-        let turnaround = slave.turnaround();
+        let (turnaround, habits) = (slave.turnaround(), slave.habits());
+        let unheard = self.sent.take();
+        self.not_acknowledged(unheard, line);
         let station = self.stations.entry(address).or_default();
-        if self.sent.take() == Some(address) {
-            LinkCounters::count(&mut station.counters.sent_not_acknowledged);
-        }
-        let content = match &station.pending {
-            Some(message) => {
+        let content = match station.pending.front() {
+            Some((ready, message)) if *ready <= at => {
                 self.sent = Some(address);
                 Content::Message(message.clone())
             }
-            None => Content::Signal(vec![EOT]),
+            _ if habits.silent => return None,
+            _ => Content::Signal(vec![EOT]),
         };
         Some(Speech { slave: address, content, heard: at, turnaround })
+    }
+
+    /// Something else came than a word to what this slave has sent.
+    fn not_acknowledged(&mut self, address: Option<u8>, line: &mut State) {
+        let Some(address) = address else { return };
+        let Some(station) = self.stations.get_mut(&address) else { return };
+        LinkCounters::count(&mut station.counters.sent_not_acknowledged);
+        let habits = line.slave(address).map(|slave| slave.habits());
+        if habits.is_some_and(|habits| habits.unacknowledged == Unacknowledged::Forgets) {
+            station.pending.pop_front();
+        }
     }
 
     /// The master's answer to a data frame. One that is refused stays, and is sent at the next poll.
@@ -198,7 +213,7 @@ impl UniTelway {
             return;
         };
         if taken {
-            station.pending = None;
+            station.pending.pop_front();
         } else {
             LinkCounters::count(&mut station.counters.sent_refused);
         }
@@ -206,7 +221,8 @@ impl UniTelway {
 
     /// A whole data frame: acknowledged or refused by its slave, and carried out.
     fn received(&mut self, check: u8, at: Instant, line: &mut State) -> Option<Speech> {
-        self.sent = None;
+        let unheard = self.sent.take();
+        self.not_acknowledged(unheard, line);
         let Frame { address, ref data, sum, .. } = self.frame;
         let intact = check == sum;
         if intact {
@@ -218,14 +234,22 @@ impl UniTelway {
         if !slave.is_connected(at) || !slave.speaks_unite() {
             return None;
         }
-        let turnaround = slave.turnaround();
+        let habits = slave.habits();
+        let LinkHabits { unacknowledged, acknowledges_after, works_for, .. } = habits;
+        let turnaround = acknowledges_after.unwrap_or(slave.turnaround());
         let station = self.stations.entry(address).or_default();
-        let signal = match intact.then(|| split_header(data)).flatten() {
+        let is_full = unacknowledged == Unacknowledged::Refuses && !station.pending.is_empty();
+        let takes = intact && !is_full && !slave.is_busy(at);
+        let request = takes.then(|| split_header(data)).flatten();
+        let signal = match request.filter(|(header, _)| is_known(habits.header, header)) {
             Some((header, request)) => {
                 station.header = header.to_vec();
                 let answer = slave.unite(at, request, &mut station.counters);
-                // A new request takes the place of an answer that nobody came for.
-                station.pending = answer.map(|answer| [header, &answer].concat());
+                if unacknowledged != Unacknowledged::Queues {
+                    station.pending.clear();
+                }
+                let ready = at + works_for;
+                station.pending.extend(answer.map(|answer| (ready, [header, &answer].concat())));
                 ACK
             }
             None => {
@@ -250,6 +274,14 @@ fn split_header(message: &[u8]) -> Option<(&[u8], &[u8])> {
         SIMPLE_HEADER => message.split_at_checked(1),
         NETWORK_HEADER => message.split_at_checked(NETWORK_HEADER_LENGTH),
         _ => None,
+    }
+}
+
+fn is_known(form: HeaderForm, header: &[u8]) -> bool {
+    match form {
+        HeaderForm::Either => true,
+        HeaderForm::Simplified => header.len() == 1,
+        HeaderForm::Standard => header.len() == NETWORK_HEADER_LENGTH,
     }
 }
 

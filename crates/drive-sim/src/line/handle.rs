@@ -7,6 +7,7 @@ use tokio::time::Instant;
 
 use super::SimLine;
 use crate::{
+    habits::LinkHabits,
     model::{Exception, Observation, Panel},
     slave::{LineCounters, Received, Slave},
     world::{Act, Surroundings, UnknownName},
@@ -82,6 +83,18 @@ impl SimSlave {
     /// Changes the time from the end of a request to the start of its answer; `None`: the family's own.
     pub fn set_turnaround(&self, turnaround: Option<Duration>) {
         self.order(|slave, _| slave.set_turnaround(turnaround));
+    }
+
+    /// Changes what it does on a UNI-TELWAY line where the card's manual says nothing; in the other protocols it has no
+    /// effect.
+    pub fn set_link_habits(&self, habits: LinkHabits) {
+        self.order(|slave, _| slave.set_habits(habits));
+    }
+
+    /// Keeps it busy for this long: on a UNI-TELWAY line it refuses (NAK) every request; in the other protocols it has no
+    /// effect.
+    pub fn keep_busy(&self, time: Duration) {
+        self.order(|slave, _| slave.busy_until(Instant::now() + time));
     }
 
     /// Trips the drive with a code of its family.

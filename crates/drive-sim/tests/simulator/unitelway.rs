@@ -3,7 +3,10 @@
 use std::time::Duration;
 
 use drive_core::{SerialSettings, serial::CharacterFormat};
-use drive_sim::{ALWAYS, Exception, Fault, Protocol, SimLine, SimSlave, Wiring, models::atv58::Atv58};
+use drive_sim::{
+    ALWAYS, Exception, Fault, HeaderForm, LinkHabits, Protocol, SimLine, SimSlave, Unacknowledged, Wiring,
+    models::atv58::Atv58,
+};
 use tokio::io::{AsyncWriteExt, DuplexStream};
 
 use crate::support::{ACC, CMD, KEEP, OUT, REF, Small, ask};
@@ -249,4 +252,63 @@ async fn an_acknowledgement_can_be_lost_too() {
     master.line.set_fault(Fault::Lost, 0);
     assert_eq!(master.slave(1).peek(KEEP.address()), Some(9), "the write was carried out");
     assert_eq!(unframe(1, &master.poll(1).await), [0, 0xFE]);
+}
+
+/// A slave with these habits that has said the reply to mirror 1, which nobody acknowledged.
+async fn unacknowledged(unacknowledged: Unacknowledged) -> Master {
+    let mut master = Master::new([1]);
+    master.slave(1).set_link_habits(LinkHabits { unacknowledged, ..LinkHabits::default() });
+    assert_eq!(master.send(&frame(1, &[0, 0xFA, 0, 1])).await, [ACK]);
+    assert_eq!(unframe(1, &master.poll(1).await), [0, 0xFB, 1]);
+    master
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_becomes_of_a_reply_that_nobody_acknowledges_is_a_switch() {
+    let mut repeats = unacknowledged(Unacknowledged::Repeats).await;
+    assert_eq!(unframe(1, &repeats.poll(1).await), [0, 0xFB, 1]);
+    assert_eq!(repeats.exchange(1, &[0xFA, 0, 2]).await, [0xFB, 2], "in its place");
+
+    let mut forgets = unacknowledged(Unacknowledged::Forgets).await;
+    assert_eq!(forgets.poll(1).await, [EOT]);
+
+    let mut queues = unacknowledged(Unacknowledged::Queues).await;
+    assert_eq!(queues.exchange(1, &[0xFA, 0, 2]).await, [0xFB, 1], "the earlier one first");
+    assert_eq!(unframe(1, &queues.poll(1).await), [0, 0xFB, 2]);
+
+    let mut refuses = unacknowledged(Unacknowledged::Refuses).await;
+    assert_eq!(refuses.send(&frame(1, &[0, 0xFA, 0, 2])).await, [NAK]);
+    refuses.poll(1).await;
+    refuses.port.write_all(&[ACK]).await.unwrap();
+    assert_eq!(refuses.exchange(1, &[0xFA, 0, 2]).await, [0xFB, 2]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_slave_that_works_longer_says_nothing_or_that_it_has_nothing_to_say() {
+    for silent in [false, true] {
+        let mut master = Master::new([1]);
+        let works_for = Duration::from_secs(2);
+        master.slave(1).set_link_habits(LinkHabits { silent, works_for, ..LinkHabits::default() });
+        assert_eq!(master.send(&frame(1, &[0, 0xFA, 0, 1])).await, [ACK]);
+        assert_eq!(master.poll(1).await, if silent { vec![] } else { vec![EOT] });
+        tokio::time::sleep(works_for).await;
+        assert_eq!(unframe(1, &master.poll(1).await), [0, 0xFB, 1]);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_busy_slave_and_one_that_takes_another_header_refuse_and_a_slow_one_acknowledges_late() {
+    let mut master = Master::new([1]);
+    let request = frame(1, &[0, 0xFA, 0, 1]);
+    master.slave(1).keep_busy(Duration::from_secs(1));
+    assert_eq!(master.send(&request).await, [NAK]);
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(master.send(&request).await, [ACK]);
+    for (header, word) in [(HeaderForm::Standard, NAK), (HeaderForm::Simplified, ACK)] {
+        master.slave(1).set_link_habits(LinkHabits { header, ..LinkHabits::default() });
+        assert_eq!(master.send(&request).await, [word]);
+    }
+    let late = Some(Duration::from_millis(600));
+    master.slave(1).set_link_habits(LinkHabits { acknowledges_after: late, ..LinkHabits::default() });
+    assert_eq!(master.send(&request).await, [], "it takes longer than we wait");
 }

@@ -7,11 +7,14 @@ use super::{
     UniTelway,
     frame::{self, ACK, EOT, Heard, NAK, poll},
     network::unite_of,
-    request::decode,
+    request::{REFUSED, decode},
     settings::{LEFTOVERS, POLL_LEN},
-    stage::{Current, Next, Stage},
+    stage::{Next, Stage, Then, Wanted},
 };
 use crate::exchange::{Failure, Step, Stray};
+
+/// Why a reply that fits its request is not taken.
+const DOUBTED: &str = "the confirmation may belong to an earlier request";
 
 impl UniTelway {
     /// Takes what the receiver has made of the bytes.
@@ -28,7 +31,7 @@ impl UniTelway {
                 }
                 self.data(now, address, &message)
             }
-            Heard::Damaged(len) => self.damaged(len),
+            Heard::Damaged(len) => self.damaged(now, len),
             Heard::Noise(len) => self.noise(len),
         }
     }
@@ -48,35 +51,39 @@ impl UniTelway {
     fn signal(&mut self, now: Instant, byte: u8, alone: bool) -> Step {
         // A single character proves no echo, it is only taken away where there is one.
         if self.echoes && self.is_echo(&[byte]) {
-            let is_last = self.current.as_ref().is_some_and(|current| current.stage == Stage::Ending);
-            return if is_last { self.overdue() } else { Step::More };
+            return match self.current.as_ref().map(|current| current.stage) {
+                Some(Stage::Answering(then)) => self.go_on(now, then),
+                _ => Step::More,
+            };
         }
-        let (turnaround, pause) = (self.turnaround, self.settings.poll_pause.max(self.turnaround));
-        let repeats = self.settings.repeats;
         let Some(current) = &mut self.current else { return self.noise(1) };
-        match (&current.stage, byte) {
-            (Stage::Requesting, ACK) => current.pause(now + turnaround, Next::Poll),
+        match (current.stage, byte) {
+            (Stage::Asking, ACK) => {
+                current.waiting_since = None;
+                current.refusals = 0;
+                self.after_turnaround(now, Next::Poll(Wanted::Reply))
+            }
             // What stands among other bytes is no refusal: the slave may have taken the request.
-            (Stage::Requesting, NAK) if alone && current.refusals < repeats => {
+            (Stage::Asking, NAK) if alone => {
                 current.refusals += 1;
-                current.pause(now + turnaround, Next::Request);
+                let since = *current.waiting_since.get_or_insert(now);
+                if now.saturating_duration_since(since) >= self.settings.busy_timeout {
+                    return self.end(Err(Failure::Refused("NAK")));
+                }
+                // It may refuse because nobody has come for what it holds.
+                self.after_turnaround(now, Next::Poll(Wanted::Room))
             }
-            (Stage::Requesting, NAK) if alone => {
-                self.empty.insert(current.slave);
-                return self.end(Err(Failure::Refused("the slave refuses the frame (NAK)")));
+            (Stage::Polling(wanted), EOT) if alone => {
+                // Of a slave whose earlier reply may still be on its way it proves nothing, nor does one to an earlier poll.
+                let emptied = wanted == Wanted::Nothing && current.is_proven && current.unanswered == 0;
+                self.known.entry(current.slave).or_default().says_nothing(emptied);
+                match wanted {
+                    Wanted::Nothing => self.close(),
+                    wanted => self.nothing_came(now, wanted, true),
+                }
             }
-            (Stage::Emptying, EOT) if alone => {
-                self.silent.remove(&current.slave);
-                self.outspoken.insert(current.slave);
-                current.pause(now + turnaround, Next::Request);
-            }
-            (Stage::Polling, EOT) if alone && !current.is_late(now) => {
-                current.pause(now + pause, Next::Poll);
-            }
-            (Stage::Polling, EOT) if alone => return self.fail(),
-            _ => return self.noise(1),
+            _ => self.noise(1),
         }
-        Step::More
     }
 
     /// A data frame whose BCC fits.
@@ -87,16 +94,30 @@ impl UniTelway {
             _ => message.first().copied().unwrap_or_default(),
         };
         let stray = Stray::Frame { slave: address, function };
-        let Some(current) = self.current.as_mut().filter(|current| current.slave == address) else {
+        let current = self.current.as_mut().filter(|current| current.slave == address);
+        let Some((current, wanted)) = current.and_then(|current| match current.stage {
+            Stage::Polling(wanted) => Some((current, wanted)),
+            _ => None,
+        }) else {
             self.strays.push(stray);
             return Step::More;
         };
-        match current.stage {
-            Stage::Emptying => {
-                self.strays.push(stray);
-                self.respond(ACK)
-            }
-            Stage::Polling => {
+        match (wanted, &mut current.mark) {
+            (Wanted::Room, _) => self.leftover(now, stray, Then::Ask),
+            (Wanted::Nothing, _) => self.leftover(now, stray, Then::Poll(Wanted::Nothing)),
+            (Wanted::Reply, Some(mark)) => match unite {
+                Some(Ok(unite)) if *unite == mark.reply => {
+                    current.mark = None;
+                    current.is_proven = true;
+                    self.answer_with(now, ACK, Then::Ask)
+                }
+                other => {
+                    mark.refused |=
+                        other.is_some_and(|other| other.is_ok_and(|unite| unite.starts_with(&[REFUSED])));
+                    self.leftover(now, stray, Then::Poll(Wanted::Reply))
+                }
+            },
+            (Wanted::Reply, None) => {
                 let answer = match unite {
                     Some(Ok(unite)) => decode(&current.request, &unite),
                     Some(Err(exception)) => Ok(Err(exception)),
@@ -104,54 +125,51 @@ impl UniTelway {
                 };
                 match answer {
                     Ok(answer) => {
-                        self.silent.remove(&current.slave);
-                        current.stage = Stage::Ending;
-                        current.answer = Some(answer);
-                        self.send(Bytes::from_static(&[ACK]))
+                        let said = self.serial.characters(1 + POLL_LEN + frame::len(message.len()));
+                        self.took = current.requested.map(|end| {
+                            now.saturating_duration_since(end).saturating_sub(said + self.turnaround)
+                        });
+                        current.result =
+                            Some(if current.is_proven { Ok(answer) } else { Err(Failure::Doubted(DOUBTED)) });
+                        self.answer_with(now, ACK, Then::Close)
                     }
                     Err(why) => {
-                        let is_late = current.is_late(now);
                         current.misfit = Some(why);
-                        self.strays.push(stray);
-                        if is_late { self.fail() } else { self.respond(ACK) }
+                        self.leftover(now, stray, Then::Poll(Wanted::Reply))
                     }
                 }
             }
-            _ => {
-                self.strays.push(stray);
-                Step::More
-            }
         }
     }
 
-    fn damaged(&mut self, len: usize) -> Step {
-        self.strays.push(Stray::Noise(len));
-        let repeats = self.settings.repeats;
-        match &mut self.current {
-            Some(current) if current.stage == Stage::Polling => {
-                if current.damaged >= repeats {
-                    return self.end(Err(Failure::Damaged("BCC")));
-                }
-                current.damaged += 1;
-                self.respond(NAK)
-            }
-            Some(Current { stage: Stage::Emptying, .. }) => self.respond(NAK),
-            _ => Step::More,
-        }
-    }
-
-    /// Answers a data frame, before the next poll.
-    fn respond(&mut self, signal: u8) -> Step {
+    /// What is not the request's is taken from the slave and dropped.
+    fn leftover(&mut self, now: Instant, stray: Stray, then: Then) -> Step {
+        self.strays.push(stray);
         let Some(current) = &mut self.current else { return Step::More };
-        let next = match current.stage {
-            Stage::Emptying => {
-                current.leftovers += 1;
-                if current.leftovers < LEFTOVERS { Next::Empty } else { Next::Request }
-            }
-            _ => Next::Poll,
-        };
-        current.stage = Stage::Answering(next);
-        self.send(Bytes::copy_from_slice(&[signal]))
+        current.leftovers += 1;
+        if current.leftovers > LEFTOVERS || (then == Then::Poll(Wanted::Reply) && current.is_late(now)) {
+            return self.close();
+        }
+        self.answer_with(now, ACK, then)
+    }
+
+    fn damaged(&mut self, now: Instant, len: usize) -> Step {
+        self.strays.push(Stray::Noise(len));
+        let Some(current) = &mut self.current else { return Step::More };
+        let Stage::Polling(wanted) = current.stage else { return Step::More };
+        current.damaged += 1;
+        if current.damaged <= self.settings.repeats {
+            return self.answer_with(now, NAK, Then::Poll(wanted));
+        }
+        match current.result.take() {
+            Some(result) => self.end(result),
+            None => self.end(Err(Failure::Damaged("BCC"))),
+        }
+    }
+
+    /// Answers a data frame.
+    fn answer_with(&mut self, now: Instant, signal: u8, then: Then) -> Step {
+        self.after_turnaround(now, Next::Signal(signal, then))
     }
 
     fn noise(&mut self, len: usize) -> Step {

@@ -1,68 +1,165 @@
 //! What is sent next, and how an exchange ends.
 
+use std::time::Duration;
+
 use bytes::Bytes;
+use tokio::time::Instant;
 
 use super::{
     UniTelway,
-    stage::{Next, Stage},
+    frame::{self, poll},
+    request::{MARK, code},
+    stage::{Current, Mark, Next, Stage, Then, Wanted},
 };
 use crate::exchange::{Answer, Failure, Step, Stray};
 
+/// The pause before a slave is polled or asked again grows by this part of the time that it has kept us waiting.
+const PAUSE_GROWTH: u32 = 8;
+
 impl UniTelway {
     /// The time of a stage is over.
-    pub(super) fn overdue(&mut self) -> Step {
+    pub(super) fn overdue(&mut self, now: Instant) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         match current.stage {
-            Stage::Before(next) | Stage::Answering(next) => self.send_next(next),
-            // It may be late, with a reply that would then be taken for the next one. Not twice: a stop must go out.
-            Stage::Emptying
-                if self.outspoken.contains(&current.slave) && self.silent.insert(current.slave) =>
-            {
-                self.fail()
-            }
-            // A slave that never says anything to such a poll has nothing to say, or is not there: the request will
-            // show it.
-            Stage::Emptying => self.send_next(Next::Request),
-            // Polled again, it might answer twice, and the second answer be taken for a later request's.
-            Stage::Requesting | Stage::Polling => self.fail(),
-            Stage::Ending => {
+            Stage::Before(next) => self.send(next),
+            Stage::Answering(then) => {
                 // One that was taken for an echo once may have been none.
                 self.echoes &= self.sent.is_empty();
-                match current.answer.take() {
-                    Some(answer) => {
-                        self.empty.insert(current.slave);
-                        self.end(Ok(answer))
-                    }
-                    None => self.fail(),
-                }
+                self.go_on(now, then)
+            }
+            // Whether it has come to the slave is not known: to ask again might do it twice.
+            Stage::Asking => self.fail(),
+            Stage::Polling(wanted) => {
+                current.unanswered += 1;
+                self.nothing_came(now, wanted, false)
             }
         }
     }
 
-    fn send_next(&mut self, next: Next) -> Step {
+    /// A poll has brought nothing: `said`, or silence.
+    pub(super) fn nothing_came(&mut self, now: Instant, wanted: Wanted, said: bool) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
-        let bytes = current.begin(next);
-        if next == Next::Request {
-            self.empty.remove(&current.slave);
+        match wanted {
+            Wanted::Reply => match &current.mark {
+                // It cannot mirror: that nothing comes any more has to be enough.
+                Some(mark) if mark.refused => self.marked(now),
+                // What was lost is asked for again, however short the time is.
+                _ if current.is_late(now) && (said || current.unanswered > self.settings.repeats) => {
+                    self.fail()
+                }
+                _ => self.wait(now, Next::Poll(Wanted::Reply)),
+            },
+            // Whatever was refused for is over, or it was the frame: at once. Then the slave is busy.
+            Wanted::Room if current.refusals <= 1 => self.after_turnaround(now, Next::Ask),
+            Wanted::Room => self.wait(now, Next::Ask),
+            Wanted::Nothing => {
+                if let Some(known) = self.known.get_mut(&current.slave) {
+                    known.is_silent();
+                }
+                self.close()
+            }
         }
-        self.send(bytes)
     }
 
-    pub(super) fn send(&mut self, bytes: Bytes) -> Step {
-        self.prepare(&bytes);
-        Step::Send(bytes)
+    pub(super) fn go_on(&mut self, now: Instant, then: Then) -> Step {
+        let Some(current) = &self.current else { return Step::More };
+        match then {
+            Then::Ask => self.yield_line(now, Next::Ask),
+            Then::Poll(wanted) => self.yield_line(now, Next::Poll(wanted)),
+            Then::Close => {
+                let known = self.known.entry(current.slave).or_default();
+                if known.may_say_nothing() {
+                    return self.after_turnaround(now, Next::Poll(Wanted::Nothing));
+                }
+                known.is_silent();
+                self.close()
+            }
+        }
     }
 
-    /// These bytes are sent next: what comes after them is heard anew.
-    pub(super) fn prepare(&mut self, bytes: &Bytes) {
-        if let Some(current) = &mut self.current {
-            current.due = None;
+    /// The mark has come back, or cannot: what comes from now on can only be the request's.
+    pub(super) fn marked(&mut self, now: Instant) -> Step {
+        let Some(current) = &mut self.current else { return Step::More };
+        current.mark = None;
+        current.is_proven = true;
+        current.waiting_since = None;
+        current.refusals = 0;
+        self.after_turnaround(now, Next::Ask)
+    }
+
+    /// Ends as what came has decided.
+    pub(super) fn close(&mut self) -> Step {
+        match self.current.as_mut().and_then(|current| current.result.take()) {
+            Some(result) => self.end(result),
+            None => self.fail(),
         }
+    }
+
+    /// The silence before this passes, then it is sent.
+    pub(super) fn after_turnaround(&mut self, now: Instant, next: Next) -> Step {
+        let Some(current) = &mut self.current else { return Step::More };
+        current.stage = Stage::Before(next);
+        current.due = Some(now + self.turnaround);
+        Step::More
+    }
+
+    /// The slave is not ready: the line is free for others until this is sent, the longer the longer it takes.
+    pub(super) fn wait(&mut self, now: Instant, next: Next) -> Step {
+        let Some(mut current) = self.current.take() else { return Step::More };
+        let since = *current.waiting_since.get_or_insert(now);
+        let waited = now.saturating_duration_since(since);
+        let pause = self.settings.poll_pause.max(self.turnaround).max(waited / PAUSE_GROWTH);
+        self.put_aside(now, current, next, pause)
+    }
+
+    /// The exchange goes on with this after the turnaround, unless a stop is more urgent.
+    pub(super) fn yield_line(&mut self, now: Instant, next: Next) -> Step {
+        let Some(current) = self.current.take() else { return Step::More };
+        self.put_aside(now, current, next, self.turnaround)
+    }
+
+    fn put_aside(&mut self, now: Instant, mut current: Current, next: Next, pause: Duration) -> Step {
+        current.stage = Stage::Before(next);
+        current.due = None;
+        self.aside.insert(current.slave, current);
+        Step::Wait(now + pause)
+    }
+
+    pub(super) fn send(&mut self, next: Next) -> Step {
+        Step::Send(self.begin(next))
+    }
+
+    /// The bytes of a stage, which begins with them. What comes after them is heard anew.
+    pub(super) fn begin(&mut self, next: Next) -> Bytes {
+        let Some(current) = &mut self.current else { return Bytes::new() };
+        let (stage, bytes) = match next {
+            Next::Ask => {
+                self.known.entry(current.slave).or_default().ask();
+                let frame = current.mark.as_ref().map_or(&current.frame, |mark| &mark.frame);
+                (Stage::Asking, frame.clone())
+            }
+            Next::Poll(wanted) => (Stage::Polling(wanted), poll(current.slave)),
+            Next::Signal(signal, then) => (Stage::Answering(then), Bytes::copy_from_slice(&[signal])),
+        };
+        current.stage = stage;
+        current.due = None;
         self.sent = bytes.clone();
         let unfinished = self.receiver.begin();
         if unfinished > 0 {
             self.strays.push(Stray::Noise(unfinished));
         }
+        bytes
+    }
+
+    /// A number that no earlier one can be taken for.
+    pub(super) fn new_mark(&mut self, slave: u8) -> Mark {
+        self.marks = self.marks.wrapping_add(1);
+        // Six bits a byte: none of them is a 10h, which would be doubled.
+        let number = [18, 12, 6, 0].map(|shift| 0x40 | (self.marks >> shift) as u8 & 0x3F);
+        let [a, b, c, d] = number;
+        let request = [code::MIRROR, self.settings.category, a, b, c, d];
+        let frame = frame::data(slave, &self.settings.header.message(&request));
+        Mark { frame, reply: [MARK, a, b, c, d], refused: false }
     }
 
     pub(super) fn fail(&mut self) -> Step {

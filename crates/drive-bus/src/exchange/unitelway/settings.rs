@@ -9,8 +9,8 @@ use super::{
     network::{NetworkHeader, STANDARD_LEN},
 };
 
-/// How many leftovers of a slave are taken before its next request.
-pub(super) const LEFTOVERS: u32 = 2;
+/// How many replies that are not its request's an exchange takes from a slave.
+pub(super) const LEFTOVERS: u32 = 16;
 /// Characters of a poll.
 pub(super) const POLL_LEN: usize = 3;
 /// The highest category of a request.
@@ -27,14 +27,17 @@ pub struct UniTelwaySettings {
     pub turnaround_bits: u32,
     /// How long a slave may take to begin its acknowledgement, or what it answers to a poll.
     pub link_timeout: Duration,
-    /// From "nothing to say" to the next poll for the same reply.
+    /// From a poll that brought nothing, or a refusal, to the next attempt, at first; it grows with the time that the
+    /// slave has kept us waiting. Other slaves are served meanwhile.
     pub poll_pause: Duration,
-    /// How often a refused request is sent again, and a damaged reply refused.
+    /// How often a damaged reply is refused, so that the slave sends it again.
     pub repeats: u32,
+    /// How long a slave may go on refusing a request (NAK), because it is busy.
+    pub busy_timeout: Duration,
 }
 
 impl Default for UniTelwaySettings {
-    /// The standard header, category 7, 10 bits, 100 ms, 5 ms, 1.
+    /// The standard header, category 7, 10 bits, 100 ms, 5 ms, 1, 1 s.
     fn default() -> Self {
         Self {
             header: NetworkHeader::default(),
@@ -43,6 +46,7 @@ impl Default for UniTelwaySettings {
             link_timeout: Duration::from_millis(100),
             poll_pause: Duration::from_millis(5),
             repeats: 1,
+            busy_timeout: Duration::from_secs(1),
         }
     }
 }
@@ -54,10 +58,10 @@ impl UniTelwaySettings {
     }
 }
 
-/// How long an exchange may go on beyond its request and the time of its reply, when everything goes wrong that the
-/// settings still put up with. Request and replies have so many characters at the most.
+/// How long an exchange may hold the line at the most, from its first bit until a stop to another slave may be sent, when
+/// everything goes wrong that the settings still put up with. Request and replies have so many characters at the most.
 #[must_use]
-pub fn overtime(
+pub fn longest(
     serial: SerialSettings,
     settings: UniTelwaySettings,
     chunk_gap: Duration,
@@ -65,11 +69,10 @@ pub fn overtime(
     reply: usize,
 ) -> Duration {
     let said = |characters| serial.bits(settings.turnaround_bits) + serial.characters(characters);
-    // A request that is refused; a poll with a damaged reply or a leftover, and our word to it.
-    let refused = said(request) + settings.link_timeout + serial.characters(1);
+    // A request; a poll with a reply, and our word to it; the last poll, which may bring one more.
+    let asked = said(request) + settings.link_timeout + serial.characters(1);
     let polled = said(POLL_LEN) + settings.link_timeout + serial.characters(reply) + chunk_gap + said(1);
-    let polls = settings.repeats.saturating_add(LEFTOVERS).saturating_add(1);
-    refused.saturating_mul(settings.repeats) + polled.saturating_mul(polls)
+    asked + polled * 2
 }
 
 /// How many characters the data frame has that carries a Modbus PDU of this length, without doubled bytes.
@@ -77,8 +80,8 @@ pub(crate) const fn request_len(pdu: usize) -> usize {
     frame::len(pdu + STANDARD_LEN + 4)
 }
 
-/// How many characters come and go from the end of a request to the end of its exchange: two acknowledgements, a poll and
-/// the reply.
+/// How many characters come and go from the end of a request to the end of its exchange: two acknowledgements, two polls,
+/// the reply and an EOT.
 pub(crate) const fn reply_len(pdu: usize) -> usize {
-    2 + POLL_LEN + frame::len(pdu + STANDARD_LEN)
+    3 + 2 * POLL_LEN + frame::len(pdu + STANDARD_LEN)
 }

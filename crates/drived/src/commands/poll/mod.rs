@@ -1,6 +1,7 @@
 //! `drived poll`: reads the status of many drives on one line again and again.
 
 mod json;
+mod link;
 mod summary;
 
 use std::{
@@ -90,6 +91,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         }
     }
     polls.shutdown().await;
+    link::read_counters(&line, &names, &config).await;
     let stats = line.stats();
     line.close().await;
     let summary = Summary::new(&names, &book.answered, &stats, &config);
@@ -98,6 +100,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     } else {
         output::say_table(summary.table())?;
         output::say(summary.of_line())?;
+        for text in link::told(&summary) {
+            output::say(text)?;
+        }
     }
     book.verdict(&names)
 }
