@@ -144,7 +144,7 @@ fn a_stop_is_confirmed_in_its_bound_whatever_the_slave_does_and_the_link_loses()
                 // Two losses, so three attempts at the most: each a number that is mirrored and the stop itself, of four
                 // words each, and the time of a reply that does not come; and the time in which the slave is busy.
                 let attempt = config.response_timeout + 200 * MS * 8;
-                let bound = config.worst_case_stop() + attempt * 3 + SECOND;
+                let bound = config.worst_case_stop(253, 253) + attempt * 3 + SECOND;
                 let mut line = Telway::new(seed, config, [habits; 2]);
                 for _ in 0..10 {
                     line.faults = faults;

@@ -37,7 +37,7 @@ impl<C> Master<C> {
         let waits_long = |entry: &Entry<Job<C>>| self.waits_long(now, entry);
         let stop_at =
             self.schedule.first_stop(|entry| !waits_long(entry)).map(|since| self.stop_free_at(since));
-        let probe = self.next_probe().filter(|_| stop_at.is_none());
+        let probe = self.next_probe().filter(|_| stop_at.is_none() && !self.closing);
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
             let waits = !self.schedule.is_empty() || probe.is_some() || aside.is_some();

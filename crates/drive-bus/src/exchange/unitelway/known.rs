@@ -20,18 +20,18 @@ impl Known {
     }
 
     /// It is asked something: a reply will come.
-    pub(super) const fn ask(&mut self) {
+    pub(super) const fn note_request(&mut self) {
         self.empty = false;
     }
 
     /// It has said that it has nothing to say. `emptied`: to a poll for nothing, so that it holds nothing either.
-    pub(super) const fn says_nothing(&mut self, emptied: bool) {
+    pub(super) const fn note_nothing_said(&mut self, emptied: bool) {
         self.silences = 0;
         self.empty = emptied;
     }
 
     /// An exchange has ended without that word.
-    pub(super) const fn is_silent(&mut self) {
+    pub(super) const fn note_silence(&mut self) {
         self.silences = self.silences.saturating_add(1);
     }
 

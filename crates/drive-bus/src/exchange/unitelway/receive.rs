@@ -76,7 +76,7 @@ impl UniTelway {
             (Stage::Polling(wanted), EOT) if alone => {
                 // Of a slave whose earlier reply may still be on its way it proves nothing, nor does one to an earlier poll.
                 let emptied = wanted == Wanted::Nothing && current.is_proven && current.unanswered == 0;
-                self.known.entry(current.slave).or_default().says_nothing(emptied);
+                self.known.entry(current.slave).or_default().note_nothing_said(emptied);
                 match wanted {
                     Wanted::Nothing => self.close(),
                     wanted => self.nothing_came(now, wanted, true),

@@ -54,7 +54,7 @@ impl UniTelway {
             Wanted::Room => self.wait(now, Next::Ask),
             Wanted::Nothing => {
                 if let Some(known) = self.known.get_mut(&current.slave) {
-                    known.is_silent();
+                    known.note_silence();
                 }
                 self.close()
             }
@@ -71,7 +71,7 @@ impl UniTelway {
                 if known.may_say_nothing() {
                     return self.after_turnaround(now, Next::Poll(Wanted::Nothing));
                 }
-                known.is_silent();
+                known.note_silence();
                 self.close()
             }
         }
@@ -134,7 +134,7 @@ impl UniTelway {
         let Some(current) = &mut self.current else { return Bytes::new() };
         let (stage, bytes) = match next {
             Next::Ask => {
-                self.known.entry(current.slave).or_default().ask();
+                self.known.entry(current.slave).or_default().note_request();
                 let frame = current.mark.as_ref().map_or(&current.frame, |mark| &mark.frame);
                 (Stage::Asking, frame.clone())
             }
