@@ -106,7 +106,7 @@ fn play(script: &mut Script<UniTelway>, mut sent: Bytes, reply: &[u8]) -> Step {
     let mut holds = None;
     for _ in 0..1_000 {
         let heard = match *sent {
-            [0x10, 0x02, 1, len, .., code, _, a, b, c, d, _] if code == 0xFA => {
+            [0x10, 0x02, 1, len, .., 0xFA, _, a, b, c, d, _] => {
                 let header = &sent[4..usize::from(len) - 2];
                 holds = Some(data_frame(1, &[header, &[0xFB, a, b, c, d]].concat()).to_vec());
                 vec![0x06]

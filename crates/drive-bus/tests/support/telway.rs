@@ -83,6 +83,8 @@ pub(crate) struct Faults {
     pub(crate) anything: u64,
 }
 
+type OnItsWay = (Instant, u64, bool, Vec<u8>);
+
 struct Slave {
     habits: Habits,
     /// Replies, and when they are ready.
@@ -130,7 +132,7 @@ pub(crate) struct Telway {
     happened: bool,
     slaves: BTreeMap<u8, Slave>,
     /// What is on its way: when it has come, in which order, to the master or to the slaves.
-    wire: BinaryHeap<Reverse<(Instant, u64, bool, Vec<u8>)>>,
+    wire: BinaryHeap<Reverse<OnItsWay>>,
     order: u64,
     asked: BTreeMap<u64, Asked>,
     calls: u64,
