@@ -46,6 +46,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 8,
     write_words: 8,
     highest_address: 31,
+    stations: 31,
     speeds: &[2_400, 4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1],
     factory: match SerialSettings::new(9_600, CharacterFormat::F8E1) {

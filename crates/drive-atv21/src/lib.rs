@@ -61,6 +61,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 5,
     write_words: 2,
     highest_address: 247,
+    stations: 31,
     speeds: &[9_600, 19_200],
     // The manual names the parity and no number of stop bits; without parity Modbus has two and many masters send one.
     formats: &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1, CharacterFormat::F8N2],

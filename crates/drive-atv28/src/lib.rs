@@ -29,6 +29,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 7,
     write_words: 7,
     highest_address: 31,
+    stations: 18,
     speeds: &[9_600, 19_200],
     formats: &[CharacterFormat::F8N1],
     factory: match SerialSettings::new(19_200, CharacterFormat::F8N1) {

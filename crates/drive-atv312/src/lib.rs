@@ -36,6 +36,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 29,
     write_words: 27,
     highest_address: 247,
+    stations: 31,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8O1, CharacterFormat::F8E1, CharacterFormat::F8N1, CharacterFormat::F8N2],
     factory: SerialSettings::MODBUS_DEFAULT,

@@ -108,15 +108,15 @@ impl<P: Port> Drive for Atv58<P> {
         }
     }
 
-    /// The time of [`Atv58Map::message_watch`](crate::Atv58Map::message_watch): on a line in Modbus ASCII it is another one.
+    /// The time of [`Atv58Map::message_watch`](crate::Atv58Map::message_watch), on a line in Modbus ASCII 1 s at the most.
     fn watchdog_capability(&self) -> Option<WatchdogCapability> {
-        Some(watchdog(self.map.message_watch))
+        Some(watchdog(self.message_watch()))
     }
 
     /// What the card's manual prints, without an exchange: the time can neither be read nor set, and what the drive does
     /// when it runs out is not said.
     async fn watchdog(&mut self) -> Result<Watchdog> {
-        Ok(Watchdog { timeout: Some(self.map.message_watch), reaction: None })
+        Ok(Watchdog { timeout: Some(self.message_watch()), reaction: None })
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

@@ -38,6 +38,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 63,
     write_words: 60,
     highest_address: 31,
+    stations: 31,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[
         CharacterFormat::F8O1,
@@ -113,6 +114,14 @@ impl<P: Port> Atv58<P> {
     #[must_use]
     pub fn into_port(self) -> P {
         self.registers.into_port()
+    }
+
+    /// How long the card waits for a message, which its owner's setting cannot lengthen in Modbus ASCII.
+    fn message_watch(&self) -> Duration {
+        match self.registers.port().is_ascii() {
+            true => self.map.message_watch.min(ASCII_MESSAGE_WATCH),
+            false => self.map.message_watch,
+        }
     }
 
     /// Reads the fault register W483, whether the drive has tripped or not.

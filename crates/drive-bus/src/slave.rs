@@ -120,6 +120,10 @@ impl Port for Slave {
     fn answered_at(&self) -> Option<Instant> {
         self.answered_at
     }
+
+    fn is_ascii(&self) -> bool {
+        matches!(self.handle.shared.master().config().protocol, Protocol::Ascii(_))
+    }
 }
 
 impl From<Slave> for Context {

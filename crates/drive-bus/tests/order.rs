@@ -213,3 +213,31 @@ async fn closing_ends_what_waits_and_lets_the_exchange_finish() {
     closing.await.unwrap();
     assert_eq!(read(&mut line.slave(1), 0, 1).await, Err(PortError::Closed));
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_write_whose_repetition_is_refused_after_a_lost_answer_has_an_unknown_outcome() {
+    let (line, mut peer) = line(|config| config);
+    let mut slave = line.slave(1).with_terms(Terms::of(Class::Command));
+    let call = tokio::spawn(async move { write(&mut slave, 8501, 15).await });
+    // Carried out, and its confirmation is lost.
+    peer.request().await;
+    peer.answer(&[0x86, 6]).await;
+    let outcome = call.await.unwrap();
+    assert!(matches!(outcome, Err(PortError::OutcomeUnknown(_))), "{outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_waits_for_the_pause_of_every_slave() {
+    let pause = SlaveSettings { turnaround: 50 * MS, ..SlaveSettings::default() };
+    let (line, mut peer) = line(|config| config.slave(1, pause));
+    let mut one = line.slave(1);
+    let first = tokio::spawn(async move { read(&mut one, 0, 1).await });
+    peer.answer(&[3, 2, 0, 1]).await;
+    assert!(first.await.unwrap().is_ok());
+    let answered = Instant::now();
+    let mut all = line.broadcast().with_terms(Terms::of(Class::Stop));
+    let stop = tokio::spawn(async move { write(&mut all, 1, 0).await });
+    assert_eq!(peer.request().await[0], 0);
+    assert!(answered.elapsed() >= 50 * MS, "{:?}", answered.elapsed());
+    assert_eq!(stop.await.unwrap(), Ok(()));
+}

@@ -8,7 +8,8 @@ use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 
 use crate::{
     capabilities::Capabilities,
-    error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
+    confirm::Confirming,
+    error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
     identity::Identity,
     port::{Class, Effect, Port, PortError, Terms},
     registers::{
@@ -18,6 +19,10 @@ use crate::{
     setpoint::Command,
     status::{RawWord, Status},
 };
+
+/// How long a drive that answers that it is busy is asked again by a call without a lifetime, and how long one that has
+/// accepted a write and takes long for it is read back.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,6 +121,12 @@ impl<P: Port> Registers<P> {
         self.oldest
     }
 
+    /// The port.
+    #[must_use]
+    pub const fn port(&self) -> &P {
+        &self.port
+    }
+
     /// Gives the port back.
     #[must_use]
     pub fn into_port(self) -> P {
@@ -196,19 +207,28 @@ impl<P: Port> Calls<'_, P> {
     /// value stands there. An edge is never read back, because its bit may clear itself.
     pub async fn write<A: Writable>(&mut self, register: Register<A>, value: u16) -> Result<()> {
         let result = self.write_word(register.address(), value).await;
-        let readable = A::ACCESS.is_readable();
-        match result {
-            Err(Error::Port { problem: ref problem @ PortError::OutcomeUnknown(_), .. })
-                if readable && self.terms.effect == Effect::Level =>
-            {
-                let problem = problem.clone();
-                // A reading that fails, or is not even sent any more, leaves the outcome unknown.
-                if self.read_word(register.address()).await == Ok(value) {
-                    return Ok(());
-                }
-                Err(self.port_error(Self::writing(register.address(), self.single_write()), problem))
+        let Err(error) = result else { return Ok(()) };
+        let seen = A::ACCESS.is_readable() && self.terms.effect == Effect::Level;
+        // A reading that fails, or is not even sent any more, leaves the outcome unknown.
+        if error.kind() == ErrorKind::OutcomeUnknown
+            && seen
+            && self.read_back(register.address(), value, &error).await == Ok(value)
+        {
+            return Ok(());
+        }
+        Err(error)
+    }
+
+    /// What a register holds after a write of which nobody knows what became: read once, or for a while where the drive
+    /// has said that it takes long.
+    async fn read_back(&mut self, address: u16, value: u16, error: &Error) -> Result<u16> {
+        let takes_long = matches!(error, Error::Exception { .. });
+        let mut confirming = Confirming::within(PATIENCE);
+        loop {
+            let held = self.read_word(address).await?;
+            if held == value || !takes_long || !confirming.again().await {
+                return Ok(held);
             }
-            result => result,
         }
     }
 
@@ -277,13 +297,15 @@ impl<P: Port> Calls<'_, P> {
         if !row.access.is_readable() {
             return outcome.map(|()| written);
         }
-        // Whether an ambiguous write arrived, the reading tells.
-        if let Err(error) = outcome
-            && error.kind() != ErrorKind::OutcomeUnknown
-        {
-            return Err(error);
-        }
-        let value = self.read_row(row).await.map_err(Error::after_write)?;
+        let value = match outcome {
+            Ok(()) => self.read_row(row).await,
+            // Whether an ambiguous write arrived, the reading tells.
+            Err(error) if error.kind() == ErrorKind::OutcomeUnknown => {
+                self.read_back(row.address, word, &error).await
+            }
+            Err(error) => return Err(error),
+        };
+        let value = value.map_err(Error::after_write)?;
         if value == word {
             return Ok(written);
         }
@@ -320,8 +342,26 @@ impl<P: Port> Calls<'_, P> {
     }
 
     /// Sends any request and returns the response as tokio-modbus decodes it. What the typed methods do not cover.
+    ///
+    /// A drive that answers that it is busy (exception 06, Modbus Application Protocol V1.1b3, section 7) has done nothing,
+    /// and is asked again within the lifetime of the call, or a second where it has none; an edge is not.
     pub async fn request(&mut self, request: Request<'_>, exchange: Exchange) -> Result<Response> {
-        self.registers.port.set_terms(self.terms);
+        let patience = self.terms.lifetime.unwrap_or(PATIENCE);
+        let until = Instant::now() + patience;
+        let mut asking = Confirming::within(patience);
+        let mut terms = self.terms;
+        loop {
+            let outcome = self.once(terms, request.clone(), exchange).await;
+            let busy = matches!(outcome, Err(Error::Exception { code: BUSY, .. }));
+            if !busy || terms.effect == Effect::Edge || !asking.again().await {
+                return outcome;
+            }
+            terms.lifetime = terms.lifetime.map(|_| until.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    async fn once(&mut self, terms: Terms, request: Request<'_>, exchange: Exchange) -> Result<Response> {
+        self.registers.port.set_terms(terms);
         let outcome = self.registers.port.call(request).await;
         if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.answered_at()) {
             self.registers.oldest = Some(self.registers.oldest.map_or(at, |oldest| oldest.min(at)));
@@ -375,15 +415,140 @@ impl<P: Port> Calls<'_, P> {
         self.registers.capabilities.functions.contains(&0x06)
     }
 
-    fn single_write(&self) -> u8 {
-        if self.has_single_write() { 0x06 } else { 0x10 }
-    }
-
     const fn reading(register: u16) -> Exchange {
         Exchange { function: 0x03, register: Some(register) }
     }
 
     const fn writing(register: u16, function: u8) -> Exchange {
         Exchange { function, register: Some(register) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::VecDeque, io};
+
+    use async_trait::async_trait;
+    use tokio_modbus::{ExceptionCode, client::Client, slave::SlaveContext};
+
+    use super::*;
+    use crate::{SerialSettings, StopMode, serial::CharacterFormat};
+
+    const CAPABILITIES: Capabilities = Capabilities {
+        key: "test",
+        name: "Test drive",
+        functions: &[3, 6, 16],
+        read_words: 16,
+        write_words: 16,
+        highest_address: 31,
+        stations: 31,
+        speeds: &[19_200],
+        formats: &[CharacterFormat::F8E1],
+        factory: SerialSettings::MODBUS_DEFAULT,
+        stop_modes: &[StopMode::Ramp],
+        speed_setpoint: false,
+        frequency_step: "0.1 Hz",
+        fault_reset: "a bit",
+        watchdog: None,
+        identification: None,
+        release: false,
+        persist: None,
+        broadcast_stops: &[],
+        fault_history: 0,
+        turnaround: Duration::ZERO,
+        status_exchanges: 1,
+        measurement_exchanges: 1,
+    };
+
+    /// A slave that answers by a script and then by holding the last word that it was given.
+    #[derive(Debug, Default)]
+    struct Script {
+        answers: VecDeque<ExceptionCode>,
+        held: u16,
+        /// It takes a write whose answer is exception 05 only after so many readings.
+        takes_after: usize,
+        asked: Option<u16>,
+        writes: usize,
+    }
+
+    #[async_trait]
+    impl Client for Script {
+        async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+            match request {
+                Request::WriteSingleRegister(at, value) => {
+                    self.writes += 1;
+                    let exception = self.answers.pop_front();
+                    match exception {
+                        Some(ExceptionCode::Acknowledge) => self.asked = Some(value),
+                        Some(_) => {}
+                        None => self.held = value,
+                    }
+                    Ok(exception.map_or(Ok(Response::WriteSingleRegister(at, value)), Err))
+                }
+                _ => {
+                    match self.takes_after.checked_sub(1) {
+                        Some(left) => self.takes_after = left,
+                        None => self.held = self.asked.take().unwrap_or(self.held),
+                    }
+                    Ok(Ok(Response::ReadHoldingRegisters(vec![self.held])))
+                }
+            }
+        }
+
+        async fn disconnect(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl SlaveContext for Script {
+        fn set_slave(&mut self, _: Slave) {}
+    }
+
+    impl Port for Script {}
+
+    crate::registers! {
+        /// One register.
+        pub(crate) const ROWS;
+
+        CMD: ReadWrite(8501, "CMD", "control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "test");
+    }
+
+    fn registers(answers: impl IntoIterator<Item = ExceptionCode>, takes_after: usize) -> Registers<Script> {
+        let port = Script { answers: answers.into_iter().collect(), takes_after, ..Script::default() };
+        let slave = SlaveAddress::try_from(1).unwrap();
+        Registers::new(port, slave, &CAPABILITIES, |_, code| ExceptionMeaning::standard(code))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_drive_that_is_busy_is_asked_again_for_the_lifetime_of_the_call_and_not_longer() {
+        let mut registers = registers([ExceptionCode::ServerDeviceBusy; 3], 0);
+        assert_eq!(registers.at(Class::Command).write(CMD, 15).await, Ok(()));
+        assert_eq!((registers.port.held, registers.port.writes), (15, 4));
+
+        for (class, edge, least, most) in [(Class::Command, false, 5, 30), (Class::Command, true, 1, 1)] {
+            let mut busy = self::registers([ExceptionCode::ServerDeviceBusy; 1_000], 0);
+            let begun = Instant::now();
+            let mut calls = busy.at(class);
+            calls = if edge { calls.edge() } else { calls };
+            let error = calls.write(CMD, 15).await.unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Exception, "{error}");
+            assert!(begun.elapsed() <= Duration::from_secs(1), "{:?}", begun.elapsed());
+            assert!((least..=most).contains(&busy.port.writes), "{}", busy.port.writes);
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_write_that_was_accepted_and_takes_long_is_known_once_it_is_read_back() {
+        let mut registers = registers([ExceptionCode::Acknowledge], 3);
+        assert_eq!(registers.at(Class::Command).write(CMD, 15).await, Ok(()));
+        assert_eq!(registers.port.writes, 1);
+
+        let mut never = self::registers([ExceptionCode::Acknowledge], usize::MAX);
+        let error = never.at(Class::Command).write(CMD, 15).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+
+        let mut parameter = self::registers([ExceptionCode::Acknowledge], 3);
+        let written = parameter.at(Class::Background).change_row(CMD.row(), 15).await;
+        assert_eq!(written.map(|written| written.changed), Ok(true));
     }
 }

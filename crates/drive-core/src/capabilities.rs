@@ -24,6 +24,9 @@ pub struct Capabilities {
     pub write_words: u16,
     /// The highest slave address it can have; the lowest is 1.
     pub highest_address: u8,
+    /// How many stations its manual allows on one segment; 31, which is what RS-485 carries besides the master, where it
+    /// prints none.
+    pub stations: u8,
     /// The speeds it can be set to, in bit/s.
     pub speeds: &'static [u32],
     /// The character formats it can be set to.

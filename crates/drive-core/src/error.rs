@@ -52,6 +52,13 @@ pub struct Exchange {
     pub register: Option<u16>,
 }
 
+impl Exchange {
+    /// Whether it writes registers.
+    const fn is_write(self) -> bool {
+        matches!(self.function, 0x06 | 0x10)
+    }
+}
+
 impl fmt::Display for Exchange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verb = match self.function {
@@ -65,6 +72,11 @@ impl fmt::Display for Exchange {
         }
     }
 }
+
+/// Acknowledge: the slave has accepted the request and takes long for it (Modbus Application Protocol V1.1b3, section 7).
+const ACCEPTED: u8 = 5;
+/// Server device busy: the slave has done nothing, and wants to be asked again (the same section).
+pub(crate) const BUSY: u8 = 6;
 
 /// What an exception means on a drive of this family, and so what to do about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -81,12 +93,16 @@ pub enum ExceptionMeaning {
     NotNow,
     /// The drive began and could not complete; a retry may help.
     Failed,
+    /// The drive has accepted it and takes long for it: whether it was carried out has to be read back.
+    Accepted,
+    /// The drive is busy with something else and has done nothing: it is asked again.
+    Busy,
     /// A code that the manual does not list.
     Unknown,
 }
 
 impl ExceptionMeaning {
-    /// What the Modbus specification says of the codes 1 to 4, for families whose manual says the same.
+    /// What the Modbus specification says of the codes 1 to 6, for families whose manual says the same.
     #[must_use]
     pub const fn standard(code: u8) -> Self {
         match code {
@@ -94,6 +110,8 @@ impl ExceptionMeaning {
             2 => Self::NoSuchRegister,
             3 => Self::ValueRefused,
             4 => Self::Failed,
+            ACCEPTED => Self::Accepted,
+            BUSY => Self::Busy,
             _ => Self::Unknown,
         }
     }
@@ -101,7 +119,7 @@ impl ExceptionMeaning {
     /// Whether the same request may succeed later without anybody changing anything.
     #[must_use]
     pub const fn is_worth_a_retry(self) -> bool {
-        matches!(self, Self::Failed)
+        matches!(self, Self::Failed | Self::Busy)
     }
 }
 
@@ -115,6 +133,8 @@ impl fmt::Display for ExceptionMeaning {
                 "the drive refuses it now: stop the motor first, and see that it is supplied and not busy"
             }
             Self::Failed => "the drive could not complete it",
+            Self::Accepted => "the drive has accepted it and takes long for it",
+            Self::Busy => "the drive is busy",
             Self::Unknown => "a code that the manual does not list",
         })
     }
@@ -357,7 +377,7 @@ pub enum Error {
     },
 }
 
-/// The kind of an [`Error`], for who decides by it.
+/// The kind of an [`Error`], for a program that decides by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ErrorKind {
@@ -402,6 +422,7 @@ impl Error {
             Self::Port { problem: PortError::OutcomeUnknown(_), .. } => ErrorKind::OutcomeUnknown,
             Self::Port { problem, .. } if problem.nothing_sent() => ErrorKind::NotSent,
             Self::Port { .. } => ErrorKind::NoAnswer,
+            Self::Exception { code: ACCEPTED, exchange, .. } if exchange.is_write() => ErrorKind::OutcomeUnknown,
             Self::Exception { .. } => ErrorKind::Exception,
             Self::Answer { .. } => ErrorKind::Answer,
             Self::Unsupported { .. } => ErrorKind::Unsupported,

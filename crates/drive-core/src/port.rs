@@ -115,6 +115,11 @@ pub trait Port: Client {
     fn answered_at(&self) -> Option<Instant> {
         None
     }
+
+    /// Whether its line speaks Modbus ASCII, in which some drives watch their line more closely.
+    fn is_ascii(&self) -> bool {
+        false
+    }
 }
 
 impl Port for Context {}

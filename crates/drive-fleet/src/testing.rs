@@ -14,6 +14,7 @@ pub(crate) const CAPABILITIES: Capabilities = Capabilities {
     read_words: 16,
     write_words: 16,
     highest_address: 31,
+    stations: 31,
     speeds: &[9_600, 19_200],
     formats: &[CharacterFormat::F8E1],
     factory: SerialSettings::MODBUS_DEFAULT,

@@ -34,7 +34,13 @@ impl<C> Master<C> {
         let took = now.saturating_duration_since(flight.started);
         match flight.purpose {
             Purpose::Call(Some(entry)) => match result {
-                Ok(answer) => self.outcomes.push_back((entry.work.caller, Ok(answer))),
+                Ok(answer) => {
+                    // An earlier attempt may have been carried out: its repetition can be refused for that very reason.
+                    let doubtful = answer.is_err() && entry.work.is_write && entry.work.last.is_some();
+                    let refused = "not answered, and refused when it was repeated";
+                    let outcome = if doubtful { Err(PortError::OutcomeUnknown(refused)) } else { Ok(answer) };
+                    self.outcomes.push_back((entry.work.caller, outcome));
+                }
                 Err(failure) => {
                     if entry.terms.class == Class::Stop && self.station(slave).stop_failed() {
                         self.offline_stop_at = Some(now + took * OFFLINE_STOP_REST);
