@@ -103,11 +103,15 @@ async fn run_conveyor(
     }
 }
 
+/// Between two attempts of a stop.
+const STOP_PAUSE: Duration = Duration::from_millis(100);
+
 /// A stop is repeated until the drive confirms it, or until the line takes the drive for dead.
 async fn stop(drive: &mut Atv312<Slave>) -> drive_core::Result<Status> {
     loop {
         match drive.stop(StopMode::Ramp).await {
-            Err(error) if error.kind() != ErrorKind::NotSent => {}
+            // A drive that refuses at once is given time to do otherwise.
+            Err(error) if error.kind() != ErrorKind::NotSent => time::sleep(STOP_PAUSE).await,
             outcome => return outcome.map(|stopped| stopped.status),
         }
     }

@@ -422,7 +422,9 @@ impl Error {
             Self::Port { problem: PortError::OutcomeUnknown(_), .. } => ErrorKind::OutcomeUnknown,
             Self::Port { problem, .. } if problem.nothing_sent() => ErrorKind::NotSent,
             Self::Port { .. } => ErrorKind::NoAnswer,
-            Self::Exception { code: ACCEPTED, exchange, .. } if exchange.is_write() => ErrorKind::OutcomeUnknown,
+            Self::Exception { code: ACCEPTED, exchange, .. } if exchange.is_write() => {
+                ErrorKind::OutcomeUnknown
+            }
             Self::Exception { .. } => ErrorKind::Exception,
             Self::Answer { .. } => ErrorKind::Answer,
             Self::Unsupported { .. } => ErrorKind::Unsupported,

@@ -9,7 +9,6 @@ use crate::{
 
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[must_use]
 pub struct Stopped {
     /// The status in which it shows.
     pub status: Status,
@@ -25,6 +24,7 @@ pub struct Stopped {
 
 impl Stopped {
     /// A stop in the mode that was asked for.
+    #[must_use]
     pub const fn by(mode: StopMode, status: Status) -> Self {
         Self { status, mode, instead: None, taken_from: None }
     }

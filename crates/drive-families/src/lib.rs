@@ -11,6 +11,7 @@
 
 #![forbid(unsafe_code)]
 
+mod nowhere;
 mod options;
 
 use std::{fmt, str::FromStr};
@@ -20,8 +21,9 @@ use drive_atv21::Atv21;
 use drive_atv28::Atv28;
 use drive_atv58::Atv58;
 use drive_atv312::Atv312;
-use drive_core::{Capabilities, Drive, Port, Row, SlaveAddress};
+use drive_core::{Capabilities, Drive, Port, Row, SlaveAddress, WatchdogCapability};
 
+use crate::nowhere::Nowhere;
 pub use crate::options::{OPTIONS, OptionEntry, OptionError, Options};
 
 /// A family of drives.
@@ -95,6 +97,14 @@ impl Family {
     ) -> Result<Box<dyn Drive>, OptionError> {
         options.check(self)?;
         Ok(self.build(port, slave, options))
+    }
+
+    /// The communication watchdog of a drive of this family on its line, of which those of the options hold that are the
+    /// family's: [`Drive::watchdog_capability`], asked without a line.
+    #[must_use]
+    pub fn watchdog(self, ascii: bool, options: &Options) -> Option<WatchdogCapability> {
+        let slave = SlaveAddress::try_from(1).ok()?;
+        self.build(Nowhere { ascii }, slave, &options.of(self)).watchdog_capability()
     }
 
     /// The drive with those of the options that are its family's.

@@ -7,7 +7,7 @@ use std::{
 };
 
 use drive_bus::Line;
-use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode};
+use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode, WatchdogCapability};
 use tokio::{
     sync::{Mutex, Semaphore, broadcast, mpsc, watch},
     time::Instant,
@@ -17,7 +17,7 @@ use crate::{
     event::Event,
     fleet::{Fleet, LineEntry},
     handle::Entry,
-    plan::{Demand, LineBudget, PlanProblem, plan},
+    plan::{Demand, LineBudget, PlanProblem, Reckoning, reckon},
     settings::{DriveSettings, Times, WatchdogContract},
     supervisor::Supervisor,
     task::{Desk, Task},
@@ -103,6 +103,7 @@ pub struct FleetBuilder {
     lines: Vec<(String, Line, LineBudget)>,
     members: Vec<(String, DriveSettings, Box<dyn Drive>)>,
     events: usize,
+    refuses_plans: bool,
 }
 
 impl Fleet {
@@ -114,7 +115,7 @@ impl Fleet {
 
 impl FleetBuilder {
     pub(crate) const fn new() -> Self {
-        Self { lines: Vec::new(), members: Vec::new(), events: EVENTS }
+        Self { lines: Vec::new(), members: Vec::new(), events: EVENTS, refuses_plans: true }
     }
 
     /// Adds a line. The budget says what it gives, see [`LineBudget::of`].
@@ -132,6 +133,13 @@ impl FleetBuilder {
     /// How many events are kept for a reader that is slow; 4096 unless said.
     pub const fn event_capacity(mut self, events: usize) -> Self {
         self.events = events;
+        self
+    }
+
+    /// Starts also if a line cannot keep its periods or feed its watchdogs: for a tool that commands a drive for a moment,
+    /// whatever its line is like.
+    pub const fn whatever_the_plan(mut self) -> Self {
+        self.refuses_plans = false;
         self
     }
 
@@ -184,18 +192,21 @@ impl FleetBuilder {
                 let fits = capabilities.check_line(slave, serial);
                 fits.map_err(|problem| FleetError::Mismatch { drive: name.clone(), problem })?;
             }
-            check_settings(&settings, capabilities)
+            let watchdog_capability = drive.watchdog_capability();
+            check_settings(&settings, capabilities, watchdog_capability)
                 .map_err(|problem| FleetError::Setting { drive: name.clone(), problem })?;
             if let Some(demands) = demands.get_mut(line) {
                 let (periods, watchdog) = (settings.periods, settings.watchdog);
-                demands.push(Demand { drive: name, capabilities, periods, watchdog });
+                demands.push(Demand { drive: name, capabilities, watchdog_capability, periods, watchdog });
             }
             members.push(Member { line, settings, drive });
         }
         let mut lines = Vec::with_capacity(self.lines.len());
         for ((name, line, budget), demands) in self.lines.into_iter().zip(demands) {
-            let plan =
-                plan(budget, &demands).map_err(|problem| FleetError::Plan { line: name.clone(), problem })?;
+            let Reckoning { plan, problem } = reckon(budget, &demands, 0);
+            if let Some(problem) = problem.filter(|_| self.refuses_plans) {
+                return Err(FleetError::Plan { line: name, problem });
+            }
             let commands = Mutex::new(Instant::now());
             lines.push(LineEntry { name: Arc::from(name), line, plan, commands });
         }
@@ -203,11 +214,16 @@ impl FleetBuilder {
     }
 }
 
-/// Checks what the settings of a drive say against each other and against its family.
+/// Checks what the settings of a drive say against each other, its family and its own watchdog
+/// ([`Drive::watchdog_capability`]).
 ///
 /// # Errors
 /// [`SettingProblem`] with the first that does not fit.
-pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> Result<(), SettingProblem> {
+pub fn check_settings(
+    settings: &DriveSettings,
+    capabilities: &Capabilities,
+    watchdog: Option<WatchdogCapability>,
+) -> Result<(), SettingProblem> {
     let problem = |setting, reason| Err(SettingProblem { setting, reason });
     if settings.name.trim().is_empty() {
         return problem("name", "a drive needs a name".to_owned());
@@ -251,15 +267,18 @@ pub fn check_settings(settings: &DriveSettings, capabilities: &Capabilities) -> 
     if let Err(reason) = settings.limits.check() {
         return problem("limits", reason);
     }
-    match settings.watchdog.map(|contract| check_watchdog(contract, capabilities)) {
+    match settings.watchdog.map(|contract| check_watchdog(contract, capabilities.name, watchdog)) {
         Some(Err(reason)) => problem("watchdog", reason),
         _ => Ok(()),
     }
 }
 
-fn check_watchdog(contract: WatchdogContract, capabilities: &Capabilities) -> Result<(), String> {
-    let name = capabilities.name;
-    let Some(watchdog) = capabilities.watchdog else {
+fn check_watchdog(
+    contract: WatchdogContract,
+    name: &str,
+    watchdog: Option<WatchdogCapability>,
+) -> Result<(), String> {
+    let Some(watchdog) = watchdog else {
         return Err(format!("the bus can neither read nor set a communication watchdog of a {name}"));
     };
     let timeout = contract.timeout;
@@ -284,14 +303,16 @@ fn check_watchdog(contract: WatchdogContract, capabilities: &Capabilities) -> Re
 }
 
 fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore>) -> Arc<Entry> {
-    let Member { line, settings, drive } = member;
+    let Member { line, settings, mut drive } = member;
     let (slave, capabilities, control) = (drive.slave(), drive.capabilities(), settings.control);
     let reference = settings.times.reference;
     let broadcasts = StopMode::ALL
         .into_iter()
         .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
         .collect();
-    let supervisor = Supervisor::new(Instant::now(), settings, capabilities);
+    let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
+    drive.accept_self_restart(&accepted);
+    let supervisor = Supervisor::new(Instant::now(), settings, drive.watchdog_capability());
     let name = supervisor.name();
     let (messages, message_box) = mpsc::channel(MAILBOX);
     // Unbounded, because a stop must never be refused for want of room: each entry is a caller that waits.
@@ -324,7 +345,7 @@ mod tests {
     #[test]
     fn times_that_no_clock_can_hold_and_a_lifetime_of_nothing_are_refused() {
         let usual = DriveSettings::controlled("pump");
-        assert_eq!(check_settings(&usual, &CAPABILITIES), Ok(()));
+        assert_eq!(check_settings(&usual, &CAPABILITIES, CAPABILITIES.watchdog), Ok(()));
         let (periods, times, for_ever) = (Periods::default(), Times::default(), Duration::MAX);
         for (setting, periods, times) in [
             ("periods", Periods { max_age: for_ever, ..periods }, times),
@@ -337,7 +358,7 @@ mod tests {
             ("times", periods, Times { lifetime: Duration::ZERO, ..times }),
         ] {
             let settings = DriveSettings { periods, times, ..usual.clone() };
-            let problem = check_settings(&settings, &CAPABILITIES).unwrap_err();
+            let problem = check_settings(&settings, &CAPABILITIES, CAPABILITIES.watchdog).unwrap_err();
             assert_eq!(problem.setting, setting, "{problem}");
         }
     }

@@ -2,7 +2,9 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Control, Current, Error, Identity, Percent, State, Status, StopMode, Watchdog};
+use drive_core::{
+    Command, Control, Current, Error, Identity, Percent, SelfRestart, State, Status, StopMode, Watchdog,
+};
 use tokio::time::Instant;
 
 use crate::{outcome::Outcome, snapshot::Trip};
@@ -60,6 +62,16 @@ pub enum EventKind {
     ControlTaken(Control),
     /// This bus has control again.
     ControlReturned,
+    /// **Alarm**: somebody else has control, and the run command of this side still stands in the drive. When control is
+    /// given back it may start the motor.
+    RunCommandStands(Error),
+    /// Settings of the drive start its motor again by themselves.
+    RestartsItself {
+        /// Which.
+        by: Arc<[SelfRestart]>,
+        /// Whether the settings of this fleet accept all of them.
+        accepted: bool,
+    },
     /// It said what it is for the first time, or again what is remembered.
     Identified(Arc<Identity>),
     /// It says that it is another drive than before. Motion is refused.
@@ -93,15 +105,19 @@ pub enum EventKind {
         asked: StopMode,
         /// What is done.
         used: StopMode,
+        /// Why, where the drive or its driver tells.
+        why: Option<&'static str>,
     },
+    /// The drive was commanded by somebody else until a stop took the command from him. It is kept until it is released.
+    StopTookCommand(Control),
     /// **Alarm**: a stop cannot be confirmed. It is repeated.
     StopUnconfirmed {
         /// Since when, as a duration.
         since: Duration,
-        /// How often it was sent.
+        /// How often it was sent, or may have been.
         attempts: u32,
-        /// The last error; `None` when the drive took the stop and does not stand.
-        error: Option<Error>,
+        /// What is known of it.
+        outcome: Outcome,
     },
     /// A stop is confirmed: the drive shows standstill.
     StopConfirmed,
@@ -124,12 +140,15 @@ impl EventKind {
             Self::Limit { .. } => "limit",
             Self::ControlTaken(_) => "control taken",
             Self::ControlReturned => "control returned",
+            Self::RunCommandStands(_) => "run command stands",
+            Self::RestartsItself { .. } => "restarts itself",
             Self::Identified(_) => "identified",
             Self::IdentityChanged { .. } => "identity changed",
             Self::WatchdogVerified { .. } => "watchdog verified",
             Self::WatchdogBroken(_) => "watchdog broken",
             Self::Command { .. } => "command",
             Self::StopModeReplaced { .. } => "stop mode replaced",
+            Self::StopTookCommand(_) => "stop took command",
             Self::StopUnconfirmed { .. } => "stop unconfirmed",
             Self::StopConfirmed => "stop confirmed",
             Self::Exit(_) => "exit",
@@ -146,6 +165,8 @@ impl EventKind {
                 | Self::IdentityChanged { .. }
                 | Self::WatchdogBroken(_)
                 | Self::StopUnconfirmed { .. }
+                | Self::RunCommandStands(_)
+                | Self::RestartsItself { accepted: false, .. }
                 | Self::Limit { exceeded: true, .. }
                 | Self::Warning { present: true }
         )
@@ -181,13 +202,21 @@ impl fmt::Display for EventKind {
             Self::Command { command, commander, outcome } => {
                 write!(f, ": {command} by {commander}: {outcome}")
             }
-            Self::StopModeReplaced { asked, used } => write!(f, ": {used} instead of {asked}"),
-            Self::StopUnconfirmed { since, attempts, error } => {
-                write!(f, " since {since:?} after {attempts} attempts")?;
-                match error {
-                    Some(error) => write!(f, ": {error}"),
-                    None => f.write_str(": the motor does not stand"),
-                }
+            Self::RunCommandStands(error) => {
+                write!(f, ", it may start the motor when control is given back: {error}")
+            }
+            Self::RestartsItself { by, accepted } => {
+                let settings: Vec<String> = by.iter().map(ToString::to_string).collect();
+                let judged = if *accepted { "accepted" } else { "not accepted, so that a start is refused" };
+                write!(f, ": {} ({judged})", settings.join(", "))
+            }
+            Self::StopModeReplaced { asked, used, why } => {
+                write!(f, ": {used} instead of {asked}")?;
+                why.map_or(Ok(()), |why| write!(f, ", {why}"))
+            }
+            Self::StopTookCommand(other) => write!(f, " from {other}, and keeps it until it is released"),
+            Self::StopUnconfirmed { since, attempts, outcome } => {
+                write!(f, " since {since:?} after {attempts} attempts: {outcome}")
             }
             Self::Exit(action) => write!(f, ": {action}"),
             Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed => Ok(()),

@@ -57,6 +57,7 @@ impl Fleet {
 
 /// What became of a stop of several drives.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[must_use = "a stop that is not confirmed is an alarm"]
 pub struct StopReport {
     /// Drives that show standstill.
     pub confirmed: Vec<Arc<str>>,
@@ -347,8 +348,8 @@ async fn reach(member: DriveHandle) -> (Arc<str>, Outcome) {
         Ok(snapshot) if snapshot.is_at_setpoint() => Outcome::Confirmed,
         Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),
         Err(_) => {
-            let status = member.snapshot().status.as_ref().map(|status| Arc::clone(&status.value));
-            Outcome::NotConfirmed(Unconfirmed::TimeOver { after, status })
+            let last = member.snapshot().status.as_ref().map(|status| status.seen(Instant::now()));
+            Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
         }
     };
     (Arc::clone(member.name()), outcome)

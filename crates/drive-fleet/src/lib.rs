@@ -64,10 +64,11 @@ pub use fleet::{Events, Fleet, Received};
 pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
-pub use outcome::{Order, Outcome, Refused, Unconfirmed, Until};
+pub use outcome::{LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
 pub use plan::{Demand, Feed, LineBudget, LinePlan, PlanProblem, Reckoning, plan, reckon};
 pub use settings::{
-    Alarms, Commanders, DriveSettings, OnExit, OnFault, OnLoss, Periods, Times, WatchdogContract,
+    Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnFault, OnLoss, Periods, Times,
+    WatchdogContract,
 };
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,

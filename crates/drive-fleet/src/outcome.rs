@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Direction, Error, Setpoint, State, Status};
+use drive_core::{Command, Direction, Error, Refusal, Setpoint, Status};
 
 use crate::limits::LimitProblem;
 
@@ -67,6 +67,7 @@ impl Order {
 
 /// What became of a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[must_use = "only a confirmed command is known to be in force"]
 pub enum Outcome {
     /// The drive's own words show it.
     Confirmed,
@@ -75,9 +76,9 @@ pub enum Outcome {
     NotConfirmed(Unconfirmed),
     /// Its lifetime ran out before it was sent. It never will be.
     Expired,
-    /// It was sent, an answer was lost, and the drive could not be asked in time what became of it. A start is taken back
+    /// It was sent, or may have been, and the drive could not be asked in time what became of it. A start is taken back
     /// as above.
-    OutcomeUnknown(Error),
+    OutcomeUnknown(Unknown),
     /// It was refused; nothing moved because of it.
     Refused(Refused),
 }
@@ -108,8 +109,46 @@ impl fmt::Display for Outcome {
         match self {
             Self::Confirmed | Self::Expired => Ok(()),
             Self::NotConfirmed(why) => write!(f, ": {why}"),
-            Self::OutcomeUnknown(error) => write!(f, ": {error}"),
+            Self::OutcomeUnknown(unknown) => write!(f, ": {unknown}"),
             Self::Refused(why) => write!(f, ": {why}"),
+        }
+    }
+}
+
+/// A status that may be old.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LastSeen {
+    /// The status.
+    pub status: Arc<Status>,
+    /// How long ago it was read.
+    pub age: Duration,
+}
+
+impl fmt::Display for LastSeen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let tenths = self.age.as_millis() / 100;
+        write!(f, "{}, {}.{} s ago", self.status, tenths / 10, tenths % 10)
+    }
+}
+
+/// What is known of a command whose outcome is not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unknown {
+    /// The last error; `None` while no answer has come yet.
+    pub error: Option<Error>,
+    /// What the drive said last, which is older than the command.
+    pub last: Option<LastSeen>,
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.error {
+            Some(error) => error.fmt(f)?,
+            None => f.write_str("no answer yet")?,
+        }
+        match &self.last {
+            Some(last) => write!(f, "; the drive was last seen {last}"),
+            None => f.write_str("; the drive has never been seen"),
         }
     }
 }
@@ -121,8 +160,8 @@ pub enum Unconfirmed {
     TimeOver {
         /// The time it had.
         after: Duration,
-        /// The last status, if there was one.
-        status: Option<Arc<Status>>,
+        /// What the drive said since, if anything.
+        last: Option<LastSeen>,
     },
     /// The drive's words deny it.
     Denied(Error),
@@ -139,10 +178,8 @@ pub enum Unconfirmed {
 impl fmt::Display for Unconfirmed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TimeOver { after, status: Some(status) } => {
-                write!(f, "after {after:?} the drive says {status}")
-            }
-            Self::TimeOver { after, status: None } => write!(f, "the drive has said nothing for {after:?}"),
+            Self::TimeOver { after, last: Some(last) } => write!(f, "after {after:?} the drive says {last}"),
+            Self::TimeOver { after, last: None } => write!(f, "the drive has said nothing for {after:?}"),
             Self::Denied(error) => error.fmt(f),
             Self::Superseded => f.write_str("a later command took its place"),
             Self::Stopped => f.write_str("a stop came"),
@@ -164,10 +201,8 @@ pub enum Refused {
     NotConnected,
     /// Its last status is too old, and no fresh one came in time.
     Stale,
-    /// Its status is none that its manual explains, or one that does not start.
-    State(State),
-    /// It has tripped; the code where it is known.
-    Tripped(Option<u16>),
+    /// The drive as it is does not allow it, as seen here or by its driver.
+    Because(Refusal),
     /// It says that it is another drive than before; accept that first.
     IdentityChanged,
     /// What it is could not be checked in time since it was connected.
@@ -182,13 +217,24 @@ pub enum Refused {
     Superseded,
     /// The limits of this fleet forbid the setpoint.
     Limit(LimitProblem),
-    /// The drive or its driver refused it.
+    /// The drive refused it, or its driver for another reason than the drive's state.
     Drive(Error),
     /// Too many commands for this drive wait.
     QueueFull,
     /// The fleet has shut down.
     ShutDown,
 }
+
+impl From<Error> for Refused {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Refused { reason, .. } => Self::Because(reason),
+            error => Self::Drive(error),
+        }
+    }
+}
+
+impl std::error::Error for Refused {}
 
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -197,9 +243,7 @@ impl fmt::Display for Refused {
             Self::Commander(name) => write!(f, "{name:?} may not command this drive"),
             Self::NotConnected => f.write_str("the drive does not answer"),
             Self::Stale => f.write_str("its status is too old"),
-            Self::State(state) => write!(f, "the drive is in state {state}"),
-            Self::Tripped(Some(code)) => write!(f, "the drive has tripped (fault {code}); reset it first"),
-            Self::Tripped(None) => f.write_str("the drive has tripped; reset it first"),
+            Self::Because(reason) => reason.fmt(f),
             Self::IdentityChanged => {
                 f.write_str("it is another drive than before: accept its identity first")
             }

@@ -32,6 +32,11 @@ pub struct DriveSettings {
     pub on_loss: OnLoss,
     /// What happens to it after a trip.
     pub on_fault: OnFault,
+    /// What happens to it when somebody else takes control of it while it runs by our command.
+    pub on_control_taken: OnControlTaken,
+    /// The settings of the drive by which it may start again by itself, by their mnemonics, such as `Atr`. A start of a
+    /// drive that has another such setting active is refused.
+    pub accept_self_restart: Vec<String>,
     /// What it said it was, from an earlier run; `None`: what it says first is remembered.
     pub identity: Option<Identity>,
 }
@@ -52,6 +57,8 @@ impl DriveSettings {
             on_exit: OnExit::default(),
             on_loss: OnLoss::default(),
             on_fault: OnFault::default(),
+            on_control_taken: OnControlTaken::default(),
+            accept_self_restart: Vec::new(),
             identity: None,
         }
     }
@@ -185,6 +192,17 @@ pub enum OnLoss {
     Report,
     /// It is stopped as soon as it can be reached, whatever it does then.
     Stop(StopMode),
+}
+
+/// What happens to a drive that runs by our command when its panel, its terminals or another bus take control of it (rule 5).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum OnControlTaken {
+    /// Our run command is withdrawn, so that nothing starts by it when control is given back. Where the family has no word
+    /// for that it is an alarm; and a drive that has control back before it is withdrawn is stopped along its ramp.
+    #[default]
+    Withdraw,
+    /// An event; the run command stands.
+    Report,
 }
 
 /// What happens to a drive after a trip. It never starts again by itself (rule 5).

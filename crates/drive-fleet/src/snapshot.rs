@@ -2,8 +2,13 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use drive_core::{Faults, Frequency, Identity, Measurements, Setpoint, State, Status, StopMode, Watchdog};
+use drive_core::{
+    Control, Error, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status,
+    StopMode, Watchdog,
+};
 use tokio::time::Instant;
+
+use crate::outcome::LastSeen;
 
 /// How far the output may be from a setpoint that it has reached by its frequency alone.
 const NEAR: Frequency = Frequency::from_centihertz(50);
@@ -15,19 +20,26 @@ const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
 pub struct Timed<T> {
     /// The value.
     pub value: Arc<T>,
-    /// When its answer came.
+    /// When the exchange that brought it ended on the line; of several the first.
     pub at: Instant,
 }
 
 impl<T> Timed<T> {
-    pub(crate) fn new(value: T, at: Instant) -> Self {
-        Self { value: Arc::new(value), at }
+    /// A value that says itself when it was read, or was told now.
+    pub(crate) fn new(value: T, at: Option<Instant>, now: Instant) -> Self {
+        Self { value: Arc::new(value), at: at.map_or(now, |at| at.min(now)) }
     }
 
     /// How old it is at `now`.
     #[must_use]
     pub fn age(&self, now: Instant) -> Duration {
         now.saturating_duration_since(self.at)
+    }
+}
+
+impl Timed<Status> {
+    pub(crate) fn seen(&self, now: Instant) -> LastSeen {
+        LastSeen { status: Arc::clone(&self.value), age: self.age(now) }
     }
 }
 
@@ -101,11 +113,13 @@ impl WatchdogCheck {
 /// A stop that is not confirmed yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PendingStop {
-    /// By which mode.
+    /// By which mode: the one that was asked for, or the one that took its place.
     pub mode: StopMode,
+    /// Who commanded the drive until this stop took the command from him.
+    pub taken_from: Option<Control>,
     /// Since when.
     pub since: Instant,
-    /// How often it was sent.
+    /// How often it was sent, or may have been.
     pub attempts: u32,
     /// Whether the drive has shown that no run command is in force; what is missing then is standstill.
     pub taken: bool,
@@ -153,6 +167,8 @@ pub struct Snapshot {
     pub name: Arc<str>,
     /// Whether it answers.
     pub link: Link,
+    /// What went wrong last since its last status; `None` where nothing did.
+    pub error: Option<Error>,
     /// The fast set.
     pub status: Option<Timed<Status>>,
     /// The slow set.
@@ -163,6 +179,8 @@ pub struct Snapshot {
     pub identity: IdentityCheck,
     /// Its communication watchdog.
     pub watchdog: WatchdogCheck,
+    /// Which settings start its motor again by themselves; `None` where they have not been read yet.
+    pub self_restarts: Option<Arc<[SelfRestart]>>,
     /// A stop that is not confirmed yet.
     pub stop: Option<PendingStop>,
     /// Whether this fleet started the motor and has not seen it stand since.

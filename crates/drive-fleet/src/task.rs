@@ -255,7 +255,8 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         _ => {}
     }
     match job {
-        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await.map(|stopped| stopped.status)),
+        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
+        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
         Job::Start(direction) => Reply::Started(drive.start(direction).await),
         Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
         Job::ResetFaults => Reply::Reset(drive.reset_faults().await),
@@ -271,6 +272,7 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         }
         Job::Identify => Reply::Identity(drive.identify().await),
         Job::Watchdog => Reply::Watchdog(drive.watchdog().await),
+        Job::SelfRestarts => Reply::SelfRestarts(drive.self_restarts().await),
         Job::Faults => Reply::Faults(drive.faults().await),
         Job::Measurements => Reply::Measurements(drive.measurements().await),
     }

@@ -7,7 +7,11 @@ use drive_bus::{
     Endpoint, LineConfig, Protocol, SlaveSettings,
     protocol::{ProtocolError, ProtocolMismatch},
 };
-use drive_core::serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings};
+use drive_core::{
+    WatchdogCapability,
+    serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings},
+};
+use drive_families::Options;
 
 use crate::drive_spec::DriveName;
 
@@ -37,7 +41,17 @@ pub(crate) struct SerialSpec {
     pub(crate) protocol: Protocol,
 }
 
+/// The communication watchdog of a drive on a line with this protocol, asked of the driver itself.
+pub(crate) fn watchdog(name: DriveName, options: &Options, protocol: Protocol) -> Option<WatchdogCapability> {
+    name.family.watchdog(matches!(protocol, Protocol::Ascii(_)), options)
+}
+
 impl LineSpec {
+    /// What is spoken on it.
+    pub(crate) const fn protocol(&self) -> Protocol {
+        self.serial.protocol
+    }
+
     /// The configuration of this line for these drives, checked against what each family can be set to.
     pub(crate) fn config(&self, drives: &[DriveName]) -> Result<LineConfig, LineSpecError> {
         let config = match &self.target {

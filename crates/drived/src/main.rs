@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod cli;
+mod commanded;
 mod commands;
 mod config;
 mod drive_options;

@@ -1,16 +1,30 @@
 //! The one drive on which a subcommand acts.
 
+use std::time::Duration;
+
 use drive_bus::{Line, LineConfig};
-use drive_core::{Drive, Error, ErrorKind};
+use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError};
 use drive_families::Options;
+use tokio::time::timeout;
 
 use crate::{
+    commanded::Commanded,
     drive_options::{self, OptionArgs},
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
     signals::Ending,
 };
+
+/// How long a request may wait until the line is quiet enough for it.
+const QUIET_WITHIN: Duration = Duration::from_secs(5);
+
+/// What is said of a line on which nothing can be sent.
+pub(crate) const NEVER_QUIET: &str = "the line is never quiet, something else is sending: see whether speed, format and \
+    protocol are those of the drives, and whether a second master is on it";
+
+/// How long a port has to let itself be closed.
+const CLOSED_WITHIN: Duration = Duration::from_secs(1);
 
 /// `--line` and `--drive` of the subcommands that act on one drive.
 #[derive(Debug, clap::Args)]
@@ -33,22 +47,69 @@ impl OneDriveArgs {
         })
     }
 
-    /// Opens the line. Nothing is sent by it.
+    /// Opens the line, for reading and for parameters. Nothing is sent by it.
     pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
+        let (name, options, config) = self.parts()?;
+        let line = open_line(config.clone()).await?;
+        let mut drive = open_drive(&line, name, &options)?;
+        wait_at_most(&mut *drive);
+        Ok(OneDrive { name, drive, config, line })
+    }
+
+    /// Opens the line, for a command: see [`Commanded::over`].
+    pub(crate) async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
+        let (name, options, config) = self.parts()?;
+        let line = open_line(config.clone()).await?;
+        Commanded::over(name, line, config, &options, accepted)
+    }
+
+    fn parts(&self) -> Result<(DriveName, Options, LineConfig), Failure> {
         let name = self.name()?;
         let options = self.options.of(&[name])?;
         let config = self.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
         // No other drive waits behind a mute one here, so each request is really sent.
-        let config = LineConfig { offline_after: 0, ..config };
-        let line = open_line(config.clone()).await?;
-        let drive = open_drive(&line, name, &options)?;
-        Ok(OneDrive { name, drive, config, line })
+        Ok((name, options, LineConfig { offline_after: 0, ..config }))
+    }
+}
+
+/// Lets no request to a drive wait without end for a line that is never quiet.
+pub(crate) fn wait_at_most(drive: &mut dyn Drive) {
+    let all = Some(QUIET_WITHIN);
+    *drive.lifetimes_mut() =
+        Lifetimes { stop: None, command: all, keep_alive: all, status: all, background: all };
+}
+
+/// Closes a port, if it lets itself be closed.
+pub(crate) async fn close(line: &Line) {
+    // The program ends, and with it the port.
+    let _ = timeout(CLOSED_WITHIN, line.clone().close()).await;
+}
+
+/// What a person reads when a drive did not do it.
+pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> String {
+    match (error, error.kind()) {
+        (Error::Port { problem: PortError::Expired, .. }, _) => {
+            format!("{name} could not be asked: {NEVER_QUIET}")
+        }
+        (Error::Port { problem: PortError::Damaged(_) | PortError::Mismatch(_), .. }, _) => format!(
+            "{name} cannot be understood ({error}): something else is sending, two slaves have this address, or speed, \
+             format or protocol are others"
+        ),
+        (_, ErrorKind::NoAnswer) => format!(
+            "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}",
+            name.slave, config.serial
+        ),
+        (_, ErrorKind::OutcomeUnknown) => {
+            format!("{name}: {error}: nobody knows whether it was carried out, read the status")
+        }
+        (_, ErrorKind::Unsupported) => format!("{name}: {error}{}", drive_options::hint(name.family)),
+        _ => format!("{name}: {error}"),
     }
 }
 
 /// Opens a line; a port that is missing or in use is the caller's input.
 pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
-    Line::open(config).await.map_err(|error| Failure::Input(error.to_string()))
+    Line::open(config).await.map_err(|error| Failure::Port(error.to_string()))
 }
 
 /// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.
@@ -82,29 +143,11 @@ pub(crate) struct OneDrive {
 impl OneDrive {
     /// What a person reads when the drive did not do it.
     pub(crate) fn failure(&self, error: &Error) -> Failure {
-        let name = self.name;
-        Failure::Drive(match error.kind() {
-            ErrorKind::NoAnswer => format!(
-                "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}",
-                name.slave, self.config.serial
-            ),
-            ErrorKind::OutcomeUnknown => {
-                format!("{name}: {error}: nobody knows whether it was carried out, read the status")
-            }
-            ErrorKind::Unsupported => format!("{name}: {error}{}", drive_options::hint(name.family)),
-            _ => format!("{name}: {error}"),
-        })
-    }
-
-    /// A drive on a line of a test.
-    #[cfg(test)]
-    pub(crate) fn over(name: DriveName, line: Line, config: LineConfig) -> Self {
-        let drive = open_drive(&line, name, &Options::default()).unwrap();
-        Self { name, drive, config, line }
+        Failure::Drive(words(self.name, &self.config, error))
     }
 
     /// Closes the port.
     pub(crate) async fn close(self) {
-        self.line.close().await;
+        close(&self.line).await;
     }
 }

@@ -64,7 +64,7 @@ mod tests {
     use drive_sim::{SimLine, Wiring};
 
     use super::*;
-    use crate::commands::reset::reset;
+    use crate::{commanded::Commanded, drive_spec::DriveName};
 
     #[tokio::test(start_paused = true)]
     async fn the_trip_of_every_family_is_read_as_a_fault_and_reset() {
@@ -73,14 +73,17 @@ mod tests {
             let simulated = SimLine::new(Wiring::rtu(settings));
             let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
             let machine = simulated.add_boxed(1, model(family, SetUp::ForTheBus)).unwrap();
-            let line = Line::over(simulated.in_memory(), config);
+            let line = Line::over(simulated.in_memory(), config.clone());
             let slave = SlaveAddress::try_from(1).unwrap();
             let mut drive = family.open_with(line.slave(1), slave, &options().of(family)).unwrap();
             assert!(!drive.status().await.unwrap().is_fault(), "{family}");
             machine.trip(trip_code(family));
             assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
             assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
-            assert!(!reset(&mut *drive).await.unwrap().is_fault(), "{family}");
+            let name = DriveName { family, slave };
+            let mut one = Commanded::over(name, line, config, &options().of(family), Vec::new()).unwrap();
+            let outcome = one.command(async |drive| drive.reset_faults().await).await.unwrap();
+            assert!(outcome.is_confirmed() && !one.status().is_fault(), "{family}: {outcome}");
         }
     }
 }

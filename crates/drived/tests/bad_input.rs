@@ -83,9 +83,11 @@ fn drives_that_cannot_share_a_line_are_refused_by_name() {
 
 #[test]
 fn a_missing_port_is_named() {
-    for subcommand in ["poll", "status", "start", "stop", "faults", "reset"] {
+    for subcommand in ["poll", "status", "start", "faults", "reset"] {
         run(&[subcommand, "--line", PORT, "--drive", "atv312@1"]).assert_refused(2, PORT);
     }
+    // A motor that was to be stopped is more than bad input.
+    run(&["stop", "--line", PORT, "--drive", "atv312@1"]).assert_refused(1, "STOP NOT CONFIRMED");
     run(&["setpoint", "30", "--line", PORT, "--drive", "atv312@1"]).assert_refused(2, PORT);
     // Nobody listens on the discard port of this machine.
     let line = "rtu+tcp://127.0.0.1:9";

@@ -291,3 +291,40 @@ fn the_example_of_the_repository_can_work_and_the_manual_shows_what_is_printed_o
     let families = run(&["families"]);
     assert!(manual.contains(families.assert_done()), "{families:?}");
 }
+
+#[test]
+fn an_altivar_58_on_ascii_has_the_watchdog_of_its_card_there_in_plan_check_and_families() {
+    let line = "/dev/nowhere,9600,7E1,ascii";
+    let plan = run(&["plan", "--line", line, "--drive", "atv58@1-3"]);
+    plan.assert_refused(2, "the watchdog of atv58@1 is 1s");
+    assert_eq!(row(&plan.out, "watchdog of 1s").len(), 2, "{plan:?}");
+    let rtu = run(&["plan", "--line", "/dev/nowhere,9600,8E1", "--drive", "atv58@1-3"]);
+    assert_eq!(row(rtu.assert_done(), "watchdog of 10s").len(), 2, "{rtu:?}");
+    let file = |time: &str| {
+        let text = format!(
+            "[lines.cell]\nport = \"{line}\"\n[[drives]]\nline = \"cell\"\ndrive = \"atv58@1-3\"\ncontrol = true\n\
+             watchdog = {{ time = \"{time}\", reaction = \"trip\" }}\n"
+        );
+        let file = File::new("ascii", &text);
+        run(&["check", "--config", file.path()])
+    };
+    assert!(file("1s").assert_done().contains("watchdog          1s"), "{:?}", file("1s"));
+    file("10s").assert_refused(2, "a watchdog of 10s: a Schneider Altivar 58");
+    let families = run(&["families", "atv58"]);
+    assert!(families.assert_done().contains("10s, not settable over the bus; in ASCII 1s"), "{families:?}");
+}
+
+#[test]
+fn more_stations_than_a_family_allows_on_a_segment_are_refused() {
+    let plan = |more: &[&str]| {
+        let line = ["plan", "--line", "/dev/nowhere,19200,8N1", "--drive", "atv28@1-19", "--period", "5s"];
+        run(&[&line[..], more].concat())
+    };
+    plan(&[]).assert_refused(
+        2,
+        "19 drives on 1 segment: atv28@1 is a Schneider Altivar 28, which allows 18 stations",
+    );
+    plan(&["--segments", "2"]).assert_done();
+    let wide = run(&["plan", "--line", "/dev/nowhere,19200,8E1", "--drive", "atv312@1-32", "--period", "5s"]);
+    wide.assert_refused(2, "which allows 31 stations");
+}

@@ -56,7 +56,13 @@ async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_
         let slave = SlaveAddress::try_from(number).expect("it is an address");
         let name = format!("fan {number}");
         let capabilities = family.capabilities();
-        demands.push(Demand { drive: name.clone(), capabilities, periods: PERIODS, watchdog });
+        demands.push(Demand {
+            drive: name.clone(),
+            capabilities,
+            watchdog_capability: capabilities.watchdog,
+            periods: PERIODS,
+            watchdog,
+        });
         let settings = DriveSettings { periods: PERIODS, watchdog, ..DriveSettings::controlled(name) };
         builder = builder.drive("north", settings, family.open(line.slave(number), slave));
     }

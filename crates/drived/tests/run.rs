@@ -59,8 +59,11 @@ fn a_configuration_is_checked_without_a_port() {
         out.starts_with("line bench: 10 drives, 10 under control, on /dev/nowhere, 19200 8E1 rtu\n"),
         "{out}"
     );
-    assert!(out.contains("atv312@1-10 (pump 1 … pump 10)\n    status        every 500ms running"), "{out}");
-    assert!(out.contains("at the exit   stopped if it was started here (ramp stop)"), "{out}");
+    assert!(
+        out.contains("atv312@1-10 (pump 1 … pump 10)\n    status            every 500ms running"),
+        "{out}"
+    );
+    assert!(out.contains("at the exit       stopped if it was started here (ramp stop)"), "{out}");
     run(&["run", "--config", file.path()]).assert_refused(2, "/dev/nowhere");
 }
 

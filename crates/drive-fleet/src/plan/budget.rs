@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_bus::{Endpoint, LineConfig, Protocol};
-use drive_core::{Capabilities, SerialSettings};
+use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
 use crate::{
     settings::{Periods, WatchdogContract},
@@ -33,6 +33,8 @@ pub struct LineBudget {
     pub slave_change_gap: Duration,
     /// After how many unanswered requests the line counts a slave as off-line.
     pub offline_after: u32,
+    /// How many segments the line has: 1, and one more behind each repeater.
+    pub segments: u8,
 }
 
 impl LineBudget {
@@ -50,6 +52,7 @@ impl LineBudget {
             broadcast_turnaround: config.broadcast_turnaround,
             slave_change_gap: config.slave_change_gap,
             offline_after: config.offline_after,
+            segments: 1,
         }
     }
 
@@ -86,6 +89,9 @@ pub struct Demand {
     pub drive: String,
     /// What its family can do.
     pub capabilities: &'static Capabilities,
+    /// The communication watchdog of this drive on its line, see
+    /// [`Drive::watchdog_capability`](drive_core::Drive::watchdog_capability).
+    pub watchdog_capability: Option<WatchdogCapability>,
     /// How often it is asked.
     pub periods: Periods,
     /// Its watchdog, where the settings have a contract for it. A watchdog that the bus cannot set has to be fed in any
@@ -97,7 +103,7 @@ impl Demand {
     /// The time of the watchdog that has to be fed: that of the settings, or the one that the drive has anyway.
     #[must_use]
     pub fn watchdog_timeout(&self) -> Option<Duration> {
-        self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.capabilities))
+        self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.watchdog_capability))
     }
 
     /// The longer of the times from one status to the next.

@@ -209,12 +209,26 @@ pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
     let starved = feed
         .filter(|(feed, _)| !feed.is_in_time())
         .map(|(feed, demand)| PlanProblem::Starved { drive: demand.drive.clone(), feed });
-    let problem = starved.or_else(|| overloaded(&plan)).or_else(|| {
+    let problem = crowded(budget, drives).or(starved).or_else(|| overloaded(&plan)).or_else(|| {
         // In the order in which they were given.
         let is_living = |demand: &&Demand| living.iter().any(|(living, _)| std::ptr::eq(*living, *demand));
         drives.iter().filter(is_living).find_map(|demand| stale(&plan, demand))
     });
     Reckoning { plan, problem }
+}
+
+/// Whether there are more stations on a segment than its drives allow, the drives shared evenly among the segments.
+fn crowded(budget: LineBudget, drives: &[Demand]) -> Option<PlanProblem> {
+    let strictest = drives.iter().min_by_key(|demand| demand.capabilities.stations)?;
+    let (most, segments) = (strictest.capabilities.stations, budget.segments.max(1));
+    let fits = drives.len() <= usize::from(most) * usize::from(segments);
+    (budget.serial.is_some() && !fits).then(|| PlanProblem::Stations {
+        drive: strictest.drive.clone(),
+        family: strictest.capabilities.name,
+        most,
+        drives: drives.len(),
+        segments,
+    })
 }
 
 fn overloaded(plan: &LinePlan) -> Option<PlanProblem> {

@@ -8,6 +8,19 @@ use crate::supervisor::checks::FEED_PART;
 /// Why a plan does not work, with the arithmetic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PlanProblem {
+    /// More drives than one of them allows on a segment.
+    Stations {
+        /// The drive that allows the fewest.
+        drive: String,
+        /// What it is.
+        family: &'static str,
+        /// How many it allows.
+        most: u8,
+        /// How many drives the line has.
+        drives: usize,
+        /// On how many segments they are.
+        segments: u8,
+    },
     /// The polls want more than the line has.
     Overloaded {
         /// One status of every drive.
@@ -40,6 +53,12 @@ pub enum PlanProblem {
 impl fmt::Display for PlanProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Stations { drive, family, most, drives, segments } => write!(
+                f,
+                "{drives} drives on {segments} {}: {drive} is a {family}, which allows {most} stations on each; share the \
+                 drives among lines, or say how many segments the line has behind repeaters",
+                if *segments == 1 { "segment" } else { "segments" },
+            ),
             Self::Overloaded { sweep, drives, utilisation_ppm } => write!(
                 f,
                 "one status of {drives} drives takes {} and the polls want {}.{} % of the line: lengthen the periods, \

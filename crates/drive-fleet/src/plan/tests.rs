@@ -24,6 +24,7 @@ fn drives(number: usize, running: Duration, watchdog: Option<Duration>) -> Vec<D
     let demand = |number: usize| Demand {
         drive: format!("pump {number}"),
         capabilities: &CAPABILITIES,
+        watchdog_capability: CAPABILITIES.watchdog,
         periods,
         watchdog,
     };
@@ -126,4 +127,22 @@ fn a_pause_that_a_drive_needs_counts_only_when_there_is_no_other_to_serve_in_it(
     let pause = 12 * MS - SerialSettings::MODBUS_DEFAULT.t3_5();
     assert_eq!(of(1), budget().read_slot() + pause);
     assert_eq!(of(2), budget().read_slot() * 2);
+}
+
+#[test]
+fn more_drives_than_a_family_allows_on_a_segment_are_refused_unless_there_are_repeaters() {
+    static FEW: Capabilities = Capabilities { name: "Schneider Altivar 28", stations: 18, ..CAPABILITIES };
+    let mut every = without_measurements(drives(19, 5_000 * MS, None));
+    every[18].capabilities = &FEW;
+    let problem = plan(budget(), &every).unwrap_err();
+    assert!(
+        problem.to_string().starts_with(
+            "19 drives on 1 segment: pump 19 is a Schneider Altivar 28, which allows 18 stations on each"
+        ),
+        "{problem}"
+    );
+    assert!(plan(LineBudget { segments: 2, ..budget() }, &every).is_ok());
+    assert!(plan(budget(), &every[1..]).is_ok());
+    let tcp = LineBudget::of(&LineConfig::modbus_tcp("gateway:502"));
+    assert!(plan(tcp, &every).is_ok(), "behind a gateway there is a segment that nobody here knows");
 }

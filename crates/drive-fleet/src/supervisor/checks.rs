@@ -1,8 +1,10 @@
-//! What is checked at each connect: which drive it is, and its communication watchdog.
+//! What is checked at each connect: which drive it is, its communication watchdog, and whether it starts again by itself.
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::{Capabilities, Error, ErrorKind, ExceptionMeaning, Identity, Result, Watchdog};
+use drive_core::{
+    Error, ErrorKind, ExceptionMeaning, Identity, Result, SelfRestart, Watchdog, WatchdogCapability,
+};
 use tokio::time::Instant;
 
 use crate::{
@@ -37,10 +39,13 @@ pub(crate) struct Checks {
     armed: bool,
     heard: Option<Instant>,
     feed_again: Option<Instant>,
+    restarts: Option<Arc<[SelfRestart]>>,
+    restarts_at: Option<Instant>,
+    accepted_restarts: Vec<String>,
 }
 
 impl Checks {
-    pub(crate) fn new(settings: &DriveSettings, capabilities: &Capabilities) -> Self {
+    pub(crate) fn new(settings: &DriveSettings, capability: Option<WatchdogCapability>) -> Self {
         let watchdog = match settings.watchdog {
             Some(_) => WatchdogCheck::Unchecked,
             None => WatchdogCheck::NoContract { found: None },
@@ -50,14 +55,17 @@ impl Checks {
             remembered: settings.identity.clone().map(Arc::new),
             identity_at: None,
             contract: settings.watchdog,
-            readable: capabilities.watchdog.is_some(),
-            settable: capabilities.watchdog.is_some_and(|watchdog| watchdog.settable),
-            fixed: fixed_watchdog(capabilities),
+            readable: capability.is_some(),
+            settable: capability.is_some_and(|watchdog| watchdog.settable),
+            fixed: fixed_watchdog(capability),
             watchdog,
             watchdog_at: None,
             armed: false,
             heard: None,
             feed_again: None,
+            restarts: None,
+            restarts_at: None,
+            accepted_restarts: settings.accept_self_restart.clone(),
         }
     }
 
@@ -79,6 +87,8 @@ impl Checks {
         self.identity = IdentityCheck::Unchecked;
         self.identity_at = Some(now);
         self.watchdog_at = Some(now);
+        self.restarts = None;
+        self.restarts_at = Some(now);
         self.watchdog = match self.contract {
             Some(_) => WatchdogCheck::Unchecked,
             None => WatchdogCheck::NoContract { found: None },
@@ -108,7 +118,7 @@ impl Checks {
     pub(crate) fn wake_at(&self) -> Option<Instant> {
         let identity = self.identity_at.filter(|_| self.identity == IdentityCheck::Unchecked);
         let watchdog = self.watchdog_at.filter(|_| self.wants_watchdog());
-        [identity, watchdog].into_iter().flatten().min()
+        [identity, watchdog, self.restarts_at].into_iter().flatten().min()
     }
 
     fn wants_watchdog(&self) -> bool {
@@ -121,12 +131,14 @@ impl Checks {
 
     /// The check that is due. The watchdog is written at standstill, and only to the drive that the settings are for.
     pub(crate) fn job(&self, now: Instant, control: bool, stands: bool) -> Option<Job> {
-        self.identity_job(now).or_else(|| self.watchdog_job(now)).or_else(|| {
+        let restarts = || self.restarts_at.filter(|at| *at <= now).map(|_| Job::SelfRestarts);
+        let arms = || {
             let waits = matches!(self.watchdog, WatchdogCheck::WaitsForStandstill(_));
             let known = matches!(self.identity, IdentityCheck::Same(_) | IdentityCheck::CannotSay);
             let due = self.watchdog_at.is_none_or(|at| at <= now);
             self.arm().filter(|_| waits && known && due && control && stands)
-        })
+        };
+        self.identity_job(now).or_else(|| self.watchdog_job(now)).or_else(arms).or_else(restarts)
     }
 
     /// The question which drive it is, if it is due.
@@ -171,6 +183,24 @@ impl Checks {
                 Some(EventKind::Identified(found))
             }
         }
+    }
+
+    /// Which settings start the drive again by themselves, once they have been read.
+    pub(crate) const fn restarts(&self) -> Option<&Arc<[SelfRestart]>> {
+        self.restarts.as_ref()
+    }
+
+    pub(crate) fn handle_restarts(
+        &mut self,
+        now: Instant,
+        result: Result<Vec<SelfRestart>>,
+    ) -> Option<EventKind> {
+        self.restarts_at = matches!(result, Err(Error::Port { .. })).then_some(now + AGAIN);
+        let by: Arc<[SelfRestart]> = result.ok()?.into();
+        self.restarts = Some(Arc::clone(&by));
+        let accepted =
+            by.iter().all(|restart| self.accepted_restarts.iter().any(|code| code == restart.code));
+        (!by.is_empty()).then_some(EventKind::RestartsItself { by, accepted })
     }
 
     /// Takes what the drive says it is for right.
@@ -262,8 +292,8 @@ impl Checks {
 }
 
 /// The time of a watchdog that the bus cannot set and the drive therefore has as it is.
-pub(crate) fn fixed_watchdog(capabilities: &Capabilities) -> Option<Duration> {
-    capabilities.watchdog.filter(|watchdog| !watchdog.settable).map(|watchdog| watchdog.max)
+pub(crate) fn fixed_watchdog(capability: Option<WatchdogCapability>) -> Option<Duration> {
+    capability.filter(|watchdog| !watchdog.settable).map(|watchdog| watchdog.max)
 }
 
 /// Whether a family or a drive has nothing to say of what it is.

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Direction, Error, Faults, Identity, Measurements, Reaction, Result, Setpoint, Status, StopMode, Watchdog,
+    Direction, Error, Faults, Identity, Measurements, Reaction, Result, SelfRestart, Setpoint, Status,
+    StopMode, Stopped, Watchdog,
 };
 use tokio::time::Instant;
 
@@ -42,6 +43,7 @@ pub(crate) enum Turn {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Job {
     Stop(StopMode),
+    Withdraw,
     Start(Direction),
     SetSetpoint(Setpoint),
     ResetFaults,
@@ -55,6 +57,7 @@ pub(crate) enum Job {
     },
     Identify,
     Watchdog,
+    SelfRestarts,
     Faults,
     Measurements,
 }
@@ -68,6 +71,7 @@ impl Job {
                 | Self::Status { .. }
                 | Self::Identify
                 | Self::Watchdog
+                | Self::SelfRestarts
                 | Self::Faults
                 | Self::Measurements
         )
@@ -77,7 +81,8 @@ impl Job {
 /// What a call of the drive gave.
 #[derive(Debug)]
 pub(crate) enum Reply {
-    Stopped(Result<Status>),
+    Stopped(Result<Stopped>),
+    Withdrawn(Result<Status>),
     Started(Result<Status>),
     Setpoint(Result<()>),
     Reset(Result<Status>),
@@ -87,6 +92,7 @@ pub(crate) enum Reply {
     Status(Result<Status>),
     Identity(Result<Identity>),
     Watchdog(Result<Watchdog>),
+    SelfRestarts(Result<Vec<SelfRestart>>),
     Faults(Result<Faults>),
     Measurements(Result<Measurements>),
 }
@@ -95,7 +101,8 @@ impl Reply {
     /// The error, if it is one that tells of the line or the drive, and not of what the family has.
     pub(crate) fn error(&self) -> Option<&Error> {
         let error = match self {
-            Self::Stopped(result)
+            Self::Stopped(result) => result.as_ref().err(),
+            Self::Withdrawn(result)
             | Self::Started(result)
             | Self::Reset(result)
             | Self::Released(result)
@@ -104,6 +111,7 @@ impl Reply {
             Self::Saved(result) => result.as_ref().err(),
             Self::Identity(result) => result.as_ref().err(),
             Self::Watchdog(result) => result.as_ref().err(),
+            Self::SelfRestarts(result) => result.as_ref().err(),
             Self::Faults(result) => result.as_ref().err(),
             Self::Measurements(result) => result.as_ref().err(),
         };

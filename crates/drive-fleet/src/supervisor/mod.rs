@@ -16,6 +16,7 @@ mod stopping;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod withdraw;
 
 use std::{
     collections::{BTreeSet, VecDeque},
@@ -23,7 +24,7 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Capabilities, Error, ErrorKind, Measurements, PortError, Status};
+use drive_core::{Error, ErrorKind, Measurements, PortError, Status, WatchdogCapability};
 use tokio::time::Instant;
 
 use self::{
@@ -32,6 +33,7 @@ use self::{
     orders::{Active, Queued},
     pace::Pace,
     stopping::Stopping,
+    withdraw::Withdrawal,
 };
 pub(crate) use self::{
     job::{Job, Reply, Step, Turn},
@@ -40,9 +42,9 @@ pub(crate) use self::{
 use crate::{
     event::{EventKind, ExitAction},
     limits::Given,
-    outcome::Outcome,
+    outcome::{Outcome, Unknown},
     settings::DriveSettings,
-    snapshot::{Counters, IdentityCheck, Link, Snapshot, Timed, Trip, WatchdogCheck},
+    snapshot::{Counters, Link, Snapshot, Timed, Trip},
 };
 
 /// Names a caller that waits for an outcome.
@@ -84,7 +86,6 @@ pub(crate) enum Output {
 pub(crate) struct Supervisor {
     name: Arc<str>,
     settings: DriveSettings,
-    capabilities: &'static Capabilities,
     link: Link,
     status: Option<Timed<Status>>,
     measurements: Option<Timed<Measurements>>,
@@ -97,6 +98,7 @@ pub(crate) struct Supervisor {
     stopping: Option<Stopping>,
     /// How many stops were asked of it.
     stops: u64,
+    withdrawal: Option<Withdrawal>,
     exit: Exit,
     started_here: bool,
     exceeded: BTreeSet<&'static str>,
@@ -106,6 +108,7 @@ pub(crate) struct Supervisor {
     counters: Counters,
     /// Since when there has been no valid status.
     silent_since: Instant,
+    /// The last error since the last status.
     last_error: Option<Error>,
     /// A status has failed since the last that came: the drive may have been switched off and on.
     doubtful: bool,
@@ -118,20 +121,20 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(now: Instant, settings: DriveSettings, capabilities: &'static Capabilities) -> Self {
+    pub(crate) fn new(now: Instant, settings: DriveSettings, watchdog: Option<WatchdogCapability>) -> Self {
         Self {
             name: Arc::from(settings.name.as_str()),
-            capabilities,
             link: Link::Connecting,
             status: None,
             measurements: None,
             given: None,
-            checks: Checks::new(&settings, capabilities),
+            checks: Checks::new(&settings, watchdog),
             pace: Pace::new(now, settings.periods),
             active: None,
             queue: VecDeque::new(),
             stopping: None,
             stops: 0,
+            withdrawal: None,
             exit: Exit::No,
             started_here: false,
             exceeded: BTreeSet::new(),
@@ -175,6 +178,9 @@ impl Supervisor {
     /// What is most urgent, and how long it may hold up the rest.
     fn choose(&mut self, now: Instant) -> Option<(Job, Option<Instant>)> {
         if let Some(job) = self.stop_job(now) {
+            return Some((job, None));
+        }
+        if let Some(job) = self.withdraw_job(now) {
             return Some((job, None));
         }
         let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
@@ -252,7 +258,8 @@ impl Supervisor {
         }
         let stop = self.stopping.as_ref().and_then(Stopping::wake_at);
         let order = self.active.as_ref().and_then(Active::wake_at);
-        stop.into_iter().chain(order).fold(at, Instant::min).max(now)
+        let withdrawal = self.withdrawal.as_ref().and_then(Withdrawal::wake_at);
+        stop.into_iter().chain(order).chain(withdrawal).fold(at, Instant::min).max(now)
     }
 
     fn handle_time(&mut self, now: Instant) {
@@ -276,8 +283,8 @@ impl Supervisor {
             self.checks.heard(now);
         }
         if let Some(error) = reply.error() {
-            self.counters.failures += 1;
             self.last_error = Some(error.clone());
+            self.counters.failures += 1;
             if is_gone(error) && self.link == Link::Connected {
                 self.lose(now);
             }
@@ -298,6 +305,12 @@ impl Supervisor {
                     self.emit(event);
                 }
             }
+            Reply::SelfRestarts(result) => {
+                if let Some(event) = self.checks.handle_restarts(now, result) {
+                    self.emit(event);
+                }
+            }
+            Reply::Withdrawn(result) => self.handle_withdrawn(now, result),
             Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
             Reply::Stopped(result) => self.handle_stopped(now, result),
             Reply::Setpoint(result) => self.handle_setpoint_reply(now, result),
@@ -344,11 +357,13 @@ impl Supervisor {
         Snapshot {
             name: self.name(),
             link: self.link,
+            error: self.last_error.clone(),
             status: self.status.clone(),
             measurements: self.measurements.clone(),
             setpoint: self.given.map(|given| given.setpoint),
             identity: self.checks.identity().clone(),
             watchdog: self.checks.watchdog().clone(),
+            self_restarts: self.checks.restarts().cloned(),
             stop: self.stopping.as_ref().map(Stopping::pending),
             started_here: self.started_here,
             trips: Arc::clone(&self.trips),
@@ -382,16 +397,10 @@ impl Supervisor {
         self.link == Link::Connected && (moving || self.active.is_some() || self.stopping.is_some())
     }
 
-    fn watchdog_allows_motion(&self) -> bool {
-        self.checks.watchdog().allows_motion()
-    }
-
-    fn identity_check(&self) -> &IdentityCheck {
-        self.checks.identity()
-    }
-
-    fn watchdog_check(&self) -> &WatchdogCheck {
-        self.checks.watchdog()
+    /// What is known of something whose outcome is not.
+    fn unknown(&self, now: Instant, error: Option<Error>) -> Outcome {
+        let last = self.status.as_ref().map(|status| status.seen(now));
+        Outcome::OutcomeUnknown(Unknown { error, last })
     }
 }
 

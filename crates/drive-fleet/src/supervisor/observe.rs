@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use drive_core::{Control, Faults, Measurements, Result, Status};
+use drive_core::{Control, Faults, Measurements, Result, State, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Supervisor};
@@ -42,10 +42,12 @@ impl Supervisor {
     pub(super) fn accept_status(&mut self, now: Instant, status: Status) {
         let was = self.link;
         let before = self.status.take();
-        let status = Timed::new(status, now);
-        let silent_for = now.saturating_duration_since(self.silent_since);
-        self.silent_since = now;
+        let at = status.at;
+        let status = Timed::new(status, at, now);
+        let silent_for = status.at.saturating_duration_since(self.silent_since);
+        self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
+        self.last_error = None;
         self.changed = true;
         if was != Link::Connected {
             self.link = Link::Connected;
@@ -57,7 +59,7 @@ impl Supervisor {
             self.checks.connected(now);
         }
         self.doubtful = false;
-        self.compare(before.as_ref().map(|before| &*before.value), &status.value);
+        self.compare(now, before.as_ref().map(|before| &*before.value), &status.value);
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
             let watchdog_after = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
@@ -90,7 +92,7 @@ impl Supervisor {
         }
     }
 
-    fn compare(&mut self, before: Option<&Status>, status: &Status) {
+    fn compare(&mut self, now: Instant, before: Option<&Status>, status: &Status) {
         if let Some(before) = before {
             if before.state != status.state {
                 self.emit(EventKind::StateChanged { from: before.state, to: status.state });
@@ -110,10 +112,15 @@ impl Supervisor {
         };
         if was != Control::Bus && is == Control::Bus {
             self.emit(EventKind::ControlReturned);
+            self.control_returned(now);
         } else if was != is {
             // Whoever has control now may give another reference.
             self.given = None;
             self.emit(EventKind::ControlTaken(is));
+            let ran = self.started_here || before.is_some_and(|before| before.state == State::Running);
+            if was == Control::Bus && ran {
+                self.control_taken(now);
+            }
         }
     }
 
@@ -163,7 +170,8 @@ impl Supervisor {
                 .zip(alarms.motor_thermal)
                 .map(|(measured, limit)| (Limit::MotorThermal { measured, limit }, measured > limit))
         });
-        self.measurements = Some(Timed::new(measurements, now));
+        let at = measurements.at;
+        self.measurements = Some(Timed::new(measurements, at, now));
         self.changed = true;
     }
 

@@ -25,8 +25,6 @@ pub(super) struct Active {
     expires: Instant,
     /// The setpoint of a start has been given.
     pub(super) setpoint_given: bool,
-    /// A fresh status was asked for on its behalf.
-    pub(super) hurried: bool,
     /// The watchdog was written on its behalf.
     pub(super) armed: bool,
     /// Why it could not be sent yet.
@@ -146,7 +144,6 @@ impl Supervisor {
                     order,
                     expires: issued + self.settings.times.lifetime,
                     setpoint_given: false,
-                    hurried: false,
                     armed: false,
                     blocked: None,
                     phase: Phase::Prepare,
@@ -166,20 +163,33 @@ impl Supervisor {
                 self.end_order(blocked.map_or(Outcome::Expired, Outcome::Refused));
                 continue;
             }
-            match self.allow(now, order) {
+            match self.allow(now, order, self.active.as_ref()) {
                 Ok(Some(job)) => {
-                    self.started_here |= matches!(job, Job::Start(_));
+                    if matches!(job, Job::Start(_)) {
+                        self.started_here = true;
+                        // What is started anew is not to be withdrawn any more.
+                        self.withdrawal = None;
+                    }
                     self.set_phase(Phase::Sending(job));
                     return Some((job, None));
                 }
-                Ok(None) => self.end_order(Outcome::Confirmed),
-                Err(Blocked::Refused(refused)) => self.end_order(Outcome::Refused(refused)),
-                Err(Blocked::Needs(job, refused)) => {
-                    self.block(refused);
+                Ok(None) => {
+                    if order == Order::AcceptIdentity {
+                        self.checks.accept_identity();
+                    }
+                    self.end_order(Outcome::Confirmed);
+                }
+                Err(Blocked::For(refused)) => self.end_order(Outcome::Refused(refused)),
+                Err(Blocked::Until(job, refused)) => {
+                    self.block(refused, matches!(job, Job::ArmWatchdog(..)));
                     return Some((job, Some(expires)));
                 }
-                Err(Blocked::Waits(refused)) => {
-                    self.block(refused);
+                Err(Blocked::Meanwhile(refused)) => {
+                    let stale = refused == Refused::Stale;
+                    let first = self.block(refused, false);
+                    if stale && first {
+                        self.pace.hurry(now);
+                    }
                     return None;
                 }
             }
@@ -192,10 +202,11 @@ impl Supervisor {
         }
     }
 
-    fn block(&mut self, refused: Refused) {
-        if let Some(active) = &mut self.active {
-            active.blocked = Some(refused);
-        }
+    /// The order has to wait for this reason; whether it is the first. `armed`: the watchdog is written on its behalf.
+    fn block(&mut self, refused: Refused, armed: bool) -> bool {
+        let Some(active) = &mut self.active else { return false };
+        active.armed |= armed;
+        active.blocked.replace(refused).is_none()
     }
 
     pub(super) fn end_order(&mut self, outcome: Outcome) {

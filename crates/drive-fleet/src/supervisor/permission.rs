@@ -1,9 +1,9 @@
-//! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings.
+//! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings. To ask changes nothing.
 
-use drive_core::{Direction, Setpoint, State, Status};
+use drive_core::{Direction, Refusal, Setpoint, State, Status};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor};
+use super::{Asker, Job, Supervisor, orders::Active};
 use crate::{
     limits::LimitProblem,
     outcome::{Order, Refused, Until},
@@ -13,19 +13,32 @@ use crate::{
 /// How many orders of one drive may wait.
 pub(super) const QUEUE: usize = 16;
 
-/// Why an order cannot be sent now.
+/// Why an order cannot be sent now, and what may change that.
 pub(super) enum Blocked {
-    /// Never.
-    Refused(Refused),
-    /// Not before this job.
-    Needs(Job, Refused),
-    /// Not before something that is on its way.
-    Waits(Refused),
+    /// Nothing.
+    For(Refused),
+    /// This job.
+    Until(Job, Refused),
+    /// Something that is on its way.
+    Meanwhile(Refused),
+}
+
+impl Blocked {
+    fn reason(self) -> Refused {
+        let (Self::For(reason) | Self::Until(_, reason) | Self::Meanwhile(reason)) = self;
+        reason
+    }
 }
 
 impl From<Refused> for Blocked {
     fn from(refused: Refused) -> Self {
-        Self::Refused(refused)
+        Self::For(refused)
+    }
+}
+
+impl From<Refusal> for Blocked {
+    fn from(reason: Refusal) -> Self {
+        Self::For(Refused::Because(reason))
     }
 }
 
@@ -38,35 +51,32 @@ pub(crate) struct Leave {
 impl Supervisor {
     /// The leave to start, or why a start would not be sent now.
     pub(crate) fn leave(
-        &mut self,
+        &self,
         now: Instant,
         name: &str,
         setpoint: Option<Setpoint>,
     ) -> Result<Leave, Refused> {
-        self.unready(now, name, setpoint).map_or(Ok(Leave { stops: self.stops }), Err)
+        let order = Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce };
+        match self.refuse_commander(Some(name), &order) {
+            Some(refused) => Err(refused),
+            None => {
+                self.allow(now, order, None).map(|_| Leave { stops: self.stops }).map_err(Blocked::reason)
+            }
+        }
     }
 
-    fn unready(&mut self, now: Instant, name: &str, setpoint: Option<Setpoint>) -> Option<Refused> {
-        let order = Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce };
+    /// Why nobody of this name may give this order now.
+    fn refuse_commander(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
         if !self.settings.control {
             return Some(Refused::ReadOnly);
         }
-        if !self.settings.commanders.allow(name) {
+        if self.is_exiting() {
+            return Some(Refused::ShutDown);
+        }
+        if let Some(name) = name.filter(|name| !self.settings.commanders.allow(name)) {
             return Some(Refused::Commander(name.to_owned()));
         }
-        if self.stopping.is_some() {
-            return Some(Refused::StopPending);
-        }
-        // The question must not count as an attempt of the order under way.
-        let active = self.active.take();
-        let result = self.allow(now, order);
-        self.active = active;
-        match result {
-            Ok(_) => None,
-            Err(Blocked::Refused(refused) | Blocked::Needs(_, refused) | Blocked::Waits(refused)) => {
-                Some(refused)
-            }
-        }
+        (self.stopping.is_some() && *order != Order::AcceptIdentity).then_some(Refused::StopPending)
     }
 
     pub(super) fn refuse_at_once(
@@ -75,19 +85,12 @@ impl Supervisor {
         order: &Order,
         leave: Option<Leave>,
     ) -> Option<Refused> {
-        if !self.settings.control {
-            return Some(Refused::ReadOnly);
-        }
-        if self.is_exiting() {
-            return Some(Refused::ShutDown);
-        }
-        if let Asker::Caller { name, .. } = asker
-            && !self.settings.commanders.allow(name)
-        {
-            return Some(Refused::Commander(name.to_string()));
-        }
-        if self.stopping.is_some() && *order != Order::AcceptIdentity {
-            return Some(Refused::StopPending);
+        let name = match asker {
+            Asker::Caller { name, .. } => Some(&**name),
+            Asker::Policy(_) | Asker::Exit => None,
+        };
+        if let Some(refused) = self.refuse_commander(name, order) {
+            return Some(refused);
         }
         if leave.is_some_and(|leave| leave.stops != self.stops) {
             return Some(Refused::Stopped);
@@ -95,16 +98,17 @@ impl Supervisor {
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)
     }
 
-    /// The next job of an order; `None` when it is done.
-    pub(super) fn allow(&mut self, now: Instant, order: Order) -> Result<Option<Job>, Blocked> {
+    /// The next job of an order; `None` when it is done, or needs none. `active`: what was done for it before.
+    pub(super) fn allow(
+        &self,
+        now: Instant,
+        order: Order,
+        active: Option<&Active>,
+    ) -> Result<Option<Job>, Blocked> {
         self.allow_writing(now, order)?;
-        let status = self.status.as_ref().map(|status| status.value.clone()).ok_or(Refused::NotConnected)?;
-        let setpoint_given = self.active.as_ref().is_some_and(|active| active.setpoint_given);
+        let status = self.status.as_ref().map(|status| &*status.value).ok_or(Refused::NotConnected)?;
         Ok(match order {
-            Order::AcceptIdentity => {
-                self.checks.accept_identity();
-                None
-            }
+            Order::AcceptIdentity => None,
             Order::ResetFaults if !status.is_fault() => None,
             Order::ResetFaults => Some(Job::ResetFaults),
             Order::Release => Some(Job::Release),
@@ -112,18 +116,18 @@ impl Supervisor {
             Order::Setpoint { setpoint, until } => {
                 if status.is_standstill() {
                     if until == Until::AtReference {
-                        return Err(Refused::State(status.state).into());
+                        return Err(Refusal::State(status.state).into());
                     }
                 } else {
-                    self.allow_motion(now, &status)?;
+                    self.allow_motion(now, status, active)?;
                 }
                 self.allow_setpoint(now, setpoint)?;
                 Some(Job::SetSetpoint(setpoint))
             }
             Order::Start { direction, setpoint, .. } => {
-                self.allow_motion(now, &status)?;
+                self.allow_motion(now, status, active)?;
                 match setpoint {
-                    Some(setpoint) if !setpoint_given => {
+                    Some(setpoint) if active.is_none_or(|active| !active.setpoint_given) => {
                         self.allow_setpoint(now, setpoint)?;
                         Some(Job::SetSetpoint(setpoint))
                     }
@@ -138,61 +142,52 @@ impl Supervisor {
 
     /// What holds for everything that is written: the drive is there, its status is fresh, and it is the one that is
     /// meant (rules 4 and 7).
-    fn allow_writing(&mut self, now: Instant, order: Order) -> Result<(), Blocked> {
+    fn allow_writing(&self, now: Instant, order: Order) -> Result<(), Blocked> {
         if self.link != Link::Connected {
             return Err(Refused::NotConnected.into());
         }
-        let fresh = self
-            .status
-            .as_ref()
-            .is_some_and(|status| now.saturating_duration_since(status.at) <= self.settings.periods.max_age);
-        if !fresh {
-            let hurried =
-                self.active.as_mut().is_none_or(|active| std::mem::replace(&mut active.hurried, true));
-            if !hurried {
-                self.pace.hurry(now);
-            }
-            return Err(Blocked::Waits(Refused::Stale));
+        let max_age = self.settings.periods.max_age;
+        if self.status.as_ref().is_none_or(|status| status.age(now) > max_age) {
+            return Err(Blocked::Meanwhile(Refused::Stale));
         }
-        match self.identity_check() {
+        match self.checks.identity() {
             IdentityCheck::Same(_) | IdentityCheck::CannotSay => Ok(()),
             IdentityCheck::Changed { .. } if order == Order::AcceptIdentity => Ok(()),
             IdentityCheck::Changed { .. } => Err(Refused::IdentityChanged.into()),
             IdentityCheck::Unchecked => Err(match self.checks.identity_job(now) {
-                Some(job) => Blocked::Needs(job, Refused::IdentityUnchecked),
-                None => Blocked::Waits(Refused::IdentityUnchecked),
+                Some(job) => Blocked::Until(job, Refused::IdentityUnchecked),
+                None => Blocked::Meanwhile(Refused::IdentityUnchecked),
             }),
         }
     }
 
     /// What holds for motion besides: a state that the manual explains, no fault, the watchdog armed. Who has control is
     /// for the family to judge, which reads it anew before a start: on some drives a command of the bus takes it.
-    fn allow_motion(&mut self, now: Instant, status: &Status) -> Result<(), Blocked> {
+    fn allow_motion(&self, now: Instant, status: &Status, active: Option<&Active>) -> Result<(), Blocked> {
         if status.is_fault() {
-            return Err(Refused::Tripped(status.fault_code).into());
+            return Err(status
+                .fault_code
+                .filter(|&code| code != 0)
+                .map_or(Refusal::Tripped, Refusal::Fault)
+                .into());
         }
         if matches!(status.state, State::Unknown | State::NotReady) {
-            return Err(Refused::State(status.state).into());
-        }
-        if self.watchdog_allows_motion() {
-            return Ok(());
+            return Err(Refusal::State(status.state).into());
         }
         let unverified = Refused::WatchdogUnverified;
-        Err(match self.watchdog_check() {
-            WatchdogCheck::WaitsForStandstill(_) => {
-                let tried =
-                    self.active.as_mut().is_none_or(|active| std::mem::replace(&mut active.armed, true));
-                match self.checks.arm() {
-                    Some(job) if !tried => Blocked::Needs(job, unverified),
-                    _ => unverified.into(),
-                }
-            }
-            WatchdogCheck::Broken(_) => unverified.into(),
-            _ => match self.checks.watchdog_job(now) {
-                Some(job) => Blocked::Needs(job, unverified),
-                None => Blocked::Waits(unverified),
-            },
-        })
+        match self.checks.watchdog() {
+            check if check.allows_motion() => Ok(()),
+            // It is written for an order once.
+            WatchdogCheck::WaitsForStandstill(_) if active.is_none_or(|active| !active.armed) => Err(self
+                .checks
+                .arm()
+                .map_or(Blocked::For(unverified.clone()), |job| Blocked::Until(job, unverified))),
+            WatchdogCheck::WaitsForStandstill(_) | WatchdogCheck::Broken(_) => Err(unverified.into()),
+            _ => Err(match self.checks.watchdog_job(now) {
+                Some(job) => Blocked::Until(job, unverified),
+                None => Blocked::Meanwhile(unverified),
+            }),
+        }
     }
 
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Capabilities, Error, ErrorKind, Result, State, Status, StopMode};
+use drive_core::{Command, Control, Error, ErrorKind, Frequency, Result, State, Status, StopMode, Stopped};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
@@ -13,11 +13,7 @@ use crate::{
 };
 
 /// The shortest and the longest pause between two attempts of a stop.
-const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
-
-/// What stands in for a mode that a drive, as it is set up, does not have, the first that it has: better another stop than
-/// none.
-const STAND_INS: [StopMode; 3] = [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel];
+pub(super) const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
 /// Longer than any exit: its own limit ends it.
 const EXIT: Duration = Duration::from_secs(86_400);
@@ -25,9 +21,12 @@ const EXIT: Duration = Duration::from_secs(86_400);
 /// A stop under way.
 #[derive(Debug)]
 pub(super) struct Stopping {
+    /// The mode that is sent.
     mode: StopMode,
-    /// The modes that the drive has turned out not to be set up for.
-    lacking: Vec<StopMode>,
+    /// The mode by which the drive says that it stops; that which is sent until it has said so.
+    used: StopMode,
+    /// From whom it took the command.
+    taken_from: Option<Control>,
     since: Instant,
     attempts: u32,
     /// The drive has shown that no run command is in force.
@@ -50,7 +49,13 @@ struct Waiter {
 
 impl Stopping {
     pub(super) const fn pending(&self) -> PendingStop {
-        PendingStop { mode: self.mode, since: self.since, attempts: self.attempts, taken: self.taken }
+        PendingStop {
+            taken_from: self.taken_from,
+            mode: self.used,
+            since: self.since,
+            attempts: self.attempts,
+            taken: self.taken,
+        }
     }
 
     pub(super) fn wake_at(&self) -> Option<Instant> {
@@ -61,15 +66,6 @@ impl Stopping {
         let waiters = self.waiters.iter().map(|waiter| waiter.until);
         waiters.chain(self.alarm_at).min()
     }
-}
-
-/// The mode that a family uses for a wish: itself, or else the ramp, or else the first that it has.
-fn usable(capabilities: &Capabilities, asked: StopMode) -> StopMode {
-    if capabilities.stop_modes.contains(&asked) {
-        return asked;
-    }
-    let ramp = capabilities.stop_modes.contains(&StopMode::Ramp).then_some(StopMode::Ramp);
-    ramp.or_else(|| capabilities.stop_modes.first().copied()).unwrap_or(asked)
 }
 
 impl Supervisor {
@@ -84,7 +80,7 @@ impl Supervisor {
         patience: Option<Duration>,
     ) -> bool {
         if !self.settings.control {
-            self.conclude(asker, drive_core::Command::Stop(mode), Outcome::Refused(Refused::ReadOnly));
+            self.conclude(asker, Command::Stop(mode), Outcome::Refused(Refused::ReadOnly));
             return false;
         }
         let mode = self.stopping.as_ref().filter(|_| anyhow).map_or(mode, |stopping| stopping.mode);
@@ -103,21 +99,19 @@ impl Supervisor {
         self.begin_stop(now, asker, mode, self.settings.times.stop_alarm);
     }
 
-    pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, asked: StopMode, patience: Duration) {
+    pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, mode: StopMode, patience: Duration) {
         self.end_orders_by_stop();
         self.stops += 1;
         self.changed = true;
-        let mode = usable(self.capabilities, asked);
-        if mode != asked {
-            self.emit(EventKind::StopModeReplaced { asked, used: mode });
-        }
+        // A stop takes the run command back as well.
+        self.withdrawal = None;
         // The exit has its own limit; until then the stop is repeated.
         let until = if asker == Asker::Exit { now + EXIT } else { now + patience };
-        let waiter = Waiter { asker, asked, until };
+        let waiter = Waiter { asker, asked: mode, until };
         match &mut self.stopping {
             Some(stopping) => {
                 if stopping.mode != mode {
-                    stopping.mode = mode;
+                    (stopping.mode, stopping.used) = (mode, mode);
                     stopping.taken = false;
                 }
                 if !stopping.taken {
@@ -129,7 +123,8 @@ impl Supervisor {
             None => {
                 self.stopping = Some(Stopping {
                     mode,
-                    lacking: Vec::new(),
+                    used: mode,
+                    taken_from: None,
                     since: now,
                     attempts: 0,
                     taken: false,
@@ -151,20 +146,21 @@ impl Supervisor {
         }
     }
 
-    pub(super) fn stop_job(&mut self, now: Instant) -> Option<Job> {
-        let stopping = self.stopping.as_mut()?;
-        if stopping.next_try? > now {
-            return None;
-        }
-        stopping.attempts = stopping.attempts.saturating_add(1);
-        Some(Job::Stop(stopping.mode))
+    pub(super) fn stop_job(&self, now: Instant) -> Option<Job> {
+        let stopping = self.stopping.as_ref()?;
+        (stopping.next_try? <= now).then_some(Job::Stop(stopping.mode))
     }
 
-    pub(super) fn handle_stopped(&mut self, now: Instant, result: Result<Status>) {
+    pub(super) fn handle_stopped(&mut self, now: Instant, result: Result<Stopped>) {
         let standstill = self.settings.times.standstill;
         let Some(stopping) = &mut self.stopping else { return };
-        match result {
-            Ok(status) => {
+        // What never left for the line was no attempt.
+        let sent = result.as_ref().err().is_none_or(|error| error.kind() != ErrorKind::NotSent);
+        stopping.attempts = stopping.attempts.saturating_add(u32::from(sent));
+        let status = match result {
+            Ok(Stopped { status, mode: used, instead: why, taken_from }) => {
+                let asked = stopping.mode;
+                let told = std::mem::replace(&mut stopping.used, used);
                 stopping.next_try = None;
                 stopping.error = None;
                 stopping.pause = REPEAT.0;
@@ -176,36 +172,42 @@ impl Supervisor {
                         waiter.until = now + standstill;
                     }
                 }
-                self.accept_status(now, status);
+                if let Some(other) = taken_from {
+                    stopping.taken_from = taken_from;
+                    self.emit(EventKind::StopTookCommand(other));
+                }
+                if used != asked && used != told {
+                    self.emit(EventKind::StopModeReplaced { asked, used, why });
+                }
+                Some(status)
             }
             Err(error) => {
                 stopping.next_try = Some(now + stopping.pause);
                 stopping.pause = (stopping.pause * 2).min(REPEAT.1);
                 stopping.taken = false;
-                let unsupported = error.kind() == ErrorKind::Unsupported;
                 let status = match &error {
                     Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
                     _ => None,
                 };
+                let asked = stopping.mode;
+                let lacks = error.kind() == ErrorKind::Unsupported;
                 stopping.error = Some(error);
-                if unsupported {
-                    let asked = stopping.mode;
-                    if !stopping.lacking.contains(&asked) {
-                        stopping.lacking.push(asked);
-                    }
-                    let has = |mode: &StopMode| {
-                        self.capabilities.stop_modes.contains(mode) && !stopping.lacking.contains(mode)
+                if lacks {
+                    // Better another stop than none.
+                    let used = match asked {
+                        StopMode::DcInjection | StopMode::Freewheel => StopMode::Ramp,
+                        StopMode::Ramp => StopMode::Fast,
+                        StopMode::Fast => StopMode::Freewheel,
                     };
-                    if let Some(used) = STAND_INS.into_iter().find(has) {
-                        stopping.mode = used;
-                        stopping.next_try = Some(now);
-                        self.emit(EventKind::StopModeReplaced { asked, used });
-                    }
+                    (stopping.mode, stopping.used) = (used, used);
+                    stopping.next_try = Some(now);
+                    self.emit(EventKind::StopModeReplaced { asked, used, why: None });
                 }
-                if let Some(status) = status {
-                    self.accept_status(now, status);
-                }
+                status
             }
+        };
+        if let Some(status) = status {
+            self.accept_status(now, status);
         }
     }
 
@@ -213,12 +215,18 @@ impl Supervisor {
     pub(super) fn judge_stop(&mut self, now: Instant) {
         let Some(status) = self.status.as_ref().map(|status| &*status.value) else { return };
         let (stands, runs) = (status.is_standstill(), status.state == State::Running);
+        let at_zero = stands || status.output_frequency == Some(Frequency::ZERO);
         let Some(stopping) = &mut self.stopping else { return };
-        if stands && stopping.attempts > 0 {
+        if stopping.attempts > 0 && at_zero && stopping.used == StopMode::DcInjection {
+            // Some drives inject for as long as they are told to, and heat a motor that stands: their ramp ends it.
+            (stopping.mode, stopping.used) = (StopMode::Ramp, StopMode::Ramp);
+            stopping.taken = false;
+            stopping.next_try = Some(now);
+        } else if stands && stopping.attempts > 0 {
             let Some(stopping) = self.stopping.take() else { return };
             self.given = None;
             for waiter in stopping.waiters {
-                self.conclude(waiter.asker, drive_core::Command::Stop(waiter.asked), Outcome::Confirmed);
+                self.conclude(waiter.asker, Command::Stop(waiter.asked), Outcome::Confirmed);
             }
             self.emit(EventKind::StopConfirmed);
         } else if runs && stopping.taken {
@@ -228,39 +236,41 @@ impl Supervisor {
     }
 
     pub(super) fn check_stop_times(&mut self, now: Instant) {
-        let status = self.status.as_ref().map(|status| status.value.clone());
         let Some(stopping) = &mut self.stopping else { return };
-        let alarm = stopping.alarm_at.is_some_and(|at| at <= now);
-        let since = now.saturating_duration_since(stopping.since);
-        let (attempts, error) = (stopping.attempts, stopping.error.clone());
-        if alarm {
-            stopping.alarm_at = None;
-        }
-        if alarm && stopping.taken && stopping.mode == StopMode::DcInjection {
-            // Some drives inject for as long as they are told to; their ramp ends it.
-            stopping.mode = StopMode::Ramp;
-            stopping.taken = false;
-            stopping.next_try = Some(now);
-        }
+        let alarm = stopping.alarm_at.take_if(|at| *at <= now).is_some();
         let (over, waiting): (Vec<_>, Vec<_>) =
             stopping.waiters.drain(..).partition(|waiter| waiter.until <= now);
         stopping.waiters = waiting;
+        if !alarm && over.is_empty() {
+            return;
+        }
+        let (since, attempts) = (now.saturating_duration_since(stopping.since), stopping.attempts);
+        let outcome = self.unconfirmed_stop(now);
         if alarm {
-            self.emit(EventKind::StopUnconfirmed { since, attempts, error: error.clone() });
+            self.emit(EventKind::StopUnconfirmed { since, attempts, outcome: outcome.clone() });
         }
         for waiter in over {
-            let outcome = match &error {
-                Some(error) if !matches!(error, Error::NotConfirmed { .. }) => {
-                    Outcome::OutcomeUnknown(error.clone())
-                }
-                _ => Outcome::NotConfirmed(Unconfirmed::TimeOver { after: since, status: status.clone() }),
-            };
-            self.conclude(waiter.asker, drive_core::Command::Stop(waiter.asked), outcome);
+            self.conclude(waiter.asker, Command::Stop(waiter.asked), outcome.clone());
+        }
+    }
+
+    /// What is known of a stop that is not confirmed: only a status that is younger than it says anything of it.
+    fn unconfirmed_stop(&self, now: Instant) -> Outcome {
+        let Some(stopping) = &self.stopping else { return Outcome::Confirmed };
+        let error = stopping.error.clone();
+        let said = self.status.as_ref().filter(|status| status.at >= stopping.since);
+        match (said, &error) {
+            (Some(status), None | Some(Error::NotConfirmed { .. })) if stopping.attempts > 0 => {
+                let after = now.saturating_duration_since(stopping.since);
+                let last = Some(status.seen(now));
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
+            }
+            _ => self.unknown(now, error),
         }
     }
 
     /// Tells everybody how a command ended, and its caller first.
-    pub(super) fn conclude(&mut self, asker: Asker, command: drive_core::Command, outcome: Outcome) {
+    pub(super) fn conclude(&mut self, asker: Asker, command: Command, outcome: Outcome) {
         let commander = asker.name();
         match asker {
             Asker::Caller { id, .. } => self.outputs.push_back(Output::Answer(id, outcome.clone())),

@@ -19,6 +19,7 @@ use crate::{
 
 /// Until a reference is read back again after that has failed.
 const READ_AGAIN: Duration = Duration::from_millis(100);
+
 impl Supervisor {
     pub(super) fn handle_setpoint_reply(&mut self, now: Instant, result: Result<()>) {
         let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint)), .. }) = self.active else {
@@ -30,7 +31,7 @@ impl Supervisor {
                 self.given = None;
                 match error.kind() {
                     ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::Exception => {
-                        self.end_order(Outcome::Refused(Refused::Drive(error)));
+                        self.end_order(Outcome::Refused(error.into()));
                     }
                     _ => self.verify(now, Job::SetSetpoint(setpoint), error),
                 }
@@ -83,13 +84,13 @@ impl Supervisor {
                 }
             }
             Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
-                self.end_order(Outcome::Refused(Refused::Drive(error)));
+                self.end_order(Outcome::Refused(error.into()));
             }
             Err(error) if job == Job::Persist => self.end_order(match error.kind() {
                 ErrorKind::Exception => Outcome::Refused(Refused::Drive(error)),
                 ErrorKind::NotConfirmed => Outcome::NotConfirmed(Unconfirmed::Denied(error)),
                 // A save is an edge and cannot be read back.
-                _ => Outcome::OutcomeUnknown(error),
+                _ => self.unknown(now, Some(error)),
             }),
             Err(error) => {
                 let status = match &error {
@@ -152,7 +153,7 @@ impl Supervisor {
                 let unconfirmed = Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()));
                 self.end_order(denied(&error).unwrap_or(unconfirmed));
             }
-            Ok(_) => self.end_order(Outcome::OutcomeUnknown(error)),
+            Ok(_) => self.end_order(self.unknown(now, Some(error))),
         }
         result
     }
@@ -164,13 +165,13 @@ impl Supervisor {
                 if *seen {
                     Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()))
                 } else {
-                    Outcome::OutcomeUnknown(error.clone())
+                    self.unknown(now, Some(error.clone()))
                 }
             }
             Phase::Awaiting { since, until } if *until <= now => {
                 let after = now.saturating_duration_since(*since);
-                let status = self.status.as_ref().map(|status| status.value.clone());
-                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, status })
+                let last = self.status.as_ref().map(|status| status.seen(now));
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
             }
             _ => return,
         };

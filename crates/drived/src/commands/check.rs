@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use drive_fleet::{Alarms, Commanders, DriveSettings, FrequencyLimits, OnExit, OnFault, OnLoss, Periods};
+use drive_fleet::{
+    Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnFault, OnLoss, Periods,
+};
 
 use crate::{
     config::{Config, DrivePart, LinePart},
@@ -97,6 +99,19 @@ fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
         OnFault::ResetWatchdogTrip => "reported; a trip of the watchdog is reset once the line is back",
     };
     line("when tripped", Some(tripped.to_owned()));
+    let taken = match settings.on_control_taken {
+        OnControlTaken::Withdraw => {
+            "reported; the run command is withdrawn, so that nothing starts by it afterwards"
+        }
+        OnControlTaken::Report => "reported; the run command stands",
+    };
+    line("control taken", Some(taken.to_owned()));
+    let accepted = settings.accept_self_restart.join(", ");
+    let accepted = match accepted.is_empty() {
+        true => "a start is refused while a setting of the drive does that".to_owned(),
+        false => format!("accepted by {accepted}"),
+    };
+    line("starts by itself", Some(accepted));
     lines
 }
 

@@ -1,7 +1,7 @@
 //! `drived families`: the families of drives, and what their owner can say of one.
 
-use drive_core::Capabilities;
-use drive_families::{Family, OPTIONS};
+use drive_core::{Capabilities, WatchdogCapability};
+use drive_families::{Family, OPTIONS, Options};
 
 use crate::{
     failure::Failure,
@@ -50,7 +50,8 @@ fn one(family: Family) -> Result<(), Failure> {
     fact("factory setting", capabilities.factory.to_string());
     fact("stop modes", list(capabilities.stop_modes));
     fact("fault reset", capabilities.fault_reset.to_owned());
-    fact("watchdog", watchdog(capabilities));
+    fact("stations on a segment", capabilities.stations.to_string());
+    fact("watchdog", watchdogs(family));
     fact("identification", capabilities.identification.unwrap_or("none").to_owned());
     fact("save to EEPROM", capabilities.persist.unwrap_or("no command").to_owned());
     output::say_table(facts)?;
@@ -61,8 +62,17 @@ fn one(family: Family) -> Result<(), Failure> {
     if options.is_empty() { output::say("  no options") } else { output::say_table(options) }
 }
 
-fn watchdog(capabilities: &Capabilities) -> String {
-    let Some(watchdog) = capabilities.watchdog else { return "none that the bus can read or set".to_owned() };
+/// The watchdog on each of the family's protocols.
+fn watchdogs(family: Family) -> String {
+    let on = |ascii| watchdog(family.watchdog(ascii, &Options::default()));
+    match on(false) == on(true) {
+        true => on(false),
+        false => format!("{}; in ASCII {}", on(false), on(true)),
+    }
+}
+
+fn watchdog(capability: Option<WatchdogCapability>) -> String {
+    let Some(watchdog) = capability else { return "none that the bus can read or set".to_owned() };
     let time = match watchdog.min == watchdog.max {
         true => format!("{:?}", watchdog.min),
         false => format!("{:?} to {:?}", watchdog.min, watchdog.max),

@@ -62,7 +62,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         ended = scan => ended,
         () = ending.asked() => Ok(()),
     };
-    line.close().await;
+    one_drive::close(&line).await;
     ended?;
     found.conclude(args.addresses.0.len(), &line_spec::written(&config))
 }
@@ -109,13 +109,20 @@ struct Likeness {
 
 /// Asks one address.
 async fn look(line: &Line, config: &LineConfig, slave: SlaveAddress) -> Result<Answer, Failure> {
-    let open = |family: Family| family.open(line.slave(slave.number()), slave);
+    let open = |family: Family| {
+        let mut drive = family.open(line.slave(slave.number()), slave);
+        one_drive::wait_at_most(&mut *drive);
+        drive
+    };
     // The shortest read that a family has; an exception is an answer too.
     match open(Family::Atv312).keep_alive().await {
         Err(Error::Port { problem: PortError::Timeout { .. }, .. }) => return Ok(Answer::Silence),
         Err(Error::Exception { code, .. }) if GATEWAY.contains(&code) => return Ok(Answer::Silence),
         Err(Error::Port { problem: problem @ (PortError::Damaged(_) | PortError::Mismatch(_)), .. }) => {
             return Ok(Answer::Damaged(problem.to_string()));
+        }
+        Err(Error::Port { problem: PortError::Expired, .. }) => {
+            return Err(Failure::Drive(one_drive::NEVER_QUIET.to_owned()));
         }
         Err(Error::Port { problem, .. }) => return Err(Failure::Input(problem.to_string())),
         Ok(()) | Err(_) => {}
@@ -140,8 +147,7 @@ async fn likeness(family: Family, drive: &mut dyn Drive) -> Likeness {
     let identity = drive.identify().await.ok();
     let says = identity.as_ref().and_then(says);
     let model = identity.and_then(|identity| identity.model).unwrap_or_default();
-    // The Altivar 58's manual writes it with a hyphen and without (VVDED397054 p. 11/35).
-    let certain = model.to_ascii_lowercase().replace('-', "").contains(family.capabilities().key);
+    let certain = model.to_ascii_lowercase().contains(family.capabilities().key);
     Likeness { family, certain, says }
 }
 
@@ -167,7 +173,9 @@ impl Found {
             Answer::Silence => return Ok(()),
             Answer::Damaged(why) => {
                 self.damaged += 1;
-                format!("{why}: two slaves at this address, or another speed, format or protocol")
+                format!(
+                    "{why}: something else is sending, two slaves have this address, or speed, format or protocol are others"
+                )
             }
             Answer::Slave(alike) => {
                 self.answered += 1;
@@ -259,20 +267,6 @@ mod tests {
             }
             assert_eq!(simulated.violations(), []);
         }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn on_uni_telway_a_drive_is_known_by_its_own_words() {
-        let settings = SerialSettings::new(19_200, CharacterFormat::F8O1).unwrap();
-        let wiring = Wiring { protocol: drive_sim::Protocol::UniTelway, ..Wiring::rtu(settings) };
-        let simulated = SimLine::new(wiring);
-        simulated.add_boxed(4, simulated::model(Family::Atv58, SetUp::ForTheBus)).unwrap();
-        let protocol = "unitelway".parse().unwrap();
-        let config =
-            of_scan(LineConfig { protocol, ..LineConfig::stream(settings) }, Duration::from_millis(100));
-        let line = Line::over(simulated.in_memory(), config.clone());
-        let answer = look(&line, &config, SlaveAddress::try_from(4).unwrap()).await.unwrap();
-        assert_eq!(answer, Answer::Slave(vec![like(Family::Atv58, true, Some("ATV58U18N4 V2.1"))]));
     }
 
     #[tokio::test(start_paused = true)]

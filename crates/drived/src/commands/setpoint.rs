@@ -4,11 +4,7 @@ use std::str::FromStr;
 
 use drive_core::{Frequency, Setpoint, Speed};
 
-use crate::{
-    failure::Failure,
-    one_drive::{OneDriveArgs, told},
-    output,
-};
+use crate::{failure::Failure, one_drive::OneDriveArgs, output};
 
 /// Give one drive a setpoint; a motor that runs follows its ramp to it
 #[derive(Debug, clap::Args)]
@@ -60,10 +56,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             "{name}: a {family} takes no speed in rpm: give a frequency, such as 47.5Hz"
         )));
     }
-    let mut one = args.one.open().await?;
-    told(name, one.drive.set_setpoint(setpoint)).await?.map_err(|error| one.failure(&error))?;
-    let status = one.drive.status().await.map_err(|error| one.failure(&error))?;
-    output::say(format_args!("{name} holds the setpoint {setpoint}: the drive shows {status}"))?;
+    let mut one = args.one.command(Vec::new()).await?;
+    let outcome = one.command(async |drive| drive.set_setpoint(setpoint).await).await?;
+    if !outcome.is_confirmed() {
+        return Err(one.failure(&outcome));
+    }
+    output::say(format_args!("{name} holds the setpoint {setpoint}: the drive shows {}", one.status()))?;
     one.close().await;
     Ok(())
 }

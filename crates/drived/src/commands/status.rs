@@ -21,13 +21,21 @@ pub(crate) struct Args {
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut one = args.one.open().await?;
     let status = one.drive.status().await.map_err(|error| one.failure(&error))?;
+    let restarts = one.drive.self_restarts().await;
     let measurements = match args.all {
         true => Some(one.drive.measurements().await.map_err(|error| one.failure(&error))?),
         false => None,
     };
     output::say(format_args!("{} {}", one.name, one.drive.capabilities().name))?;
     let mut table = Table::texts();
-    for (label, value) in lines(&status).into_iter().chain(measurements.iter().flat_map(slow_lines)) {
+    let restarts = match restarts {
+        Ok(restarts) => restarts.iter().map(ToString::to_string).collect(),
+        Err(error) => vec![format!("not known: {error}")],
+    };
+    let restarts = restarts.into_iter().map(|restart| ("starts by itself", restart));
+    for (label, value) in
+        lines(&status).into_iter().chain(restarts).chain(measurements.iter().flat_map(slow_lines))
+    {
         table.row([format!("  {label}"), value]);
     }
     output::say_table(table)?;
@@ -60,6 +68,8 @@ fn slow_lines(values: &Measurements) -> Vec<(&'static str, String)> {
     let bits = |word: u16| format!("{word:016b}");
     let mut lines = Vec::new();
     let mut line = |label, value: Option<String>| lines.extend(value.map(|value| (label, value)));
+    let before = "some are from before the trip, and stand in the drive's words alone";
+    line("measured", values.before_trip.then(|| before.to_owned()));
     line("reference", values.reference.map(|value| value.to_string()));
     line("speed", values.speed.map(|value| value.to_string()));
     line("output voltage", values.output_voltage.map(|value| value.to_string()));

@@ -1,22 +1,23 @@
 //! `drived stop`: stops the motor of one drive.
 
 use clap::ValueEnum;
-use drive_core::{Error, ErrorKind, Status, StopMode};
+use drive_core::StopMode;
+use tokio::time::{Instant, sleep};
 
 use crate::{
-    drive_spec::DriveName,
+    commanded::{STOP_TIME, UNCONFIRMED},
     failure::Failure,
-    one_drive::{OneDrive, OneDriveArgs},
+    one_drive::OneDriveArgs,
     output,
-    signals::Ending,
 };
 
-/// How often a stop is sent before it is given up with an alarm.
-const ATTEMPTS: u32 = 5;
-
-const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
+/// Between two attempts to open a port.
+const OPEN_AGAIN: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// Stop the motor of one drive, again and again until the drive confirms it
+///
+/// A mode that the drive as it is set up does not have is replaced by one that stops; what was done is told. Exit code 1
+/// when the stop is not confirmed after 5 s, or the motor does not stand after a minute.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -50,83 +51,21 @@ impl From<Mode> for StopMode {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let mode = StopMode::from(args.mode);
-    check(args.one.name()?, mode)?;
-    let mut one = args.one.open().await?;
-    let mut ending = Ending::listen()?;
-    let stopped = tokio::select! {
-        biased;
-        stopped = stop(&mut one, mode) => Some(stopped),
-        () = ending.asked() => None,
+    let name = args.one.name()?;
+    let until = Instant::now() + STOP_TIME;
+    let mut one = loop {
+        match args.one.command(Vec::new()).await {
+            Ok(one) => break one,
+            // What was typed is no better a moment later; a port may be.
+            Err(failure) if !failure.is_of_port() => return Err(failure),
+            Err(failure) if Instant::now() >= until => {
+                return Err(Failure::Drive(format!("{UNCONFIRMED}. {name}: {failure}")));
+            }
+            Err(_) => sleep(OPEN_AGAIN).await,
+        }
     };
-    let status = stopped.unwrap_or_else(|| {
-        Err(Failure::Drive(format!("{UNCONFIRMED}. {}: asked to end before it was confirmed", one.name)))
-    })?;
-    let done = if status.is_standstill() { "stands still" } else { "is stopping" };
-    output::say(format_args!("{} {done} ({mode} stop): the drive shows {status}", one.name))?;
+    let status = one.stop(args.mode.into()).await?;
+    output::say(format_args!("{name} stands still: the drive shows {status}"))?;
     one.close().await;
     Ok(())
-}
-
-fn check(name: DriveName, mode: StopMode) -> Result<(), Failure> {
-    let modes = name.family.capabilities().stop_modes;
-    if modes.contains(&mode) {
-        return Ok(());
-    }
-    let allowed = Mode::value_variants().iter().filter(|&&mode| modes.contains(&mode.into()));
-    let allowed = allowed.filter_map(|mode| Some(mode.to_possible_value()?.get_name().to_owned()));
-    Err(Failure::Input(format!(
-        "{name}: a {} has no {mode} stop, so nothing was stopped: choose --mode {}",
-        name.family.capabilities().name,
-        allowed.collect::<Vec<_>>().join(" or ")
-    )))
-}
-
-/// A stop is repeated until it is confirmed; only what no repetition can change ends it sooner.
-pub(super) async fn stop(one: &mut OneDrive, mode: StopMode) -> Result<Status, Failure> {
-    let mut why = None;
-    for attempt in 1..=ATTEMPTS {
-        let error = match one.drive.stop(mode).await {
-            Ok(stopped) => return Ok(stopped.status),
-            Err(error) => error,
-        };
-        tracing::info!(drive = %one.name, attempt, %error, "stop not confirmed");
-        match error.kind() {
-            ErrorKind::Unsupported | ErrorKind::Refused => return Err(alarm(one, &error)),
-            _ => why = Some(error),
-        }
-        if attempt < ATTEMPTS {
-            // Whoever waits for it has to know at once that the motor may turn. A reader who went away ends no stop.
-            let _ = output::say(format_args!(
-                "{} has not confirmed the stop ({attempt} of {ATTEMPTS}), it is sent again",
-                one.name
-            ));
-        }
-    }
-    Err(why.map_or_else(
-        || Failure::Drive(format!("{} was not asked to stop", one.name)),
-        |why| alarm(one, &why),
-    ))
-}
-
-fn alarm(one: &OneDrive, error: &Error) -> Failure {
-    let Failure::Drive(text) = one.failure(error) else { return one.failure(error) };
-    Failure::Drive(format!("{UNCONFIRMED}. {text}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::drive_spec::DriveSpec;
-
-    #[test]
-    fn a_mode_that_the_family_does_not_have_is_refused_with_those_that_it_has() {
-        for family in drive_families::Family::ALL {
-            let name = format!("{family}@1").parse::<DriveSpec>().unwrap().single().unwrap();
-            for mode in StopMode::ALL {
-                let has = family.capabilities().stop_modes.contains(&mode);
-                assert_eq!(check(name, mode).is_ok(), has, "{family} {mode}");
-            }
-        }
-    }
 }

@@ -9,12 +9,12 @@ mod values;
 
 use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
-use drive_bus::{Endpoint, LineConfig};
-use drive_core::{Capabilities, StopMode};
+use drive_bus::{Endpoint, LineConfig, Protocol};
+use drive_core::{StopMode, WatchdogCapability};
 use drive_families::{OptionEntry, Options};
 use drive_fleet::{
-    Alarms, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnExit, OnFault, OnLoss, Periods,
-    WatchdogContract, check_settings, plan,
+    Alarms, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnControlTaken, OnExit, OnFault,
+    OnLoss, Periods, WatchdogContract, check_settings, plan,
 };
 
 pub(crate) use self::place::ConfigError;
@@ -23,7 +23,7 @@ use self::{
     raw::{DriveEntry, File, LineEntry},
     values::Exit,
 };
-use crate::{drive_spec::DriveName, failure::Failure};
+use crate::{drive_spec::DriveName, failure::Failure, line_spec};
 
 /// How often snapshots are printed unless the file says otherwise.
 const SNAPSHOTS: Duration = Duration::from_secs(5);
@@ -79,7 +79,11 @@ pub(crate) struct SaidOptions {
 impl LinePart {
     /// What its drives want of it.
     pub(crate) fn demands(&self) -> Vec<Demand> {
-        self.drives.iter().map(|drive| demand(drive.name, &drive.settings)).collect()
+        let protocol = self.config.protocol;
+        self.drives
+            .iter()
+            .map(|drive| demand(drive.name, &drive.settings, &drive.options, protocol))
+            .collect()
     }
 }
 
@@ -162,17 +166,21 @@ impl Groups {
             let Some(line) = &entry.line else {
                 return Err(source.error(span, "expected line = \"NAME\" of one of the lines"));
             };
-            if !raw.lines.keys().any(|name| name.get_ref() == line.get_ref()) {
+            let on = raw.lines.iter().find(|(name, _)| name.get_ref() == line.get_ref());
+            let Some((_, on)) = on else {
                 let problem = format_args!("there is no line {:?}: expected a [lines.NAME]", line.get_ref());
                 return Err(source.error(line.span(), problem));
-            }
+            };
+            let protocol = on.port.get_ref().0.protocol();
             let Some(drive) = &entry.drive else {
                 return Err(source.error(span, "expected drive = \"FAMILY@ADDRESSES\", such as atv312@1-31"));
             };
             let named: Vec<DriveName> = drive.get_ref().0.names().collect();
             for name in &named {
                 let place = entry.name.as_ref().map_or(drive.span(), toml::Spanned::span);
-                let settings = settings(source, entry, defaults, *name, named.len())?;
+                let options = options(source, entry, defaults, *name)?;
+                let watchdog = line_spec::watchdog(*name, &options.values, protocol);
+                let settings = settings(source, entry, defaults, *name, named.len(), watchdog)?;
                 if names.insert(settings.name.clone(), *name).is_some() {
                     let problem = format_args!("two drives are named {:?}", settings.name);
                     return Err(source.error(place, problem));
@@ -183,7 +191,6 @@ impl Groups {
                     return Err(source.error(drive.span(), problem));
                 }
                 let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
-                let options = options(source, entry, defaults, *name)?;
                 group.push(Member { drive: *name, settings, options, has_own_periods });
             }
         }
@@ -222,7 +229,11 @@ fn line_part(
         );
         return Err(source.error(time.span(), problem));
     }
-    let budget = LineBudget { response, ..budget };
+    let segments = entry.segments.as_ref().map_or(1, |segments| *segments.get_ref());
+    if let Some(said) = entry.segments.as_ref().filter(|_| segments == 0) {
+        return Err(source.error(said.span(), "0 segments: expected 1, and one more for each repeater"));
+    }
+    let budget = LineBudget { response, segments, ..budget };
     let stretch = fitting_stretch(budget, group);
     let part = |member: &Member| DrivePart {
         name: member.drive,
@@ -275,7 +286,9 @@ fn check_ports(source: Source<'_>, raw: &File, lines: &[LinePart]) -> Result<(),
 /// commands. Periods that the file names stay as they are.
 fn fitting_stretch(budget: LineBudget, group: &[Member]) -> u32 {
     let fits = |stretch: &u32| {
-        let demand = |member: &Member| demand(member.drive, &member.settings_with(*stretch));
+        let demand = |member: &Member| {
+            demand(member.drive, &member.settings_with(*stretch), &member.options, budget.protocol)
+        };
         let demands: Vec<_> = group.iter().map(demand).collect();
         plan(budget, &demands).is_ok_and(|plan| plan.utilisation_ppm <= ROOM_PPM)
     };
@@ -283,10 +296,11 @@ fn fitting_stretch(budget: LineBudget, group: &[Member]) -> u32 {
     (1..=longest).find(fits).unwrap_or(1)
 }
 
-fn demand(drive: DriveName, settings: &DriveSettings) -> Demand {
+fn demand(drive: DriveName, settings: &DriveSettings, options: &SaidOptions, protocol: Protocol) -> Demand {
     Demand {
         drive: settings.name.clone(),
         capabilities: drive.family.capabilities(),
+        watchdog_capability: line_spec::watchdog(drive, &options.values, protocol),
         periods: settings.periods,
         watchdog: settings.watchdog,
     }
@@ -316,6 +330,7 @@ fn settings(
     defaults: &DriveEntry,
     drive: DriveName,
     of: usize,
+    capability: Option<WatchdogCapability>,
 ) -> Result<DriveSettings, ConfigError> {
     let capabilities = drive.family.capabilities();
     let name = name(source, entry, drive, of)?;
@@ -339,7 +354,7 @@ fn settings(
         periods,
         limits: limits(entry, defaults),
         alarms: alarms(entry, defaults),
-        watchdog: watchdog(entry, defaults, capabilities),
+        watchdog: watchdog(entry, defaults, capability),
         on_exit: match entry.on_exit.or(defaults.on_exit).map_or(Exit::Stop, |policy| policy.0.0) {
             Exit::Stop => OnExit::Stop(mode),
             Exit::Release => OnExit::Release(mode),
@@ -353,9 +368,19 @@ fn settings(
             true => OnFault::ResetWatchdogTrip,
             false => OnFault::Report,
         },
+        on_control_taken: entry
+            .on_control_taken
+            .or(defaults.on_control_taken)
+            .map_or(OnControlTaken::default(), |policy| policy.0.0),
+        accept_self_restart: entry
+            .accept_self_restart
+            .as_ref()
+            .or(defaults.accept_self_restart.as_ref())
+            .cloned()
+            .unwrap_or_default(),
         ..DriveSettings::watched(name)
     };
-    check_settings(&settings, capabilities).map_err(|problem| {
+    check_settings(&settings, capabilities, capability).map_err(|problem| {
         let place = place_of(problem.setting, entry).or_else(|| place_of(problem.setting, defaults));
         let place = place.or_else(|| entry.drive.as_ref().map(toml::Spanned::span)).unwrap_or_default();
         source.error(place, format_args!("{}: {problem}", settings.name.escape_debug()))
@@ -445,9 +470,9 @@ fn alarms(entry: &DriveEntry, defaults: &DriveEntry) -> Alarms {
 fn watchdog(
     entry: &DriveEntry,
     defaults: &DriveEntry,
-    capabilities: &Capabilities,
+    capability: Option<WatchdogCapability>,
 ) -> Option<WatchdogContract> {
-    let settable = capabilities.watchdog.is_some_and(|watchdog| watchdog.settable);
+    let settable = capability.is_some_and(|watchdog| watchdog.settable);
     let by_default = defaults.watchdog.as_ref().filter(|_| settable);
     let watchdog = entry.watchdog.as_ref().or(by_default)?.get_ref();
     Some(WatchdogContract { timeout: watchdog.time.0.0, reaction: watchdog.reaction.0.0 })

@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::values::{
     BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue, Parsed,
-    PercentValue, ReactionValue,
+    PercentValue, ReactionValue, TakenPolicy,
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
 
@@ -37,6 +37,7 @@ pub(super) struct LineEntry {
     pub(super) response: Option<Spanned<Parsed<Time>>>,
     pub(super) slave_change_gap: Option<Parsed<Time>>,
     pub(super) low_latency: Option<bool>,
+    pub(super) segments: Option<Spanned<u8>>,
 }
 
 /// `[[drives]]`, and `[defaults]` without the first three.
@@ -59,6 +60,8 @@ pub(super) struct DriveEntry {
     pub(super) on_exit: Option<Parsed<ExitPolicy>>,
     pub(super) on_loss: Option<Parsed<LossPolicy>>,
     pub(super) on_fault: Option<Parsed<FaultPolicy>>,
+    pub(super) on_control_taken: Option<Parsed<TakenPolicy>>,
+    pub(super) accept_self_restart: Option<Vec<String>>,
     /// As `--option` has them.
     #[serde(default)]
     pub(super) options: BTreeMap<Spanned<String>, Spanned<OptionValue>>,

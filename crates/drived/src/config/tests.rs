@@ -42,6 +42,8 @@ drive = "atv21@1"
 on_exit = "release"
 stop_mode = "freewheel"
 on_fault = "reset-watchdog-trip"
+on_control_taken = "report"
+accept_self_restart = ["Atr"]
 alarms = { current = 12.5, motor_thermal = 110 }
 "#;
 
@@ -76,6 +78,8 @@ fn a_full_file_says_what_it_says() {
     let released = &south.drives[0].settings;
     assert_eq!(released.on_exit, OnExit::Release(StopMode::Freewheel));
     assert_eq!(released.on_fault, OnFault::ResetWatchdogTrip);
+    assert_eq!(released.on_control_taken, OnControlTaken::Report);
+    assert_eq!(released.accept_self_restart, ["Atr"]);
     assert_eq!(south.config.response_timeout, Duration::from_millis(100));
 }
 

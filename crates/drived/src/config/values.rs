@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use drive_core::{Current, Frequency, Percent, Reaction, StopMode};
-use drive_fleet::Band;
+use drive_fleet::{Band, OnControlTaken};
 use serde::{Deserialize, Deserializer, de};
 
 /// A value that is written as a text and read by its own rules, whose error says what was expected.
@@ -97,6 +97,13 @@ words! {
     FaultPolicy(bool):
     "report" => false,
     "reset-watchdog-trip" => true
+}
+
+words! {
+    /// What happens when somebody else takes control.
+    TakenPolicy(OnControlTaken):
+    "withdraw" => OnControlTaken::Withdraw,
+    "report" => OnControlTaken::Report
 }
 
 /// The value of a drive's option: a text or a whole number, read by the option itself.

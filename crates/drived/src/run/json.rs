@@ -64,6 +64,8 @@ struct SnapshotObject<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     age_ms: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    measurements_age_ms: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     state: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     direction: Option<String>,
@@ -81,6 +83,8 @@ struct SnapshotObject<'a> {
     motor_thermal_hundredths_of_percent: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     drive_thermal_hundredths_of_percent: Option<i32>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    starts_by_itself: Vec<&'static str>,
     started_here: bool,
     stop_pending: bool,
     polls: u64,
@@ -129,6 +133,7 @@ pub(super) fn snapshot(snapshot: &Snapshot) -> String {
             Freshness::Never => "never",
         },
         age_ms: snapshot.status.as_ref().map(|status| milliseconds(status.age(now))),
+        measurements_age_ms: snapshot.measurements.as_ref().map(|values| milliseconds(values.age(now))),
         state: status.map(|status| status.state.to_string()),
         direction: status.and_then(|status| status.direction).map(|direction| direction.to_string()),
         output_frequency_centihertz: status
@@ -144,6 +149,12 @@ pub(super) fn snapshot(snapshot: &Snapshot) -> String {
         drive_thermal_hundredths_of_percent: measured
             .and_then(|measured| measured.drive_thermal)
             .map(Percent::hundredths),
+        starts_by_itself: snapshot
+            .self_restarts
+            .iter()
+            .flat_map(|all| all.iter())
+            .map(|one| one.code)
+            .collect(),
         started_here: snapshot.started_here,
         stop_pending: snapshot.stop.is_some(),
         polls: snapshot.counters.polls,

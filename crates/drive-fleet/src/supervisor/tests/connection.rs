@@ -1,6 +1,7 @@
 //! Connecting, losing, tripping, feeding.
 
 use super::*;
+use crate::snapshot::{Freshness, WatchdogCheck};
 
 #[test]
 fn a_connect_reads_the_state_then_the_identity_then_the_watchdog_and_only_then_arms_it() {
@@ -230,4 +231,18 @@ fn after_a_silence_in_which_it_can_have_been_switched_off_a_drive_is_checked_aga
     rig.pass(1_500 * MS);
     let arm = Job::ArmWatchdog(CONTRACT.timeout, CONTRACT.reaction);
     assert_eq!(rig.drive.log[..4], [Job::Status { anew: true }, Job::Identify, Job::Watchdog, arm]);
+}
+
+#[test]
+fn a_status_is_as_old_as_the_exchange_that_brought_it_and_not_as_its_call() {
+    let mut rig = Rig::ready();
+    rig.drive.status.at = Some(rig.now);
+    let read = rig.now;
+    rig.now += 2_000 * MS;
+    let status = rig.drive.status.clone();
+    rig.machine.accept_status(rig.now, status);
+    let snapshot = rig.machine.snapshot();
+    assert_eq!(snapshot.status.as_ref().map(|status| status.at), Some(read));
+    assert_eq!(snapshot.freshness(read + snapshot.max_age), Freshness::Fresh);
+    assert_eq!(snapshot.freshness(read + snapshot.max_age + MS), Freshness::Stale);
 }

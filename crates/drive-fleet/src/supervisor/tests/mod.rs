@@ -1,19 +1,20 @@
 //! The machine alone: a made-up drive answers what it is asked, time is a number.
 
 mod connection;
+mod control;
 mod orders;
 mod stops;
 
 use drive_core::{
     Command, Control, Direction, Exchange, Frequency, Identity, Measurements, PortError, Reaction, Refusal,
-    Result, SlaveAddress, State, StopMode, Watchdog,
+    Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Watchdog,
 };
 
 use super::*;
 use crate::{
     limits::{Band, FrequencyLimits},
     outcome::{Order, Refused, Unconfirmed, Until},
-    settings::{Commanders, OnExit, OnFault, OnLoss, WatchdogContract},
+    settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss, WatchdogContract},
     testing::CAPABILITIES,
 };
 
@@ -33,6 +34,11 @@ struct Paper {
     loses_answer: bool,
     /// What a run command does; `false`: nothing.
     obeys: bool,
+    /// By which mode it stops whatever it is told, and why.
+    stops_by: Option<(StopMode, &'static str)>,
+    /// Whether it has a word that withdraws a run command.
+    withdraws: bool,
+    self_restarts: Vec<SelfRestart>,
     log: Vec<Job>,
 }
 
@@ -60,6 +66,9 @@ impl Paper {
             failing: None,
             loses_answer: false,
             obeys: true,
+            stops_by: None,
+            withdraws: true,
+            self_restarts: Vec::new(),
             log: Vec::new(),
         }
     }
@@ -105,11 +114,24 @@ impl Paper {
         self.log.push(job);
         let reached = self.failing.is_none();
         match job {
-            Job::Stop(_) => {
+            Job::Stop(asked) => {
                 if reached && self.obeys {
                     self.stand();
                 }
-                Reply::Stopped(self.status())
+                let (mode, instead) = match self.stops_by {
+                    Some((mode, why)) if mode != asked => (mode, Some(why)),
+                    _ => (asked, None),
+                };
+                Reply::Stopped(self.status().map(|status| Stopped { instead, ..Stopped::by(mode, status) }))
+            }
+            Job::Withdraw if !self.withdraws => {
+                let (what, reason) = ("withdrawal of the run command", "a test");
+                Reply::Withdrawn(Err(Error::Unsupported { what, reason }))
+            }
+            Job::Withdraw => Reply::Withdrawn(self.status()),
+            Job::SelfRestarts => {
+                let restarts = self.self_restarts.clone();
+                Reply::SelfRestarts(self.result(restarts))
             }
             Job::Start(direction) => {
                 if self.status.is_fault() {
@@ -187,7 +209,7 @@ struct Rig {
 impl Rig {
     fn new(settings: DriveSettings) -> Self {
         let now = Instant::now();
-        let machine = Supervisor::new(now, settings, &CAPABILITIES);
+        let machine = Supervisor::new(now, settings, CAPABILITIES.watchdog);
         Self { machine, drive: Paper::new(), now, outputs: Vec::new(), next_call: 0 }
     }
 

@@ -106,8 +106,11 @@ fn motion_is_refused_without_connection_fault_free_state_control_or_permission()
         |rig| rig.drive.failing = Some(PortError::Offline { retry_in: 500 * MS }),
         Refused::NotConnected,
     );
-    refused_after(|rig| rig.drive.trip(7), Refused::Tripped(Some(7)));
-    refused_after(|rig| rig.drive.status.state = State::Unknown, Refused::State(State::Unknown));
+    refused_after(|rig| rig.drive.trip(7), Refused::Because(Refusal::Fault(7)));
+    refused_after(
+        |rig| rig.drive.status.state = State::Unknown,
+        Refused::Because(Refusal::State(State::Unknown)),
+    );
     refused_after(
         |rig| rig.machine.settings.commanders = Commanders::Only(vec!["operator".to_owned()]),
         Refused::Commander("tester".to_owned()),

@@ -54,7 +54,7 @@ fn a_stop_that_the_drive_takes_back_is_sent_again() {
     // The drive takes the stop, comes down, and is started by somebody else before it stands.
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
     let stopping = Status { state: State::Stopping, ..rig.drive.status.clone() };
-    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopping)));
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
     assert_eq!(rig.outcome(id), None);
     rig.pass(2_000 * MS);
     assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
@@ -62,13 +62,81 @@ fn a_stop_that_the_drive_takes_back_is_sent_again() {
 }
 
 #[test]
-fn a_stop_mode_that_the_family_lacks_is_replaced_by_the_ramp() {
+fn a_stop_mode_that_the_drive_replaces_is_told_with_the_reason_and_confirmed() {
     let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    let why = "its setting Stt is freewheel";
+    rig.drive.stops_by = Some((StopMode::Freewheel, why));
     let id = rig.stop(StopMode::DcInjection);
     rig.pass(100 * MS);
     assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
-    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
-    assert!(rig.events().contains(&"stop mode replaced"));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::DcInjection)]);
+    let (asked, used) = (StopMode::DcInjection, StopMode::Freewheel);
+    let told = EventKind::StopModeReplaced { asked, used, why: Some(why) };
+    assert!(rig.outputs.contains(&Output::Event(told)), "{:?}", rig.outputs);
+}
+
+#[test]
+fn whoever_stops_by_injection_ends_it_once_the_output_is_at_zero() {
+    for (state, output) in [
+        (State::Stopping, Some(Frequency::ZERO)),
+        (State::Ready, Some(Frequency::ZERO)),
+        (State::Ready, None),
+    ] {
+        let mut rig = Rig::ready();
+        rig.drive.run();
+        rig.pass(1_000 * MS);
+        rig.drive.log.clear();
+        let id = rig.stop(StopMode::DcInjection);
+        assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+        let braking = Status { state: State::Stopping, ..rig.drive.status.clone() };
+        rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::DcInjection, braking))));
+        rig.drive.status = Status { state, output_frequency: output, ..rig.drive.status.clone() };
+        rig.pass(1_000 * MS);
+        assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)], "{state}");
+        assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed), "{state}");
+    }
+}
+
+#[test]
+fn a_stop_that_never_left_for_the_line_is_no_attempt_and_is_sent_when_the_port_is_back() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    rig.drive.failing = Some(PortError::LineDown("unplugged".to_owned()));
+    let id = rig.stop(StopMode::Ramp);
+    rig.pass(300 * MS);
+    assert!(rig.drive.log.len() >= 3, "it is tried meanwhile: {:?}", rig.drive.log);
+    assert_eq!(rig.machine.snapshot().stop.map(|stop| stop.attempts), Some(0));
+    rig.drive.failing = None;
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+}
+
+#[test]
+fn the_alarm_of_a_stop_over_a_cut_cable_says_what_is_not_known_and_how_old_the_last_status_is() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    let id = rig.stop(StopMode::Ramp);
+    // The call takes as long as it likes: no error is known yet.
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    rig.now = rig.machine.stop_alarm_at().unwrap();
+    rig.machine.handle_stop_alarm(rig.now);
+    rig.collect();
+    let Some(outcome) = rig.outcome(id) else { panic!("no outcome") };
+    let said = outcome.to_string();
+    assert!(said.starts_with("outcome unknown: no answer yet; the drive was last seen running, "), "{said}");
+    assert!(said.ends_with(" s ago"), "{said}");
+    let alarm = rig.outputs.iter().find_map(|output| match output {
+        Output::Event(kind @ EventKind::StopUnconfirmed { .. }) => Some(kind.to_string()),
+        _ => None,
+    });
+    assert!(alarm.is_some_and(|alarm| alarm.contains("outcome unknown")), "{said}");
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! The numbers of a line over the last seconds.
 
-use std::{
-    collections::VecDeque,
-    time::{Duration, Instant},
-};
+use std::{collections::VecDeque, time::Duration};
 
 use drive_bus::stats::{SlaveStats, Stats};
+use tokio::time::Instant;
 
 use super::plant::{Plant, PlantLine};
 use crate::output;

@@ -13,13 +13,11 @@ use std::{
     time::Duration,
 };
 
-use tokio::{sync::mpsc, time};
+use drive_fleet::{Events, ExitAction};
+use tokio::time;
 use tracing::Level;
 
-use self::{
-    plant::Plant,
-    unit::{Event, Unit},
-};
+use self::plant::Plant;
 use crate::{
     failure::Failure,
     output::{self, Table},
@@ -29,9 +27,6 @@ use crate::{
 /// How long the motors may take to come to a stop at the end: the longest ramp of a simulated drive is 10 s, and one
 /// that restarts after a reset is mute before it.
 const STOPPING: Duration = Duration::from_secs(30);
-
-/// Events that may wait for a slow terminal; the drives do not wait for it, later ones are left out.
-const WAITING: usize = 1_024;
 
 /// Watch simulated drives of every family on one line: started, stopped, tripped, reset
 ///
@@ -44,16 +39,16 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// The table must not be written over; plain lines may have warnings between them.
+    /// The table must not be written over, and where there is none the events are told already.
     pub(crate) fn log_level(&self) -> Option<Level> {
-        (!io::stdout().is_terminal()).then_some(Level::WARN)
+        (!io::stdout().is_terminal()).then_some(Level::ERROR)
     }
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut ending = Ending::listen()?;
-    let (events, incoming) = mpsc::channel(WAITING);
-    let plant = Plant::start(&events)?;
+    let plant = Plant::start()?;
+    let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, incoming, until, ending: &mut ending };
     let why = if io::stdout().is_terminal() { screen::run(show).await? } else { plain::run(show).await? };
@@ -63,7 +58,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 /// What the two ways of showing the demo need.
 struct Show<'a> {
     plant: &'a Plant,
-    incoming: mpsc::Receiver<Event>,
+    incoming: Events,
     until: Option<time::Instant>,
     ending: &'a mut Ending,
 }
@@ -73,8 +68,8 @@ struct Show<'a> {
 enum Act {
     /// Telling its story.
     Playing,
-    /// Stopping the motors, until when at most.
-    Stopping(Why, time::Instant),
+    /// Stopping the motors.
+    Stopping(Why),
 }
 
 /// Why the demo ended.
@@ -97,16 +92,13 @@ impl Act {
     /// Begins to stop the motors.
     fn stop(plant: &Plant, why: Why) -> Self {
         plant.stop();
-        Self::Stopping(why, time::Instant::now() + STOPPING)
+        Self::Stopping(why)
     }
 
-    /// Why it is over, when it is: every motor stands, or the time for it has passed.
+    /// Why it is over, when it is.
     fn over(self, plant: &Plant) -> Option<Why> {
         match self {
-            Self::Stopping(why, at_the_latest) => {
-                let stand = plant.units.iter().all(Unit::stands);
-                (stand || time::Instant::now() >= at_the_latest).then_some(why)
-            }
+            Self::Stopping(why) => plant.actions().map(|_| why),
             Self::Playing => None,
         }
     }
@@ -125,15 +117,22 @@ fn waited_for(plant: &Plant) -> String {
 /// Says how each motor was left.
 fn farewell(plant: &Plant, why: Why) -> Result<(), Failure> {
     output::say(format_args!("{}: the motors were asked to stop", why.text()))?;
+    let actions = plant.actions().unwrap_or_default();
     let mut turning = Vec::new();
     let mut table = Table::texts();
     for unit in &plant.units {
-        let view = unit.view();
-        let status = view.status.map_or_else(|| "no status".to_owned(), |status| status.to_string());
-        let verdict = if unit.stands() { "stands still" } else { "NOT CONFIRMED" };
-        if !unit.stands() {
-            turning.push(unit.name.to_string());
-        }
+        let status = unit.view().status.map_or_else(|| "no status".to_owned(), |status| status.to_string());
+        let action =
+            actions.iter().find(|(name, _)| **name == *unit.name.to_string()).map(|(_, action)| action);
+        let verdict = match action {
+            Some(ExitAction::Left) if unit.stands() => "stands still",
+            Some(ExitAction::Left) => "left as it is",
+            Some(ExitAction::Stopped(outcome)) if outcome.is_confirmed() => "stands still",
+            _ => {
+                turning.push(unit.name.to_string());
+                "NOT CONFIRMED"
+            }
+        };
         table.row([format!("  {}", unit.name), verdict.to_owned(), status]);
     }
     output::say_table(table)?;

@@ -1,8 +1,9 @@
 //! The demo where stdout is no terminal: one line for each event, and the line's numbers now and then.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use tokio::time;
+use drive_fleet::Received;
+use tokio::time::{self, Instant};
 
 use super::{
     Act, STOPPING, Show, Why,
@@ -24,23 +25,23 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
     let seconds = |at: Instant| at.saturating_duration_since(began).as_millis();
     let mut meters: Vec<Meter> = plant.lines.iter().map(|_| Meter::new()).collect();
     let mut looks = time::interval(LOOK);
-    let mut reports = time::interval_at(time::Instant::now() + REPORT, REPORT);
+    let mut reports = time::interval_at(Instant::now() + REPORT, REPORT);
     let mut act = Act::Playing;
     loop {
         tokio::select! {
-            Some(event) = incoming.recv() => {
+            Received::Event(event) = incoming.recv() => {
                 let at = seconds(event.at);
-                output::say(format_args!("{:>3}.{:03} {:<12} {}", at / 1_000, at % 1_000, event.name, event.text))?;
+                output::say(format_args!("{:>3}.{:03} {:<12} {}", at / 1_000, at % 1_000, event.drive, event.kind))?;
             }
             () = ending.asked() => match act {
                 Act::Playing => act = stop(plant, Why::Asked)?,
-                Act::Stopping(why, _) => return Ok(why),
+                Act::Stopping(why) => return Ok(why),
             },
             _ = looks.tick() => {
                 for (meter, line) in meters.iter_mut().zip(&plant.lines) {
                     meter.look(plant, line, Instant::now());
                 }
-                if act == Act::Playing && until.is_some_and(|until| time::Instant::now() >= until) {
+                if act == Act::Playing && until.is_some_and(|until| Instant::now() >= until) {
                     act = stop(plant, Why::TimeIsUp)?;
                 }
                 if let Some(why) = act.over(plant) {

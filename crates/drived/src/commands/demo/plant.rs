@@ -1,20 +1,15 @@
-//! The simulated plant: lines, drives on them, and one task for each drive.
+//! The simulated plant: lines, simulated drives on them, and the fleet that supervises them.
 
-use std::time::Duration;
+use std::{ops::Range, sync::Arc, time::Duration};
 
 use drive_bus::{Line, LineConfig};
 use drive_core::{SerialSettings, SlaveAddress, serial::CharacterFormat};
 use drive_families::Family;
+use drive_fleet::{DriveSettings, ExitAction, Fleet, LineBudget, Periods};
 use drive_sim::{SimLine, Wiring};
-use tokio::{
-    sync::{mpsc, watch},
-    task::{AbortHandle, JoinSet},
-};
+use tokio::{sync::watch, task::AbortHandle};
 
-use super::{
-    story,
-    unit::{Event, Unit},
-};
+use super::{STOPPING, story, unit::Unit};
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
@@ -28,29 +23,38 @@ const EACH: u8 = 2;
 /// Simulated drives answer soon. A short limit makes the probes of a drive that restarts cheap, and so frequent.
 const RESPONSE_TIMEOUT: Duration = Duration::from_millis(100);
 
+/// As often as the line allows.
+const PERIODS: Periods = Periods {
+    running: Duration::from_millis(300),
+    rest: Duration::from_millis(300),
+    slow: Duration::ZERO,
+    max_age: Duration::from_secs(5),
+};
+
+/// What was done to each drive at the end.
+type Actions = Vec<(Arc<str>, ExitAction)>;
+
 pub(super) struct Plant {
     pub(super) lines: Vec<PlantLine>,
     pub(super) units: Vec<Unit>,
+    pub(super) fleet: Fleet,
     story: AbortHandle,
-    ending: watch::Sender<bool>,
-    /// The drives' tasks and the story; they end with the plant.
-    _tasks: JoinSet<()>,
+    ended: watch::Sender<Option<Actions>>,
 }
 
 pub(super) struct PlantLine {
     pub(super) settings: SerialSettings,
     pub(super) line: Line,
     /// The units on it, by their place in the plant.
-    pub(super) units: std::ops::Range<usize>,
+    pub(super) units: Range<usize>,
 }
 
 impl Plant {
     /// Builds the plant and sets it going.
-    pub(super) fn start(events: &mpsc::Sender<Event>) -> Result<Self, Failure> {
-        let mut tasks = JoinSet::new();
-        let ending = watch::Sender::new(false);
+    pub(super) fn start() -> Result<Self, Failure> {
         let mut lines = Vec::new();
-        let mut units: Vec<Unit> = Vec::new();
+        let mut members = Vec::new();
+        let mut builder = Fleet::builder().whatever_the_plan();
         for (settings, names) in layout() {
             let simulated = SimLine::new(Wiring::rtu(settings));
             let config = LineConfig {
@@ -58,28 +62,44 @@ impl Plant {
                 response_timeout: RESPONSE_TIMEOUT,
                 ..LineConfig::stream(settings)
             };
-            let mut machines = Vec::new();
+            let config = line_spec::with_turnarounds(config, &names);
+            let budget = LineBudget::of(&config);
+            let first = members.len();
             for name in &names {
-                let machine =
-                    simulated.add_boxed(name.slave.number(), simulated::model(name.family, SetUp::ForTheBus));
-                machines.push(machine.map_err(|error| Failure::Input(error.to_string()))?);
+                let model = simulated::model(name.family, SetUp::ForTheBus);
+                let machine = simulated.add_boxed(name.slave.number(), model);
+                members.push((*name, machine.map_err(|error| Failure::Input(error.to_string()))?));
             }
-            let line = Line::over(simulated.in_memory_precise(), line_spec::with_turnarounds(config, &names));
-            let first = units.len();
-            for (name, machine) in names.into_iter().zip(machines) {
+            let line = Line::over(simulated.in_memory_precise(), config);
+            builder = builder.line(settings.to_string(), line.clone(), budget);
+            for name in names {
                 let drive = one_drive::open_drive(&line, name, &simulated::options())?;
-                units.push(Unit::start(name, machine, drive, events.clone(), ending.subscribe(), &mut tasks));
+                let drive_settings =
+                    DriveSettings { periods: PERIODS, ..DriveSettings::controlled(name.to_string()) };
+                builder = builder.drive(settings.to_string(), drive_settings, drive);
             }
-            lines.push(PlantLine { settings, line, units: first..units.len() });
+            lines.push(PlantLine { settings, line, units: first..members.len() });
         }
-        let story = tasks.spawn(story::tell(units.clone()));
-        Ok(Self { lines, units, story, ending, _tasks: tasks })
+        let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+        let units: Vec<Unit> = members
+            .into_iter()
+            .zip(fleet.drives())
+            .map(|((name, machine), handle)| Unit::new(name, machine, handle))
+            .collect();
+        let story = tokio::spawn(story::tell(units.clone())).abort_handle();
+        Ok(Self { lines, units, fleet, story, ended: watch::Sender::new(None) })
     }
 
-    /// Ends the story and stops every motor, whatever its drive was told before.
+    /// Ends the story and stops every motor that it has started.
     pub(super) fn stop(&self) {
         self.story.abort();
-        self.ending.send_replace(true);
+        let (fleet, ended) = (self.fleet.clone(), self.ended.clone());
+        tokio::spawn(async move { ended.send_replace(Some(fleet.shutdown(STOPPING).await)) });
+    }
+
+    /// What was done to each drive at the end, once it is.
+    pub(super) fn actions(&self) -> Option<Actions> {
+        self.ended.borrow().clone()
     }
 }
 

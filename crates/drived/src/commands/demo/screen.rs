@@ -1,14 +1,11 @@
 //! The demo on a terminal: the table, drawn ten times a second, and the keys.
 
-use std::{
-    collections::VecDeque,
-    io,
-    time::{Duration, Instant},
-};
+use std::{collections::VecDeque, io, time::Duration};
 
 use crossterm::event::{self, Event as Input, KeyCode, KeyModifiers};
+use drive_fleet::Received;
 use ratatui::DefaultTerminal;
-use tokio::time;
+use tokio::time::{self, Instant};
 
 use super::{Act, Show, Why, meter::Meter, table, waited_for};
 use crate::failure::Failure;
@@ -29,7 +26,7 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
     let mut act = Act::Playing;
     loop {
         let asked = tokio::select! {
-            Some(event) = incoming.recv() => {
+            Received::Event(event) = incoming.recv() => {
                 events.push_front(event);
                 events.truncate(REMEMBERED);
                 continue;
@@ -39,8 +36,8 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
         };
         match act {
             Act::Playing if asked => act = Act::stop(plant, Why::Asked),
-            Act::Stopping(why, _) if asked => return Ok(why),
-            Act::Playing if until.is_some_and(|until| time::Instant::now() >= until) => {
+            Act::Stopping(why) if asked => return Ok(why),
+            Act::Playing if until.is_some_and(|until| Instant::now() >= until) => {
                 act = Act::stop(plant, Why::TimeIsUp);
             }
             _ => {}

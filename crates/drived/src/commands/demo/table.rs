@@ -1,8 +1,9 @@
 //! What the demo's screen looks like.
 
-use std::{collections::VecDeque, time::Instant};
+use std::collections::VecDeque;
 
 use drive_core::{Control, Direction, Frequency, State, Status};
+use drive_fleet::Event;
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
@@ -10,10 +11,11 @@ use ratatui::{
     text::{Line, Span},
     widgets::{Block, Borders, Cell, Paragraph, Row, Table},
 };
+use tokio::time::Instant;
 
 use super::{
     meter::HEADS,
-    unit::{Done, Event, Order, View},
+    unit::{Done, Order, View},
 };
 use crate::{drive_spec::DriveName, output};
 
@@ -110,10 +112,10 @@ impl Picture<'_> {
         let lines = self.events.iter().take(usize::from(area.height)).flat_map(|event| {
             let at = event.at.saturating_duration_since(self.began).as_millis();
             let at = format!(" {:>4}.{:01} s ", at / 1_000, at % 1_000 / 100);
-            let style = if event.alarm { Style::new().fg(Color::Red) } else { Style::new() };
-            output::wrapped(&event.text, room).into_iter().enumerate().map(move |(line, text)| {
+            let style = if event.kind.is_alarm() { Style::new().fg(Color::Red) } else { Style::new() };
+            output::wrapped(&event.kind.to_string(), room).into_iter().enumerate().map(move |(line, text)| {
                 let (at, name) =
-                    if line == 0 { (at.clone(), event.name.to_string()) } else { <_>::default() };
+                    if line == 0 { (at.clone(), event.drive.to_string()) } else { <_>::default() };
                 Line::from(vec![
                     Span::raw(format!("{at:10}")).dim(),
                     Span::styled(format!("{name:<9} {text}"), style),
@@ -218,11 +220,11 @@ fn last(done: Option<&Done>, wide: bool) -> Cell<'static> {
         (Order::Stop(_), false) => "stop".to_owned(),
         (Order::Reset, false) => "reset".to_owned(),
     };
-    match (&done.failure, wide) {
-        (None, true) => Cell::from(format!("{order}: confirmed, {} ms", done.took.as_millis())),
-        (None, false) => Cell::from(format!("✓ {order}")),
-        (Some(failure), true) => Cell::from(format!("{order}: {failure}")).fg(Color::Red),
-        (Some(_), false) => Cell::from(format!("✗ {order}")).fg(Color::Red),
+    match (done.outcome.is_confirmed(), wide) {
+        (true, true) => Cell::from(format!("{order}: confirmed, {} ms", done.took.as_millis())),
+        (true, false) => Cell::from(format!("✓ {order}")),
+        (false, true) => Cell::from(format!("{order}: {}", done.outcome)).fg(Color::Red),
+        (false, false) => Cell::from(format!("✗ {order}")).fg(Color::Red),
     }
 }
 
@@ -231,6 +233,7 @@ mod tests {
     use std::time::Duration;
 
     use drive_core::Current;
+    use drive_fleet::{EventKind, Outcome};
     use ratatui::{Terminal, backend::TestBackend};
 
     use super::*;
@@ -252,15 +255,14 @@ mod tests {
             last: Some(Done {
                 order: Order::Start(Direction::Reverse),
                 took: Duration::from_millis(48),
-                failure: None,
+                outcome: Outcome::Confirmed,
             }),
             ..View::default()
         };
         let events = VecDeque::from([Event {
             at: Instant::now(),
-            name: name("atv312@1"),
-            text: "start reverse: confirmed".to_owned(),
-            alarm: false,
+            drive: "atv312@1".into(),
+            kind: EventKind::ControlReturned,
         }]);
         let picture = Picture {
             began: Instant::now(),

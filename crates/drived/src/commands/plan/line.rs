@@ -59,7 +59,11 @@ impl PlannedLine {
     }
 
     fn case(&self, label: String, config: &LineConfig, dead: usize) -> Case {
-        let budget = LineBudget { response: self.budget.response, ..LineBudget::of(config) };
+        let budget = LineBudget {
+            response: self.budget.response,
+            segments: self.budget.segments,
+            ..LineBudget::of(config)
+        };
         let demands: Vec<Demand> = self.drives.iter().map(|(_, demand)| demand.clone()).collect();
         let reckoning = reckon(budget, &demands, dead);
         let stop_to_the_wire = self.stop_to_the_wire(config);

@@ -6,7 +6,9 @@ mod sheet;
 use std::{path::PathBuf, time::Duration};
 
 use clap::ArgGroup;
+use drive_bus::Protocol;
 use drive_core::Reaction;
+use drive_families::Options;
 use drive_fleet::{Demand, LineBudget, Periods, WatchdogContract, plan};
 
 use self::{
@@ -30,7 +32,7 @@ use crate::{
 #[command(group = ArgGroup::new("what").required(true).args(["config", "line"]))]
 pub(crate) struct Args {
     /// The configuration of `drived run`, in TOML
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["drives", "period", "watchdog", "response"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["drives", "period", "watchdog", "response", "segments"])]
     config: Option<PathBuf>,
     // The text has brackets that a doc comment would take for links.
     #[arg(long, value_name = "LINE", help = line_spec::HELP, requires = "drives")]
@@ -47,6 +49,9 @@ pub(crate) struct Args {
     /// The usual time from the end of a request to its answer
     #[arg(long, value_name = "TIME", default_value = "10ms")]
     response: Time,
+    /// Segments of the line: 1, and one more behind each repeater
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    segments: u8,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -99,21 +104,24 @@ impl Args {
                 "--period 0: expected the time between two polls of one drive".to_owned(),
             ));
         }
-        let budget = LineBudget { response: self.response.0, ..LineBudget::of(&config) };
-        let drives: Vec<_> = names.into_iter().map(|name| (name, self.demand(name))).collect();
+        let budget =
+            LineBudget { response: self.response.0, segments: self.segments, ..LineBudget::of(&config) };
+        let demand = |name| (name, self.demand(name, config.protocol));
+        let drives: Vec<_> = names.into_iter().map(demand).collect();
         let demands: Vec<Demand> = drives.iter().map(|(_, demand)| demand.clone()).collect();
         let problem = plan(budget, &demands).err().map(|problem| format!("it cannot work: {problem}"));
         Ok((vec![PlannedLine { name: None, config, budget, drives }], problem.into_iter().collect()))
     }
 
-    fn demand(&self, name: DriveName) -> Demand {
-        let capabilities = name.family.capabilities();
+    fn demand(&self, name: DriveName, protocol: Protocol) -> Demand {
+        let watchdog_capability = line_spec::watchdog(name, &Options::default(), protocol);
         // A watchdog that the bus cannot set has its own time, whatever is wished here.
-        let fixed = capabilities.watchdog.is_some_and(|watchdog| !watchdog.settable);
+        let fixed = watchdog_capability.is_some_and(|watchdog| !watchdog.settable);
         let wished = !self.watchdog.0.is_zero() && !fixed;
         Demand {
             drive: name.to_string(),
-            capabilities,
+            capabilities: name.family.capabilities(),
+            watchdog_capability,
             periods: Periods {
                 running: self.period.0,
                 rest: self.period.0,

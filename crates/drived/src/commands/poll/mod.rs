@@ -5,7 +5,7 @@ mod link;
 mod summary;
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     time::{Duration, SystemTime},
 };
 
@@ -32,7 +32,7 @@ const NOT_SENT_PAUSE: Duration = Duration::from_millis(100);
 /// Poll the status of many drives on one line, and say how well it went; nothing is written
 ///
 /// A drive's line is printed when what it says has changed. The summary counts the exchanges of the line, repeated ones
-/// included. Exit code 1 when a drive has not answered once.
+/// included. Exit code 1 when a drive has not answered once, however short the time was.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     // The text has brackets that a doc comment would take for links.
@@ -93,7 +93,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     polls.shutdown().await;
     link::read_counters(&line, &names, &config).await;
     let stats = line.stats();
-    line.close().await;
+    one_drive::close(&line).await;
     let summary = Summary::new(&names, &book.answered, &stats, &config);
     if args.json {
         output::say_as_it_is(json::summary(&summary))?;
@@ -120,11 +120,15 @@ async fn poll(name: DriveName, mut drive: Box<dyn Drive>, period: Duration, read
     loop {
         let outcome = drive.status().await;
         let pause = match &outcome {
-            Err(Error::Port { problem: PortError::Offline { retry_in }, .. }) => *retry_in,
+            Err(Error::Port { problem: PortError::Offline { retry_in }, .. }) => {
+                (*retry_in).max(NOT_SENT_PAUSE)
+            }
             Err(error) if error.kind() == ErrorKind::NotSent => NOT_SENT_PAUSE,
             _ => Duration::ZERO,
         };
-        if readings.send(Reading { name, at: SystemTime::now(), outcome }).await.is_err() {
+        let read = outcome.as_ref().ok().and_then(|status| status.at);
+        let age = read.map(|read| read.elapsed()).unwrap_or_default();
+        if readings.send(Reading { name, at: SystemTime::now() - age, outcome }).await.is_err() {
             return;
         }
         // A poll that took longer than the period is followed by the next at once, and none is made up for.
@@ -136,40 +140,36 @@ async fn poll(name: DriveName, mut drive: Box<dyn Drive>, period: Duration, read
 /// What the readings have told so far.
 #[derive(Default)]
 struct Book {
-    last: BTreeMap<DriveName, String>,
+    /// What was printed last, and whether that was a failure.
+    last: BTreeMap<DriveName, (String, bool)>,
     answered: BTreeMap<DriveName, u64>,
-    failed: BTreeSet<DriveName>,
 }
 
 impl Book {
-    /// What a person wants to know of a reading: nothing, when it says what the last one said.
+    /// What a person wants to know of a reading: nothing, when it says what the last one said. A drive that fails is told
+    /// once, in whatever ways it goes on failing.
     fn news(&mut self, reading: &Reading) -> Option<String> {
-        let text = match &reading.outcome {
-            Ok(status) => status.to_string(),
-            Err(error) if error.kind() == ErrorKind::NotSent && self.failed.contains(&reading.name) => {
-                return None;
-            }
-            Err(error) => error.to_string(),
+        let (text, failed) = match &reading.outcome {
+            Ok(status) => (status.to_string(), false),
+            Err(error) => (error.to_string(), true),
         };
-        let last = self.last.insert(reading.name, text.clone());
-        (last.as_ref() != Some(&text)).then_some(text)
+        match self.last.get(&reading.name) {
+            Some((_, true)) if failed => return None,
+            Some((last, _)) if *last == text => return None,
+            _ => {}
+        }
+        self.last.insert(reading.name, (text.clone(), failed));
+        Some(text)
     }
 
     fn note(&mut self, reading: &Reading) {
-        match reading.outcome {
-            Ok(_) => {
-                *self.answered.entry(reading.name).or_default() += 1;
-                self.failed.remove(&reading.name);
-            }
-            Err(_) => {
-                self.failed.insert(reading.name);
-            }
+        if reading.outcome.is_ok() {
+            *self.answered.entry(reading.name).or_default() += 1;
         }
     }
 
     fn verdict(&self, names: &[DriveName]) -> Result<(), Failure> {
-        let silent =
-            names.iter().filter(|name| !self.answered.contains_key(name) && self.failed.contains(name));
+        let silent = names.iter().filter(|name| !self.answered.contains_key(name));
         let silent: Vec<String> = silent.map(ToString::to_string).collect();
         if silent.is_empty() {
             return Ok(());

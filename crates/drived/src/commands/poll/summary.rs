@@ -19,6 +19,8 @@ pub(super) struct Summary {
     /// Full rounds: how often every drive that answers at all was read.
     pub(super) sweeps: u64,
     pub(super) utilisation_ppm: u32,
+    /// Intact frames of somebody else, and bytes that made no frame.
+    pub(super) strange: (u64, u64),
     pub(super) silences: u64,
     pub(super) shortest_silence: Duration,
     /// The silence that the protocol needs before each request, and how it is called; `None` where it needs none.
@@ -38,6 +40,7 @@ impl Summary {
             elapsed: stats.elapsed,
             sweeps: answered.values().copied().min().unwrap_or_default(),
             utilisation_ppm: stats.utilisation_ppm(),
+            strange: (stats.foreign, stats.noise_bytes),
             silences: stats.silence.count(),
             shortest_silence: stats.silence.min(),
             needed: line_spec::needed_silence(config),
@@ -53,7 +56,7 @@ impl Summary {
 
     /// What each drive answered.
     pub(super) fn table(&self) -> Table {
-        let heads = ["drive", "good", "timeouts", "damaged", "exceptions", "p50", "p99"];
+        let heads = ["drive", "good", "timeouts", "damaged", "wrong", "late", "exceptions", "p50", "p99"];
         let mut table = Table::new(heads).with_numbers_from(1);
         for (name, stats) in &self.drives {
             let response = |per_mille| {
@@ -65,6 +68,8 @@ impl Summary {
                 stats.outcomes.answered.to_string(),
                 stats.outcomes.timeouts.to_string(),
                 stats.outcomes.damaged.to_string(),
+                stats.outcomes.mismatches.to_string(),
+                stats.late.to_string(),
                 stats.outcomes.exceptions.to_string(),
                 response(500),
                 response(990),
@@ -82,6 +87,11 @@ impl Summary {
             rate % 1_000,
             output::percent(self.utilisation_ppm.into()),
         );
+        let (frames, bytes) = self.strange;
+        let used = match frames + bytes {
+            0 => used,
+            _ => format!("{used}; from others: {frames} frames, {bytes} bytes that make none"),
+        };
         match &self.needed {
             Some((silence, name)) => format!(
                 "{used}; {} silences kept, the shortest {} ({name} {})",

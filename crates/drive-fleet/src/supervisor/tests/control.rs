@@ -1,0 +1,90 @@
+//! Control that somebody else takes and gives back, and drives that start again by themselves.
+
+use super::*;
+
+/// A drive that runs by our command.
+fn running(settings: DriveSettings) -> Rig {
+    let mut rig = Rig::new(settings);
+    rig.pass(1_500 * MS);
+    rig.order(run_at(40));
+    rig.pass(1_500 * MS);
+    assert!(rig.machine.snapshot().started_here);
+    rig.outputs.clear();
+    rig.drive.log.clear();
+    rig
+}
+
+#[test]
+fn the_run_command_is_withdrawn_when_somebody_else_takes_control() {
+    let mut rig = running(settings());
+    rig.drive.status.control = Some(Control::Terminals);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw]);
+    assert_eq!(rig.events(), ["control taken", "command"]);
+    rig.drive.status.control = Some(Control::Bus);
+    rig.drive.stand();
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw], "nothing is left to be done when he gives it back");
+}
+
+#[test]
+fn a_withdrawal_that_is_not_heard_is_repeated_and_becomes_an_alarm_in_its_time() {
+    let mut rig = running(settings());
+    rig.machine.control_taken(rig.now);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(2_900 * MS);
+    assert!(rig.drive.writes().iter().filter(|job| **job == Job::Withdraw).count() >= 3);
+    assert!(rig.events().contains(&"run command stands"), "{:?}", rig.events());
+    rig.drive.failing = None;
+    rig.pass(2_000 * MS);
+    assert!(rig.machine.withdrawal.is_none());
+}
+
+#[test]
+fn a_family_that_cannot_withdraw_is_an_alarm_and_its_drive_is_stopped_when_control_is_back() {
+    let mut rig = running(settings());
+    rig.drive.withdraws = false;
+    rig.drive.status.control = Some(Control::Terminals);
+    rig.pass(3_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw], "what it does not have is asked for once");
+    assert!(rig.events().contains(&"run command stands"));
+    rig.drive.status.control = Some(Control::Bus);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw, Job::Stop(StopMode::Ramp)]);
+}
+
+#[test]
+fn nothing_is_withdrawn_where_the_policy_says_so_or_the_drive_is_only_read_or_did_not_run() {
+    let report = DriveSettings { on_control_taken: OnControlTaken::Report, ..settings() };
+    let mut rig = running(report);
+    rig.drive.status.control = Some(Control::Terminals);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+
+    let mut watched = Rig::new(DriveSettings::watched("pump"));
+    watched.drive.run();
+    watched.pass(1_500 * MS);
+    watched.drive.status.control = Some(Control::Terminals);
+    watched.pass(2_000 * MS);
+    assert_eq!(watched.drive.writes(), []);
+
+    let mut standing = Rig::ready();
+    standing.drive.status.control = Some(Control::Terminals);
+    standing.pass(2_000 * MS);
+    assert_eq!(standing.drive.writes(), []);
+}
+
+#[test]
+fn a_drive_that_starts_again_by_itself_is_told_at_each_connect_and_is_an_alarm_unless_it_is_accepted() {
+    let restart = SelfRestart { code: "Atr", meaning: "starts again after a trip" };
+    for accept_self_restart in [vec![], vec!["Atr".to_owned()]] {
+        let accepted = !accept_self_restart.is_empty();
+        let mut rig = Rig::new(DriveSettings { accept_self_restart, ..settings() });
+        rig.drive.self_restarts = vec![restart];
+        rig.pass(2_000 * MS);
+        let told = EventKind::RestartsItself { by: [restart].into(), accepted };
+        assert_eq!(told.is_alarm(), !accepted);
+        assert_eq!(rig.outputs.iter().filter(|output| **output == Output::Event(told.clone())).count(), 1);
+        assert_eq!(rig.machine.snapshot().self_restarts.as_deref(), Some(&[restart][..]));
+    }
+}
