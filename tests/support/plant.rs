@@ -106,7 +106,8 @@ impl Plant {
         let mut lines = Vec::new();
         for (number, site) in sites.iter().enumerate() {
             let config = site.config();
-            let budget = LineBudget::of(&config);
+            // With a repeater in the middle: an Altivar 28 allows 18 stations on a segment.
+            let budget = LineBudget { segments: 2, ..LineBudget::of(&config) };
             let line = Line::over(site.simulated.in_memory(), config);
             let name = format!("line {number}");
             builder = builder.line(name.clone(), line.clone(), budget);

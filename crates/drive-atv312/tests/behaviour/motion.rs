@@ -76,7 +76,9 @@ async fn a_drive_that_was_adopted_running_is_stopped_in_each_mode() {
     for mode in StopMode::ALL {
         let (mut drive, machine, _line) = running().await;
         drive.forget();
-        drive.stop(mode).await.unwrap();
+        let stopped = drive.stop(mode).await.unwrap();
+        // A quick stop locks: an injection that is asked for behind it does not begin (BBV51701 p. 11).
+        assert_ne!(stopped.mode, StopMode::DcInjection);
         machine.wait_until(|seen| seen.shaft_frequency == 0 && !seen.running).await;
         let quick_stop = commands(&machine).last() == Some(&0x0002);
         assert_eq!(quick_stop, mode != StopMode::Freewheel, "no word but these is sure without the settings");

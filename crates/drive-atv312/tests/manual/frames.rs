@@ -142,7 +142,8 @@ async fn exceptions_page_15() {
         (2, ExceptionMeaning::NoSuchRegister),
         (3, ExceptionMeaning::ValueRefused),
         (4, ExceptionMeaning::Failed),
-        (5, ExceptionMeaning::Unknown),
+        (5, ExceptionMeaning::Accepted),
+        (7, ExceptionMeaning::Unknown),
     ] {
         let (line, other_end) = scripted(&[("02 03 0C81 0001", &format!("02 83 {code:02X}"))]);
         let mut drive = Atv312::new(line.slave(2), bench::address(2));

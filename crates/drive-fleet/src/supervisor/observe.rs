@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use drive_core::{Control, Faults, Measurements, Result, State, Status};
+use drive_core::{Control, Error, Faults, Measurements, PortError, Result, State, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Supervisor};
@@ -31,9 +31,10 @@ impl Supervisor {
                 self.counters.missed += u64::from(!in_time);
                 self.accept_status(now, status);
             }
-            Err(_) => {
+            Err(error) => {
                 self.counters.missed += 1;
-                self.doubtful = true;
+                // What this side had no time to ask says nothing of the drive.
+                self.doubtful |= !matches!(error, Error::Port { problem: PortError::Expired, .. });
             }
         }
     }

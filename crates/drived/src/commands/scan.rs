@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::{Line, LineConfig, SlaveSettings};
 use drive_core::{Drive, Error, Identity, PortError, SlaveAddress};
 use drive_families::Family;
 use drive_fleet::LineBudget;
@@ -68,8 +68,14 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 }
 
 /// Each address is asked once, however many are silent.
+/// Who answers is not known yet, so whoever has answered gets the longest pause that a family needs.
 fn of_scan(config: LineConfig, wait: Duration) -> LineConfig {
-    LineConfig { response_timeout: wait, offline_after: 0, retries: 0, ..config }
+    let pauses = Family::ALL.map(|family| family.capabilities().turnaround);
+    let turnaround = pauses.into_iter().max().unwrap_or_default();
+    let patient = LineConfig { response_timeout: wait, offline_after: 0, retries: 0, ..config };
+    (1..=247).fold(patient, |config, address| {
+        config.slave(address, SlaveSettings { turnaround, ..SlaveSettings::default() })
+    })
 }
 
 /// Says how long it will take, before anything is sent.
