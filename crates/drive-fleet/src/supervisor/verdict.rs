@@ -110,6 +110,13 @@ impl Supervisor {
         let Some(status) = self.status.as_ref().map(|status| status.value.clone()) else { return };
         let given = self.given.map(|given| given.setpoint);
         let Some(active) = &mut self.active else { return };
+        // What the order itself has given counts, whatever is remembered for later ones.
+        let given = match active.order {
+            Order::Start { setpoint: Some(setpoint), .. } | Order::Setpoint { setpoint, .. } => {
+                Some(setpoint)
+            }
+            _ => given,
+        };
         match &mut active.phase {
             Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(_), .. } => {}
             Phase::Awaiting { .. } => {
