@@ -51,7 +51,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     measurement_exchanges: 6,
 };
 
-/// An Altivar 28 behind a port. See [`Drive`] for what its methods promise.
+/// An Altivar 28 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise.
 #[derive(Debug)]
 pub struct Atv28<P> {
     registers: Registers<P>,

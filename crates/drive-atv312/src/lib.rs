@@ -55,7 +55,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     measurement_exchanges: 6,
 };
 
-/// An Altivar 312 behind a port. See [`Drive`] for what its methods promise, and the crate's page for what is special
+/// An Altivar 312 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise, and the crate's page for what is special
 /// about this family.
 #[derive(Debug)]
 pub struct Atv312<P> {

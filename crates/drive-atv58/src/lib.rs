@@ -70,7 +70,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     measurement_exchanges: 2,
 };
 
-/// An Altivar 58 behind a port. See [`Drive`] for what its methods promise, and [`Atv58Map`] for what they rest on.
+/// An Altivar 58 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise, and [`Atv58Map`] for what they rest on.
 #[derive(Debug)]
 pub struct Atv58<P> {
     registers: Registers<P>,
@@ -127,7 +127,7 @@ impl<P: Port> Atv58<P> {
     /// Reads the fault register W483, whether the drive has tripped or not.
     ///
     /// # Errors
-    /// [`Error::Port`] and [`Error::Exception`].
+    /// [`Error::Port`](drive_core::Error::Port) and [`Error::Exception`](drive_core::Error::Exception).
     pub async fn fault_register(&mut self) -> Result<FaultRegister> {
         let words = self.produced(Class::Background, W483.address()).await?;
         Ok(FaultRegister(words.at(Some(W483.address())).unwrap_or_default()))
