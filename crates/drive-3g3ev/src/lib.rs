@@ -44,6 +44,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     name: "Omron 3G3EV",
     functions: &[0x03, 0x08, 0x10],
     read_words: 8,
+    blocks: ROWS,
     write_words: 8,
     highest_address: 31,
     stations: 31,

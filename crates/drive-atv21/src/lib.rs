@@ -59,6 +59,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     name: "Schneider Altivar 21",
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 5,
+    blocks: &[],
     write_words: 2,
     highest_address: 247,
     stations: 31,

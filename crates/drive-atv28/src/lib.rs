@@ -27,6 +27,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     name: "Schneider Altivar 28",
     functions: &[0x03, 0x06, 0x10],
     read_words: 7,
+    blocks: ROWS,
     write_words: 7,
     highest_address: 31,
     stations: 18,

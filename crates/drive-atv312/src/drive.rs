@@ -40,7 +40,7 @@ impl<P: Port> Drive for Atv312<P> {
         self.control = None;
     }
 
-    /// W3201 to W3207 in one exchange. Where these words alone do not tell the frequency or whether a run command is in
+    /// W3201 to W3206 in one exchange. Where these words alone do not tell the frequency or whether a run command is in
     /// force, W8501 to W8504 in a second one: the first time for a drive that runs, and while a motor slows down or stands
     /// with a run command. The statuses behind the first read one more setting each, until a [`stop`](Self::stop) needs no
     /// reading: 7 blocks, 15 at access level L3, 17 where a bit switches the command channel.

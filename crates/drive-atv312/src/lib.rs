@@ -34,6 +34,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     name: "Schneider Altivar 312",
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 29,
+    blocks: ROWS,
     write_words: 27,
     highest_address: 247,
     stations: 31,

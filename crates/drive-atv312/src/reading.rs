@@ -1,7 +1,8 @@
-//! The fast set: W3201 to W3207 in one request, and what they say.
+//! The fast set: W3201 to W3206 in one request, and what they say. W3207 can be read along where the line needs an
+//! answer of another length.
 //!
-//! The block ends before W3208, which no list of the manual has: what a read across it answers is not printed, and the
-//! fast set needs nothing behind it.
+//! W3208 is in no list of the manual: what a read across it answers is not printed, and the fast set needs nothing behind
+//! it.
 
 use drive_core::{
     Current, Frequency, RawWord, Refusal, Status,
@@ -10,7 +11,7 @@ use drive_core::{
 };
 
 use crate::{
-    registers::{CMD, ETA, ETI, FRH, LCR, OTR, RFR, ULN},
+    registers::{CMD, ETA, ETI, FRH, LCR, OTR, RFR},
     words::{ControlWord, ExtendedStatus},
 };
 
@@ -18,15 +19,8 @@ use crate::{
 pub(crate) const FIRST: u16 = ETA.address();
 
 /// The mnemonics of the block in its order.
-const CODES: [&str; 7] = [
-    ETA.row().code,
-    RFR.row().code,
-    FRH.row().code,
-    LCR.row().code,
-    OTR.row().code,
-    ETI.row().code,
-    ULN.row().code,
-];
+const CODES: [&str; 6] =
+    [ETA.row().code, RFR.row().code, FRH.row().code, LCR.row().code, OTR.row().code, ETI.row().code];
 
 /// What a count of `rFr`, `LFr`, `LFRD` and `RFRD` is, by bit 9 of `CMI` (p. 16, 19 and 21).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,7 +62,7 @@ impl Resolution {
     }
 }
 
-/// W3201 to W3207 as they were read.
+/// W3201 to W3206 as they were read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FastWords {
     words: [u16; CODES.len()],
@@ -150,7 +144,7 @@ mod tests {
     #[test]
     fn every_word_of_the_block_is_kept() {
         for eta in 0..=u16::MAX {
-            let status = FastWords::of([eta, 0, 0, 0, 0, 0xFFFF, 0]).status(None, None);
+            let status = FastWords::of([eta, 0, 0, 0, 0, 0xFFFF]).status(None, None);
             assert_eq!(status.state == State::Unknown, ChartState::of(eta).is_none(), "{eta:04X}h");
             assert_eq!(status.raw(3201), Some(eta));
         }

@@ -180,11 +180,11 @@ async fn the_first_status_is_one_exchange_and_the_settings_follow_one_by_one() {
         drive.status().await.unwrap();
     }
     let asked = drive.into_port().asked;
-    assert_eq!(asked[..2], [Asked::Read(Class::Status, 3201, 7), Asked::Read(Class::Status, 3201, 7)]);
+    assert_eq!(asked[..2], [Asked::Read(Class::Status, 3201, 6), Asked::Read(Class::Status, 3201, 6)]);
     let settings = asked.len() - 31;
     assert_eq!(settings, 15, "each block once");
     let apart =
-        asked.windows(2).all(|pair| pair.iter().any(|asked| matches!(asked, Asked::Read(_, 3201, 7))));
+        asked.windows(2).all(|pair| pair.iter().any(|asked| matches!(asked, Asked::Read(_, 3201, 6))));
     assert!(apart, "never two behind one status");
 }
 

@@ -84,8 +84,8 @@ impl Client for Silent {
         let mut written = self.written.lock().unwrap();
         let eta = if written.contains(&(8501, 0x0002)) { 0x0207 } else { 0x0627 };
         Ok(match request {
-            Request::ReadHoldingRegisters(3201, 7) => {
-                Ok(Response::ReadHoldingRegisters(vec![eta, 500, 500, 10, 0, 0x4010, 4_000]))
+            Request::ReadHoldingRegisters(3201, 6) => {
+                Ok(Response::ReadHoldingRegisters(vec![eta, 500, 500, 10, 0, 0x4010]))
             }
             Request::ReadHoldingRegisters(8504, 1) => Ok(Response::ReadHoldingRegisters(vec![0])),
             Request::WriteSingleRegister(register, word) => {

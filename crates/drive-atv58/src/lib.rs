@@ -36,6 +36,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     name: "Schneider Altivar 58 with card VW3-A58303",
     functions: &[0x03, 0x04, 0x06, 0x08, 0x0B, 0x10],
     read_words: 63,
+    blocks: &[],
     write_words: 60,
     highest_address: 31,
     stations: 31,

@@ -1,6 +1,10 @@
 //! What a line is: where it goes, its timing, its limits.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use drive_core::serial::SerialSettings;
 
@@ -22,6 +26,26 @@ pub enum Endpoint {
     ModbusTcp(String),
     /// A stream that the caller brings, see [`Line::over`](crate::Line::over).
     Stream,
+}
+
+impl Endpoint {
+    /// Whether what is there takes the time that characters take on a line: a serial port does. A server that speaks RTU
+    /// over TCP may be a program that answers at once; so may whatever is behind a pseudo-terminal or a stream.
+    #[must_use]
+    pub fn far_end_paces(&self) -> bool {
+        match self {
+            Self::Serial(path) => !is_pseudo_terminal(path),
+            Self::RtuOverTcp(_) | Self::ModbusTcp(_) | Self::Stream => false,
+        }
+    }
+}
+
+/// How soon an answer that comes twice comes again.
+pub(crate) const DOUBLE: Duration = Duration::from_millis(50);
+
+/// Linux keeps pseudo-terminals in a directory of their own; the path may be a link to one.
+fn is_pseudo_terminal(path: &Path) -> bool {
+    path.canonicalize().is_ok_and(|path| path.starts_with("/dev/pts"))
 }
 
 /// The kernel's RS-485 mode: it switches the transmitter with RTS (Linux `TIOCSRS485`). For UARTs whose driver has it;
@@ -98,6 +122,12 @@ pub struct LineConfig {
     /// Keep no silences and count no character times: for a stream that is no line, and for measurements of everything
     /// but the line.
     pub unpaced: bool,
+    /// Whether the far end takes the time that characters take on a line, so that what comes sooner than request and answer
+    /// can is no answer. `None`: it follows from the kind of port, see [`Endpoint::far_end_paces`].
+    pub far_end_paces: Option<bool>,
+    /// How soon an answer may come a second time on a line on which nothing strange was seen. Two reads of one slave within
+    /// this time differ in length where they can. Zero on a stream that the caller brings.
+    pub double_window: Duration,
     /// Use the precise timer also on a stream that the caller brings. Not under a paused clock.
     pub precise_timer: bool,
     /// Stay awake for the last character of an answer where its time is known, so that no processor has to be woken for
@@ -130,7 +160,7 @@ impl LineConfig {
     /// RTU on a stream for [`Line::over`](crate::Line::over).
     #[must_use]
     pub fn stream(serial: SerialSettings) -> Self {
-        Self::to(Endpoint::Stream, serial)
+        Self { double_window: Duration::ZERO, ..Self::to(Endpoint::Stream, serial) }
     }
 
     fn to(endpoint: Endpoint, serial: SerialSettings) -> Self {
@@ -152,6 +182,8 @@ impl LineConfig {
             offline_after: 3,
             probe_backoff: (Duration::from_millis(500), Duration::from_secs(10)),
             unpaced: false,
+            far_end_paces: None,
+            double_window: DOUBLE,
             precise_timer: false,
             stay_awake: true,
             slaves: BTreeMap::new(),

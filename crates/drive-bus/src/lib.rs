@@ -65,6 +65,7 @@ pub mod master;
 pub mod pdu;
 pub mod protocol;
 pub mod schedule;
+pub mod shape;
 mod shared;
 mod slave;
 pub mod stats;

@@ -167,6 +167,12 @@ pub struct SlaveStats {
     pub probes: u64,
     /// Answers that came after their time was over.
     pub late: u64,
+    /// Answers that came sooner than a line can carry request and answer: those that come twice, mostly.
+    pub early: u64,
+    /// Intact frames with another function than was asked for.
+    pub wrong_function: u64,
+    /// Intact frames with the function that was asked for, and another count, address or value.
+    pub wrong_count: u64,
     /// How often it went off-line.
     pub went_offline: u64,
     /// Whether it is off-line now.
@@ -207,7 +213,7 @@ pub struct Stats {
     pub silence: Histogram,
     /// How much later than allowed each request was written while one was waiting: what the host costs.
     pub lag: Histogram,
-    /// Intact frames of somebody else.
+    /// Intact frames of somebody else, or of a slave that nobody had asked.
     pub foreign: u64,
     /// Bytes that made no frame.
     pub noise_bytes: u64,
@@ -215,6 +221,8 @@ pub struct Stats {
     pub echoes: u64,
     /// Whether the adapter echoes, as far as is known.
     pub echoing: bool,
+    /// Calls that ended because the line was never quiet.
+    pub never_quiet: u64,
     /// Broadcasts sent.
     pub broadcasts: u64,
     /// How often the port was opened, and lost.

@@ -1,10 +1,19 @@
 //! The task that owns the port: it writes, reads, waits, and does what the master decides.
 
-use std::{future::poll_fn, io, mem, ops::Range, pin::pin, sync::Arc, task::Poll, time::Duration};
+use std::{
+    future::poll_fn,
+    io, mem,
+    ops::Range,
+    pin::pin,
+    sync::Arc,
+    task::{Context, Poll, Waker},
+    time::Duration,
+};
 
 use drive_clock::{Timer, Watch};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
+    task::yield_now,
     time::{Instant, timeout},
 };
 
@@ -18,11 +27,15 @@ use crate::{
 /// How long a frame may wait for room in the system's buffer. A port that takes none for so long is as good as gone.
 const WRITE_LIMIT: Duration = Duration::from_secs(1);
 
+/// How often a port that gives bytes without end is read before anything else is done.
+const MOST_READS: u32 = 16;
+
 /// First and longest time between two attempts to open the port again.
 const REOPEN_BACKOFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
 
 pub(crate) struct Task {
     shared: Arc<Shared>,
+    endpoint: Endpoint,
     connector: Connector,
     port: Port,
     timer: Timer,
@@ -61,13 +74,14 @@ impl Task {
         let precise = on_descriptor || config.precise_timer;
         let port = match stream {
             Some(stream) => {
-                shared.master().handle_up(Instant::now());
+                up(&shared, &config.endpoint);
                 Port::Open(stream)
             }
             None => Port::Waiting(Instant::now()),
         };
         Self {
             shared,
+            endpoint: config.endpoint.clone(),
             connector,
             port,
             timer: if precise { Timer::precise() } else { Timer::tokio() },
@@ -83,18 +97,10 @@ impl Task {
         while let Some(deadline) = self.decide().await {
             match self.next_event(deadline).await {
                 Event::Received(Ok(0)) => self.lose("the port was closed by its far end"),
-                Event::Received(Ok(len)) => {
-                    self.backoff = REOPEN_BACKOFF.0;
-                    let bytes = self.received.get(..len).unwrap_or_default();
-                    let (now, mut master) = (Instant::now(), self.shared.master());
-                    master.handle_bytes(now, bytes);
-                    let complete = !master.is_busy();
-                    drop(master);
-                    self.shared.tap().take_if(|tap| !tap.received(now, bytes, complete));
-                }
+                Event::Received(Ok(len)) => self.take(len),
                 Event::Received(Err(error)) => self.lose(&error.to_string()),
                 Event::Opened(Ok(stream)) => {
-                    self.shared.master().handle_up(Instant::now());
+                    up(&self.shared, &self.endpoint);
                     self.port = Port::Open(stream);
                 }
                 Event::Opened(Err(error)) => {
@@ -111,6 +117,7 @@ impl Task {
     /// Lets the master decide and writes what it wants written, until there is nothing to do but wait. `None`: the end.
     async fn decide(&mut self) -> Option<Option<Instant>> {
         loop {
+            self.read_rest().await;
             let (frame, deadline, finished, exchange_end) = {
                 let now = Instant::now();
                 let mut master = self.shared.master();
@@ -150,6 +157,44 @@ impl Task {
                 Err(error) => self.lose(&error.to_string()),
             }
         }
+    }
+
+    /// Reads what lies in the port before a time is declared over or a request is sent: what came before is then known
+    /// to have come before.
+    async fn read_rest(&mut self) {
+        let (is_over, may_send) = {
+            let (now, master) = (Instant::now(), self.shared.master());
+            (master.is_over(now), master.may_send())
+        };
+        let Port::Open(_) = self.port else { return };
+        if is_over || (may_send && !matches!(self.endpoint, Endpoint::Serial(_) | Endpoint::Stream)) {
+            // The runtime itself may have been away, or has not looked at the port since the last answer.
+            yield_now().await;
+        } else if !may_send {
+            return;
+        }
+        for _ in 0..MOST_READS {
+            let Port::Open(stream) = &mut self.port else { return };
+            // Whoever waits for more asks again.
+            let mut context = Context::from_waker(Waker::noop());
+            match poll_read_now(stream.as_mut(), &mut context, &mut self.received) {
+                Poll::Pending => return,
+                Poll::Ready(Ok(0)) => return self.lose("the port was closed by its far end"),
+                Poll::Ready(Ok(len)) => self.take(len),
+                Poll::Ready(Err(error)) => return self.lose(&error.to_string()),
+            }
+        }
+    }
+
+    /// Bytes were received.
+    fn take(&mut self, len: usize) {
+        self.backoff = REOPEN_BACKOFF.0;
+        let bytes = self.received.get(..len).unwrap_or_default();
+        let (now, mut master) = (Instant::now(), self.shared.master());
+        master.handle_bytes(now, bytes);
+        let complete = !master.is_busy();
+        drop(master);
+        self.shared.tap().take_if(|tap| !tap.received(now, bytes, complete));
     }
 
     async fn next_event(&mut self, deadline: Option<Instant>) -> Event {
@@ -210,6 +255,14 @@ impl Task {
     fn lengthen_backoff(&mut self) {
         self.backoff = (self.backoff * 2).min(REOPEN_BACKOFF.1);
     }
+}
+
+/// The port is open.
+fn up(shared: &Shared, endpoint: &Endpoint) {
+    let paces = endpoint.far_end_paces();
+    let mut master = shared.master();
+    master.set_far_end_paces(paces);
+    master.handle_up(Instant::now());
 }
 
 /// Writes a frame. A port nearly always takes it at once; only one that does not is worth a timer.

@@ -62,7 +62,7 @@ fn the_manuals_frame_goes_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
     // What comes a second time belongs to nobody.
     script.ask(2, &WRITE);
     assert_eq!(script.hear(&[PRINTED, PRINTED].concat()), Step::Done(Ok(Ok(WRITTEN))));
-    assert_eq!(script.strays(), [Stray::Frame { slave: 2, function: 6 }]);
+    assert!(matches!(script.strays()[..], [Stray::Frame { slave: 2, function: 6, .. }]));
 }
 
 #[test]
@@ -202,12 +202,18 @@ fn foreign_late_and_unfit_frames_are_no_answer_and_are_counted() {
     assert_eq!(script.hear(&frame(7, &[3, 4, 0, 9, 0, 9], b'\n')), Step::More);
     assert_eq!(script.hear(&frame(1, &[4, 4, 0, 9, 0, 9], b'\n')), Step::More);
     assert_eq!(script.hear(b"\x00\x00"), Step::More);
-    let strays =
-        [Stray::Frame { slave: 7, function: 3 }, Stray::Frame { slave: 1, function: 4 }, Stray::Noise(2)];
-    assert_eq!(script.strays(), strays);
+    let strays = script.strays();
+    assert!(matches!(
+        strays[..],
+        [
+            Stray::Frame { slave: 7, function: 3, .. },
+            Stray::Frame { slave: 1, function: 4, .. },
+            Stray::Noise(2)
+        ]
+    ));
     assert!(matches!(script.wait_for_step(), Step::Done(Err(Failure::Mismatch(_)))));
     script.hear(&frame(1, &[3, 4, 0, 9, 0, 9], b'\n'));
-    assert_eq!(script.strays(), [Stray::Frame { slave: 1, function: 3 }]);
+    assert!(matches!(script.strays()[..], [Stray::Frame { slave: 1, function: 3, .. }]));
 }
 
 #[test]
@@ -241,13 +247,14 @@ async fn a_line_speaks_ascii_and_leaves_a_late_slave_alone() {
     let lost = PortError::from_modbus(call.await.unwrap().unwrap_err());
     assert_eq!(lost, PortError::OutcomeUnknown("no answer"));
 
-    let call = tokio::spawn(async move { again.call(Request::WriteSingleRegister(252, 11)).await });
+    // The same again: its confirmation could be the first one's.
+    let call = tokio::spawn(async move { again.call(WRITE).await });
     let early = tokio::time::timeout(100 * MS, theirs.read(&mut frames)).await;
     assert!(early.is_err(), "it is asked in its late window");
     theirs.write_all(PRINTED).await.unwrap();
     let len = theirs.read(&mut frames).await.unwrap();
     theirs.write_all(&frames[..len]).await.unwrap();
-    assert_eq!(call.await.unwrap().unwrap(), Ok(Response::WriteSingleRegister(252, 11)));
+    assert_eq!(call.await.unwrap().unwrap(), Ok(WRITTEN));
     assert_eq!(line.stats().slaves[&2].late, 1);
 }
 

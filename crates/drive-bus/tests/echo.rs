@@ -81,8 +81,8 @@ fn an_echo_that_is_damaged_and_never_answered_fails_when_the_time_is_over() {
 #[test]
 fn where_nothing_echoes_a_damaged_answer_fails_at_once() {
     let mut script = rtu(Echo::Off);
-    let request = script.ask(1, &READ);
-    script.hear(&damaged(&request));
+    script.ask(1, &READ);
+    script.hear(&damaged(&drive_bus::exchange::rtu::frame(1, &[3, 2, 0x11, 0x11])));
     assert_eq!(script.wait(), Step::Done(Err(Failure::Damaged("CRC"))));
 }
 

@@ -311,7 +311,7 @@ fn a_slave_is_known_to_hold_nothing_only_once_it_has_said_so_behind_its_last_rep
     send(&mut script);
     script.strays();
     assert_eq!(dropped(&mut script, &reply(&[0xFE])), poll(1));
-    assert_eq!(script.strays(), [Stray::Frame { slave: 1, function: 0xFE }]);
+    assert!(matches!(script.strays()[..], [Stray::Frame { slave: 1, function: 0xFE, .. }]));
     let request = dropped(&mut script, &mirrored(&mark));
     assert_eq!(request, reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
 }

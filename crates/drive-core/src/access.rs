@@ -181,7 +181,9 @@ impl<P: Port> Calls<'_, P> {
     pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>> {
         self.check_words(usize::from(count), self.registers.capabilities.read_words)?;
         let exchange = Self::reading(first);
-        let response = self.request(Request::ReadHoldingRegisters(first, count), exchange).await?;
+        let terms = self.terms.sparing(self.registers.capabilities.spare_words(first, count));
+        let response =
+            self.request_under(terms, Request::ReadHoldingRegisters(first, count), exchange).await?;
         let Response::ReadHoldingRegisters(words) = response else {
             return Err(self.answer(exchange, "the answer is of another function"));
         };
@@ -346,10 +348,18 @@ impl<P: Port> Calls<'_, P> {
     /// A drive that answers that it is busy (exception 06, Modbus Application Protocol V1.1b3, section 7) has done nothing,
     /// and is asked again within the lifetime of the call, or a second where it has none; an edge is not.
     pub async fn request(&mut self, request: Request<'_>, exchange: Exchange) -> Result<Response> {
-        let patience = self.terms.lifetime.unwrap_or(PATIENCE);
+        self.request_under(self.terms, request, exchange).await
+    }
+
+    async fn request_under(
+        &mut self,
+        mut terms: Terms,
+        request: Request<'_>,
+        exchange: Exchange,
+    ) -> Result<Response> {
+        let patience = terms.lifetime.unwrap_or(PATIENCE);
         let until = Instant::now() + patience;
         let mut asking = Confirming::within(patience);
-        let mut terms = self.terms;
         loop {
             let outcome = self.once(terms, request.clone(), exchange).await;
             let busy = matches!(outcome, Err(Error::Exception { code: BUSY, .. }));
@@ -439,6 +449,7 @@ mod tests {
         name: "Test drive",
         functions: &[3, 6, 16],
         read_words: 16,
+        blocks: &[],
         write_words: 16,
         highest_address: 31,
         stations: 31,

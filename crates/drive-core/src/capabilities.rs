@@ -4,6 +4,7 @@ use std::{fmt, time::Duration};
 
 use crate::{
     error::SlaveAddress,
+    registers::Row,
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,
 };
@@ -20,6 +21,10 @@ pub struct Capabilities {
     pub functions: &'static [u8],
     /// Words that one read may ask for.
     pub read_words: u16,
+    /// The registers of which one read may take any that stand in a row, up to [`read_words`](Self::read_words). Where an
+    /// answer must differ from one that may still come, a read takes some more of them along. Empty where each read has its
+    /// own fixed form, or where what stands behind it is not known.
+    pub blocks: &'static [Row],
     /// Words that one write (function 16) may carry.
     pub write_words: u16,
     /// The highest slave address it can have; the lowest is 1.
@@ -64,6 +69,18 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
+    /// How many words a read of `count` words from `first` on may take along at its end.
+    #[must_use]
+    pub fn spare_words(&self, first: u16, count: u16) -> u8 {
+        let is_readable =
+            |address: u16| self.blocks.iter().any(|row| row.address == address && row.access.is_readable());
+        let behind =
+            (1..=self.read_words.saturating_sub(count)).take(usize::from(u8::MAX)).take_while(|more| {
+                first.checked_add(count - 1).and_then(|last| last.checked_add(*more)).is_some_and(is_readable)
+            });
+        if count == 0 { 0 } else { behind.count() as u8 }
+    }
+
     /// Checks that a drive of this family can have this address on a line with these settings.
     ///
     /// # Errors

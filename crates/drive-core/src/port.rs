@@ -65,13 +65,17 @@ pub struct Terms {
     /// A key under which a later call to the same slave replaces this one while it is not yet sent; the replaced
     /// call ends with [`PortError::Superseded`]. Used for setpoints, where only the latest counts.
     pub replaces: Option<u16>,
+    /// How many words a read may take along behind those that are wanted: all of them can be read, and the drive's limit
+    /// allows it. A line whose answers carry no number asks for more where the answer must differ from one that may
+    /// still come, and leaves them out.
+    pub spare_words: u8,
 }
 
 impl Terms {
     /// The terms of a class, without a lifetime, for levels, replaced by nothing.
     #[must_use]
     pub const fn of(class: Class) -> Self {
-        Self { class, lifetime: None, effect: Effect::Level, replaces: None }
+        Self { class, lifetime: None, effect: Effect::Level, replaces: None, spare_words: 0 }
     }
 
     /// These terms with a lifetime.
@@ -84,6 +88,12 @@ impl Terms {
     #[must_use]
     pub const fn edge(self) -> Self {
         Self { effect: Effect::Edge, ..self }
+    }
+
+    /// These terms for a read that may take so many words along.
+    #[must_use]
+    pub const fn sparing(self, spare_words: u8) -> Self {
+        Self { spare_words, ..self }
     }
 
     /// These terms with a replacement key.
@@ -154,10 +164,17 @@ pub enum PortError {
     #[error("superseded by a later call before it was sent")]
     Superseded,
     /// The slave has not answered for several requests; the line asks it again by itself. Nothing was sent.
-    #[error("the slave is off-line, next probe in {retry_in:?}")]
+    #[error("the slave is off-line, {}", next_probe(*retry_in))]
     Offline {
-        /// Until the line's next probe.
+        /// Until the line's next probe. Zero: it is due, and sent as soon as the line is free.
         retry_in: Duration,
+    },
+    /// There is no silence on the line in which the request could be sent: another master, a node that babbles, a
+    /// receiver that hears noise. Nothing was sent. Stops are sent all the same.
+    #[error("the line is never quiet: something else is sending (no pause for {heard_for:.1?})")]
+    NeverQuiet {
+        /// For how long there has been no pause.
+        heard_for: Duration,
     },
     /// Too many requests wait on this line. Nothing was sent.
     #[error("the queue of the line is full ({0} requests wait)")]
@@ -176,6 +193,14 @@ pub enum PortError {
     Other(String),
 }
 
+fn next_probe(retry_in: Duration) -> String {
+    if retry_in.is_zero() {
+        "it is probed as soon as the line is free".to_owned()
+    } else {
+        format!("next probe in {retry_in:.1?}")
+    }
+}
+
 impl PortError {
     /// Wraps this error for the way through tokio-modbus; [`from_modbus`](Self::from_modbus) takes it out again.
     #[must_use]
@@ -185,7 +210,7 @@ impl PortError {
             Self::Damaged(_) | Self::Mismatch(_) => io::ErrorKind::InvalidData,
             Self::Offline { .. } => io::ErrorKind::HostUnreachable,
             Self::Superseded => io::ErrorKind::Interrupted,
-            Self::QueueFull(_) | Self::Busy(_) => io::ErrorKind::ResourceBusy,
+            Self::QueueFull(_) | Self::Busy(_) | Self::NeverQuiet { .. } => io::ErrorKind::ResourceBusy,
             Self::LineDown(_) | Self::Closed => io::ErrorKind::NotConnected,
             Self::NotCarried(_) => io::ErrorKind::Unsupported,
             Self::Other(_) => io::ErrorKind::Other,
@@ -203,6 +228,7 @@ impl PortError {
                 | Self::Busy(_)
                 | Self::Offline { .. }
                 | Self::QueueFull(_)
+                | Self::NeverQuiet { .. }
                 | Self::LineDown(_)
                 | Self::Closed
                 | Self::NotCarried(_)

@@ -12,6 +12,7 @@ pub(crate) const CAPABILITIES: Capabilities = Capabilities {
     name: "Test drive",
     functions: &[3, 6, 16],
     read_words: 16,
+    blocks: &[],
     write_words: 16,
     highest_address: 31,
     stations: 31,

@@ -110,7 +110,7 @@ impl Ascii {
 
     /// A frame whose LRC fits.
     fn heard(&mut self, slave: u8, pdu: Bytes) -> Step {
-        let stray = Stray::Frame { slave, function: pdu.first().copied().unwrap_or_default() };
+        let stray = Stray::frame(slave, &pdu);
         let equals = slave == self.sent.0 && pdu == self.sent.1;
         let Some(current) = self.current.as_mut().filter(|current| current.slave == slave) else {
             // The echo of a request that was given up while it was sent is no late answer.

@@ -18,6 +18,8 @@ pub struct Mbap {
     transaction: u16,
     current: Option<Current>,
     received: BytesMut,
+    /// How many of the bytes received came before the request.
+    stale: usize,
     strays: Vec<Stray>,
 }
 
@@ -30,14 +32,15 @@ struct Current {
 }
 
 impl Mbap {
-    /// A machine that has sent nothing yet.
+    /// A machine that has sent nothing yet. Its numbers begin anywhere, so that an answer to another connection's request
+    /// is none to its own.
     #[must_use]
     pub fn new() -> Self {
-        Self::default()
+        Self { transaction: fastrand::u16(..), ..Self::default() }
     }
 
-    /// The next whole frame: transaction, unit, PDU.
-    fn next_frame(&mut self) -> Option<(u16, u8, Bytes)> {
+    /// The next whole frame: transaction, unit, PDU. The transaction is none where the frame began before the request.
+    fn next_frame(&mut self) -> Option<(Option<u16>, u8, Bytes)> {
         let mut noise = 0;
         let frame = loop {
             let Some(&[t1, t0, p1, p0, l1, l0, unit]) = self.received.first_chunk::<HEADER>() else {
@@ -47,6 +50,7 @@ impl Mbap {
             if (p1, p0) != (0, 0) || !(2..=MAX_PDU + 1).contains(&len) {
                 // No header: go on with the next byte until one fits.
                 self.received.advance(1);
+                self.stale = self.stale.saturating_sub(1);
                 noise += 1;
                 continue;
             }
@@ -54,7 +58,9 @@ impl Mbap {
                 break None;
             }
             self.received.advance(HEADER);
-            break Some((u16::from_be_bytes([t1, t0]), unit, self.received.split_to(len - 1).freeze()));
+            let transaction = (self.stale == 0).then(|| u16::from_be_bytes([t1, t0]));
+            self.stale = self.stale.saturating_sub(HEADER - 1 + len);
+            break Some((transaction, unit, self.received.split_to(len - 1).freeze()));
         };
         if noise > 0 {
             self.strays.push(Stray::Noise(noise));
@@ -62,9 +68,9 @@ impl Mbap {
         frame
     }
 
-    fn fits(&mut self, transaction: u16, unit: u8, pdu: Bytes) -> Option<Answer> {
-        let stray = Stray::Frame { slave: unit, function: pdu.first().copied().unwrap_or_default() };
-        let Some(current) = self.current.as_mut().filter(|_| transaction == self.transaction) else {
+    fn fits(&mut self, transaction: Option<u16>, unit: u8, pdu: Bytes) -> Option<Answer> {
+        let stray = Stray::frame(unit, &pdu);
+        let Some(current) = self.current.as_mut().filter(|_| transaction == Some(self.transaction)) else {
             self.strays.push(stray);
             return None;
         };
@@ -79,6 +85,12 @@ impl Mbap {
 
 impl Exchange for Mbap {
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
+        // What came before the request is no answer to it, whatever its number.
+        self.current = None;
+        while let Some((transaction, unit, pdu)) = self.next_frame() {
+            self.fits(transaction, unit, pdu);
+        }
+        self.stale = self.received.len();
         self.transaction = self.transaction.wrapping_add(1);
         self.current = Some(Current { unit: slave, request, answer_by: None, misfit: None });
         let mut frame = BytesMut::with_capacity(HEADER + pdu.len());
@@ -115,6 +127,7 @@ impl Exchange for Mbap {
         if !self.received.is_empty() {
             self.strays.push(Stray::Noise(self.received.len()));
             self.received.clear();
+            self.stale = 0;
         }
         match self.current.take().and_then(|current| current.misfit) {
             Some(why) => Step::Done(Err(Failure::Mismatch(why))),
@@ -133,6 +146,7 @@ impl Exchange for Mbap {
     fn reset(&mut self) {
         self.current = None;
         self.received.clear();
+        self.stale = 0;
     }
 
     fn take_strays(&mut self) -> Vec<Stray> {

@@ -5,6 +5,7 @@
 pub mod ascii;
 pub(crate) mod echo;
 pub mod mbap;
+mod pace;
 pub mod rtu;
 pub mod unitelway;
 
@@ -15,7 +16,7 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response};
 
-use crate::pdu;
+use crate::{pdu, shape::Shape};
 
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
@@ -44,7 +45,7 @@ pub enum Failure {
     Mismatch(String),
     /// The slave has refused the frame for as long as it was repeated, so that nothing of it was carried out.
     Refused(&'static str),
-    /// A confirmation came that may belong to an earlier request.
+    /// An answer came that may belong to an earlier request.
     Doubted(&'static str),
 }
 
@@ -57,11 +58,31 @@ pub enum Stray {
         slave: u8,
         /// Its function code.
         function: u8,
+        /// The shape of the answer that it is, or that will follow it.
+        shape: Shape,
+        /// Another master's request.
+        is_request: bool,
+    },
+    /// An intact frame with the form of the answer, and sooner than a line can carry the request and it.
+    Early {
+        /// Its address.
+        slave: u8,
+        /// Its shape.
+        shape: Shape,
     },
     /// Bytes that make no frame.
     Noise(usize),
     /// Our own request, given back by the adapter.
     Echo,
+}
+
+impl Stray {
+    /// An intact frame with this PDU.
+    pub(crate) fn frame(slave: u8, pdu: &[u8]) -> Self {
+        let function = pdu.first().copied().unwrap_or_default();
+        let shape = Shape::heard(pdu);
+        Self::Frame { slave, function, shape, is_request: Shape::is_request(pdu) }
+    }
 }
 
 /// The machine of one protocol, used for one exchange after another.
@@ -78,6 +99,11 @@ pub trait Exchange: Send {
     /// Whether the request may change something in the slave, so that it is not repeated as a read is.
     fn is_write(&self, request: &Request<'_>) -> bool {
         pdu::is_write(request)
+    }
+
+    /// Whether the far end takes the time that characters take on the line, so that what comes sooner is no answer.
+    fn set_far_end_paces(&mut self, paces: bool) {
+        let _ = paces;
     }
 
     /// Begins an exchange and gives the bytes that open it. `pdu` is the request, encoded.
@@ -111,9 +137,9 @@ pub trait Exchange: Send {
         None
     }
 
-    /// The bytes that [`start`](Self::start) or [`Step::Send`] gave have been written; their last bit ends at `end`. The
-    /// first character of the answer, and as many more as the answer likely has, are due at `answer_by`, which is
-    /// reckoned from the end of what opened the exchange.
+    /// The bytes that [`start`](Self::start) or [`Step::Send`] gave have been written; their last bit ends at `end` at
+    /// the earliest. The first character of the answer, and as many more as the answer likely has, are due at `answer_by`,
+    /// which is     /// reckoned from the end of what opened the exchange.
     fn handle_sent(&mut self, end: Instant, answer_by: Instant);
 
     /// Bytes came in at `now`. Bytes that come when no exchange is under way are strays.
@@ -138,10 +164,10 @@ pub trait Exchange: Send {
     /// timeout.
     fn confuses_late_answers(&self) -> bool;
 
-    /// The kind of answer that a function has. Requests whose answers are of one kind wait for each other's late
-    /// answers.
-    fn kind_of_answer(&self, function: u8) -> u8 {
-        function
+    /// The shape of the answer to a request with this PDU. Requests whose answers have one shape wait for each other's
+    /// late answers.
+    fn shape(&self, pdu: &[u8]) -> Shape {
+        Shape::of_answer_to(pdu)
     }
 
     /// Whether it is unknown if the adapter echoes, so that an answer that equals its request proves nothing yet.

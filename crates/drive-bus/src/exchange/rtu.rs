@@ -20,6 +20,7 @@ use self::frame::MAX_FRAME;
 use super::{
     Exchange, Failure, Step, Stray,
     echo::{Echo, EchoState},
+    pace::Pace,
 };
 
 /// What may come in during one exchange before it is given up: somebody who never stops talking.
@@ -38,6 +39,7 @@ pub struct Rtu {
     t3_5: Duration,
     /// How long an answer that has begun may go on after its time is over.
     longest: Duration,
+    pace: Pace,
     echo: EchoState,
     configured: Echo,
     current: Option<Current>,
@@ -45,6 +47,8 @@ pub struct Rtu {
     sent: Vec<u8>,
     /// What has come and is not yet part of anything.
     received: Vec<u8>,
+    /// How many of them came before the slave can have heard the request.
+    early: usize,
     last_byte: Option<Instant>,
     strays: Vec<Stray>,
 }
@@ -73,11 +77,13 @@ impl Rtu {
             chunk_gap: chunk_gap.max(t3_5),
             t3_5,
             longest: overtime(serial, chunk_gap),
+            pace: Pace::new(serial),
             echo: echo.into(),
             configured: echo,
             current: None,
             sent: Vec::with_capacity(MAX_FRAME),
             received: Vec::with_capacity(MAX_FRAME),
+            early: 0,
             last_byte: None,
             strays: Vec::new(),
         }
@@ -96,8 +102,13 @@ impl Rtu {
 }
 
 impl Exchange for Rtu {
+    fn set_far_end_paces(&mut self, paces: bool) {
+        self.pace.set_far_end_paces(paces);
+    }
+
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
         self.judge(self.received.len());
+        self.pace.forget();
         let sent = frame(slave, pdu);
         self.sent.clear();
         self.sent.extend_from_slice(&sent);
@@ -113,7 +124,8 @@ impl Exchange for Rtu {
         sent
     }
 
-    fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
+    fn handle_sent(&mut self, end: Instant, answer_by: Instant) {
+        self.pace.sent(end, self.sent.len());
         if let Some(current) = &mut self.current {
             current.answer_by = Some(answer_by);
         }
@@ -122,11 +134,14 @@ impl Exchange for Rtu {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step {
         self.last_byte = Some(now);
         self.received.extend_from_slice(bytes);
+        if self.pace.is_early(now, 0) {
+            self.early = self.received.len();
+        }
         match &mut self.current {
             Some(current) => {
                 current.received += bytes.len();
                 let babble = current.received > MAX_RECEIVED;
-                let step = self.examine();
+                let step = self.examine(now);
                 if babble && step == Step::More {
                     self.judge(self.received.len());
                     self.current = None;
@@ -135,7 +150,8 @@ impl Exchange for Rtu {
                 step
             }
             None => {
-                if self.received.len() > MAX_FRAME {
+                let is_whole = |offset: usize| self.received.get(offset..).is_some_and(is_frame);
+                if self.received.len() > MAX_FRAME || (0..self.received.len()).any(is_whole) {
                     self.judge(self.received.len());
                 }
                 Step::More
@@ -173,6 +189,7 @@ impl Exchange for Rtu {
     fn reset(&mut self) {
         self.current = None;
         self.received.clear();
+        self.early = 0;
         // The port may be another adapter now; one that was seen to echo is trusted to do it again, which is the safe
         // side.
         if self.echo == EchoState::Absent {

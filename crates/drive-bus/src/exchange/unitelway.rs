@@ -85,7 +85,7 @@ pub(crate) use self::{
     settings::{reply_len, request_len},
 };
 use super::{Exchange, Step, Stray};
-use crate::answer;
+use crate::{answer, shape::Shape};
 
 /// The machine.
 #[derive(Debug)]
@@ -297,8 +297,8 @@ impl Exchange for UniTelway {
     }
 
     /// Of any reply it is unknown which request it belongs to.
-    fn kind_of_answer(&self, _: u8) -> u8 {
-        0
+    fn shape(&self, _: &[u8]) -> Shape {
+        Shape::ANY
     }
 
     fn echoes(&self) -> bool {

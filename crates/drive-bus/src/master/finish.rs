@@ -7,9 +7,10 @@ use tokio::time::Instant;
 
 use super::{Flight, Job, Master, OFFLINE_STOP_REST, PROBE_REST, Purpose, link::Link};
 use crate::{
-    answer,
+    answer, config,
     exchange::{Answer, Failure},
     schedule::Entry,
+    shape,
 };
 
 /// The length of an exception: its function code and its number.
@@ -22,18 +23,20 @@ impl<C> Master<C> {
         self.to_send = None;
         self.exchange_end = now;
         let slave = flight.slave;
+        let result = self.believe(now, &flight, result);
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
-            Ok(answer) => {
-                // The slave heard the end of our request, whatever was computed for it.
-                self.quiet_from = now;
-                self.note_answer(now, &flight, answer);
-            }
+            Ok(answer) => self.note_answer(now, &flight, answer),
             Err(failure) => self.note_failure(now, &flight, failure),
         }
         let took = now.saturating_duration_since(flight.started);
         match flight.purpose {
-            Purpose::Call(Some(entry)) => match result {
+            Purpose::Call(Some(mut entry)) => match result {
+                Ok(Err(_)) if flight.more > 0 => {
+                    // The drive may have nothing behind what was wanted.
+                    entry.work.asked_longer = true;
+                    self.schedule.put_back(entry);
+                }
                 Ok(answer) => {
                     // An earlier attempt may have been carried out: its repetition can be refused for that very reason.
                     let doubtful = answer.is_err() && entry.work.is_write && entry.work.last.is_some();
@@ -61,10 +64,28 @@ impl<C> Master<C> {
         }
     }
 
+    /// What the exchange brought, as far as it proves itself. Where it does not, its own answer may still come.
+    fn believe(
+        &mut self,
+        now: Instant,
+        flight: &Flight<C>,
+        result: Result<Answer, Failure>,
+    ) -> Result<Answer, Failure> {
+        let answer = result?;
+        let owes_refusal = self.station(flight.slave).doubt.owes_refusal(now, flight.shape);
+        if flight.suspect || answer.is_err() && owes_refusal {
+            self.fear_late_answer(now, flight);
+            return Err(Failure::Doubted("the answer may be that to an earlier request"));
+        }
+        Ok(answer.map(|response| shape::shortened(response, flight.more)))
+    }
+
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
+        let double = self.config.double_window;
         let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
         let characters = self.config.characters(self.config.answer_len(expected));
         let took = self.exchange.took();
+        let confuses = self.exchange.confuses_late_answers();
         let station = self.station(flight.slave);
         if let Some(sent) = flight.sent {
             let elapsed = || now.saturating_duration_since(sent.end).saturating_sub(characters);
@@ -73,7 +94,12 @@ impl<C> Master<C> {
             station.stats.response.record(after);
         }
         match answer {
-            Ok(_) => station.stats.outcomes.answered += 1,
+            Ok(_) => {
+                station.stats.outcomes.answered += 1;
+                if confuses {
+                    station.doubt.answered(now, flight.shape, double);
+                }
+            }
             Err(_) => station.stats.outcomes.exceptions += 1,
         }
         self.note_alive(now, flight.slave);
@@ -89,7 +115,9 @@ impl<C> Master<C> {
     fn note_failure(&mut self, now: Instant, flight: &Flight<C>, failure: &Failure) {
         // Damage may have made it look like ours: then our own answer is still to come.
         let may_be_anothers = matches!(failure, Failure::Damaged(_))
-            && self.stations.iter().any(|(slave, other)| *slave != flight.slave && other.may_be_late(now));
+            && self.stations.iter().any(|(slave, other)| {
+                *slave != flight.slave && other.doubt.over().is_some_and(|over| over > now)
+            });
         if may_be_anothers {
             self.fear_late_answer(now, flight);
         }
@@ -97,6 +125,9 @@ impl<C> Master<C> {
         match failure {
             Failure::Damaged(_) => {
                 station.stats.outcomes.damaged += 1;
+                // It may come once more, whole.
+                let again = if self.far_end_paces { config::DOUBLE } else { self.config.late_window };
+                station.doubt.owe(now, flight.shape, now + again, false);
                 return;
             }
             // It answers, and its next exchange will prove something.
@@ -129,21 +160,25 @@ impl<C> Master<C> {
         if flight.slave == 0 || !self.exchange.confuses_late_answers() {
             return;
         }
-        let kind = self.exchange.kind_of_answer(flight.request.function_code().value());
         let station = self.station(flight.slave);
         let timeout = flight.sent.map_or(station.timeout.current(), |sent| sent.timeout);
         // A slave that may take longer than the window to answer in time may take longer still to be late.
         let window = self.config.late_window.max(timeout * 3 / 2);
         let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
         let lost = !matches!(self.link, Link::Up);
-        self.station(flight.slave).expect_late(kind, sent + window, lost);
+        let from = if flight.stalled { now } else { sent };
+        let doubt = &mut self.station(flight.slave).doubt;
+        doubt.owe(now, flight.shape, from + window, lost);
+        if flight.stalled {
+            doubt.hold(now, from + window);
+        }
     }
 
     fn go_offline(&mut self, now: Instant, slave: u8) {
         tracing::warn!(slave, "slave off-line");
         self.offline.insert(slave);
         let at = self.station(slave).probe_at().unwrap_or(now);
-        let retry_in = at.saturating_duration_since(now);
+        let retry_in = self.probe_in(now, at);
         let waiting =
             self.schedule.withdraw_all(|entry| entry.slave == slave && entry.terms.class != Class::Stop);
         for entry in waiting {
@@ -166,7 +201,8 @@ impl<C> Master<C> {
                 Some(unknown @ PortError::OutcomeUnknown(_)) => unknown,
                 _ => PortError::Busy(why),
             },
-            Failure::Doubted(why) => PortError::OutcomeUnknown(why),
+            Failure::Doubted(why) if write => PortError::OutcomeUnknown(why),
+            Failure::Doubted(why) => PortError::Mismatch(why.to_owned()),
             Failure::Timeout if write => PortError::OutcomeUnknown("no answer"),
             Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
             Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),

@@ -3,6 +3,7 @@
 //! Inputs are named `handle_…`, `submit`, `withdraw`; outputs `poll_…`. The task feeds it and acts.
 
 mod aside;
+mod doubt;
 mod finish;
 mod link;
 mod send;
@@ -21,11 +22,12 @@ use tokio_modbus::Request;
 
 use crate::{
     answer,
-    config::{LineConfig, SlaveSettings},
+    config::{Endpoint, LineConfig, SlaveSettings},
     exchange::{Answer, Exchange, Step, Stray, ascii::Ascii, mbap::Mbap, rtu::Rtu, unitelway::UniTelway},
     pdu,
     protocol::Protocol,
     schedule::{Entry, Rules, Schedule, Ticket},
+    shape::Shape,
     stats::Stats,
     unite::LinkCounters,
 };
@@ -64,16 +66,21 @@ pub struct Master<C> {
     /// The last exchange that was sent was one of those: the next turn is another's.
     resumed: bool,
     to_send: Option<Bytes>,
-    /// How many characters the port was given whose sending is not confirmed yet.
-    sending: Option<usize>,
+    /// What the port was given and has not confirmed yet.
+    sending: Option<Sending>,
     outcomes: VecDeque<(C, Outcome)>,
     link: Link,
+    far_end_paces: bool,
     closing: bool,
     /// End of the last activity on the line: computed for what we sent, observed for what we received.
     quiet_from: Instant,
+    /// What was heard last without a silence in it: from when, and until when.
+    heard: Option<(Instant, Instant)>,
     /// End of our own last exchange.
     exchange_end: Instant,
     last_slave: Option<u8>,
+    /// When somebody's call was sent last.
+    called_at: Option<Instant>,
     /// No probe before this.
     probe_free_at: Option<Instant>,
     /// No stop of a slave that is off-line before this.
@@ -88,11 +95,14 @@ pub struct Master<C> {
 struct Job<C> {
     request: Arc<Request<'static>>,
     pdu: Bytes,
+    shape: Shape,
     is_write: bool,
     caller: C,
     attempts: u32,
     /// The adapter was asked for its echo on behalf of this request.
     settled: bool,
+    /// The slave refuses to read more along.
+    asked_longer: bool,
     /// What became of the last attempt.
     last: Option<PortError>,
 }
@@ -102,8 +112,22 @@ struct Flight<C> {
     purpose: Purpose<C>,
     slave: u8,
     request: Arc<Request<'static>>,
+    shape: Shape,
+    /// By how many words the read was lengthened.
+    more: u8,
+    /// An answer of this shape may be that to an earlier request.
+    suspect: bool,
+    /// The host was away when its time was over.
+    stalled: bool,
     started: Instant,
     sent: Option<Sent>,
+}
+
+/// What the port was given.
+#[derive(Clone, Copy)]
+struct Sending {
+    since: Instant,
+    characters: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -140,7 +164,7 @@ impl<C> Master<C> {
                 Protocol::UniTelway(settings) => Box::new(UniTelway::new(serial, settings, chunk_gap)),
             }
         };
-        Self {
+        let mut master = Self {
             exchange,
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
@@ -152,8 +176,11 @@ impl<C> Master<C> {
             sending: None,
             outcomes: VecDeque::new(),
             link: Link::Opening,
+            far_end_paces: true,
             closing: false,
             quiet_from: Instant::now(),
+            heard: None,
+            called_at: None,
             exchange_end: Instant::now(),
             last_slave: None,
             probe_free_at: None,
@@ -162,7 +189,9 @@ impl<C> Master<C> {
             opened_at: None,
             stats: Stats::default(),
             config,
-        }
+        };
+        master.set_far_end_paces(matches!(master.config.endpoint, Endpoint::Serial(_)));
+        master
     }
 
     /// The configuration.
@@ -202,7 +231,18 @@ impl<C> Master<C> {
         if terms.class == Class::Stop {
             self.clear_the_way(now, slave);
         }
-        let job = Job { request, pdu, is_write, caller, attempts: 0, settled: false, last: None };
+        let shape = self.exchange.shape(&pdu);
+        let job = Job {
+            request,
+            pdu,
+            shape,
+            is_write,
+            caller,
+            attempts: 0,
+            settled: false,
+            asked_longer: false,
+            last: None,
+        };
         let (ticket, replaced) = self
             .schedule
             .push(now, slave, terms, job)
@@ -245,7 +285,7 @@ impl<C> Master<C> {
         if terms.class != Class::Stop
             && let Some(at) = station.probe_at()
         {
-            return Err(PortError::Offline { retry_in: at.saturating_duration_since(now) });
+            return Err(PortError::Offline { retry_in: self.probe_in(now, at) });
         }
         Ok(pdu)
     }
@@ -289,9 +329,32 @@ impl<C> Master<C> {
 
     /// Bytes came in.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        let goes_on = self.heard.filter(|(_, until)| now < *until + self.config.silence());
+        self.heard = Some((goes_on.map_or(now, |(since, _)| since), now));
         self.quiet_from = self.quiet_from.max(now);
         let step = self.exchange.handle_bytes(now, bytes);
         self.act(now, step);
+    }
+
+    /// Whether [`deadline`](Self::deadline) has passed. What lies in the port **must** be handed over before
+    /// [`handle_timeout`](Self::handle_timeout) is called then.
+    #[must_use]
+    pub fn is_over(&self, now: Instant) -> bool {
+        self.deadline().is_some_and(|deadline| now >= deadline)
+    }
+
+    /// Whether [`poll_transmit`](Self::poll_transmit) may begin an exchange. What lies in the port **must** be handed over
+    /// before.
+    #[must_use]
+    pub fn may_send(&self) -> bool {
+        self.flight.is_none() && !self.schedule.is_empty()
+    }
+
+    /// Whether the far end of the port takes the time that characters take on a line, see
+    /// [`LineConfig::far_end_paces`]. Told before [`handle_up`](Self::handle_up); the configuration comes first.
+    pub fn set_far_end_paces(&mut self, paces: bool) {
+        self.far_end_paces = self.config.is_paced() && self.config.far_end_paces.unwrap_or(paces);
+        self.exchange.set_far_end_paces(self.far_end_paces);
     }
 
     /// [`deadline`](Self::deadline) has passed.
@@ -303,7 +366,11 @@ impl<C> Master<C> {
             self.flight.as_ref().and_then(|flight| flight.sent).and_then(|sent| sent.unanswered_until);
         if unanswered.is_some_and(|until| now >= until) {
             self.finish_unanswered(now);
-        } else if self.exchange.deadline().is_some_and(|deadline| now >= deadline) {
+        } else if let Some(deadline) = self.exchange.deadline().filter(|deadline| now >= *deadline) {
+            let away = now - deadline > self.config.chunk_gap;
+            if let Some(flight) = &mut self.flight {
+                flight.stalled |= away;
+            }
             let step = self.exchange.handle_timeout(now);
             self.act(now, step);
         }
@@ -326,7 +393,7 @@ impl<C> Master<C> {
     }
 
     fn act(&mut self, now: Instant, step: Step) {
-        self.count_strays();
+        self.count_strays(now);
         let unanswered = self
             .flight
             .as_ref()
@@ -344,17 +411,41 @@ impl<C> Master<C> {
         }
     }
 
-    fn count_strays(&mut self) {
+    fn count_strays(&mut self, now: Instant) {
         for stray in self.exchange.take_strays() {
             match stray {
                 Stray::Echo => self.stats.echoes += 1,
                 Stray::Noise(bytes) => self.stats.noise_bytes += bytes as u64,
-                Stray::Frame { slave, function } => {
-                    let kind = self.exchange.kind_of_answer(function & 0x7F);
-                    let late = self.stations.get_mut(&slave).is_some_and(|station| station.came_late(kind));
-                    self.stats.foreign += u64::from(!late);
+                Stray::Early { slave, shape } => {
+                    let station = self.station(slave);
+                    station.stats.early += 1;
+                    station.doubt.heard(now, shape, false);
+                }
+                Stray::Frame { slave, function, shape, is_request } => {
+                    self.count_frame(now, slave, function, shape, is_request);
                 }
             }
+        }
+    }
+
+    fn count_frame(&mut self, now: Instant, slave: u8, function: u8, shape: Shape, is_request: bool) {
+        if let Some(flight) = self.flight.as_mut().filter(|flight| flight.slave == slave) {
+            // Two masters have asked for the same; whose answer comes first nobody knows.
+            flight.suspect |= is_request && shape == flight.shape;
+        }
+        let asked = self.flight.as_ref().filter(|flight| flight.slave == slave);
+        let asked = asked.map(|flight| flight.request.function_code().value());
+        let confuses = self.exchange.confuses_late_answers();
+        let Some(station) = self.stations.get_mut(&slave) else {
+            self.stats.foreign += 1;
+            return;
+        };
+        let late = confuses && station.doubt.heard(now, shape, is_request);
+        match asked {
+            _ if late => station.stats.late += 1,
+            Some(asked) if function & 0x7F != asked => station.stats.wrong_function += 1,
+            Some(_) => station.stats.wrong_count += 1,
+            None => self.stats.foreign += 1,
         }
     }
 

@@ -3,15 +3,26 @@
 use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
-use drive_core::Class;
+use drive_core::{Class, PortError};
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{AGING, Flight, Job, Master, Purpose, Sent, Station, link::Link, station::wants_settling};
+use super::{
+    AGING, Flight, Job, Master, Purpose, Sending, Sent, Station,
+    link::Link,
+    station::{shape_of, wants_settling},
+};
 use crate::{
     answer, pdu,
     schedule::{Choice, Entry, Readiness},
+    shape,
 };
+
+/// A line on which nobody has asked for anything for so long is idle.
+const IDLE: Duration = Duration::from_secs(1);
+
+/// A line without any silence for so long has somebody else on it that sends for ever.
+const NEVER_QUIET: Duration = Duration::from_secs(1);
 
 impl<C> Master<C> {
     /// What is to be written now, if anything. [`handle_sent`](Self::handle_sent) **must** follow when it is.
@@ -20,7 +31,7 @@ impl<C> Master<C> {
             Some(bytes) => bytes,
             None => self.next_exchange(now)?,
         };
-        self.sending = Some(bytes.len());
+        self.sending = Some(Sending { since: now, characters: bytes.len() });
         Some(bytes)
     }
 
@@ -40,6 +51,7 @@ impl<C> Master<C> {
         let probe = self.next_probe().filter(|_| stop_at.is_none() && !self.closing);
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
+            self.give_up_on_silence(now);
             let waits = !self.schedule.is_empty() || probe.is_some() || aside.is_some();
             self.choose_at = waits.then_some(soonest);
             return None;
@@ -126,13 +138,42 @@ impl<C> Master<C> {
     }
 
     fn due_probe(&self) -> Option<(u8, Instant)> {
-        let (slave, at) = self
-            .offline
-            .iter()
-            .filter(|slave| !self.aside.contains_key(slave))
-            .filter_map(|slave| Some((*slave, self.stations.get(slave)?.wanted_probe_at()?)))
-            .min_by_key(|(_, at)| *at)?;
-        Some((slave, self.probe_free_at.map_or(at, |free| free.max(at))))
+        let soonest = |idle: bool| {
+            let at = |slave: &u8| self.stations.get(slave)?.wanted_probe_at(idle, &self.config);
+            let idle_ones = self.offline.iter().filter(|slave| !self.aside.contains_key(slave));
+            idle_ones.filter_map(|slave| Some((*slave, at(slave)?))).min_by_key(|(_, at)| *at)
+        };
+        let (slave, at) = soonest(false)?;
+        let rested = (slave, self.probe_free_at.map_or(at, |free| free.max(at)));
+        if !self.schedule.is_empty() {
+            return Some(rested);
+        }
+        // Nobody has asked for anything for a while: what probes take is taken from nobody.
+        let idle_from = self.called_at.map(|called| called + IDLE);
+        let (slave, at) = soonest(true)?;
+        let idle = (slave, idle_from.map_or(at, |from| from.max(at)));
+        Some(if idle.1 < rested.1 { idle } else { rested })
+    }
+
+    /// How long it takes until the slave that is off-line and due at `at` is probed, as far as is known.
+    pub(super) fn probe_in(&self, now: Instant, at: Instant) -> Duration {
+        let under_way = self.flight.as_ref().and_then(|flight| flight.sent).map(|sent| sent.answer_by);
+        let soonest = [Some(at), self.probe_free_at, under_way].into_iter().flatten().max();
+        soonest.map_or(Duration::ZERO, |at| at.saturating_duration_since(now))
+    }
+
+    /// There has been no silence for so long that there will be none: what waits for it ends, but for a Stop.
+    fn give_up_on_silence(&mut self, now: Instant) {
+        let longest = NEVER_QUIET.max(self.config.longest_stray() * 2);
+        let goes_on = self.heard.filter(|(_, until)| now < *until + self.config.silence());
+        let heard_for = goes_on.map_or(Duration::ZERO, |(since, until)| until - since);
+        if heard_for < longest {
+            return;
+        }
+        for entry in self.schedule.withdraw_all(|entry| entry.terms.class != Class::Stop) {
+            self.stats.never_quiet += 1;
+            self.drop_unsent(entry, PortError::NeverQuiet { heard_for });
+        }
     }
 
     fn begin(&mut self, now: Instant, mut entry: Entry<Job<C>>) -> Option<Bytes> {
@@ -142,7 +183,8 @@ impl<C> Master<C> {
             self.schedule.put_back(entry);
             return self.begin_read(now, slave, Purpose::Settle);
         }
-        if entry.work.attempts == 0 {
+        self.called_at = Some(now);
+        if entry.work.attempts == 0 && entry.work.last.is_none() {
             let class = self.stats.class_mut(entry.terms.class);
             class.sent += 1;
             class.wait.record(now.saturating_duration_since(entry.arrived));
@@ -151,32 +193,28 @@ impl<C> Master<C> {
         }
         self.note_start(now, slave, entry.arrived);
         self.forsake(now, slave);
-        let request = Arc::clone(&entry.work.request);
-        let first = entry.work.attempts == 0 && entry.work.is_write && entry.terms.class == Class::Stop;
-        let bytes = if first {
-            self.exchange.start_at_once(slave, Arc::clone(&request), &entry.work.pdu)
-        } else {
-            self.exchange.start(slave, Arc::clone(&request), &entry.work.pdu)
+        let (more, _) = self.station(slave).place(now, &entry);
+        let longer = shape::lengthened(&entry.work.request, more).filter(|_| more > 0);
+        let (request, pdu) = match longer.map(|request| (pdu::encode(&request), request)) {
+            Some((Ok(pdu), request)) => (Arc::new(request), pdu),
+            _ => (Arc::clone(&entry.work.request), entry.work.pdu.clone()),
         };
-        Some(self.fly(now, slave, Purpose::Call(Some(entry)), request, bytes))
+        Some(self.fly(now, slave, Purpose::Call(Some(entry)), request, &pdu, more))
     }
 
     /// Whether no late answer can be taken for that of the read that finds out about the echo. Only a Stop comes here
     /// while one can: it is sent as it is, and asks before its next attempt.
     fn may_settle(&self, now: Instant, slave: u8) -> bool {
-        let late_until = self
-            .stations
-            .get(&slave)
-            .and_then(|station| station.late_until(self.exchange.as_ref(), &station.harmless_read()));
-        late_until.is_none_or(|until| until <= now)
+        let Some(station) = self.stations.get(&slave) else { return true };
+        let read = shape_of(self.exchange.as_ref(), &station.harmless_read());
+        station.doubt.wait(now, read).is_none()
     }
 
     fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
         let request = self.station(slave).harmless_read();
         let pdu = pdu::encode(&request).ok()?;
         self.note_start(now, slave, now);
-        let bytes = self.exchange.start(slave, Arc::clone(&request), &pdu);
-        Some(self.fly(now, slave, purpose, request, bytes))
+        Some(self.fly(now, slave, purpose, request, &pdu, 0))
     }
 
     /// A request that could have been sent from `since` on is sent at `now`.
@@ -192,22 +230,47 @@ impl<C> Master<C> {
         slave: u8,
         purpose: Purpose<C>,
         request: Arc<Request<'static>>,
-        bytes: Bytes,
+        pdu: &Bytes,
+        more: u8,
     ) -> Bytes {
         self.resumed = false;
-        self.flight = Some(Flight { purpose, slave, request, started: now, sent: None });
+        let shape = self.exchange.shape(pdu);
+        let at_once = matches!(&purpose, Purpose::Call(Some(entry))
+            if entry.work.attempts == 0 && entry.work.is_write && entry.terms.class == Class::Stop);
+        let bytes = if at_once {
+            self.exchange.start_at_once(slave, Arc::clone(&request), pdu)
+        } else {
+            self.exchange.start(slave, Arc::clone(&request), pdu)
+        };
+        let is_write = self.exchange.is_write(&request);
+        let doubt = &mut self.station(slave).doubt;
+        let suspect = doubt.owes(now, shape);
+        if is_write {
+            doubt.written(shape);
+        }
+        self.flight = Some(Flight {
+            purpose,
+            slave,
+            request,
+            shape,
+            more,
+            suspect,
+            stalled: false,
+            started: now,
+            sent: None,
+        });
         bytes
     }
 
     /// When the last bit of what the port was given is off the line, if it is sent from `now` on.
     pub(super) fn end_of_sending(&self, now: Instant) -> Instant {
-        now + self.config.characters(self.sending.unwrap_or_default())
+        now + self.config.characters(self.sending.map_or(0, |sending| sending.characters))
     }
 
     /// What [`poll_transmit`](Self::poll_transmit) gave has been handed to the port.
     pub fn handle_sent(&mut self, now: Instant) {
         let end = self.end_of_sending(now);
-        self.sending = None;
+        let taken_in = now - self.sending.take().map_or(now, |sending| sending.since);
         self.quiet_from = end;
         let Some(flight) = &mut self.flight else {
             // Given up while it was written, for a Stop: that waits until this is off the line.
@@ -215,9 +278,12 @@ impl<C> Master<C> {
             return;
         };
         if let Some(sent) = flight.sent {
-            self.exchange.handle_sent(end, sent.answer_by);
+            self.exchange.handle_sent(end - taken_in, sent.answer_by);
             return;
         }
+        // While the host was away anything may have come, before the request was sent.
+        let away = taken_in > self.config.chunk_gap;
+        flight.suspect |= away && self.exchange.confuses_late_answers();
         let unanswered = flight.slave == 0 || pdu::is_unanswered(&flight.request);
         let station = self.stations.entry(flight.slave).or_insert_with(|| {
             Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
@@ -237,7 +303,7 @@ impl<C> Master<C> {
             answer_by,
             unanswered_until: unanswered.then(|| end + self.config.broadcast_turnaround),
         });
-        self.exchange.handle_sent(end, answer_by);
+        self.exchange.handle_sent(end - taken_in, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);
     }
 

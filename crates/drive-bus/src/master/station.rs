@@ -6,12 +6,14 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::Job;
+use super::{Job, doubt::Doubt};
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
     exchange::Exchange,
+    pdu,
     schedule::Entry,
+    shape::Shape,
     stats::SlaveStats,
     timeout::LearnedTimeout,
 };
@@ -19,8 +21,8 @@ use crate::{
 /// How long a slave is probed after somebody last asked for it.
 const INTEREST: Duration = Duration::from_secs(60);
 
-/// How many late answers are kept in mind.
-const MOST_LATE: usize = 8;
+/// By how many words a read is lengthened at the most, to tell its answer from others.
+const MOST_SPARE: u8 = 3;
 
 /// One slave, as seen by the master.
 #[derive(Debug)]
@@ -30,7 +32,7 @@ pub(super) struct Station {
     pub(super) stats: SlaveStats,
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
-    late: Vec<Late>,
+    pub(super) doubt: Doubt,
     failures: u32,
     offline: Option<Offline>,
     /// What a probe asks: the last read that was asked of this slave.
@@ -38,18 +40,9 @@ pub(super) struct Station {
     asked: Option<Instant>,
 }
 
-/// An answer that may still come.
-#[derive(Debug, Clone, Copy)]
-struct Late {
-    kind: u8,
-    until: Instant,
-    /// Its port was lost. What comes over the next one may be anything that the last one left behind, also an echo, so
-    /// that no frame proves that this answer has come.
-    over_a_lost_port: bool,
-}
-
 #[derive(Debug, Clone, Copy)]
 struct Offline {
+    missed_at: Instant,
     probe_at: Instant,
     backoff: Duration,
     /// A Stop was sent to it in vain: the next is a repetition.
@@ -64,7 +57,7 @@ impl Station {
             timeout: LearnedTimeout::new(config.timeout_floor, ceiling),
             stats: SlaveStats::default(),
             ready_at: None,
-            late: Vec::new(),
+            doubt: Doubt::default(),
             failures: 0,
             offline: None,
             last_read: None,
@@ -93,28 +86,24 @@ impl Station {
     /// It has answered, at `now`. True: it had been off-line.
     pub(super) fn answered(&mut self, now: Instant) -> bool {
         self.failures = 0;
-        self.late.retain(|late| late.until > now);
         self.ready_at = Some(now + self.settings.turnaround);
         self.stats.offline = false;
         self.offline.take().is_some()
     }
 
-    /// An answer of this kind may still come, until `until`.
-    pub(super) fn expect_late(&mut self, kind: u8, until: Instant, over_a_lost_port: bool) {
-        if self.late.len() >= MOST_LATE {
-            self.late.remove(0);
-        }
-        self.late.push(Late { kind, until, over_a_lost_port });
+    /// With how many words more a read is asked, so that its answer differs from what may come, and until when it waits
+    /// nevertheless.
+    pub(super) fn place<C>(&self, now: Instant, entry: &Entry<Job<C>>) -> (u8, Option<Instant>) {
+        let spare = if entry.work.asked_longer { 0 } else { entry.terms.spare_words.min(MOST_SPARE) };
+        let shapes = (0..=spare).map_while(|more| match more {
+            0 => Some(entry.work.shape),
+            more => entry.work.shape.longer(more),
+        });
+        self.doubt.best(now, shapes).map_or((0, None), |(more, wait)| (more as u8, wait))
     }
 
-    /// Until when this request must wait, because a late answer could be taken for its own.
-    pub(super) fn late_until(&self, exchange: &dyn Exchange, request: &Request<'_>) -> Option<Instant> {
-        let kind = exchange.kind_of_answer(request.function_code().value());
-        self.late.iter().filter(|late| late.kind == kind).map(|late| late.until).max()
-    }
-
-    /// Until when this request still waits, besides its slave's pause: a late answer could be taken for its own, or it
-    /// repeats the stop of a slave that is off-line. The write of any other Stop waits for neither.
+    /// Until when this request still waits, besides its slave's pause: an answer that may come could be taken for its own,
+    /// or it repeats the stop of a slave that is off-line. The write of any other Stop waits for neither.
     pub(super) fn held_until<C>(
         &self,
         now: Instant,
@@ -127,9 +116,8 @@ impl Station {
         let (late, settling) = if stop && entry.work.is_write {
             (None, None)
         } else {
-            let settling = wants_settling(exchange, entry).then(|| self.harmless_read());
-            let late = |request: &Request<'_>| self.late_until(exchange, request);
-            (late(&entry.work.request), settling.and_then(|read| late(&read)))
+            let settling = wants_settling(exchange, entry).then(|| shape_of(exchange, &self.harmless_read()));
+            (self.place(now, entry).1, settling.and_then(|shape| self.doubt.wait(now, shape)))
         };
         [late, settling, offline].into_iter().flatten().max().filter(|until| *until > now)
     }
@@ -144,24 +132,6 @@ impl Station {
         self.offline.is_some_and(|offline| offline.stopped_in_vain)
     }
 
-    /// Whether an answer of any kind may still come.
-    pub(super) fn may_be_late(&self, now: Instant) -> bool {
-        self.late.iter().any(|late| late.until > now)
-    }
-
-    /// An intact frame of this slave came outside an exchange with it. True: it was a late answer.
-    pub(super) fn came_late(&mut self, kind: u8) -> bool {
-        if !self.late.iter().any(|late| late.kind == kind) {
-            return false;
-        }
-        // What was waited for has come: one thing less to be afraid of.
-        if let Some(index) = self.late.iter().position(|late| late.kind == kind && !late.over_a_lost_port) {
-            self.late.remove(index);
-        }
-        self.stats.late += 1;
-        true
-    }
-
     /// It did not answer. True: it goes off-line with this.
     pub(super) fn missed(&mut self, now: Instant, config: &LineConfig) -> bool {
         self.timeout.missed();
@@ -169,13 +139,18 @@ impl Station {
         let (first, longest) = config.probe_backoff;
         match &mut self.offline {
             Some(offline) => {
+                offline.missed_at = now;
                 offline.backoff = offline.backoff.saturating_mul(2).min(longest);
                 offline.probe_at = now + offline.backoff;
                 false
             }
             None if config.offline_after > 0 && self.failures >= config.offline_after => {
-                self.offline =
-                    Some(Offline { probe_at: now + first, backoff: first, stopped_in_vain: false });
+                self.offline = Some(Offline {
+                    missed_at: now,
+                    probe_at: now + first,
+                    backoff: first,
+                    stopped_in_vain: false,
+                });
                 self.stats.offline = true;
                 self.stats.went_offline += 1;
                 true
@@ -187,12 +162,18 @@ impl Station {
     /// When it is off-line: when it is asked next.
     pub(super) fn probe_at(&self) -> Option<Instant> {
         let offline = self.offline?;
-        Some(self.late.iter().map(|late| late.until).fold(offline.probe_at, Instant::max))
+        Some(self.doubt.over().map_or(offline.probe_at, |over| over.max(offline.probe_at)))
     }
 
-    /// [`probe_at`](Self::probe_at), as long as somebody cares.
-    pub(super) fn wanted_probe_at(&self) -> Option<Instant> {
-        let at = self.probe_at()?;
+    /// [`probe_at`](Self::probe_at), as long as somebody cares. On an `idle` line no probe waits longer than the first.
+    pub(super) fn wanted_probe_at(&self, idle: bool, config: &LineConfig) -> Option<Instant> {
+        let at = match self.offline? {
+            offline if idle => {
+                let at = offline.probe_at.min(offline.missed_at + config.probe_backoff.0);
+                self.doubt.over().map_or(at, |over| over.max(at))
+            }
+            _ => self.probe_at()?,
+        };
         self.asked.is_some_and(|asked| at <= asked + INTEREST).then_some(at)
     }
 
@@ -202,6 +183,11 @@ impl Station {
             offline.probe_at = at;
         }
     }
+}
+
+/// The shape of the answer to `request`.
+pub(super) fn shape_of(exchange: &dyn Exchange, request: &Request<'_>) -> Shape {
+    exchange.shape(&pdu::encode(request).unwrap_or_default())
 }
 
 /// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.

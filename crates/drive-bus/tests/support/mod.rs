@@ -7,6 +7,7 @@ pub(crate) mod rig;
 pub(crate) mod script;
 pub(crate) mod server;
 pub(crate) mod telway;
+pub(crate) mod truth;
 pub(crate) mod unitelway;
 
 use std::time::Duration;
@@ -62,6 +63,8 @@ impl Peer {
 
     /// Bytes on the line, one by one, as a UART delivers them.
     pub(crate) async fn one_by_one(&mut self, bytes: &[u8]) {
+        // The slave begins when it has heard the request.
+        sleep_until(self.last.unwrap_or_else(Instant::now)).await;
         for byte in bytes {
             sleep(characters(1)).await;
             self.stream.write_all(&[*byte]).await.unwrap();

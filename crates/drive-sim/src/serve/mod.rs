@@ -89,7 +89,7 @@ impl SimLine {
         let (master, slaves) = tokio::io::duplex(MEMORY);
         let wire = self.wiring().wire(false);
         // Detached: it ends by itself with the master's end.
-        drop(tokio::spawn(wired::serve(self.shared().clone(), slaves, timer, wire)));
+        drop(tokio::spawn(wired::serve(self.shared().clone(), slaves, timer, wire, || true)));
         master
     }
 
@@ -97,15 +97,19 @@ impl SimLine {
     /// link that is there already is replaced; anything else at that path is an error. The link goes with the
     /// [`Serving`].
     ///
-    /// A pty has no speed and no parity: the line paces by itself and takes whatever a master sets.
+    /// A pty does not pace and has no parity: the line paces by itself and takes whatever format a master sets. The speed
+    /// it tells: a master that has set another than the line's is not understood, unless the line is unpaced.
     ///
     /// # Errors
     /// No pty can be had, or the link cannot be made.
     #[cfg(unix)]
     pub fn serve_pty(&self, link: impl Into<std::path::PathBuf>) -> io::Result<Serving> {
-        let (port, pty) = pty::open(link.into())?;
+        let (port, kept, pty) = pty::open(link.into())?;
         let wire = self.wiring().wire(false);
-        let task = tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire));
+        let (baud, unpaced) = (self.wiring().settings.baud(), self.wiring().unpaced);
+        let is_understood = move || unpaced || kept.is_set_to(baud);
+        let task =
+            tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire, is_understood));
         let mut serving = Serving::new(task);
         serving.pty = Some(pty);
         Ok(serving)
@@ -130,7 +134,13 @@ impl SimLine {
             .flow_control(FlowControl::None)
             .open_native_async()?;
         let wire = self.wiring().wire(true);
-        Ok(Serving::new(tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire))))
+        Ok(Serving::new(tokio::spawn(wired::serve(
+            self.shared().clone(),
+            port,
+            Timer::precise(),
+            wire,
+            || true,
+        ))))
     }
 
     /// Serves masters that speak the line's protocol over TCP, as a serial server does: one connection at a time,

@@ -12,9 +12,17 @@ use tokio_serial::{SerialPort, SerialStream};
 pub(super) struct Pty {
     link: PathBuf,
     device: String,
-    /// Never used, but open: while it is, a master that closes the device does not end it, and reading our side does
-    /// not fail.
-    _kept: SerialStream,
+}
+
+/// The slave side, kept open: while it is, a master that closes the device does not end it, and reading our side does not
+/// fail. It tells the speed that the master has set.
+pub(super) struct Kept(SerialStream);
+
+impl Kept {
+    /// Whether a master that has set this speed is understood.
+    pub(super) fn is_set_to(&self, baud: u32) -> bool {
+        self.0.baud_rate().is_ok_and(|set| set == baud)
+    }
 }
 
 impl Pty {
@@ -33,7 +41,7 @@ impl Drop for Pty {
 }
 
 /// Opens a pty in raw mode and links to it: our side, and what keeps it.
-pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Pty)> {
+pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Kept, Pty)> {
     let (ours, kept) = SerialStream::pair()?;
     let device = kept.name().ok_or_else(|| io::Error::other("the pty has no name"))?;
     match fs::symlink_metadata(&link) {
@@ -46,5 +54,5 @@ pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Pty)> {
     }
     symlink(&device, &link)
         .map_err(|error| io::Error::new(error.kind(), format!("cannot link {}: {error}", link.display())))?;
-    Ok((ours, Pty { link, device, _kept: kept }))
+    Ok((ours, Kept(kept), Pty { link, device }))
 }

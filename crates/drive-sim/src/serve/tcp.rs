@@ -28,7 +28,8 @@ pub(super) async fn serve_rtu(line: SimLine, listener: TcpListener) -> io::Resul
         hurry(&stream);
         let wire = line.wiring().wire(false);
         // A broken connection ends that master's service, not the line's.
-        if let Err(error) = wired::serve(line.shared().clone(), stream, Timer::precise(), wire).await {
+        if let Err(error) = wired::serve(line.shared().clone(), stream, Timer::precise(), wire, || true).await
+        {
             tracing::debug!(%error, "connection lost");
         }
     }

@@ -13,12 +13,13 @@ use crate::{
     wire::{Step, Wire},
 };
 
-/// Serves one master until its end of the port closes.
+/// Serves one master until its end of the port closes. What comes while it is not understood is nothing to the slaves.
 pub(super) async fn serve(
     shared: Arc<Shared>,
     mut port: impl AsyncRead + AsyncWrite + Unpin,
     mut timer: Timer,
     mut wire: Wire,
+    is_understood: impl Fn() -> bool,
 ) -> io::Result<()> {
     let mut wakes = shared.wakes();
     let mut buffer = [0; 512];
@@ -39,6 +40,9 @@ pub(super) async fn serve(
             read = port.read(&mut buffer) => {
                 let now = Instant::now();
                 let Some(bytes) = buffer.get(..read?).filter(|bytes| !bytes.is_empty()) else { return Ok(()) };
+                if !is_understood() {
+                    continue;
+                }
                 wire.receive(now, bytes, &mut shared.lock());
                 shared.has_changed();
             }

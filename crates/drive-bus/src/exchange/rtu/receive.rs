@@ -11,9 +11,13 @@ use crate::{
     answer::{self, Extent},
     exchange::{
         Failure, Step, Stray,
-        echo::{EchoState, MAYBE_ECHO},
+        echo::{Echo, EchoState, MAYBE_ECHO},
     },
+    shape::Shape,
 };
+
+/// How many bits of an echo may change before it is no echo any more.
+const FEW_BITS: u32 = 8;
 
 /// What stands at one place of what was received.
 enum Found {
@@ -26,14 +30,14 @@ enum Found {
 
 impl Rtu {
     /// Looks at what was received, after more of it came.
-    pub(super) fn examine(&mut self) -> Step {
+    pub(super) fn examine(&mut self, now: Instant) -> Step {
         loop {
-            if self.take_echo() {
+            if self.take_echo(now) {
                 continue;
             }
             let Some(current) = &mut self.current else { return Step::More };
             current.ends_with_silence = false;
-            let found = (0..self.received.len()).find_map(|offset| {
+            let found = (self.early..self.received.len()).find_map(|offset| {
                 match look(current, self.received.get(offset..).unwrap_or_default()) {
                     Found::Frame(len) => Some((offset, len)),
                     Found::Beginning | Found::Nothing => None,
@@ -41,33 +45,43 @@ impl Rtu {
             });
             let Some((offset, len)) = found else { return Step::More };
             self.judge(offset);
-            if let Some(step) = self.accept(len) {
+            if let Some(step) = self.accept(now, len) {
                 return step;
             }
         }
     }
 
     /// What was received begins with a frame of this length that has the form of the answer.
-    fn accept(&mut self, len: usize) -> Option<Step> {
+    fn accept(&mut self, now: Instant, len: usize) -> Option<Step> {
+        let is_early = self.pace.is_early(now, len);
         let current = self.current.as_mut()?;
         // An echo would have come first. Where something came first and was not understood, that may have been it.
         let came_first = current.received == self.received.len();
-        let frame = self.received.get(..len)?;
-        let equals = *frame == self.sent;
-        let pdu = Bytes::copy_from_slice(frame.get(1..len.saturating_sub(2))?);
-        self.received.drain(..len);
-        if equals && self.echo == EchoState::Present && !current.echo_taken {
+        let equals = self.received.get(..len)? == self.sent;
+        let pdu = Bytes::copy_from_slice(self.received.get(1..len.saturating_sub(2))?);
+        self.drop_first(len);
+        let current = self.current.as_mut()?;
+        if equals && !current.echo_taken && (is_early || self.echo == EchoState::Present) {
             current.echo_taken = true;
             self.strays.push(Stray::Echo);
+            return None;
+        }
+        if is_early {
+            self.strays.push(Stray::Early { slave: current.slave, shape: Shape::heard(&pdu) });
             return None;
         }
         if equals && self.echo == EchoState::Unknown && current.slave != 0 {
             current.misfit = Some("an echo could not be told from it".to_owned());
             return None;
         }
-        match answer::check(&current.request, pdu) {
+        match answer::check(&current.request, pdu.clone()) {
             Ok(answer) => {
-                if self.echo == EchoState::Unknown && came_first && !equals {
+                if self.another_follows(&pdu) {
+                    self.judge(self.received.len());
+                    self.current = None;
+                    return Some(Step::Done(Err(Failure::Mismatch("two answers that differ".to_owned()))));
+                }
+                if came_first && !equals && self.may_be_silent() {
                     self.echo = EchoState::Absent;
                 }
                 self.judge(self.received.len());
@@ -81,10 +95,36 @@ impl Rtu {
         }
     }
 
-    /// Takes our own request away where it stands at the beginning of what was received. True: look again.
-    fn take_echo(&mut self) -> bool {
+    /// Whether an answer without an echo before it tells that the adapter does not echo. One that has echoed once may do it
+    /// again; where time tells an echo from an answer that does no harm.
+    fn may_be_silent(&self) -> bool {
+        self.echo == EchoState::Unknown || self.pace.proves() && self.configured != Echo::On
+    }
+
+    /// Whether an answer that says something else came together with this one, so that none can be told to be the right one.
+    fn another_follows(&mut self, pdu: &[u8]) -> bool {
         let Some(current) = &mut self.current else { return false };
-        if current.echo_taken || !self.received.starts_with(&self.sent) {
+        (0..self.received.len()).any(|offset| {
+            let rest = self.received.get(offset..).unwrap_or_default();
+            matches!(look(current, rest), Found::Frame(len) if rest.get(1..len - 2) != Some(pdu))
+        })
+    }
+
+    /// Forgets the first `len` bytes of what was received.
+    fn drop_first(&mut self, len: usize) -> Vec<u8> {
+        let len = len.min(self.received.len());
+        self.early = self.early.saturating_sub(len);
+        self.received.drain(..len).collect()
+    }
+
+    /// Takes our own request away where it stands at the beginning of what was received. True: look again.
+    fn take_echo(&mut self, now: Instant) -> bool {
+        // An adapter that is known to be silent may echo all the same, but in its time: later it is another master that
+        // asks for the same.
+        let in_time =
+            !self.pace.proves() || self.echo != EchoState::Absent || self.pace.is_early(now, self.sent.len());
+        let Some(current) = &mut self.current else { return false };
+        if current.echo_taken || !in_time || !self.received.starts_with(&self.sent) {
             return false;
         }
         // Of a request that its answer may equal, only an adapter that is known to echo gives an echo. Nobody answers a
@@ -97,7 +137,7 @@ impl Rtu {
         }
         current.echo_taken = true;
         self.echo = EchoState::Present;
-        self.received.drain(..self.sent.len());
+        self.drop_first(self.sent.len());
         self.strays.push(Stray::Echo);
         true
     }
@@ -107,10 +147,11 @@ impl Rtu {
         if len == 0 {
             return false;
         }
-        let dropped: Vec<u8> = self.received.drain(..len.min(self.received.len())).collect();
+        let early = self.early;
+        let dropped = self.drop_first(len);
         let mut rest = dropped.as_slice();
         let mut garbled = 0;
-        while let [slave, function, ..] = *rest {
+        while let [slave, _, ..] = *rest {
             match shortest_frame(rest) {
                 // The echo of a request that was given up while it was sent is no late answer.
                 Some(len) if self.echo != EchoState::Absent && rest.get(..len) == Some(&self.sent) => {
@@ -118,11 +159,21 @@ impl Rtu {
                     rest = rest.get(len..).unwrap_or_default();
                 }
                 Some(len) => {
-                    let ours = self.current.as_mut().filter(|current| current.slave == slave);
-                    if let Some(current) = ours {
-                        current.misfit.get_or_insert_with(|| "an answer to another request".to_owned());
+                    let pdu = rest.get(1..len - 2).unwrap_or_default();
+                    let is_early = dropped.len() - rest.len() < early;
+                    match self.current.as_mut().filter(|current| current.slave == slave) {
+                        Some(_) if is_early && !Shape::is_request(pdu) => {
+                            self.strays.push(Stray::Early { slave, shape: Shape::heard(pdu) });
+                        }
+                        ours => {
+                            if let Some(current) = ours {
+                                current
+                                    .misfit
+                                    .get_or_insert_with(|| "an answer to another request".to_owned());
+                            }
+                            self.strays.push(Stray::frame(slave, pdu));
+                        }
                     }
-                    self.strays.push(Stray::Frame { slave, function });
                     rest = rest.get(len..).unwrap_or_default();
                 }
                 None => {
@@ -148,21 +199,29 @@ impl Rtu {
             });
             if let Some(offset) = whole {
                 self.judge(offset);
-                if let Some(step) = self.accept(self.received.len()) {
+                if let Some(step) = self.accept(now, self.received.len()) {
                     return step;
                 }
             }
         }
-        let resembled = self.current.as_ref().is_some_and(|current| current.resembles(&self.received));
+        let answer = self.received.get(self.early..).unwrap_or_default();
+        let is_early = self.last_byte.is_some_and(|last| self.pace.is_early(last, answer.len()));
+        let resembled = !is_early && self.current.as_ref().is_some_and(|current| current.resembles(answer));
+        // An answer that equals its request looks like its echo, damaged, where time does not tell them apart.
+        let may_be_echo = self.current.as_ref().is_some_and(|current| {
+            let told_by_time = self.pace.proves() && answer::equals_its_request(&current.request);
+            !current.echo_taken
+                && (self.echo != EchoState::Absent && resembled
+                    || is_like(&self.sent, &self.received) && !(told_by_time && resembled))
+        });
         let garbled = self.judge(self.received.len());
         let Some(current) = &mut self.current else { return Step::More };
-        if garbled && resembled {
-            if self.echo == EchoState::Absent || current.echo_taken {
-                self.current = None;
-                return Step::Done(Err(Failure::Damaged("CRC")));
-            }
+        if garbled && may_be_echo {
             // To ask again behind an echo that was damaged would leave the answer to this request for the next one.
             current.misfit.get_or_insert_with(|| MAYBE_ECHO.to_owned());
+        } else if garbled && resembled {
+            self.current = None;
+            return Step::Done(Err(Failure::Damaged("CRC")));
         }
         if current.answer_by.is_some_and(|by| now >= by) { self.fail() } else { Step::More }
     }
@@ -172,9 +231,15 @@ impl Current {
     /// Whether these bytes are this exchange's answer, damaged: they begin as it does. Anything else may be somebody
     /// else's damaged frame, with the answer still to come; to ask again then would leave one answer too many.
     fn resembles(&self, bytes: &[u8]) -> bool {
-        matches!(*bytes, [slave, function, ..]
-            if slave == self.slave && function & 0x7F == self.request.function_code().value())
+        let Some((&slave, pdu)) = bytes.split_first() else { return false };
+        slave == self.slave && pdu.len() > 1 && !matches!(answer::extent(&self.request, pdu), Extent::Never)
     }
+}
+
+/// Whether `bytes` are what was sent with a few bits changed, or a part of it.
+fn is_like(sent: &[u8], bytes: &[u8]) -> bool {
+    let differ: u32 = sent.iter().zip(bytes).map(|(sent, got)| (sent ^ got).count_ones()).sum();
+    bytes.len() <= sent.len() && differ <= FEW_BITS
 }
 
 /// What stands at the beginning of `bytes`.

@@ -11,7 +11,10 @@ use super::{
     settings::{LEFTOVERS, POLL_LEN},
     stage::{Next, Stage, Then, Wanted},
 };
-use crate::exchange::{Failure, Step, Stray};
+use crate::{
+    exchange::{Failure, Step, Stray},
+    shape::Shape,
+};
 
 /// Why a reply that fits its request is not taken.
 const DOUBTED: &str = "the confirmation may belong to an earlier request";
@@ -93,7 +96,7 @@ impl UniTelway {
             Some(Ok(unite)) => unite.first().copied().unwrap_or_default(),
             _ => message.first().copied().unwrap_or_default(),
         };
-        let stray = Stray::Frame { slave: address, function };
+        let stray = Stray::Frame { slave: address, function, shape: Shape::ANY, is_request: false };
         let current = self.current.as_mut().filter(|current| current.slave == address);
         let Some((current, wanted)) = current.and_then(|current| match current.stage {
             Stage::Polling(wanted) => Some((current, wanted)),

@@ -1,0 +1,162 @@
+//! What may still come from one slave, and what its next request therefore waits for or differs in.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::{config::DOUBLE, shape::Shape};
+
+/// How long anything strange is remembered.
+const MEMORY: Duration = Duration::from_secs(60);
+
+/// How many shapes are remembered.
+const MOST: usize = 16;
+
+/// What is known of the answers of one slave: which are owed, which came unasked, and which came last.
+#[derive(Debug, Default)]
+pub(super) struct Doubt {
+    known: Vec<Known>,
+    strange_until: Option<Instant>,
+    held_until: Option<Instant>,
+}
+
+/// One shape that a coming answer should not have.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    shape: Shape,
+    /// A request whose answer can only have this shape waits until then.
+    wait: Instant,
+    /// One whose answer can have another shape rather takes another until then.
+    avoid: Instant,
+    /// Such an answer will come to somebody: it is owed to us, or another master asks for it. Any other shape is better.
+    will_come: bool,
+    /// Such an answer is owed and has not come.
+    owed: bool,
+    /// Something else was written since.
+    overtaken: bool,
+    /// Its port was lost. What comes over the next one may be anything that the last one left behind, also an echo, so
+    /// that no frame proves that this answer has come.
+    over_a_lost_port: bool,
+}
+
+impl Doubt {
+    /// An answer of this shape may still come until `until`, and hardly after it.
+    pub(super) fn owe(&mut self, now: Instant, shape: Shape, until: Instant, over_a_lost_port: bool) {
+        self.strange_until = Some(now + MEMORY);
+        let avoid = until.max(now + MEMORY);
+        self.remember(Known {
+            shape,
+            wait: until,
+            avoid,
+            will_come: true,
+            owed: true,
+            overtaken: false,
+            over_a_lost_port,
+        });
+    }
+
+    /// An intact frame came that was no answer to what was asked, or another master's request for one. True: it was owed.
+    pub(super) fn heard(&mut self, now: Instant, shape: Shape, is_request: bool) -> bool {
+        self.strange_until = Some(now + MEMORY);
+        let is_it = |known: &Known| {
+            known.owed && !is_request && (known.shape == shape || shape.is_refusal_of(known.shape))
+        };
+        let was_owed = self.known.iter().any(is_it);
+        if let Some(index) = self.known.iter().position(|known| is_it(known) && !known.over_a_lost_port) {
+            // What was waited for has come: one thing less to be afraid of.
+            self.known.remove(index);
+        }
+        if shape != Shape::ANY {
+            let heard = Known::come(shape, now + DOUBLE, now + MEMORY);
+            self.remember(Known { will_come: is_request, ..heard });
+        }
+        was_owed
+    }
+
+    /// An answer of this shape was taken. It may come twice within `double`. A protocol without shapes has its own proofs.
+    pub(super) fn answered(&mut self, now: Instant, shape: Shape, double: Duration) {
+        if shape == Shape::ANY {
+            return;
+        }
+        self.known.retain(|known| known.avoid > now && (known.shape != shape || known.will_come));
+        let strange = self.is_strange(now);
+        let wait = if strange { now + DOUBLE } else { now };
+        self.remember(Known::come(shape, wait, now + if strange { MEMORY } else { double }));
+    }
+
+    /// Anything may have come meanwhile: nothing is asked until `until`.
+    pub(super) fn hold(&mut self, now: Instant, until: Instant) {
+        self.strange_until = Some(now + MEMORY);
+        self.held_until = Some(until);
+    }
+
+    /// Until when a request waits whose answer can only have this shape.
+    pub(super) fn wait(&self, now: Instant, shape: Shape) -> Option<Instant> {
+        let same = self.known.iter().filter(|known| known.shape == shape).map(|known| known.wait);
+        same.chain(self.held_until).max().filter(|until| *until > now)
+    }
+
+    /// Which of these shapes tells its answer best from what may come, and until when a request for it waits.
+    pub(super) fn best(
+        &self,
+        now: Instant,
+        shapes: impl Iterator<Item = Shape>,
+    ) -> Option<(usize, Option<Instant>)> {
+        let rate = |shape: Shape| {
+            let same =
+                self.known.iter().enumerate().filter(|(_, known)| known.shape == shape && known.avoid > now);
+            let will_come =
+                same.clone().filter(|(_, known)| known.will_come).map(|(_, known)| known.avoid).max();
+            let came = same.map(|(order, known)| (known.avoid, order)).max();
+            (will_come, self.wait(now, shape), came)
+        };
+        let rated = shapes.map(rate).enumerate();
+        rated.min_by_key(|(_, rating)| *rating).map(|(index, (_, wait, _))| (index, wait))
+    }
+
+    /// Whether the confirmation of a write with this shape may be that of an earlier one and prove nothing: something else was
+    /// written between the two, or nobody knows what came meanwhile.
+    pub(super) fn owes(&self, now: Instant, shape: Shape) -> bool {
+        let held = self.held_until.is_some_and(|until| until > now);
+        self.owed(now).any(|known| known.shape == shape && (known.overtaken || held))
+    }
+
+    /// Something is written, whose confirmation has this shape.
+    pub(super) fn written(&mut self, shape: Shape) {
+        for known in &mut self.known {
+            known.overtaken |= known.shape != shape;
+        }
+    }
+
+    /// Whether the refusal of what has this shape may be that of an earlier request.
+    pub(super) fn owes_refusal(&self, now: Instant, shape: Shape) -> bool {
+        self.owed(now).any(|known| known.shape.shares_refusals_with(shape))
+    }
+
+    /// Until when anything may come.
+    pub(super) fn over(&self) -> Option<Instant> {
+        let owed = self.known.iter().filter(|known| known.owed).map(|known| known.wait);
+        owed.chain(self.held_until).max()
+    }
+
+    fn owed(&self, now: Instant) -> impl Iterator<Item = &Known> {
+        self.known.iter().filter(move |known| known.owed && known.wait > now)
+    }
+
+    fn is_strange(&self, now: Instant) -> bool {
+        self.strange_until.is_some_and(|until| until > now)
+    }
+
+    fn remember(&mut self, known: Known) {
+        if self.known.len() >= MOST {
+            self.known.remove(0);
+        }
+        self.known.push(known);
+    }
+}
+
+impl Known {
+    const fn come(shape: Shape, wait: Instant, avoid: Instant) -> Self {
+        Self { shape, wait, avoid, will_come: false, owed: false, overtaken: false, over_a_lost_port: false }
+    }
+}
