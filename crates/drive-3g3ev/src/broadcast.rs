@@ -15,6 +15,8 @@ use crate::{broadcast_command, registers::REFERENCE, words::BroadcastCommand};
 
 /// Words of the reference per hundredth of a percent: 30000 for 10000.
 const COUNTS: i32 = 3;
+/// The reference of 100 %.
+const FULL: u16 = 30_000;
 
 /// Every drive stops, in the way that it is set to.
 #[must_use]
@@ -46,9 +48,9 @@ pub const fn fault_reset() -> [BroadcastWrite; 2] {
     [broadcast_command(BroadcastCommand::FAULT_RESET.bits()), stop()]
 }
 
-/// Every drive takes this reference. `None` when it is negative or the register cannot hold it.
+/// Every drive takes this reference. `None` when it is negative or above 100 %.
 #[must_use]
 pub fn reference(share: Percent) -> Option<BroadcastWrite> {
-    let value = share.hundredths().checked_mul(COUNTS)?.try_into().ok()?;
+    let value = share.hundredths().checked_mul(COUNTS)?.try_into().ok().filter(|counts| *counts <= FULL)?;
     Some(BroadcastWrite { function: 0x10, register: REFERENCE.address(), value })
 }

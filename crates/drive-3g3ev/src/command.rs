@@ -1,20 +1,42 @@
-//! Start and stop: what is written to 0001h, and how it is seen to act.
+//! Start, stop and withdrawal: what is written to 0001h, and how it is seen to be in force.
+
+use std::time::Duration;
 
 use drive_core::{
-    Class, Command as Order, Control, Direction, Error, Port, RawWord, Refusal, Result, State, Status,
-    StopMode,
+    Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Port, RawWord, Refusal,
+    Result, State, Status, StopMode, Stopped,
 };
+use tokio::time::Instant;
 
 use crate::{
     Drive3g3ev,
-    registers::COMMAND,
+    registers::address,
     words::{Command, DriveState, Signals},
 };
 
-/// How often the drive is read until it shows what was ordered.
-pub(crate) const READS: usize = 20;
-/// How often a stop is written again where a run command has come after it.
-const REPEATS: usize = 2;
+/// How long the drive may take to show a word that it holds in its other words, before what they show counts.
+pub(crate) const SETTLED_WITHIN: Duration = Duration::from_millis(250);
+
+pub(crate) const OTHER_COMMAND: Refusal = Refusal::Overridden {
+    by: "the panel or the terminals (run command, bit A of 002Ch)",
+    remedy: "give the command back at the panel, or set n02 = 5, save it, and switch the drive off and on",
+};
+pub(crate) const LOCAL_REFERENCE: Refusal = Refusal::Overridden {
+    by: "the panel or the terminals (reference, bit 9 of 002Ch)",
+    remedy: "give the reference back at the panel, or set n02 = 5, save it, and switch the drive off and on",
+};
+pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
+    by: "another reference than that of 0002h (0023h shows it)",
+    remedy: "give the setpoint again, and see to the inputs that choose a speed (n06 to n08)",
+};
+const OTHER_WORD: Refusal = Refusal::Overridden {
+    by: "another command word in 0001h than was written",
+    remedy: "see who else writes to this drive",
+};
+const OUTPUT_OFF: Refusal = Refusal::Overridden {
+    by: "something that keeps the output off (bit 8 of 002Ch)",
+    remedy: "see to the inputs (n06 to n08)",
+};
 
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
@@ -24,105 +46,208 @@ impl<P: Port> Drive3g3ev<P> {
             let reason = status.fault_code.map_or(Refusal::Tripped, Refusal::Fault);
             return Err(self.refused(order, reason));
         }
-        self.check_run_source(order).await?;
         self.check_direction(order, direction).await?;
-        if let Some(control) = status.control
-            && control != Control::Bus
-        {
-            return Err(self.refused(order, Refusal::NotInControl(control)));
+        if let Some(reason) = commanded_by_other(&status) {
+            return Err(self.refused(order, reason));
         }
         if status.state == State::NotReady {
             return Err(self.refused(order, Refusal::State(State::NotReady)));
         }
-        self.write_command(Class::Command, Command::run(direction)).await?;
-        self.see_start(direction).await.map_err(Error::after_write)
-    }
-
-    /// Reads until the drive runs under the bus and holds the run command.
-    async fn see_start(&mut self, direction: Direction) -> Result<Status> {
-        let mut shown = Status::default();
-        for _ in 0..READS {
-            shown = self.read_status(Class::Command).await?;
-            if shown.is_fault() {
-                break;
-            }
-            if is_run(&shown) && shown.control == Some(Control::Bus) {
-                // RUN is the drive's, the direction may still be the old one: the order itself must stand too.
-                shown.raw.push(self.read_command(Class::Command).await?);
-                if self.command == Some(Command::run(direction)) {
-                    return Ok(shown);
+        if self.command.is_none() {
+            self.read_command(Class::Command).await?;
+        }
+        let word = Command::run(direction) | self.inputs();
+        self.given = Some(word);
+        match self.write_command(word).await {
+            Ok(()) => {}
+            // What was refused may be a repetition of what was carried out.
+            Err(error @ Error::Exception { .. }) => {
+                if self.read_command(Class::Command).await.map_err(Error::after_write)?.value != word.bits() {
+                    return Err(error);
                 }
-                break;
             }
+            Err(error) => return Err(error),
         }
-        Err(self.not_confirmed(Order::Start(direction), shown))
+        self.see_start(direction, word).await.map_err(Error::after_write)
     }
 
-    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        if mode != StopMode::Ramp {
-            return Err(Error::Unsupported {
-                what: "this stop mode",
-                reason: "the bus has one stop, a run command of 0; how the motor stops is a setting of the drive",
-            });
+    /// Reads until the run command is in force: 0001h holds it, bits 9 and A of 002Ch name the bus, the drive runs in that
+    /// direction with its output on, and 0023h is the reference of 0002h. A motor that turned the other way slows down
+    /// first: it is on its way, and the status tells the direction in which it still turns.
+    async fn see_start(&mut self, direction: Direction, word: Command) -> Result<Status> {
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let mut first = None;
+        loop {
+            let (status, because) = match self.look_at_start(word).await {
+                Ok(seen) => seen,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            let output = status.raw(address::OUTPUT_FREQUENCY);
+            let directed = status.direction == Some(direction) || output < first;
+            if because.is_none() && is_run(&status) && directed {
+                return Ok(status);
+            }
+            first = first.or(output);
+            let over = because.is_some() && (status.is_fault() || Instant::now() >= settled);
+            if over || !confirming.again().await {
+                return Err(self.not_confirmed(Order::Start(direction), status, because));
+            }
         }
-        self.write_command(Class::Stop, Command::empty()).await?;
-        self.see_stop(mode).await.map_err(Error::after_write)
     }
 
-    /// Reads until 0001h holds no run command after all that the drive shows: the confirmation of function 10h tells no
-    /// value, so it may be that of a start that was late, and the start itself may come later still. Then the stop is
-    /// written again.
-    async fn see_stop(&mut self, mode: StopMode) -> Result<Status> {
-        let mut repeats = 0;
-        let mut shown = Status::default();
-        for _ in 0..READS {
-            shown = self.read_status(Class::Stop).await?;
-            if shown.raw(COMMAND.address()).is_none() {
-                shown.raw.push(self.read_command(Class::Stop).await?);
-            }
-            if self.command.is_none_or(|held| held.contains(Command::RUN)) {
-                if repeats == REPEATS {
-                    break;
+    /// What the drive shows of the run command `word`: its status, and what decides instead. 0001h is read after all else,
+    /// so that no stop of somebody else's is hidden.
+    async fn look_at_start(&mut self, word: Command) -> Result<(Status, Option<Refusal>)> {
+        let mut status = self.read_status(Class::Command).await?;
+        let mut because = commanded_by_other(&status);
+        if because.is_none() && is_run(&status) {
+            because = self.not_in_force(&status).await?;
+        }
+        status.raw.push(self.read_command(Class::Command).await?);
+        if status.is_fault() {
+            because = Some(Refusal::Tripped);
+        } else if self.command != Some(word) {
+            because = Some(OTHER_WORD);
+        }
+        Ok((status, because))
+    }
+
+    /// The status, and after all that it shows 0001h.
+    async fn status_and_command(&mut self) -> Result<Status> {
+        let mut status = self.read_status(Class::Command).await?;
+        status.raw.push(self.read_command(Class::Command).await?);
+        Ok(status)
+    }
+
+    /// What keeps the reference of the bus from reaching the motor of a drive that runs.
+    async fn not_in_force(&mut self, status: &Status) -> Result<Option<Refusal>> {
+        let reference = self.registers.at(Class::Command).read_word(address::REFERENCE).await?;
+        let seen = status.raw(address::REFERENCE_SEEN).unwrap_or(0);
+        if !self.is_same_reference(seen, reference).await? {
+            return Ok(Some(OTHER_REFERENCE));
+        }
+        let off = state_word(status).contains(DriveState::OUTPUT_OFF) && reference != 0;
+        Ok(off.then_some(OUTPUT_OFF))
+    }
+
+    pub(crate) async fn stop_motor(&mut self, asked: StopMode) -> Result<Stopped> {
+        let mode = StopMode::Ramp;
+        let instead =
+            (asked != mode).then_some("the bus has one stop: the drive stops in the way that it is set to");
+        // What became of it, the reading tells.
+        self.write_stop().await?.ok();
+        let (mut confirming, mut settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let mut first = None;
+        let (status, because, sent) = loop {
+            let mut status = match self.status_and_command().await {
+                Ok(status) => status,
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error.after_write()),
+            };
+            let revoked = self.command.is_none_or(|held| held.contains(Command::RUN));
+            let runs = is_run(&status) && !status.is_fault();
+            let local = status.control != Some(Control::Bus);
+            let output = status.raw(address::OUTPUT_FREQUENCY);
+            let comes_down = output == Some(0) || output < first;
+            let (mut because, mut sent) = (None, Ok(()));
+            if revoked {
+                // The confirmation of function 10h tells no value: it may be that of a start that was late, and the start
+                // itself may come later still.
+                because = Some(OTHER_WORD);
+                sent = self.write_stop().await.map_err(Error::after_write)?;
+                settled = Instant::now() + SETTLED_WITHIN;
+            } else if runs && local {
+                because = Some(OTHER_COMMAND);
+            } else if !runs || comes_down {
+                // RUN may stand until the motor does: it is on its way when the order stands and the output goes down.
+                if status.state == State::Running {
+                    status.state = State::Stopping;
                 }
-                self.write_command(Class::Stop, Command::empty()).await?;
-                repeats += 1;
-            } else if !is_run(&shown) || shown.control == Some(Control::Bus) {
-                // RUN may stand until the motor does: it is on its way when the order stands and the bus commands.
-                return Ok(shown);
+                return Ok(Stopped { instead, ..Stopped::by(mode, status) });
             }
+            first = first.or(output);
+            let over = because.is_some() && !revoked && Instant::now() >= settled;
+            if over || !confirming.again().await {
+                break (status, because, sent);
+            }
+        };
+        sent?;
+        Err(self.not_confirmed(Order::Stop(asked), status, because))
+    }
+
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
+        let ours = self.given == Some(held) || commanded_by_other(&status) == Some(OTHER_COMMAND);
+        if !held.contains(Command::RUN) || !ours {
+            return Ok(status);
         }
-        Err(self.not_confirmed(Order::Stop(mode), shown))
+        self.write_command(held - Command::RUN).await?;
+        let status = self.status_and_command().await.map_err(Error::after_write)?;
+        if self.command.is_none_or(|held| held.contains(Command::RUN)) {
+            return Err(self.not_confirmed(Order::Withdraw, status, Some(OTHER_WORD)));
+        }
+        self.given = None;
+        Ok(status)
     }
 
     /// Writes 0001h and remembers the word; while the outcome is not known, none is.
-    pub(crate) async fn write_command(&mut self, class: Class, command: Command) -> Result<()> {
+    pub(crate) async fn write_command(&mut self, command: Command) -> Result<()> {
         self.command = None;
-        self.registers.at(class).write(COMMAND, command.bits()).await?;
+        self.registers.at(Class::Command).write(crate::registers::COMMAND, command.bits()).await?;
         self.command = Some(command);
         Ok(())
     }
 
-    /// Reads 0001h back.
-    pub(crate) async fn read_command(&mut self, class: Class) -> Result<RawWord> {
-        let value = self.registers.at(class).read(COMMAND).await?;
-        self.command = Some(Command::from_bits_retain(value));
-        Ok(RawWord { address: COMMAND.address(), code: COMMAND.row().code, value })
+    /// Writes a run command of 0, with the inputs as the drive held them last. That the drive refuses it, or that nobody
+    /// knows whether it arrived, is given back: what the drive shows tells more.
+    async fn write_stop(&mut self) -> Result<Result<()>> {
+        let word = self.inputs();
+        let sent = self.registers.at(Class::Stop).write_word(address::COMMAND, word.bits()).await;
+        if let Err(error) = &sent
+            && error.kind() == ErrorKind::NotSent
+        {
+            return sent.map(Ok);
+        }
+        (self.command, self.given) = (Some(word), None);
+        Ok(sent)
     }
 
-    pub(crate) fn not_confirmed(&self, command: Order, status: Status) -> Error {
-        Error::NotConfirmed {
-            slave: self.registers.slave(),
-            command,
-            status: Box::new(status),
-            because: None,
-        }
+    /// The inputs of n06 to n08 as 0001h holds them, which are not the motion's.
+    pub(crate) fn inputs(&self) -> Command {
+        self.command.unwrap_or(Command::empty()) & Command::INPUTS
     }
+
+    /// Reads 0001h back.
+    pub(crate) async fn read_command(&mut self, class: Class) -> Result<RawWord> {
+        let row = crate::registers::COMMAND.row();
+        let value = self.registers.at(class).read_word(row.address).await?;
+        self.command = Some(Command::from_bits_retain(value));
+        Ok(RawWord { address: row.address, code: row.code, value })
+    }
+
+    pub(crate) fn not_confirmed(&self, command: Order, status: Status, because: Option<Refusal>) -> Error {
+        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status), because }
+    }
+}
+
+/// Who decides instead of the bus, by bits A and 9 of 002Ch.
+pub(crate) fn commanded_by_other(status: &Status) -> Option<Refusal> {
+    let state = state_word(status);
+    if state.contains(DriveState::LOCAL_RUN) {
+        return Some(OTHER_COMMAND);
+    }
+    state.contains(DriveState::LOCAL_REFERENCE).then_some(LOCAL_REFERENCE)
+}
+
+pub(crate) fn state_word(status: &Status) -> DriveState {
+    DriveState::from_bits_retain(status.raw(address::STATE).unwrap_or(0))
 }
 
 /// Whether the drive shows RUN in either of its words.
 pub(crate) fn is_run(status: &Status) -> bool {
-    let word = |address| status.raw(address).unwrap_or(0);
-    let signals = Signals::from_bits_retain(word(crate::registers::SIGNALS.address()));
-    let state = DriveState::from_bits_retain(word(crate::registers::STATE.address()));
-    signals.contains(Signals::RUN) || state.contains(DriveState::RUN)
+    let signals = Signals::from_bits_retain(status.raw(address::SIGNALS).unwrap_or(0));
+    signals.contains(Signals::RUN) || state_word(status).contains(DriveState::RUN)
 }

@@ -52,6 +52,16 @@ impl FrequencyUnit {
         Some(u16::try_from(counts).map_err(|_| SetpointProblem::TooLarge))
     }
 
+    /// How many counts two words of the same reference may differ: 0.1 Hz, of 50 Hz and more where it counts percent.
+    pub(crate) const fn rounding(self) -> u16 {
+        match self {
+            Self::Decihertz => 1,
+            Self::Centihertz => 10,
+            Self::ThirtyThousandths => 60,
+            Self::PerMille => 2,
+        }
+    }
+
     /// The share that a word stands for, rounded towards zero to 0.01 %; `None` in hertz.
     #[must_use]
     pub fn share(self, word: u16) -> Option<Percent> {

@@ -11,8 +11,8 @@ use crate::{
     command::is_run,
     faults::{present, warnings},
     registers::{
-        DC_BUS, ERRORS, INPUT_TERMINALS, LINK_ERROR, OUTPUT_CONTACTS, OUTPUT_VOLTAGE, REFERENCE_SEEN,
-        SIGNALS, STATE,
+        COMMAND, DC_BUS, ERRORS, INPUT_TERMINALS, LINK_ERROR, OUTPUT_CONTACTS, OUTPUT_VOLTAGE,
+        REFERENCE_SEEN, SIGNALS, STATE,
     },
     status::FastWords,
     words::Errors,
@@ -21,6 +21,7 @@ use crate::{
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
         let unit = self.unit(class).await?;
+        self.registers.begin_snapshot();
         let mut words = Words::default();
         self.read_block(class, &FAST, &mut words).await?;
         let state = self.registers.at(class).read(STATE).await?;
@@ -32,17 +33,31 @@ impl<P: Port> Drive3g3ev<P> {
             words.extend(held.address, &[held.value]);
             status = FastWords::of(words).status(unit, self.command);
         }
-        Ok(status)
+        Ok(Status { at: self.registers.snapshot_time(), ..status })
+    }
+
+    /// Reads 0001h, where this status shows that it may be another word than is known: the next stop keeps its inputs
+    /// without reading it. What cannot be read now, a later status tells.
+    pub(crate) async fn keep_stop_ready(&mut self, status: &Status) {
+        let shown = (is_run(status), status.direction, status.control);
+        let stale = self.command.is_none() || self.shown != Some(shown);
+        if !stale || status.raw(COMMAND.address()).is_some() {
+            self.shown = Some(shown);
+        } else {
+            self.shown = self.read_command(Class::Status).await.is_ok().then_some(shown);
+        }
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
         let unit = self.unit(Class::Background).await?;
+        self.registers.begin_snapshot();
         let mut words = Words::default();
         self.read_block(Class::Background, &OUTPUT, &mut words).await?;
         self.read_block(Class::Background, &TERMINALS, &mut words).await?;
         let reference = unit.and_then(|unit| unit.frequency(words.word(REFERENCE_SEEN)));
         let volts = |word: u16| Voltage::from_decivolts(u32::from(word) * 10);
         Ok(Measurements {
+            at: self.registers.snapshot_time(),
             reference: reference.map(Setpoint::Frequency),
             output_voltage: Some(volts(words.word(OUTPUT_VOLTAGE))),
             dc_bus_voltage: Some(volts(words.word(DC_BUS))),

@@ -1,10 +1,10 @@
 //! The fault reset of one drive: a pulse of the input that carries it.
 
-use drive_core::{Class, Command as Order, Error, Port, Result, Status};
+use drive_core::{Class, Command as Order, Confirming, Error, Port, Result, Status};
 
 use crate::{
     Drive3g3ev,
-    command::READS,
+    command::{OTHER_COMMAND, commanded_by_other},
     registers::{COMMAND, N06},
     words::Command,
 };
@@ -18,14 +18,21 @@ impl<P: Port> Drive3g3ev<P> {
         if !status.is_fault() {
             return Ok(status);
         }
-        let input = self.fault_reset_input().await?;
-        // The pulse is a rising edge only where the bit was not left set, by a reset that was interrupted.
-        if self.command.is_none_or(|held| held.contains(input)) {
-            self.write_command(Class::Command, Command::empty()).await?;
+        // A run command at the panel or the terminals may start the motor as soon as the fault is gone, and nothing tells
+        // whether there is one: the manual lists no bits of 002Bh.
+        if let Some(OTHER_COMMAND) = commanded_by_other(&status) {
+            return Err(self.refused(Order::ResetFaults, OTHER_COMMAND));
         }
-        self.command = None;
+        let input = self.fault_reset_input().await?;
+        let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
+        let clear = (held & Command::INPUTS) - input;
+        // The pulse is a rising edge only where the bit was not left set, by a reset that was interrupted.
+        if held.contains(input) {
+            self.write_command(clear).await?;
+        }
+        (self.command, self.given) = (None, None);
         // Sent once; whatever becomes of it, the bit is cleared again.
-        let pulse = self.registers.at(Class::Command).edge().write(COMMAND, input.bits()).await;
+        let pulse = self.registers.at(Class::Command).edge().write(COMMAND, (clear | input).bits()).await;
         match pulse {
             Err(Error::Port { problem, exchange, slave }) if problem.nothing_sent() => {
                 return Err(Error::Port { problem, exchange, slave });
@@ -33,26 +40,28 @@ impl<P: Port> Drive3g3ev<P> {
             Err(error @ Error::Exception { .. }) => return Err(error),
             _ => {}
         }
-        self.see_reset(pulse).await.map_err(Error::after_write)
+        self.see_reset(pulse, clear).await.map_err(Error::after_write)
     }
 
     /// Clears the bit, and reads until no fault shows.
-    async fn see_reset(&mut self, pulse: Result<()>) -> Result<Status> {
-        self.write_command(Class::Command, Command::empty()).await?;
-        let mut shown = Status::default();
-        for _ in 0..READS {
-            shown = self.read_status(Class::Command).await?;
+    async fn see_reset(&mut self, pulse: Result<()>, clear: Command) -> Result<Status> {
+        self.write_command(clear).await?;
+        let mut confirming = Confirming::begin();
+        loop {
+            let shown = self.read_status(Class::Command).await?;
             if !shown.is_fault() {
                 // A pulse in doubt may have come after its clearing.
-                if pulse.is_err() && self.read_command(Class::Command).await?.value != 0 {
-                    self.write_command(Class::Command, Command::empty()).await?;
+                if pulse.is_err() && self.read_command(Class::Command).await?.value != clear.bits() {
+                    self.write_command(clear).await?;
                 }
                 return Ok(shown);
             }
+            if !confirming.again().await {
+                // The drive still shows its fault: where the pulse itself failed, that is the reason.
+                pulse?;
+                return Err(self.not_confirmed(Order::ResetFaults, shown, None));
+            }
         }
-        // The drive still shows its fault: where the pulse itself failed, that is the reason.
-        pulse?;
-        Err(self.not_confirmed(Order::ResetFaults, shown))
     }
 
     /// The bit of 0001h whose input is set to fault reset now.

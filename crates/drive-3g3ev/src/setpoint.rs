@@ -1,10 +1,17 @@
 //! The reference, 0002h.
 
 use drive_core::{
-    Class, Command as Order, Error, Frequency, Percent, Port, RawWord, Result, Setpoint, Status,
+    Class, Command as Order, Confirming, Error, ErrorKind, Frequency, Percent, Port, RawWord, Refusal,
+    Result, Setpoint, Status,
 };
+use tokio::time::Instant;
 
-use crate::{Drive3g3ev, registers::REFERENCE};
+use crate::{
+    Drive3g3ev,
+    command::{LOCAL_REFERENCE, OTHER_REFERENCE, SETTLED_WITHIN, is_run, state_word},
+    registers::{REFERENCE, REFERENCE_SEEN, STATE},
+    words::DriveState,
+};
 
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
@@ -15,7 +22,7 @@ impl<P: Port> Drive3g3ev<P> {
             });
         };
         let order = Order::Setpoint(setpoint);
-        self.check_reference_source(order).await?;
+        self.check_reference(order).await?;
         let word = self.frequency_word(frequency, order).await?;
         self.write_reference(word, order).await
     }
@@ -28,7 +35,7 @@ impl<P: Port> Drive3g3ev<P> {
     /// [`Error::ValueNotAllowed`] for a share that is negative, between two counts or beyond a word.
     pub async fn set_reference_share(&mut self, share: Percent) -> Result<()> {
         let order = Order::Configure("reference in percent");
-        self.check_reference_source(order).await?;
+        self.check_reference(order).await?;
         let unit = self.reference_unit(order).await?;
         if unit.share(0).is_none() {
             return Err(Error::Unsupported {
@@ -59,16 +66,61 @@ impl<P: Port> Drive3g3ev<P> {
         })
     }
 
-    /// Writes 0002h and reads it back. The drive's own limits are in parameters that the manual does not name: it
-    /// refuses by 21h, or keeps another value, and the reading back tells.
+    /// Refuses a reference where bit 9 of 002Ch says that the panel or the terminals give it. n02 tells less: it acts at the
+    /// next power-up only.
+    async fn check_reference(&mut self, order: Order) -> Result<()> {
+        let state = DriveState::from_bits_retain(self.registers.at(Class::Command).read(STATE).await?);
+        if state.contains(DriveState::LOCAL_REFERENCE) {
+            return Err(self.refused(order, LOCAL_REFERENCE));
+        }
+        Ok(())
+    }
+
+    /// Writes 0002h, reads it back, and sees that it is in force: bit 9 of 002Ch names the bus, and 0023h is what was
+    /// written. At rest that may be 0. The drive's own limits are in parameters that the manual does not name: it refuses
+    /// by 21h, or keeps another value, and the reading back tells.
     async fn write_reference(&mut self, word: u16, order: Order) -> Result<()> {
         let mut calls = self.registers.at(Class::Command).replacing(REFERENCE.address());
         calls.write(REFERENCE, word).await?;
-        let value = self.registers.at(Class::Command).read(REFERENCE).await.map_err(Error::after_write)?;
-        if value == word {
-            return Ok(());
+        self.see_reference(word, order).await.map_err(Error::after_write)
+    }
+
+    async fn see_reference(&mut self, word: u16, order: Order) -> Result<()> {
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        loop {
+            let (kept, status, because) = match self.look_at_reference(word).await {
+                Ok(seen) => seen,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            if kept && because.is_none() {
+                return Ok(());
+            }
+            if !kept || Instant::now() >= settled || !confirming.again().await {
+                return Err(self.not_confirmed(order, status, because.filter(|_| kept)));
+            }
         }
-        let raw = vec![RawWord { address: REFERENCE.address(), code: REFERENCE.row().code, value }];
-        Err(self.not_confirmed(order, Status { raw, ..Status::default() }))
+    }
+
+    /// Whether 0002h holds the word, the status, and what is in force instead.
+    async fn look_at_reference(&mut self, word: u16) -> Result<(bool, Status, Option<Refusal>)> {
+        let value = self.registers.at(Class::Command).read(REFERENCE).await?;
+        let mut status = self.read_status(Class::Command).await?;
+        status.raw.push(RawWord { address: REFERENCE.address(), code: REFERENCE.row().code, value });
+        let seen = status.raw(REFERENCE_SEEN.address()).unwrap_or(0);
+        let own = (seen == 0 && !is_run(&status)) || self.is_same_reference(seen, word).await?;
+        let because = if state_word(&status).contains(DriveState::LOCAL_REFERENCE) {
+            Some(LOCAL_REFERENCE)
+        } else {
+            (!own).then_some(OTHER_REFERENCE)
+        };
+        Ok((value == word, status, because))
+    }
+
+    /// Whether two references are the same but for what the drive rounds; not judged where nobody knows what they count.
+    pub(crate) async fn is_same_reference(&mut self, one: u16, other: u16) -> Result<bool> {
+        let unit = self.unit(Class::Command).await?;
+        Ok(unit.is_none_or(|unit| one.abs_diff(other) <= unit.rounding()))
     }
 }

@@ -1,4 +1,4 @@
-//! What the drive is set up for: n02, n05, n39 and n40, read when they are first needed.
+//! What the drive is set up for: n05, n39 and n40, read when they are first needed.
 
 use std::time::Duration;
 
@@ -10,13 +10,12 @@ use drive_core::{
 use crate::{
     Drive3g3ev, TIME_OVER,
     frequency::FrequencyUnit,
-    registers::{N02, N05, N39, N40},
+    registers::{N05, N39, N40},
 };
 
 /// What was read once; `None`: not yet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Settings {
-    n02: Option<u16>,
     n05: Option<u16>,
     n39: Option<u16>,
     /// n39 was changed over the bus: until the drive is switched off, the old unit may still count (§2.1, note 3).
@@ -54,28 +53,6 @@ impl<P: Port> Drive3g3ev<P> {
             exchange,
             reason: "n39 holds a unit that the manual does not list",
         })
-    }
-
-    /// Refuses what needs the run command when n02 gives it to others.
-    pub(crate) async fn check_run_source(&mut self, command: Command) -> Result<()> {
-        match self.n02().await? {
-            2 | 5 => Ok(()),
-            _ => Err(self.refused(
-                command,
-                Refusal::Settings("n02 does not take the run command from the bus; 2 or 5 does"),
-            )),
-        }
-    }
-
-    /// Refuses what needs the reference when n02 gives it to others.
-    pub(crate) async fn check_reference_source(&mut self, command: Command) -> Result<()> {
-        match self.n02().await? {
-            4 | 5 => Ok(()),
-            _ => Err(self.refused(
-                command,
-                Refusal::Settings("n02 does not take the frequency reference from the bus; 4 or 5 does"),
-            )),
-        }
     }
 
     /// Refuses reverse where n05 forbids it: the drive would show OP6.
@@ -125,13 +102,6 @@ impl<P: Port> Drive3g3ev<P> {
 
     pub(crate) const fn refused(&self, command: Command, reason: Refusal) -> Error {
         Error::Refused { slave: self.registers.slave(), command, reason }
-    }
-
-    async fn n02(&mut self) -> Result<u16> {
-        let known = self.settings.n02;
-        let value = self.once(Class::Command, N02, known).await?;
-        self.settings.n02 = Some(value);
-        Ok(value)
     }
 
     async fn n05(&mut self) -> Result<u16> {

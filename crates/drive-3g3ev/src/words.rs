@@ -21,6 +21,9 @@ bitflags! {
 }
 
 impl Command {
+    /// The inputs, which order no motion by themselves; what they do is set by n06 to n08.
+    pub const INPUTS: Self = Self::INPUT_1.union(Self::INPUT_2).union(Self::INPUT_3);
+
     /// Run in a direction.
     #[must_use]
     pub const fn run(direction: Direction) -> Self {

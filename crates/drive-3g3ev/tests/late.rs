@@ -20,8 +20,6 @@ use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext
 /// What becomes of a write to 0001h.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fate {
-    /// It is carried out.
-    Passed,
     /// It is kept back, and its sender hears nothing.
     Late,
     /// It is lost, and its sender hears the confirmation of the one that was kept back, which is carried out once so many
@@ -85,7 +83,7 @@ impl Client for Gateway {
         };
         let word = words[0];
         match self.next_fate() {
-            None | Some(Fate::Passed) => self.write(word).await,
+            None => self.write(word).await,
             Some(Fate::Late) => {
                 self.kept = Some(word);
                 return Err(tokio_modbus::Error::Transport(PortError::OutcomeUnknown("test").into_io()));
@@ -144,12 +142,13 @@ async fn a_start_that_comes_after_a_stop_is_stopped_before_the_stop_counts_as_do
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_stop_that_something_keeps_revoking_is_repeated_so_often_and_then_not_confirmed() {
-    let revoked = [Fate::Overtaken { reads: 2 }; 10];
+async fn a_stop_that_something_keeps_revoking_is_repeated_for_its_time_and_then_not_confirmed() {
+    let revoked = [Fate::Overtaken { reads: 2 }; 100];
     let (mut drive, machine, _rig) = with_a_late_start(&revoked).await;
     let error = drive.stop(StopMode::Ramp).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
-    assert_eq!(bench::written(&machine, 1), [0, 1, 0, 1, 0, 1]);
+    let written = bench::written(&machine, 1);
+    assert!((6..40).contains(&written.len()) && written.starts_with(&[0, 1, 0, 1]), "{written:?}");
 }
 
 #[tokio::test(start_paused = true)]
@@ -163,9 +162,9 @@ async fn a_motor_that_a_late_start_runs_is_not_said_to_be_stopping() {
 
 #[tokio::test(start_paused = true)]
 async fn a_reset_pulse_that_comes_after_its_clearing_is_not_left_set() {
-    let fates = [Fate::Passed, Fate::Late, Fate::Overtaken { reads: 0 }];
+    let fates = [Fate::Late, Fate::Overtaken { reads: 0 }];
     let (mut drive, machine, _rig) = behind_a_gateway(fates);
     machine.trip(0);
     assert_eq!(drive.reset_faults().await.unwrap().state, State::Ready);
-    assert_eq!((machine.peek(1), bench::written(&machine, 1)), (Some(0), vec![0, 0, 0x20, 0]));
+    assert_eq!((machine.peek(1), bench::written(&machine, 1)), (Some(0), vec![0, 0x20, 0]));
 }

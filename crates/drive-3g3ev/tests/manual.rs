@@ -388,7 +388,7 @@ async fn section_6_two_drives_at_60_hz() {
     }
     second.status().await.unwrap();
     // 0065h: running, at the reference, above n53, ready.
-    assert_eq!(rig.frames.take()[2..], bytes(STATE_2));
+    assert_eq!(rig.frames.take()[2..4], bytes(STATE_2));
     first.write_parameter(row(0x0114), 0x14).await.unwrap();
     let sent = rig.frames.take();
     assert_eq!(sent[2..4], bytes(ACCELERATION_1));

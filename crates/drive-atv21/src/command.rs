@@ -1,23 +1,37 @@
-//! What moves the motor, stops it, or decides who may.
+//! What moves the motor and what stops it.
+
+use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Control, Direction, Error, ErrorKind, Frequency, Port, PortError, Refusal, Result,
-    Setpoint, State, Status, StopMode,
+    Class, Command, Confirming, Control, Direction, Error, ErrorKind, Frequency, Port, Refusal, Result,
+    Setpoint, State, Status, StopMode, Stopped,
 };
+use tokio::time::Instant;
 
 use crate::{
     Atv21, Authority,
-    blocks::{WRITE_BLOCK, command_and_reference},
+    blocks::{WRITE_BLOCK, WriteSlot, command_and_reference},
+    control::{commanded_by_other, is_falling, other_reference, source, status_word, who},
     registers as map,
-    words::{CommandSource, CommandWord, StatusWord},
+    setpoint::is_same,
+    words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
 };
 
-/// Statuses that are read for a confirmation before it is given up.
-const CONFIRMATIONS: usize = 20;
-/// How often a stop is written again where another command word has come after it.
-const REPEATS: usize = 2;
-/// CMOD: the serial link commands.
-const SERIAL_COMMAND: u16 = 2;
+/// How long the drive may take to show a word that it holds in its other words, before what they show counts.
+pub(crate) const SETTLED_WITHIN: Duration = Duration::from_millis(250);
+
+const ST_OFF: Refusal = Refusal::Overridden {
+    by: "a freewheel stop that the bus has not ordered (ST = OFF, FD01 bit 11)",
+    remedy: "see to the input or the setting that holds it",
+};
+pub(crate) const OTHER_WORD: Refusal = Refusal::Overridden {
+    by: "another command word in FA00 than was written",
+    remedy: "see who else writes to this drive",
+};
+pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
+    by: "another reference than that of FA01 (FE02 shows it)",
+    remedy: "give the setpoint again, and see to the drive's lower limit",
+};
 
 impl<P: Port> Atv21<P> {
     /// Starts the motor at a frequency. Where the write block holds FA00 and FA01, and its owner says that it is in
@@ -29,239 +43,52 @@ impl<P: Port> Atv21<P> {
     pub async fn start_at(&mut self, direction: Direction, frequency: Frequency) -> Result<Status> {
         let setpoint = Setpoint::Frequency(frequency);
         let reference = self.reference(setpoint).await?;
-        let word = self.word(CommandWord::run(direction));
         let slots = self.write_slots().await?;
-        let block = slots.and_then(|slots| command_and_reference(slots, word.bits(), reference.1));
-        if block.is_none() {
+        let block = slots.filter(|slots| command_and_reference(*slots, 0, 0).is_some());
+        let Some(slots) = block else {
             self.write_setpoint(setpoint).await?;
-        }
-        let status = self.start_motor(direction, block).await?;
-        if block.is_some() {
-            self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)?;
-        }
+            return self.start_motor(direction, None).await;
+        };
+        self.clear_other_reference(reference.0).await?;
+        let status = self.start_motor(direction, Some((slots, reference.1))).await?;
+        self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)?;
         Ok(status)
-    }
-
-    /// Gives the drive's emergency stop (FA00 bit 12) once, then a word without it. The drive trips with fault E,
-    /// also when it is not commanded by the bus; it needs a reset afterwards. Returns the status that shows it.
-    ///
-    /// # Errors
-    /// [`Error::NotConfirmed`] when no trip and no emergency stop shows: the motor was ordered to stop along its ramp
-    /// in any case.
-    pub async fn emergency_stop(&mut self) -> Result<Status> {
-        let edge = self.word(CommandWord::EMERGENCY_STOP).bits();
-        let clear = self.word(CommandWord::empty()).bits();
-        let sent = self.registers.at(Class::Stop).edge().write(map::COMMAND_WORD, edge).await;
-        // Whatever became of the edge: a word without it clears it, and stops along the ramp.
-        let cleared = self.registers.at(Class::Stop).write(map::COMMAND_WORD, clear).await;
-        let trips = |status: &Status| status.is_fault() || status.state == State::QuickStop;
-        let status = self.read_until(Class::Stop, trips).await.map_err(Error::after_write)?;
-        if trips(&status) {
-            if cleared.is_err() {
-                self.clear_edge(Class::Stop, CommandWord::EMERGENCY_STOP)
-                    .await
-                    .map_err(Error::after_write)?;
-            }
-            return Ok(status);
-        }
-        sent?;
-        cleared.map_err(Error::after_write)?;
-        Err(self.not_confirmed(Command::Configure("emergency stop"), status))
     }
 
     pub(crate) async fn start_motor(
         &mut self,
         direction: Direction,
-        block: Option<[u16; 2]>,
+        block: Option<([WriteSlot; 2], u16)>,
     ) -> Result<Status> {
         let command = Command::Start(direction);
-        self.check_start(command).await?;
-        let word = self.word(CommandWord::run(direction));
+        let (status, held) = self.check_start(command).await?;
+        let word = self.run_word(direction, held);
+        self.take_command(command, status, held, word).await?;
+        self.given = Some(word);
+        let both = block.and_then(|(slots, reference)| command_and_reference(slots, word.bits(), reference));
         let mut calls = self.registers.at(Class::Command);
-        let sent = match block {
+        let sent = match both {
             Some(words) => calls.write_words(WRITE_BLOCK, &words).await,
             None => calls.write(map::COMMAND_WORD, word.bits()).await,
         };
         match sent {
-            // A write of the block that is in doubt is read back by what follows.
-            Err(error) if block.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
-            sent => sent?,
+            Ok(()) => {}
+            // What was refused may be a repetition of what was carried out, and a block in doubt is read back.
+            Err(error @ Error::Exception { .. }) => {
+                if self.command_word(Class::Command).await.map_err(Error::after_write)? != word {
+                    return Err(error);
+                }
+            }
+            Err(error) if both.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
+            Err(error) => return Err(error),
         }
         self.see_start(direction, word).await.map_err(Error::after_write)
     }
 
-    /// Reads until the drive runs and holds the run command `word`: RUN may be that of a motor that still turns from
-    /// before, and the direction the old one while it reverses.
-    async fn see_start(&mut self, direction: Direction, word: CommandWord) -> Result<Status> {
-        let mut status = Status::default();
-        for _ in 0..CONFIRMATIONS {
-            status = self.read_status(Class::Command).await?;
-            let runs = status_word(&status).contains(StatusWord::RUN) && !status.is_fault();
-            if runs && self.holds(word, Class::Command).await? {
-                let directed = status.direction == Some(direction);
-                if directed || self.source(Class::Command).await? == CommandSource::Serial {
-                    return Ok(status);
-                }
-            }
-        }
-        Err(self.not_confirmed(Command::Start(direction), status))
-    }
-
-    pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Status> {
-        let word = self.stop_word(mode)?;
-        self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
-        self.see_stop(mode, word).await.map_err(Error::after_write)
-    }
-
-    /// Reads until the drive holds the stop `word` after all that it shows, and either does not run, or obeys the bus: the
-    /// manual does not say whether FD01 shows "run" until the motor stands. Where another word has come after the stop,
-    /// such as that of a start that was late, the stop is written again.
-    async fn see_stop(&mut self, mode: StopMode, word: CommandWord) -> Result<Status> {
-        let mut repeats = 0;
-        let mut status = Status::default();
-        for _ in 0..CONFIRMATIONS {
-            status = self.read_status(Class::Stop).await?;
-            if !self.holds(word, Class::Stop).await? {
-                if repeats == REPEATS {
-                    break;
-                }
-                self.registers.at(Class::Stop).write(map::COMMAND_WORD, word.bits()).await?;
-                repeats += 1;
-            } else if !status_word(&status).contains(StatusWord::RUN) {
-                return Ok(status);
-            } else if self.source(Class::Stop).await? == CommandSource::Serial {
-                if status.state == State::Running {
-                    status.state = State::Stopping;
-                }
-                return Ok(status);
-            }
-        }
-        Err(self.not_confirmed(Command::Stop(mode), status))
-    }
-
-    /// Reads the status until it shows something, and gives the last one.
-    async fn read_until(&mut self, class: Class, shows: impl Fn(&Status) -> bool + Send) -> Result<Status> {
-        let mut status = self.read_status(class).await?;
-        for _ in 1..CONFIRMATIONS {
-            if shows(&status) {
-                break;
-            }
-            status = self.read_status(class).await?;
-        }
-        Ok(status)
-    }
-
-    /// Clears an edge that may still be set because the write that cleared it was lost. A drive that has started up anew
-    /// has cleared it by itself, and is not commanded again.
-    async fn clear_edge(&mut self, class: Class, edge: CommandWord) -> Result<()> {
-        let present = CommandWord::from_bits_retain(self.registers.at(class).read(map::COMMAND_WORD).await?);
-        if !present.contains(edge) {
-            return Ok(());
-        }
-        let clear = self.word(CommandWord::empty()).bits();
-        self.registers.at(class).write(map::COMMAND_WORD, clear).await
-    }
-
-    /// The word that stops in this mode.
-    pub(crate) fn stop_word(&self, mode: StopMode) -> Result<CommandWord> {
-        match mode {
-            StopMode::Ramp => Ok(self.word(CommandWord::empty())),
-            StopMode::Freewheel => Ok(self.word(CommandWord::FREEWHEEL)),
-            StopMode::DcInjection => Ok(self.word(CommandWord::DC_BRAKING)),
-            StopMode::Fast => Err(Error::Unsupported {
-                what: "fast stop",
-                reason: "the drive's emergency stop trips it; ask for emergency_stop, or stop by ramp",
-            }),
-        }
-    }
-
-    pub(crate) async fn reset_trip(&mut self) -> Result<Status> {
-        let status = self.read_status(Class::Command).await?;
-        if !status.is_fault() && status.state != State::QuickStop {
-            return Ok(status);
-        }
-        let edge = self.word(CommandWord::FAULT_RESET).bits();
-        let sent = self.registers.at(Class::Command).edge().write(map::COMMAND_WORD, edge).await;
-        match &sent {
-            Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return sent.map(|()| status),
-            _ => {}
-        }
-        // A drive that starts up anew takes other blocks into effect, if they were changed.
-        self.forget_blocks();
-        // The edge is cleared whether or not the drive is already starting up again and hears nothing: then it clears
-        // the word by itself.
-        let clear = self.word(CommandWord::empty()).bits();
-        let cleared = self.registers.at(Class::Command).write(map::COMMAND_WORD, clear).await;
-        let mut last = None;
-        for _ in 0..CONFIRMATIONS {
-            // The drive is mute while it starts up, so a read without an answer is one more reason to read again.
-            let Ok(status) = self.read_status(Class::Command).await else { continue };
-            if !status.is_fault() && status.state != State::QuickStop {
-                if cleared.is_err() {
-                    let edge = CommandWord::FAULT_RESET;
-                    self.clear_edge(Class::Command, edge).await.map_err(Error::after_write)?;
-                }
-                return Ok(status);
-            }
-            last = Some(status);
-        }
-        match last {
-            Some(status) => {
-                sent.and(cleared).map_err(Error::after_write)?;
-                Err(self.not_confirmed(Command::ResetFaults, status))
-            }
-            None => Err(Error::Port {
-                slave: self.registers.slave(),
-                exchange: drive_core::Exchange {
-                    function: 0x06,
-                    register: Some(map::COMMAND_WORD.address()),
-                },
-                problem: PortError::OutcomeUnknown(
-                    "the drive is mute after the fault reset; read its status in 2 s",
-                ),
-            }),
-        }
-    }
-
-    pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
-        let status = self.read_status(Class::Command).await?;
-        if status.state.is_moving() {
-            return Err(self.refused(Command::Release, Refusal::MotorRunning));
-        }
-        let mode = self.registers.at(Class::Command).read(map::COMMAND_MODE).await?;
-        if mode == SERIAL_COMMAND {
-            let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus");
-            return Err(self.refused(Command::Release, reason));
-        }
-        self.registers.at(Class::Command).write(map::COMMAND_WORD, 0).await?;
-        self.see_release().await.map_err(Error::after_write)
-    }
-
-    async fn see_release(&mut self) -> Result<Status> {
-        let mut status = Status::default();
-        for _ in 0..CONFIRMATIONS {
-            status = self.read_status(Class::Command).await?;
-            let source = self.source(Class::Command).await?;
-            if source != CommandSource::Serial {
-                status.control = status_control(&status, source);
-                return Ok(status);
-            }
-        }
-        Err(self.not_confirmed(Command::Release, status))
-    }
-
-    /// The command word with what this drive's owner has chosen.
-    fn word(&self, order: CommandWord) -> CommandWord {
-        let authority = match self.authority {
-            Authority::Priority => CommandWord::PRIORITIES,
-            Authority::Settings => CommandWord::empty(),
-        };
-        authority | self.selections | order
-    }
-
-    /// Refuses a start that the drive is not ready for.
-    async fn check_start(&mut self, command: Command) -> Result<()> {
-        let status = self.read_status(Class::Command).await?;
+    /// Refuses a start that the drive is not ready for, and reads what FA00 holds.
+    async fn check_start(&mut self, command: Command) -> Result<(Status, CommandWord)> {
+        let status = self.read_briefly().await?;
+        let word = status_word(&status);
         if status.is_fault() {
             let reason = match self.fault_code(Class::Command).await? {
                 0 => Refusal::Tripped,
@@ -272,39 +99,238 @@ impl<P: Port> Atv21<P> {
         if matches!(status.state, State::NotReady | State::QuickStop | State::Unknown) {
             return Err(self.refused(command, Refusal::State(status.state)));
         }
-        let source = self.source_of(&status).await?;
-        let word = status_word(&status);
-        let foreign = source != CommandSource::Serial
+        let foreign = source(&status) != CommandSource::Serial
             && (word.contains(StatusWord::RUN) || self.authority == Authority::Settings);
         if word.contains(StatusWord::LOCAL) || foreign {
-            let control = status_control(&status, source).unwrap_or(Control::Local);
-            return Err(self.refused(command, Refusal::NotInControl(control)));
+            return Err(self.refused(command, Refusal::NotInControl(who(word, source(&status)))));
         }
-        self.check_preset(command).await
-    }
-
-    /// Whether this is the command word that the drive holds.
-    async fn holds(&mut self, word: CommandWord, class: Class) -> Result<bool> {
-        Ok(self.registers.at(class).read(map::COMMAND_WORD).await? == word.bits())
-    }
-
-    async fn source(&mut self, class: Class) -> Result<CommandSource> {
-        self.registers.at(class).read(map::COMMAND_SOURCE).await.map(CommandSource::from)
-    }
-
-    /// Who commands, from the status if it tells.
-    async fn source_of(&mut self, status: &Status) -> Result<CommandSource> {
-        match status.raw(map::COMMAND_SOURCE.address()) {
-            Some(word) => Ok(word.into()),
-            None => self.source(Class::Command).await,
+        let held = self.command_word(Class::Command).await?;
+        if word.contains(StatusWord::FREEWHEEL) && !held.contains(CommandWord::FREEWHEEL) {
+            return Err(self.refused(command, ST_OFF));
         }
+        Ok((status, held))
+    }
+
+    /// Makes the bus the active source of command and reference by what `word` holds besides its run command, and sees
+    /// that it is, before a run command is written. Where something else decides, FA00 gets back what it held.
+    async fn take_command(
+        &mut self,
+        command: Command,
+        mut status: Status,
+        held: CommandWord,
+        word: CommandWord,
+    ) -> Result<()> {
+        let run = CommandWord::RUN | CommandWord::REVERSE;
+        let taken = held - run != word - run && !held.contains(CommandWord::RUN);
+        if taken {
+            self.write_command_word(word - run).await?;
+            status = self.read_briefly().await?;
+        }
+        let stands = if taken { word } else { held };
+        let mut settling = Confirming::within(SETTLED_WITHIN);
+        let reason = loop {
+            let st_off = status_word(&status).contains(StatusWord::FREEWHEEL).then_some(ST_OFF);
+            let because = match commanded_by_other(&status) {
+                None => not_in_force(stands, self.active_reference().await?),
+                other => other,
+            };
+            match because.or(st_off) {
+                None => return Ok(()),
+                Some(reason) if !taken || !settling.again().await => break reason,
+                Some(_) => status = self.read_briefly().await?,
+            }
+        };
+        if taken {
+            let before = CommandWord::from_bits_truncate(held.bits()) - CommandWord::EDGES;
+            self.write_command_word(before).await?;
+        }
+        Err(self.refused(command, reason))
+    }
+
+    /// Writes FA00, but for a stop; what may stand there then is remembered.
+    pub(crate) async fn write_command_word(&mut self, word: CommandWord) -> Result<()> {
+        self.held = None;
+        self.registers.at(Class::Command).write(map::COMMAND_WORD, word.bits()).await?;
+        self.held = Some(word);
+        Ok(())
+    }
+
+    /// Reads until the drive shows that the run command is in force: FA00 holds it, FE45 and FE46 name the bus, FD01 runs
+    /// with ST on (bits 10, 11, 13), and FE02 is the reference of the bus. A motor that turned the other way slows down
+    /// first: it is on its way, and the status tells the direction in which it still turns.
+    async fn see_start(&mut self, direction: Direction, word: CommandWord) -> Result<Status> {
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let mut first = None;
+        loop {
+            let (status, because, runs) = match self.look_at_start(word).await {
+                Ok(seen) => seen,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            let directed = status.direction == Some(direction) || is_falling(first, status.output_frequency);
+            if because.is_none() && runs && directed {
+                return Ok(status);
+            }
+            first = first.or(status.output_frequency);
+            let over = because.is_some() && (status.is_fault() || Instant::now() >= settled);
+            if over || !confirming.again().await {
+                return Err(self.not_confirmed(Command::Start(direction), status, because));
+            }
+        }
+    }
+
+    /// What the drive shows of the run command `word`: its status, what decides instead, and whether it runs. FA00 is read
+    /// after all else, so that no stop of somebody else's is hidden.
+    async fn look_at_start(&mut self, word: CommandWord) -> Result<(Status, Option<Refusal>, bool)> {
+        let status = self.read_status(Class::Command).await?;
+        let shown = status_word(&status);
+        let runs = shown.contains(StatusWord::RUN | StatusWord::STANDBY_RUN);
+        let mut because = commanded_by_other(&status);
+        if because.is_none() {
+            because = not_in_force(word, self.active_reference().await?);
+        }
+        if because.is_none() && runs && word.preset_speed() == 0 {
+            because = self.other_than_fa01().await?;
+        }
+        if status.is_fault() {
+            because = Some(Refusal::Tripped);
+        } else if self.command_word(Class::Command).await? != word {
+            because = Some(OTHER_WORD);
+        } else if shown.contains(StatusWord::FREEWHEEL) {
+            because = Some(ST_OFF);
+        }
+        Ok((status, because, runs))
+    }
+
+    /// Whether the reference before the ramp is another one than that of FA01, and none that FA13 explains.
+    async fn other_than_fa01(&mut self) -> Result<Option<Refusal>> {
+        let mut calls = self.registers.at(Class::Command);
+        let in_force = calls.read(map::REFERENCE_BEFORE_RAMP).await?;
+        if self.setpoint.is_some_and(|setpoint| is_same(in_force, setpoint)) {
+            return Ok(None);
+        }
+        let frequency = calls.read(map::FREQUENCY_REFERENCE).await?;
+        let same = is_same(in_force, frequency);
+        let explained = same || (frequency == 0 && calls.read(map::SPEED_REFERENCE).await? != 0);
+        Ok((!explained).then_some(OTHER_REFERENCE))
+    }
+
+    pub(crate) async fn stop_motor(&mut self, asked: StopMode) -> Result<Stopped> {
+        let mode = if asked == StopMode::Fast { StopMode::Ramp } else { asked };
+        let instead = (mode != asked).then_some("its only faster stop, the emergency stop, trips the drive");
+        let mut word = self.stop_word(mode);
+        let mut taken_from = self.commander().filter(|_| !self.holds_priority());
+        // What became of it, the reading tells.
+        self.write_stop(word).await?.ok();
+        let (mut confirming, mut settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let (mut first, mut force) = (None, None);
+        let (status, because, sent) = loop {
+            let (mut status, held) = match self.status_and_command_word().await {
+                Ok(seen) => seen,
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error.after_write()),
+            };
+            let output = status.output_frequency;
+            let runs = status_word(&status).contains(StatusWord::RUN) && !status.is_fault();
+            let other = commanded_by_other(&status);
+            let takes = runs && other.is_some() && !word.contains(CommandWord::COMMAND_PRIORITY);
+            if takes {
+                taken_from = Some(who(status_word(&status), source(&status)));
+                word |= CommandWord::COMMAND_PRIORITY;
+            }
+            let (mut because, mut sent) = (None, Ok(()));
+            if held != word {
+                // Refused, overtaken by another one such as that of a start that was late, or not enough.
+                because = Some(OTHER_WORD);
+                sent = self.write_stop(word).await.map_err(Error::after_write)?;
+                settled = Instant::now() + SETTLED_WITHIN;
+            } else if runs && other.is_some() {
+                because = other;
+            } else if runs {
+                // FD01 may show "run" until the motor stands, or the terminals run it whatever FE45 says.
+                if force.is_none() {
+                    force = Some(self.terminals().await.ok().and_then(|terminals| terminals.force()));
+                }
+                because = force.flatten();
+            }
+            let comes_down = output == Some(Frequency::ZERO) || is_falling(first, output);
+            if because.is_none() && (!runs || comes_down) {
+                if status.state == State::Running {
+                    status.state = State::Stopping;
+                }
+                let taken_from = taken_from.filter(|_| source(&status) == CommandSource::Serial);
+                return Ok(Stopped { status, mode, instead, taken_from });
+            }
+            first = first.or(output);
+            let over = because.is_some() && held == word && Instant::now() >= settled;
+            if over || !confirming.again().await {
+                break (status, because, sent);
+            }
+        };
+        sent?;
+        Err(self.not_confirmed(Command::Stop(asked), status, because))
+    }
+
+    /// The status, and after all that it shows FA00.
+    async fn status_and_command_word(&mut self) -> Result<(Status, CommandWord)> {
+        let status = self.read_status(Class::Command).await?;
+        Ok((status, self.command_word(Class::Command).await?))
+    }
+
+    /// Writes a stop. That the drive refuses it, or that nobody knows whether it arrived, is given back: what the drive
+    /// shows tells more.
+    pub(crate) async fn write_stop(&mut self, word: CommandWord) -> Result<Result<()>> {
+        let sent = self.registers.at(Class::Stop).write_word(map::COMMAND_WORD.address(), word.bits()).await;
+        if let Err(error) = &sent
+            && error.kind() == ErrorKind::NotSent
+        {
+            return sent.map(Ok);
+        }
+        (self.held, self.given) = (Some(word), None);
+        Ok(sent)
+    }
+
+    /// The word that stops in this mode and leaves to others what is theirs: motor, PID control, ramp and the priorities
+    /// stay as the drive holds them. A drive that was never read is commanded by the bus from then on.
+    pub(crate) fn stop_word(&self, mode: StopMode) -> CommandWord {
+        let order = match mode {
+            StopMode::Ramp | StopMode::Fast => CommandWord::empty(),
+            StopMode::Freewheel => CommandWord::FREEWHEEL,
+            StopMode::DcInjection => CommandWord::DC_BRAKING,
+        };
+        let kept = self.held.map_or(CommandWord::PRIORITIES, |held| held & CommandWord::KEPT);
+        self.priorities() | kept | order
+    }
+
+    /// The run command in this direction, with what its owner has chosen, or else as the drive holds it.
+    fn run_word(&self, direction: Direction, held: CommandWord) -> CommandWord {
+        let chosen = match self.selections {
+            Some(selections) => selections | (held & CommandWord::PRIORITIES),
+            None => held & CommandWord::KEPT,
+        };
+        self.priorities() | chosen | CommandWord::run(direction)
+    }
+
+    const fn priorities(&self) -> CommandWord {
+        match self.authority {
+            Authority::Priority => CommandWord::PRIORITIES,
+            Authority::Settings => CommandWord::empty(),
+        }
+    }
+
+    fn holds_priority(&self) -> bool {
+        self.held.is_some_and(|held| held.contains(CommandWord::COMMAND_PRIORITY))
+    }
+
+    /// Who else commanded the drive when it was last read.
+    fn commander(&self) -> Option<Control> {
+        self.shown.map(|(word, source)| who(word, source)).filter(|who| *who != Control::Bus)
     }
 }
 
-fn status_word(status: &Status) -> StatusWord {
-    StatusWord::from_bits_retain(status.raw(map::STATUS_WORD.address()).unwrap_or(0))
-}
-
-fn status_control(status: &Status, source: CommandSource) -> Option<Control> {
-    crate::status::control(status_word(status), Some(source))
+/// What gives the reference instead of what this word asks for: a preset speed where it chooses one, else the bus.
+fn not_in_force(word: CommandWord, active: ReferenceSource) -> Option<Refusal> {
+    let preset = active == ReferenceSource::PresetSpeed && word.preset_speed() != 0;
+    if preset { None } else { other_reference(active) }
 }

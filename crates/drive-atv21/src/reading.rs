@@ -85,15 +85,13 @@ pub struct LastTrip {
 impl<P: Port> Atv21<P> {
     /// Reads the fast set in any class.
     pub(crate) async fn read_status(&mut self, class: Class) -> Result<Status> {
-        let words = match self.read_fast_block(class).await? {
+        self.registers.begin_snapshot();
+        let mut words = match self.read_fast_block(class).await? {
             Some(words) => words,
-            None => {
-                let mut words = self.read_each(class, &FAST_SET).await?;
-                words.extend(self.read_each(class, &[map::COMMAND_SOURCE]).await?);
-                words
-            }
+            None => self.read_each(class, &FAST_SET).await?,
         };
-        let status = status::status(words);
+        words.extend(self.read_each(class, &[map::COMMAND_SOURCE]).await?);
+        let status = Status { at: self.registers.snapshot_time(), ..status::status(words) };
         if status.is_fault() || status.state == State::NotReady {
             // It may be reset and started up anew by somebody else.
             self.forget_blocks();
@@ -101,15 +99,36 @@ impl<P: Port> Atv21<P> {
         Ok(status)
     }
 
+    /// Reads who commands and the status word, and no more than that where it takes more exchanges.
+    pub(crate) async fn read_briefly(&mut self) -> Result<Status> {
+        if matches!(self.read_block, ReadBlock::Shown(_)) {
+            return self.read_status(Class::Command).await;
+        }
+        self.registers.begin_snapshot();
+        let words = self.read_each(Class::Command, &[map::STATUS_WORD, map::COMMAND_SOURCE]).await?;
+        Ok(Status { at: self.registers.snapshot_time(), ..status::status(words) })
+    }
+
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {
+        self.registers.begin_snapshot();
         let raw = self.read_each(Class::Background, &SLOW_SET).await?;
-        let word = |register: Register<Read>| find(&raw, register.address());
+        let at = self.registers.snapshot_time();
+        // Read last: what was read before a trip counts as from before it, and never the other way round.
+        let now =
+            StatusWord::from_bits_retain(self.registers.at(Class::Background).read(map::STATUS_WORD).await?);
+        let before_trip = now.contains(StatusWord::TRIPPED);
+        let word = |register: Register<Read>| {
+            let frozen = before_trip && FROZEN.iter().any(|held| held.address() == register.address());
+            find(&raw, register.address()).filter(|_| !frozen)
+        };
         let hundredths = |register| word(register).map(|word| Percent::from_hundredths(word.into()));
         let percent = |register| word(register).map(|word| Percent::from_hundredths(i32::from(word) * 100));
         let power = |register| word(register).map(|word| Power::from_decawatts(word.into()));
         let hours = |register| word(register).map(|word| Duration::from_secs(u64::from(word) * 3_600));
         let reference = word(map::REFERENCE_BEFORE_RAMP).map(|word| Frequency::from_centihertz(word.into()));
         Ok(Measurements {
+            at,
+            before_trip,
             reference: reference.map(Setpoint::Frequency),
             speed: word(map::OUTPUT_SPEED).map(|word| Speed::from_rpm(word.into())),
             output_voltage_share: hundredths(map::OUTPUT_VOLTAGE),

@@ -1,14 +1,18 @@
-//! Setpoints: FA01 in hertz and FA13 in rpm, and the preset speed that may override both.
+//! Setpoints: FA01 in hertz and FA13 in rpm, and what may override both.
 
 use drive_core::{
-    Class, Command, Error, ExceptionMeaning, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem,
-    Speed,
+    Class, Command, Confirming, Error, ErrorKind, ExceptionMeaning, Frequency, Port, Refusal, Result,
+    Setpoint, SetpointProblem, Speed, Status,
     registers::{Register, access::ReadWrite},
 };
+use tokio::time::Instant;
 
 use crate::{
-    Atv21, registers as map,
-    words::{CommandWord, ReferenceSource},
+    Atv21, Authority,
+    command::{OTHER_REFERENCE, SETTLED_WITHIN},
+    control::{other_reference, status_word},
+    registers as map,
+    words::{CommandWord, ReferenceSource, StatusWord},
 };
 
 /// FA13 takes no more (Altivar 21 Modbus §8.2).
@@ -20,11 +24,29 @@ pub(crate) type Reference = (Register<ReadWrite>, u16);
 impl<P: Port> Atv21<P> {
     pub(crate) async fn write_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         let reference @ (register, word) = self.reference(setpoint).await?;
-        let command = Command::Setpoint(setpoint);
-        self.check_preset(command).await?;
+        self.check_reference(Command::Setpoint(setpoint)).await?;
+        self.clear_other_reference(register).await?;
         let mut calls = self.registers.at(Class::Command).replacing(register.address());
         calls.write(register, word).await?;
         self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
+    }
+
+    /// Sets the reference to 0 that is not to count: the manual does not say which of FA01 and FA13 does where both are
+    /// set. What both held before the first setpoint is remembered.
+    pub(crate) async fn clear_other_reference(&mut self, register: Register<ReadWrite>) -> Result<()> {
+        let hertz = register.address() == map::FREQUENCY_REFERENCE.address();
+        let other = if hertz { map::SPEED_REFERENCE } else { map::FREQUENCY_REFERENCE };
+        self.setpoint = None;
+        let mut calls = self.registers.at(Class::Command);
+        let held = calls.read(other).await?;
+        if self.references.is_none() {
+            let own = calls.read(register).await?;
+            self.references = Some(if hertz { [own, held] } else { [held, own] });
+        }
+        if held != 0 {
+            calls.write(other, 0).await?;
+        }
+        Ok(())
     }
 
     /// The register and the word of a setpoint, if the drive's limits allow it.
@@ -69,37 +91,79 @@ impl<P: Port> Atv21<P> {
         Ok(limit)
     }
 
-    /// Reads a reference back.
+    /// Reads a reference back, and sees that nothing else is in force: FE46 names the bus while the motor runs, and where it
+    /// does FE02 is what was written. At rest FE02 may be 0, and what it shows of a tripped drive is from before the trip.
     pub(crate) async fn confirm_reference(
         &mut self,
         setpoint: Setpoint,
         (register, word): Reference,
     ) -> Result<()> {
-        if self.registers.at(Class::Command).read(register).await? == word {
-            return Ok(());
-        }
-        let status = self.read_status(Class::Command).await?;
-        Err(self.not_confirmed(Command::Setpoint(setpoint), status))
-    }
-
-    /// Refuses what a preset speed from elsewhere would override. One that stands in FA00 is overwritten by the next
-    /// command word, and one of our own choice is meant.
-    pub(crate) async fn check_preset(&mut self, command: Command) -> Result<()> {
-        let is_start = matches!(command, Command::Start(_));
-        if is_start && self.selections.preset_speed() != 0 {
-            return Ok(());
-        }
-        let mut calls = self.registers.at(Class::Command);
-        if ReferenceSource::from(calls.read(map::REFERENCE_SOURCE).await?) != ReferenceSource::PresetSpeed {
-            return Ok(());
-        }
-        if is_start {
-            let present = CommandWord::from_bits_retain(calls.read(map::COMMAND_WORD).await?);
-            if present.preset_speed() != 0 {
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        loop {
+            let (kept, status, because) = match self.look_at_reference((register, word)).await {
+                Ok(seen) => seen,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            if kept && because.is_none() {
                 return Ok(());
             }
+            if !kept || Instant::now() >= settled || !confirming.again().await {
+                return Err(self.not_confirmed(Command::Setpoint(setpoint), status, because));
+            }
         }
-        let reason = Refusal::Settings("a preset speed overrides the reference (FE46 = 255)");
-        Err(self.refused(command, reason))
     }
+
+    /// Whether the register holds the word, the status where it was read, and what is in force instead.
+    async fn look_at_reference(
+        &mut self,
+        (register, word): Reference,
+    ) -> Result<(bool, Status, Option<Refusal>)> {
+        let kept = self.registers.at(Class::Command).read(register).await? == word;
+        let active = self.active_reference().await?;
+        let hertz = register.address() == map::FREQUENCY_REFERENCE.address();
+        let ours = active == ReferenceSource::Serial;
+        let mut in_force = 0;
+        if hertz && ours {
+            in_force = self.registers.at(Class::Command).read(map::REFERENCE_BEFORE_RAMP).await?;
+            self.setpoint = Some(word).filter(|_| kept);
+        }
+        if kept && ours && (!hertz || is_same(in_force, word)) {
+            return Ok((kept, Status::default(), None));
+        }
+        let status = self.read_briefly().await?;
+        let runs = status_word(&status).contains(StatusWord::RUN);
+        let because = if ours {
+            let own = !hertz || status.is_fault() || is_same(in_force, word) || (in_force == 0 && !runs);
+            (!own).then_some(OTHER_REFERENCE)
+        } else {
+            other_reference(active).filter(|_| runs)
+        };
+        Ok((kept, status, because))
+    }
+
+    /// Refuses a setpoint that something else than the bus would override now or at the next start. A preset speed that
+    /// stands in FA00 at rest is overwritten by the next command word, and the reference priority that the next start
+    /// sets makes the bus the source.
+    async fn check_reference(&mut self, command: Command) -> Result<()> {
+        let own = self.selections.unwrap_or_default().preset_speed();
+        let active = if own != 0 { ReferenceSource::PresetSpeed } else { self.active_reference().await? };
+        let Some(instead) = other_reference(active) else { return Ok(()) };
+        let status = self.read_briefly().await?;
+        let held = self.command_word(Class::Command).await?;
+        let ours_at_start = match active {
+            ReferenceSource::PresetSpeed => own == 0 && held.preset_speed() != 0,
+            _ => self.authority == Authority::Priority && !held.contains(CommandWord::REFERENCE_PRIORITY),
+        };
+        if ours_at_start && !status_word(&status).intersects(StatusWord::RUN | StatusWord::LOCAL) {
+            return Ok(());
+        }
+        Err(self.refused(command, instead))
+    }
+}
+
+/// Whether two frequencies are the same but for the drive's own rounding.
+pub(crate) const fn is_same(one: u16, other: u16) -> bool {
+    one.abs_diff(other) <= 1
 }

@@ -3,25 +3,26 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Error, Port, Reaction, Refusal, Result, Row, Watchdog, Written,
-    registers::{Register, Storage, access::ReadWrite},
+    Class, Command, Confirming, Error, Port, Reaction, Refusal, Result, Row, Watchdog, Written,
+    registers::{Register, Storage, access::ReadWrite, refuse_commands},
 };
 
 use crate::{
     Atv21, WATCHDOG_LONGEST, WriteBlock,
     blocks::{BlockSetUp, Blocks, ReadSlot, WriteSlot},
+    control::DECIDE,
     in_effect::ReadBlock,
     registers as map,
     words::{CommandWord, CommandWord2, StatusWord2},
 };
 
-/// Reads of FD42 before its confirmation is given up.
-const CONFIRMATIONS: usize = 20;
+/// F603 as the drive is delivered, which the manual does not explain.
+const FACTORY_REACTION: u16 = 4;
 const STALL_LEVEL: Command = Command::Configure("stall level");
 const ENERGY_RESET: Command = Command::Configure("energy reset");
 
 /// What orders the drive: each has methods that check the drive first.
-pub(crate) const COMMANDS: [u16; 4] = [
+const COMMANDS: [u16; 4] = [
     map::COMMAND_WORD.address(),
     map::COMMAND_WORD_2.address(),
     map::FREQUENCY_REFERENCE.address(),
@@ -109,7 +110,7 @@ impl<P: Port> Atv21<P> {
         }
         sent?;
         let status = self.read_status(Class::Background).await?;
-        Err(self.not_confirmed(ENERGY_RESET, status))
+        Err(self.not_confirmed(ENERGY_RESET, status, None))
     }
 
     /// Chooses the overcurrent stall level by FA20 bit 12. It holds until the command priority, the supply or a reset
@@ -132,7 +133,7 @@ impl<P: Port> Atv21<P> {
             return Ok(());
         }
         let status = self.read_status(Class::Background).await?;
-        Err(self.not_confirmed(STALL_LEVEL, status))
+        Err(self.not_confirmed(STALL_LEVEL, status, None))
     }
 
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
@@ -153,6 +154,7 @@ impl<P: Port> Atv21<P> {
             Reaction::Freewheel => Some(0),
             Reaction::Ramp => Some(1),
             Reaction::DcInjection => Some(2),
+            Reaction::Unknown(FACTORY_REACTION) => Some(FACTORY_REACTION),
             Reaction::Fast | Reaction::Trip | Reaction::Unknown(_) => {
                 return Err(Error::Unsupported {
                     what: "this watchdog reaction",
@@ -166,6 +168,29 @@ impl<P: Port> Atv21<P> {
         }
         self.change_parameter(map::TIME_OUT.row(), seconds, Command::ArmWatchdog).await?;
         self.read_watchdog().await
+    }
+
+    /// Writes a parameter for its own sake. What decides who commands is changed only while the motor stands and no input
+    /// would start it then.
+    pub(crate) async fn set_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        refuse_commands(row, &COMMANDS)?;
+        if row.address == map::ADDRESS.address() {
+            return Err(Error::Unsupported {
+                what: "writing F802 as a parameter",
+                reason: "the drive answers at the new address at once, and at none for 0; set it at the keypad",
+            });
+        }
+        let command = Command::WriteParameter(row.address);
+        if DECIDE.iter().any(|register| register.address() == row.address) {
+            self.check_value(row, word)?;
+            if self.read_status(Class::Command).await?.state.is_moving() {
+                return Err(self.refused(command, Refusal::MotorRunning));
+            }
+            if let Some(reason) = self.terminals().await?.with(row.address, word).would_start() {
+                return Err(self.refused(command, reason));
+            }
+        }
+        self.change_parameter(row, word, command).await
     }
 
     /// Writes a parameter unless it holds the value already, and reads it back.
@@ -201,7 +226,7 @@ impl<P: Port> Atv21<P> {
         }
         sent?;
         let status = self.read_status(Class::Background).await?;
-        Err(self.not_confirmed(command, status))
+        Err(self.not_confirmed(command, status, None))
     }
 
     /// What a row forbids, before anything is sent.
@@ -239,12 +264,13 @@ impl<P: Port> Atv21<P> {
 
     /// Whether FD42 comes to show these bits set or clear.
     async fn shows(&mut self, bits: StatusWord2, set: bool) -> Result<bool> {
-        for _ in 0..CONFIRMATIONS {
+        let mut confirming = Confirming::begin();
+        loop {
             let word = self.registers.at(Class::Background).read(map::STATUS_WORD_2).await?;
-            if StatusWord2::from_bits_retain(word).contains(bits) == set {
-                return Ok(true);
+            let shown = StatusWord2::from_bits_retain(word).contains(bits) == set;
+            if shown || !confirming.again().await {
+                return Ok(shown);
             }
         }
-        Ok(false)
     }
 }

@@ -45,6 +45,11 @@ impl CommandWord {
     /// nothing by itself.
     pub const SELECTIONS: Self =
         Self::PRESET_SPEEDS.union(Self::MOTOR_2).union(Self::PID_OFF).union(Self::RAMP_2);
+    /// What a stop leaves as the drive holds it: motor, PID control, ramp, and who commands.
+    pub(crate) const KEPT: Self =
+        Self::MOTOR_2.union(Self::PID_OFF).union(Self::RAMP_2).union(Self::PRIORITIES);
+    /// What acts once, when it is set.
+    pub(crate) const EDGES: Self = Self::EMERGENCY_STOP.union(Self::FAULT_RESET);
     const PRESET_SPEEDS: Self = Self::PRESET_SPEED_1.union(Self::PRESET_SPEED_2).union(Self::PRESET_SPEED_3);
 
     /// A run command in this direction.

@@ -90,7 +90,9 @@ pub trait Drive: Send {
     /// Starts the motor in a direction, or turns a running motor to that direction, at the setpoint that the drive
     /// holds. Returns the status in which the drive shows that the run command **is in force**: the bus is the active
     /// source of commands and of the reference, the run command stands, and the motor is driven in that direction. The
-    /// speed is then on its way, not reached. That the word which was written reads back is no confirmation.
+    /// speed is then on its way, not reached; so is a motor that turned the other way, as soon as its output goes down, and
+    /// the status tells its old direction until it turns in the new one. That the word which was written reads back is no
+    /// confirmation.
     ///
     /// # Errors
     /// [`Error::Refused`] when the drive has tripped, is not ready or is commanded by somebody else: no run command was

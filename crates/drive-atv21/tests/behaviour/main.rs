@@ -1,5 +1,6 @@
 //! The driver against the simulated drive, over a real line, in virtual time.
 
+mod in_force;
 mod motion;
 mod reading;
 mod settings;

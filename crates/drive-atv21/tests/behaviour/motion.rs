@@ -55,13 +55,6 @@ async fn freewheel_and_dc_injection_hold_until_the_next_command() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_fast_stop_is_unsupported_and_sends_nothing() {
-    let (rig, mut drive) = Rig::factory();
-    assert_eq!(drive.stop(StopMode::Fast).await.unwrap_err().kind(), ErrorKind::Unsupported);
-    assert_eq!(rig.count(), 0);
-}
-
-#[tokio::test(start_paused = true)]
 async fn an_emergency_stop_trips_once_and_leaves_no_edge() {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
@@ -115,6 +108,7 @@ async fn a_start_is_refused_while_somebody_else_has_the_drive() {
     assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Terminals));
     assert_eq!(rig.machine.requests(6), 0);
     rig.machine.poke(0x0003, 2);
+    rig.machine.poke(0x0004, 4);
     drive.start(Direction::Forward).await.unwrap();
     assert_eq!(rig.machine.peek(0xFA00), Some(0x0400));
 }
@@ -159,7 +153,7 @@ async fn a_setpoint_outside_the_limits_is_refused_before_it_is_sent() {
     drive.forget();
     drive.set_setpoint(Frequency::from_hertz(60).into()).await.unwrap();
     drive.set_setpoint(Speed::from_rpm(1_500).into()).await.unwrap();
-    assert_eq!((rig.machine.peek(0xFA01), rig.machine.peek(0xFA13)), (Some(6_000), Some(1_500)));
+    assert_eq!((rig.machine.peek(0xFA01), rig.machine.peek(0xFA13)), (Some(0), Some(1_500)));
 }
 
 #[tokio::test(start_paused = true)]
@@ -168,7 +162,7 @@ async fn a_preset_speed_that_overrides_the_setpoint_is_noticed() {
     drive.select(CommandWord::PRESET_SPEED_2 | CommandWord::RUN);
     drive.start(Direction::Forward).await.unwrap();
     assert_eq!(rig.machine.peek(0xFA00), Some(0xC402), "only selections are kept");
-    assert!(matches!(refusal(drive.set_setpoint(HALF_SPEED.into()).await), Refusal::Settings(_)));
+    assert!(matches!(refusal(drive.set_setpoint(HALF_SPEED.into()).await), Refusal::Overridden { .. }));
     // A start without a preset of our own overwrites that of FA00.
     drive.select(CommandWord::RAMP_2);
     drive.start(Direction::Forward).await.unwrap();
@@ -176,7 +170,7 @@ async fn a_preset_speed_that_overrides_the_setpoint_is_noticed() {
     // One that does not come from FA00 stays: no start then.
     drive.select(CommandWord::empty());
     rig.machine.poke(0xFE46, 255);
-    assert!(matches!(refusal(drive.start(Direction::Forward).await), Refusal::Settings(_)));
+    assert!(matches!(refusal(drive.start(Direction::Forward).await), Refusal::Overridden { .. }));
 }
 
 #[tokio::test(start_paused = true)]
@@ -186,13 +180,17 @@ async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_a
     let set_up = rig.machine.requests(6);
     let status = drive.start_at(Direction::Reverse, HALF_SPEED).await.unwrap();
     assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
-    assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6) - set_up), (1, 0));
+    assert_eq!(
+        (rig.machine.requests(0x10), rig.machine.requests(6) - set_up),
+        (1, 1),
+        "the priorities first"
+    );
     rig.until(|seen| seen.output_frequency == -2_500).await;
 
     let (rig, drive) = Rig::factory();
     let mut drive = drive.with_write_block();
     drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
-    assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6)), (0, 2));
+    assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6)), (0, 3));
     rig.until(|seen| seen.output_frequency == 2_500).await;
 }
 
@@ -246,7 +244,9 @@ async fn a_stop_that_is_revoked_again_and_again_is_not_confirmed() {
     words.deaf = true;
     let mut drive = Atv21::new(words, bench::address(1));
     assert_eq!(drive.stop(StopMode::Ramp).await.unwrap_err().kind(), ErrorKind::NotConfirmed);
-    assert_eq!(drive.into_port().written(), [(0xFA00, 0xC000); 3]);
+    let written = drive.into_port().written();
+    assert!((5..40).contains(&written.len()), "{written:?}");
+    assert!(written.iter().all(|write| *write == (0xFA00, 0xC000)), "{written:?}");
 }
 
 #[tokio::test(start_paused = true)]

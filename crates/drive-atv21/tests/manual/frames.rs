@@ -138,6 +138,8 @@ async fn a_status_without_a_block_reads_the_output_frequency_as_in_7_4() {
         ONE_WORD,
         ("01 03 FE03 0001", "01 03 02 1388"),
         ("01 03 FE45 0001", "01 03 02 0002"),
+        // What the next stop keeps of it.
+        ("01 03 FA00 0001", "01 03 02 C400"),
         // The motor turns: the drive is asked for its block, and has none.
         ("01 03 0875 0001", "01 03 02 0000"),
         ("01 03 0876 0001", "01 03 02 0000"),
@@ -166,6 +168,7 @@ async fn the_block_of_five_of_7_5_is_looked_at_and_not_used_because_its_current_
         ONE_WORD,
         ("01 03 FE03 0001", "01 03 02 0000"),
         ("01 03 FE45 0001", "01 03 02 0002"),
+        ("01 03 FA00 0001", "01 03 02 C400"),
         ("01 03 0875 0001", "01 03 02 0001"),
         ("01 03 0876 0001", "01 03 02 0002"),
         ("01 03 0877 0001", "01 03 02 0003"),
@@ -213,16 +216,22 @@ async fn a_block_of_two_is_read_and_refused_as_in_7_5() {
 
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_of_60_hertz_is_the_write_of_7_6_and_one_of_80_that_of_8_5() {
-    let (line, other_end) = scripted(&[
-        ("01 03 0012 0001", "01 03 02 1F40"),
-        ("01 03 FE46 0001", "01 03 02 0004"),
-        SIXTY_HERTZ,
-        ("01 03 FA01 0001", "01 03 02 1770"),
-        ("01 03 FE46 0001", "01 03 02 0004"),
-        EIGHTY_HERTZ,
-        ("01 03 FA01 0001", "01 03 02 1F40"),
-        NO_REGISTER,
-    ]);
+    let set = |first: bool, write, word| {
+        let mut script = vec![("01 03 FE46 0001", "01 03 02 0004"), ("01 03 FA13 0001", "01 03 02 0000")];
+        if first {
+            script.push(("01 03 FA01 0001", "01 03 02 0000"));
+        }
+        script.extend([write, ("01 03 FA01 0001", word), ("01 03 FE46 0001", "01 03 02 0004")]);
+        script.push(("01 03 FE02 0001", word));
+        script
+    };
+    let script = [
+        vec![("01 03 0012 0001", "01 03 02 1F40")],
+        set(true, SIXTY_HERTZ, "01 03 02 1770"),
+        set(false, EIGHTY_HERTZ, "01 03 02 1F40"),
+        vec![NO_REGISTER],
+    ];
+    let (line, other_end) = scripted(&script.concat());
     let mut drive = Atv21::new(line.slave(1), bench::address(1));
     drive.set_setpoint(Frequency::from_hertz(60).into()).await.unwrap();
     drive.set_setpoint(Frequency::from_hertz(80).into()).await.unwrap();
@@ -283,19 +292,29 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
         let held = format!("01 03 02 {word}");
         let running =
             format!("01 03 02 {:04X}", if direction == Direction::Forward { 0x6400 } else { 0x6600 });
-        let (line, other_end) = scripted(&[
+        let mut script: Vec<(&str, &str)> = vec![
             ("01 03 FD01 0001", "01 03 02 4000"),
-            ("01 03 FD00 0001", "01 03 02 0000"),
-            ("01 03 FE03 0001", "01 03 02 0000"),
             ("01 03 FE45 0001", &source),
+            ("01 03 FA00 0001", "01 03 02 0000"),
+        ];
+        // The priorities first, so that FE45 and FE46 tell who decides before anything runs.
+        if authority == Authority::Priority {
+            script.push(("01 06 FA00 C000", "01 06 FA00 C000"));
+            script.extend([("01 03 FD01 0001", "01 03 02 4000"), ("01 03 FE45 0001", "01 03 02 0002")]);
+        }
+        script.extend([
             ("01 03 FE46 0001", "01 03 02 0004"),
             (&write, &write),
             ("01 03 FD01 0001", &running),
             ("01 03 FD00 0001", "01 03 02 0000"),
             ("01 03 FE03 0001", "01 03 02 0000"),
             ("01 03 FE45 0001", "01 03 02 0002"),
+            ("01 03 FE46 0001", "01 03 02 0004"),
+            ("01 03 FE02 0001", "01 03 02 1770"),
+            ("01 03 FA01 0001", "01 03 02 1770"),
             ("01 03 FA00 0001", &held),
         ]);
+        let (line, other_end) = scripted(&script);
         let mut drive = Atv21::new(line.slave(1), bench::address(1)).with_authority(authority);
         assert_eq!(drive.start(direction).await.unwrap().direction, Some(direction));
         other_end.is_done().await;

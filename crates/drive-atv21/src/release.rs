@@ -1,0 +1,78 @@
+//! What is given back: command and reference to whom the settings name, and a run command of ours that is no longer in
+//! force.
+
+use drive_core::{Class, Command, Confirming, Error, Port, Refusal, Result, Status};
+
+use crate::{
+    Atv21,
+    command::{OTHER_WORD, SETTLED_WITHIN},
+    control::{BY_SERIAL_LINK, commanded_by_other},
+    registers as map,
+    words::CommandWord,
+};
+
+impl<P: Port> Atv21<P> {
+    pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        if status.state.is_moving() {
+            return Err(self.refused(Command::Release, Refusal::MotorRunning));
+        }
+        let terminals = self.terminals().await?;
+        if terminals.command_mode == BY_SERIAL_LINK {
+            let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus");
+            return Err(self.refused(Command::Release, reason));
+        }
+        if let Some(reason) = terminals.would_start() {
+            return Err(self.refused(Command::Release, reason));
+        }
+        self.put_references_back().await?;
+        let held = self.command_word(Class::Command).await?;
+        let chosen = if self.selections.is_some() { CommandWord::empty() } else { CommandWord::SELECTIONS };
+        self.write_command_word(held & chosen & CommandWord::KEPT).await?;
+        self.given = None;
+        let mut settling = Confirming::within(SETTLED_WITHIN);
+        loop {
+            let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
+            if commanded_by_other(&status).is_some() {
+                return Ok(status);
+            }
+            if !settling.again().await {
+                return Err(self.not_confirmed(Command::Release, status, None));
+            }
+        }
+    }
+
+    /// Ends the run command in FA00, if this side gave it or it is not in force: what another master has written there is
+    /// his.
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        let held = self.command_word(Class::Command).await?;
+        let ours = self.given == Some(held) || commanded_by_other(&status).is_some();
+        if !held.contains(CommandWord::RUN) || !ours {
+            return Ok(status);
+        }
+        let word = held - CommandWord::RUN - CommandWord::EDGES;
+        self.write_command_word(word).await?;
+        let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
+        let now = self.command_word(Class::Command).await.map_err(Error::after_write)?;
+        if now.contains(CommandWord::RUN) {
+            return Err(self.not_confirmed(Command::Withdraw, status, Some(OTHER_WORD)));
+        }
+        self.given = None;
+        Ok(status)
+    }
+
+    /// Writes the references that stood in the drive before the first setpoint of this value: the terminals' next run
+    /// command may run at them (FMOD = 4).
+    async fn put_references_back(&mut self) -> Result<()> {
+        let Some([frequency, speed]) = self.references else { return Ok(()) };
+        let mut both = [(map::FREQUENCY_REFERENCE, frequency), (map::SPEED_REFERENCE, speed)];
+        // The one that counts may be the one that was written last.
+        both.sort_by_key(|(_, word)| *word);
+        for (register, word) in both {
+            self.registers.at(Class::Command).write(register, word).await?;
+        }
+        (self.setpoint, self.references) = (None, None);
+        Ok(())
+    }
+}
