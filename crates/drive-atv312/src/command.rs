@@ -87,8 +87,8 @@ impl<P: Port> Atv312<P> {
     }
 
     /// The fast set for whoever watches: one exchange, and a second one, for the control variables, where these words alone
-    /// do not tell the frequency or whether a run command is in force. Once a status was told, each further one reads one
-    /// more of the settings, until all are known, so that a stop waits for none of them.
+    /// do not tell the frequency or whether a run command is in force. While a motor runs whose settings are not known, each
+    /// further one reads one of them, so that its stop is the one that is asked for.
     pub(crate) async fn watch(&mut self) -> Result<Status> {
         let mut status = self.fast_status(Class::Status).await?;
         let words = FastWords::in_status(&status);
@@ -97,7 +97,7 @@ impl<P: Port> Atv312<P> {
             if self.read_controls(Class::Status).await.is_ok() {
                 status = self.status_of(&words);
             }
-        } else if self.known.seen {
+        } else if self.known.seen && status.state == State::Running {
             self.read_a_setting(Class::Status).await;
         }
         self.known.seen = true;

@@ -34,12 +34,11 @@ fn drive(words: &[&[(u16, u16)]]) -> Atv312<Words> {
     Atv312::new(Words::new(&CAPABILITIES, &words.concat()), 1.try_into().unwrap())
 }
 
-/// The same, once it has been watched for a while.
+/// The same, once its settings are known.
 async fn watched(words: &[&[(u16, u16)]]) -> Atv312<Words> {
     let mut drive = drive(words);
-    for _ in 0..20 {
-        drive.status().await.unwrap();
-    }
+    drive.status().await.unwrap();
+    drive.self_restarts().await.unwrap();
     drive
 }
 
@@ -173,19 +172,27 @@ async fn the_first_status_behind_a_stop_of_another_program_says_stopping() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn the_first_status_is_one_exchange_and_the_settings_follow_one_by_one() {
+async fn a_status_at_rest_is_one_exchange_and_of_a_motor_that_runs_two_until_its_settings_are_known() {
+    let is_status = |asked: &Asked| *asked == Asked::Read(Class::Status, 3201, 6);
     let mut drive = drive(&[&FOR_THE_BUS, &STANDS]);
-    drive.status().await.unwrap();
+    for _ in 0..3 {
+        drive.status().await.unwrap();
+    }
+    let asked = drive.into_port().asked;
+    assert!(asked.len() == 3 && asked.iter().all(is_status), "{asked:?}");
+
+    let mut drive = self::drive(&[&FOR_THE_BUS, &RUNS]);
     for _ in 0..30 {
         drive.status().await.unwrap();
     }
     let asked = drive.into_port().asked;
-    assert_eq!(asked[..2], [Asked::Read(Class::Status, 3201, 6), Asked::Read(Class::Status, 3201, 6)]);
-    let settings = asked.len() - 31;
-    assert_eq!(settings, 15, "each block once");
-    let apart =
-        asked.windows(2).all(|pair| pair.iter().any(|asked| matches!(asked, Asked::Read(_, 3201, 6))));
-    assert!(apart, "never two behind one status");
+    assert_eq!(
+        asked[1],
+        Asked::Read(Class::Status, CMD, 4),
+        "the resolution, and whether a run command is in force"
+    );
+    assert_eq!(asked.len(), 30 + 1 + 15, "each block once");
+    assert!(asked.windows(2).all(|pair| pair.iter().any(is_status)), "never two behind one status");
 }
 
 #[tokio::test(start_paused = true)]

@@ -6,7 +6,8 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, SerialSettings, Setpoint, SlaveAddress, StopMode};
 use drive_families::Family;
 use drive_fleet::{
-    DriveSettings, Fleet, GroupFailure, GroupStart, LineBudget, Outcome, Periods, Refused, Until,
+    DriveSettings, Fleet, GroupFailure, GroupStart, IdentityCheck, LineBudget, Outcome, Periods, Refused,
+    Until,
 };
 use drive_sim::{SimLine, SimSlave, Wiring, models::atv312::Atv312};
 use tokio::{
@@ -46,6 +47,7 @@ impl FullLine {
         let fleet = builder.start().expect("it is planned to work");
         for drive in fleet.drives() {
             drive.ready(Duration::MAX).await.expect("it gets ready");
+            drive.wait_until(|snapshot| matches!(snapshot.identity, IdentityCheck::Same(_))).await;
         }
         Self { fleet, machines }
     }
