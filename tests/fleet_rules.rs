@@ -149,8 +149,13 @@ async fn rule_3_nothing_is_confirmed_that_the_machine_does_not_do() {
                 plant.machine().observe()
             );
         }
-        // These read more of what their commands mean, and some of it word by word.
-        let least = if matches!(family, Family::Atv28 | Family::Atv58) { 20 } else { 8 };
+        // These read more of what their commands mean; the Altivar 21 word by word, so that its answers cannot be told
+        // apart and each loss costs the late window.
+        let least = match family {
+            Family::Atv28 | Family::Atv58 => 20,
+            Family::Atv21 => 4,
+            _ => 8,
+        };
         assert!(confirmed >= least, "{family}: {confirmed} of 40 got through a line that loses a tenth");
     })
     .await;

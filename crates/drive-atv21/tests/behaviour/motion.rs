@@ -65,7 +65,7 @@ async fn an_emergency_stop_trips_once_and_leaves_no_edge() {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_is_mute_after_a_reset_is_reported_as_unknown_and_found_reset_later() {
-    let (rig, mut drive) = Rig::factory();
+    let (rig, mut drive) = Rig::new(Model::new().restarting_in(10 * SECOND));
     rig.machine.trip(10);
     assert_eq!(drive.status().await.unwrap().state, State::Fault);
     let error = drive.reset_faults().await.unwrap_err();

@@ -120,9 +120,16 @@ async fn look(line: &Line, config: &LineConfig, slave: SlaveAddress) -> Result<A
         one_drive::wait_at_most(&mut *drive);
         drive
     };
+    let noise = || line.stats().noise_bytes;
+    let before = noise();
     // The shortest read that a family has; an exception is an answer too.
     match open(Family::Atv312).keep_alive().await {
-        Err(Error::Port { problem: PortError::Timeout { .. }, .. }) => return Ok(Answer::Silence),
+        Err(Error::Port { problem: PortError::Timeout { .. }, .. }) => {
+            return Ok(match noise() - before {
+                0 => Answer::Silence,
+                bytes => Answer::Damaged(format!("{bytes} bytes came that make no answer")),
+            });
+        }
         Err(Error::Exception { code, .. }) if GATEWAY.contains(&code) => return Ok(Answer::Silence),
         Err(Error::Port { problem: problem @ (PortError::Damaged(_) | PortError::Mismatch(_)), .. }) => {
             return Ok(Answer::Damaged(problem.to_string()));
