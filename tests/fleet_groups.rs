@@ -49,6 +49,21 @@ async fn a_group_starts_together_and_reaches_its_reference() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_drive_that_is_lost_on_its_way_to_its_reference_reaches_it_all_the_same() {
+    let settings = DriveSettings::controlled(MOTOR);
+    let site = Site::new(common_settings(), vec![(Family::Atv21, ADDRESS, settings)]);
+    let mut plant = Plant::open(vec![site]).expect("it can be");
+    plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+    let group = plant.fleet.all();
+    let started = tokio::spawn(async move { group.start(start(Duration::ZERO)).await });
+    plant.event("the start", |kind| matches!(kind, EventKind::StateChanged { .. })).await;
+    plant.machine().mute();
+    plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
+    plant.machine().unmute();
+    started.await.expect("it ends").expect("the motor runs at 30 Hz");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_staggered_group_starts_one_after_the_other() {
     let plant = four().await;
     let fleet = plant.fleet.clone();

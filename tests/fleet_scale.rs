@@ -122,10 +122,15 @@ async fn a_stop_of_31_running_drives_of_mixed_families_stops_the_living_in_the_b
     for drive in plant.fleet.drives() {
         drive.ready(120 * SECOND).await.expect("it gets ready");
     }
-    let start = GroupStart { until: Until::InForce, ..start_at(30) };
-    plant.fleet.all().start(start).await.unwrap_or_else(|failure| panic!("{failure}"));
+    plant.fleet.all().start(start_at(30)).await.unwrap_or_else(|failure| panic!("{failure}"));
     for drive in plant.fleet.drives() {
-        plant.machine_of(drive.name()).wait_until(|machine| machine.output_frequency == 3_000).await;
+        assert_eq!(plant.machine_of(drive.name()).observe().output_frequency, 3_000, "{}", drive.name());
+        assert_eq!(
+            drive.snapshot().counters.lost,
+            0,
+            "{}: the starts leave the polls their time",
+            drive.name()
+        );
     }
     let mute = ["3", "14", "25"].map(|address| {
         let drives = plant.fleet.drives();

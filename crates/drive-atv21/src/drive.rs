@@ -40,20 +40,22 @@ impl<P: Port> Drive for Atv21<P> {
     /// shows that FA00 may be another one than is known, that is read as well: the next stop keeps its bits 4 to 6, 14
     /// and 15.
     ///
-    /// What is configured for the block is in effect only if the drive was reset since, and no register tells that. So
-    /// the first status with a turning motor also reads the block and every register that it could hold: the block is
-    /// used from then on when nothing but what is configured explains its words. A trip ends that.
+    /// What is configured for the block is in effect only if the drive was reset since, and no register tells that: it is
+    /// used once [`measurements`](Self::measurements) have seen it. A trip ends that.
     ///
     /// [`Status::at_reference`] and [`Status::fault_code`] are always `None`: no word of the fast set tells them.
     async fn status(&mut self) -> Result<Status> {
         let status = self.read_status(Class::Status).await?;
         self.keep_stop_ready(&status).await;
-        self.look_at_block(&status).await;
         Ok(status)
     }
 
+    /// Reads the slow set, FD01 last. The first of a turning motor also read the block and every register that it could
+    /// hold: the block is used from then on when nothing but what is configured explains its words.
     async fn measurements(&mut self) -> Result<Measurements> {
-        self.read_measurements().await
+        let measurements = self.read_measurements().await?;
+        self.look_at_block(&measurements).await;
+        Ok(measurements)
     }
 
     /// Reads FC90, FE10 to FE13 (the newest first) and FC91, one by one.

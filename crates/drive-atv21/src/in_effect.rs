@@ -5,19 +5,18 @@
 //! block is used only once each word of the fast set has stood in its place, and no other register that the block could
 //! hold explains it. At rest nearly every word is 0 and explains nothing; that needs a turning motor.
 
-use drive_core::{Class, Error, ExceptionMeaning, Port, Result, Status, registers::Register};
+use drive_core::{Class, Error, ExceptionMeaning, Measurements, Port, Result, registers::Register};
 
 use crate::{
     Atv21, WriteBlock,
     blocks::{self, READ_BLOCK, ReadSlot, WriteSlot},
-    registers as map,
     status::FAST_SET,
 };
 
 /// What is known of the read block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ReadBlock {
-    /// It has not shown what it holds. It is looked at after so many more statuses with a turning motor, and then after
+    /// It has not shown what it holds. It is looked at after so many more measurements of a turning motor, and then after
     /// ever more, because a look takes many exchanges.
     Unshown { wait: u32, pause: u32 },
     /// It holds the fast set in these places; the others are not used.
@@ -33,7 +32,7 @@ impl Default for ReadBlock {
 }
 
 impl ReadBlock {
-    /// Whether to look at it with this status of a turning motor.
+    /// Whether to look at it after these measurements of a turning motor.
     const fn is_look_due(&mut self) -> bool {
         match self {
             Self::Unshown { wait: 0, pause } => {
@@ -111,29 +110,31 @@ impl<P: Port> Atv21<P> {
         }
     }
 
-    /// Looks, where this status makes it worth it, at what the read block holds.
-    pub(crate) async fn look_at_block(&mut self, status: &Status) {
-        let turning = status.raw(map::OUTPUT_FREQUENCY.address()).is_some_and(|word| word != 0);
+    /// Looks at what the read block holds, where the motor turns and it is worth it. A look belongs to the slow set: on a
+    /// full line its exchanges would hold up a status for longer than the status is fresh.
+    pub(crate) async fn look_at_block(&mut self, measurements: &Measurements) {
+        let turning = measurements.speed.is_some_and(|speed| speed.rpm() != 0);
         if !turning || !self.read_block.is_look_due() {
             return;
         }
-        match self.compare_block(status).await {
+        match self.compare_block().await {
             Ok(Some(read_block)) => self.read_block = read_block,
             Err(Error::Exception { meaning, .. }) if is_refusal(meaning) => {
                 self.read_block = ReadBlock::Unused;
             }
-            // The status was read whole all the same; what the line lacks, the next look will tell.
+            // The measurements were read whole all the same; what the line lacks, the next look will tell.
             Ok(None) | Err(_) => {}
         }
     }
 
     /// What is known of the block after a look; `None`: no more than before.
-    async fn compare_block(&mut self, status: &Status) -> Result<Option<ReadBlock>> {
-        let class = Class::Status;
+    async fn compare_block(&mut self) -> Result<Option<ReadBlock>> {
+        let class = Class::Background;
         let configured = self.read_slots(class).await?;
         if !holds_fast_set(&configured) {
             return Ok(Some(ReadBlock::Unused));
         }
+        let status = self.read_status(class).await?;
         let mut calls = self.registers.at(class);
         let block = calls.read_words(READ_BLOCK, blocks::read_count(&configured)).await?;
         let mut seen = Vec::with_capacity(ReadSlot::CHOICES.len());

@@ -20,7 +20,7 @@ use crate::{
     fleet::{Fleet, LineEntry},
     handle::{DriveHandle, Entry},
     outcome::{Order, Outcome, Refused, Unconfirmed, Until},
-    snapshot::Link,
+    snapshot::{Link, Snapshot, has_reached},
     supervisor::Leave,
 };
 
@@ -244,7 +244,7 @@ impl Group {
         let order = Order::Start { direction, setpoint, until: Until::InForce };
         self.keep_or_stop(self.all_or_none(&leaves, order, spacing).await).await?;
         if until == Until::AtReference {
-            let reached: Vec<_> = self.members.iter().map(|member| reach(member.clone())).collect();
+            let reached = self.members.iter().map(|member| reach(member.clone(), start.setpoint));
             self.keep_or_stop(join_all(reached).await).await?;
         }
         Ok(())
@@ -340,12 +340,18 @@ async fn stop_one(
     (Arc::clone(member.name()), outcome)
 }
 
-/// Waits until a drive that was started shows that it has reached its reference.
-async fn reach(member: DriveHandle) -> (Arc<str>, Outcome) {
+/// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it
+/// was given before. What is remembered of the setpoint for later commands ends with a lost status, and this does not.
+async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Outcome) {
     let after = member.entry.reference;
-    let there = member.wait_until(|snapshot| snapshot.is_at_setpoint() || !snapshot.started_here);
+    let setpoint = setpoint.or(member.snapshot().setpoint);
+    let is_there = |snapshot: &Snapshot| {
+        let status = snapshot.fresh_status(Instant::now());
+        status.is_some_and(|status| has_reached(setpoint, status))
+    };
+    let there = member.wait_until(|snapshot| is_there(snapshot) || !snapshot.started_here);
     let outcome = match timeout(after, there).await {
-        Ok(snapshot) if snapshot.is_at_setpoint() => Outcome::Confirmed,
+        Ok(snapshot) if is_there(&snapshot) => Outcome::Confirmed,
         Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),
         Err(_) => {
             let last = member.snapshot().status.as_ref().map(|status| status.seen(Instant::now()));

@@ -32,6 +32,18 @@ async fn a_status_takes_two_exchanges_when_the_block_is_set_up_and_four_when_not
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_status_of_a_turning_motor_takes_what_the_capabilities_say_and_one_for_the_stop_at_most() {
+    for (rig, mut drive) in [Rig::factory(), Rig::with_blocks().await] {
+        rig.at_speed(&mut drive).await;
+        for _ in 0..5 {
+            let before = rig.count();
+            drive.status().await.unwrap();
+            assert!(rig.count() - before <= u64::from(CAPABILITIES.status_exchanges) + 1);
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_takes_eleven_exchanges_with_the_block_and_a_stop_four() {
     let (rig, mut drive) = Rig::with_blocks_shown().await;
     rig.at_rest(&mut drive).await;
@@ -46,6 +58,9 @@ async fn a_start_takes_eleven_exchanges_with_the_block_and_a_stop_four() {
 async fn measurements_take_what_the_capabilities_say() {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
+    let before = rig.count();
+    drive.measurements().await.unwrap();
+    assert_eq!(rig.count() - before, u64::from(CAPABILITIES.measurement_exchanges) + 5, "and F875 to F879");
     let before = rig.count();
     let values = drive.measurements().await.unwrap();
     assert_eq!(rig.count() - before, u64::from(CAPABILITIES.measurement_exchanges));
@@ -76,6 +91,7 @@ async fn a_block_that_is_configured_and_not_in_effect_is_never_read_as_a_status(
     // A daemon that starts, or that was reconnected, knows nothing of it.
     drive.forget();
     for _ in 0..5 {
+        drive.measurements().await.unwrap();
         let status = drive.status().await.unwrap();
         assert_eq!((status.state, status.output_frequency), (State::Running, Some(HALF_SPEED)));
     }
@@ -96,6 +112,7 @@ async fn a_layout_that_shows_the_same_at_rest_is_not_believed_there() {
     }
     rig.at_speed(&mut drive).await;
     for _ in 0..5 {
+        drive.measurements().await.unwrap();
         assert_eq!(drive.status().await.unwrap().output_frequency, Some(HALF_SPEED));
     }
 }
@@ -114,11 +131,12 @@ async fn a_reset_that_takes_a_changed_block_into_effect_changes_no_value() {
     drive.reset_faults().await.unwrap();
     tokio::time::sleep(15 * SECOND).await;
     rig.at_speed(&mut drive).await;
-    for exchanges in [4 + 1 + 17, 2] {
+    for exchanges in [4 + 1, 2] {
         let before = rig.count();
         let status = drive.status().await.unwrap();
         assert_eq!((status.state, status.output_frequency), (State::Running, Some(HALF_SPEED)));
         assert_eq!(rig.count() - before, exchanges, "word by word, then the block that is in effect now");
+        drive.measurements().await.unwrap();
     }
 }
 

@@ -42,6 +42,7 @@ impl Rig {
     pub(crate) async fn with_blocks_shown() -> (Self, Atv21<Slave>) {
         let (rig, mut drive) = Self::with_blocks().await;
         rig.at_speed(&mut drive).await;
+        drive.measurements().await.unwrap();
         drive.status().await.unwrap();
         (rig, drive)
     }

@@ -140,12 +140,6 @@ async fn a_status_without_a_block_reads_the_output_frequency_as_in_7_4() {
         ("01 03 FE45 0001", "01 03 02 0002"),
         // What the next stop keeps of it.
         ("01 03 FA00 0001", "01 03 02 C400"),
-        // The motor turns: the drive is asked for its block, and has none.
-        ("01 03 0875 0001", "01 03 02 0000"),
-        ("01 03 0876 0001", "01 03 02 0000"),
-        ("01 03 0877 0001", "01 03 02 0000"),
-        ("01 03 0878 0001", "01 03 02 0000"),
-        ("01 03 0879 0001", "01 03 02 0000"),
     ]);
     let status = Atv21::new(line.slave(1), bench::address(1)).status().await.unwrap();
     assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
@@ -163,18 +157,38 @@ async fn two_words_beside_the_block_are_refused_as_in_7_4() {
 
 #[tokio::test(start_paused = true)]
 async fn the_block_of_five_of_7_5_is_looked_at_and_not_used_because_its_current_of_0_shows_nothing() {
-    let (line, other_end) = scripted(&[
+    const STATUS: [(&str, &str); 4] = [
         ("01 03 FD01 0001", "01 03 02 6404"),
         ONE_WORD,
         ("01 03 FE03 0001", "01 03 02 0000"),
         ("01 03 FE45 0001", "01 03 02 0002"),
-        ("01 03 FA00 0001", "01 03 02 C400"),
+    ];
+    let slow_set = [
+        ("01 03 FE02 0001", "01 03 02 1770"),
+        ("01 03 FE90 0001", "01 03 02 0708"),
+        ("01 03 FE05 0001", "01 03 02 26FC"),
+        ("01 03 FE04 0001", "01 03 02 2710"),
+        ("01 03 FE18 0001", "01 03 02 0000"),
+        ("01 03 FE29 0001", "01 03 02 0000"),
+        ("01 03 FE30 0001", "01 03 02 0000"),
+        ("01 03 FE26 0001", "01 03 02 0000"),
+        ("01 03 FE27 0001", "01 03 02 0000"),
+        ("01 03 FE76 0001", "01 03 02 0000"),
+        ("01 03 FE77 0001", "01 03 02 0000"),
+        ("01 03 FE14 0001", "01 03 02 0000"),
+        ("01 03 FE80 0001", "01 03 02 0000"),
+        ("01 03 FD06 0001", "01 03 02 0000"),
+        ("01 03 FD07 0001", "01 03 02 0000"),
+        ("01 03 FD01 0001", "01 03 02 6404"),
+    ];
+    let slots = [
         ("01 03 0875 0001", "01 03 02 0001"),
         ("01 03 0876 0001", "01 03 02 0002"),
         ("01 03 0877 0001", "01 03 02 0003"),
         ("01 03 0878 0001", "01 03 02 0004"),
         ("01 03 0879 0001", "01 03 02 0005"),
-        BLOCK_OF_FIVE,
+    ];
+    let held = [
         ("01 03 FD01 0001", "01 03 02 6404"),
         ONE_WORD,
         ("01 03 FE03 0001", "01 03 02 0000"),
@@ -186,18 +200,24 @@ async fn the_block_of_five_of_7_5_is_looked_at_and_not_used_because_its_current_
         ("01 03 FE35 0001", "01 03 02 03FF"),
         ("01 03 FE36 0001", "01 03 02 0000"),
         ("01 03 FE90 0001", "01 03 02 0708"),
-        ("01 03 FD01 0001", "01 03 02 6404"),
-        ONE_WORD,
-        ("01 03 FE03 0001", "01 03 02 0000"),
-        ("01 03 FE45 0001", "01 03 02 0002"),
-    ]);
+    ];
+    let held_for_the_stop = ("01 03 FA00 0001", "01 03 02 C400");
+    let script: Vec<_> = slow_set
+        .into_iter()
+        .chain(slots)
+        .chain(STATUS)
+        .chain([BLOCK_OF_FIVE])
+        .chain(held)
+        .chain(STATUS)
+        .chain([held_for_the_stop])
+        .collect();
+    let (line, other_end) = scripted(&script);
     let mut drive = Atv21::new(line.slave(1), bench::address(1));
-    for _ in 0..2 {
-        let status = drive.status().await.unwrap();
-        assert_eq!((status.state, status.direction), (State::Running, Some(Direction::Forward)));
-        assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
-        assert_eq!((status.current_share, status.warning), (Some(Percent::from_percent(0)), Some(true)));
-    }
+    drive.measurements().await.unwrap();
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.state, status.direction), (State::Running, Some(Direction::Forward)));
+    assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
+    assert_eq!((status.current_share, status.warning), (Some(Percent::from_percent(0)), Some(true)));
     other_end.is_done().await;
 }
 
