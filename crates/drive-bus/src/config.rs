@@ -212,32 +212,49 @@ impl LineConfig {
         let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
         let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
         let timeout = timeout.max(self.broadcast_turnaround);
-        let under_way = self.longest_exchange(longest_request, longest_answer, timeout);
-        let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
-        let silence = self.silence() + pauses.max(self.slave_change_gap);
         let settles =
             self.echo == Echo::Auto && !self.is_mbap() && !matches!(self.protocol, Protocol::UniTelway(_));
-        let settling = if settles {
-            self.longest_exchange(5, longest_answer, timeout) + silence
-        } else {
-            Duration::ZERO
-        };
-        under_way + silence + settling + self.longest_stray()
+        self.stop_bound((longest_request, longest_answer), timeout, settles, true)
+    }
+
+    /// The longest wait of a Stop where answers have `timeout` to begin; `settles`: the adapter may be asked for its echo
+    /// before; `disturbed`: foreign frames, noise and damage are reckoned with.
+    pub(crate) fn stop_bound(
+        &self,
+        (request, answer): (usize, usize),
+        timeout: Duration,
+        settles: bool,
+        disturbed: bool,
+    ) -> Duration {
+        let pauses = self.slaves.values().map(|slave| slave.turnaround).max().unwrap_or_default();
+        let silence = self.silence() + pauses.max(self.slave_change_gap);
+        let exchange = |request| self.longest_exchange(request, answer, timeout, disturbed) + silence;
+        let settling = if settles { exchange(5) } else { Duration::ZERO };
+        exchange(request) + settling + if disturbed { self.longest_stray() } else { Duration::ZERO }
     }
 
     /// How long an exchange with these PDUs takes at the most, when its answer has `timeout` to begin.
-    fn longest_exchange(&self, request: usize, answer: usize, timeout: Duration) -> Duration {
+    fn longest_exchange(
+        &self,
+        request: usize,
+        answer: usize,
+        timeout: Duration,
+        disturbed: bool,
+    ) -> Duration {
         let (request, answer) = (self.request_len(request), self.answer_len(answer));
+        let alone = self.characters(request + answer) + timeout;
         let overtime = match self.protocol {
             _ if self.is_mbap() => Duration::ZERO,
-            Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
-            Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
             // Its slaves are waited for while others are served.
             Protocol::UniTelway(settings) => {
-                return unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
+                let all = unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
+                return if disturbed { all } else { all.min(alone) };
             }
+            _ if !disturbed => Duration::ZERO,
+            Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
+            Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
         };
-        self.characters(request) + timeout + self.characters(answer) + overtime
+        alone + overtime
     }
 
     /// How long what belongs to no exchange, the frame of a foreign master or noise, may hold a Stop up.

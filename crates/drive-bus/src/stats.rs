@@ -186,6 +186,20 @@ pub struct SlaveStats {
     pub response: Histogram,
 }
 
+impl SlaveStats {
+    /// Whether anything came instead of its answers.
+    pub(crate) const fn has_heard_else(&self) -> bool {
+        let outcomes = &self.outcomes;
+        outcomes.damaged
+            + outcomes.mismatches
+            + self.late
+            + self.early
+            + self.wrong_function
+            + self.wrong_count
+            > 0
+    }
+}
+
 /// What the line knows of one class.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -231,6 +245,10 @@ pub struct Stats {
     pub lost: u64,
     /// Requests that wait now.
     pub queued: usize,
+    /// The longest wait of a Stop until its first bit, while the line goes on as it has: with the response times that it
+    /// has learned, the longest exchange that was asked, and foreign frames and damage only where there were any. Beside
+    /// it stands [`LineConfig::worst_case_stop`](crate::LineConfig::worst_case_stop), which holds whatever happens.
+    pub worst_case_stop: Duration,
 }
 
 impl Stats {

@@ -30,10 +30,25 @@ impl LearnedTimeout {
         learned.max(self.floor).saturating_mul(1 << self.doubled.min(16)).min(self.ceiling)
     }
 
+    /// The timeout of a short question, to a slave that may not be there: twice what it has needed, and half the floor at
+    /// the least. `None`: it has never answered.
+    #[must_use]
+    pub fn short(&self) -> Option<Duration> {
+        let (mean, deviation) = self.smoothed?;
+        let learned = mean + (deviation * 4).max(GRANULARITY);
+        Some(learned.saturating_mul(2).max(self.floor / 2).min(self.ceiling))
+    }
+
     /// The longest that it can become.
     #[must_use]
     pub const fn ceiling(&self) -> Duration {
         self.ceiling
+    }
+
+    /// Whether the slave has ever answered.
+    #[must_use]
+    pub const fn is_learned(&self) -> bool {
+        self.smoothed.is_some()
     }
 
     /// How long the slave usually takes; the ceiling when nothing is known.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
 
-use super::{Flight, Job, Master, OFFLINE_STOP_REST, PROBE_REST, Purpose, link::Link};
+use super::{Flight, Job, Master, OFFLINE_STOP_REST, Purpose, Question, link::Link};
 use crate::{
     answer, config,
     exchange::{Answer, Failure},
@@ -30,6 +30,7 @@ impl<C> Master<C> {
             Err(failure) => self.note_failure(now, &flight, failure),
         }
         let took = now.saturating_duration_since(flight.started);
+        let answered = result.is_ok();
         match flight.purpose {
             Purpose::Call(Some(mut entry)) => match result {
                 Ok(Err(_)) if flight.more > 0 => {
@@ -56,7 +57,14 @@ impl<C> Master<C> {
             },
             Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
             Purpose::Probe => {
-                self.probe_free_at = Some(now + took * PROBE_REST);
+                let took = took + self.config.silence();
+                self.probing.ended(
+                    now,
+                    took,
+                    answered,
+                    flight.question == Question::Long,
+                    self.offline.len(),
+                );
             }
             Purpose::Settle => {
                 tracing::debug!(slave, echoes = self.exchange.echoes(), "adapter asked for its echo");
@@ -107,8 +115,7 @@ impl<C> Master<C> {
 
     fn note_alive(&mut self, now: Instant, slave: u8) {
         if self.station(slave).answered(now) {
-            self.offline.remove(&slave);
-            tracing::info!(slave, "slave answers again");
+            self.welcome(now, slave);
         }
     }
 
@@ -139,7 +146,7 @@ impl<C> Master<C> {
             // Nothing of it can still come. One that does nothing but refuse is as good as away.
             Failure::Refused(_) => {
                 station.stats.outcomes.busy += 1;
-                if station.missed(now, &self.config) {
+                if station.missed(now, &self.config, false) {
                     self.go_offline(now, flight.slave);
                 }
                 return;
@@ -147,7 +154,8 @@ impl<C> Master<C> {
             Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
             Failure::Timeout => station.stats.outcomes.timeouts += 1,
         }
-        let goes_offline = *failure == Failure::Timeout && station.missed(now, &self.config);
+        let goes_offline = *failure == Failure::Timeout
+            && station.missed(now, &self.config, flight.question == Question::Short);
         self.fear_late_answer(now, flight);
         if goes_offline {
             self.go_offline(now, flight.slave);

@@ -3,9 +3,11 @@
 //! Inputs are named `handle_…`, `submit`, `withdraw`; outputs `poll_…`. The task feeds it and acts.
 
 mod aside;
+mod bound;
 mod doubt;
 mod finish;
 mod link;
+mod probing;
 mod send;
 mod station;
 
@@ -34,6 +36,7 @@ use crate::{
 
 use aside::Aside;
 use link::Link;
+use probing::{Probing, Question};
 use station::Station;
 
 /// How a call ends.
@@ -45,11 +48,8 @@ const LAST_SLAVE: u8 = 247;
 /// How long a request waits before it may take an aged turn.
 const AGING: Duration = Duration::from_secs(1);
 
-/// For each probe's time on the line, so many times as long no other probe: 4 %, and 5 % with what surrounds it.
-const PROBE_REST: u32 = 24;
-
-/// The same for stops of slaves that are off-line, which are repeated for as long as they are: together they take a fifth.
-/// If all went ahead of everything, three dead drives would take the whole line from the living.
+/// For each stop of a slave that is off-line, so many times as long on the line no other: they are repeated for as long as
+/// it is, and together they take a fifth. If all went ahead of everything, three dead drives would take the whole line from the living.
 const OFFLINE_STOP_REST: u32 = 4;
 
 /// The machine of one line. `C` is whoever waits for an answer.
@@ -81,8 +81,9 @@ pub struct Master<C> {
     last_slave: Option<u8>,
     /// When somebody's call was sent last.
     called_at: Option<Instant>,
-    /// No probe before this.
-    probe_free_at: Option<Instant>,
+    probing: Probing,
+    /// The lengths of the longest PDUs asked and likely answered so far.
+    longest: (usize, usize),
     /// No stop of a slave that is off-line before this.
     offline_stop_at: Option<Instant>,
     /// When the schedule wants to be asked again.
@@ -119,6 +120,9 @@ struct Flight<C> {
     suspect: bool,
     /// The host was away when its time was over.
     stalled: bool,
+    /// How long its answer may take to begin.
+    patience: Duration,
+    question: Question,
     started: Instant,
     sent: Option<Sent>,
 }
@@ -183,7 +187,8 @@ impl<C> Master<C> {
             called_at: None,
             exchange_end: Instant::now(),
             last_slave: None,
-            probe_free_at: None,
+            probing: Probing::default(),
+            longest: (0, 0),
             offline_stop_at: None,
             choose_at: None,
             opened_at: None,
@@ -441,6 +446,9 @@ impl<C> Master<C> {
             return;
         };
         let late = confuses && station.doubt.heard(now, shape, is_request);
+        if late {
+            station.heard_late(now);
+        }
         match asked {
             _ if late => station.stats.late += 1,
             Some(asked) if function & 0x7F != asked => station.stats.wrong_function += 1,
@@ -472,6 +480,7 @@ impl<C> Master<C> {
         stats.elapsed = self.opened_at.map_or(Duration::ZERO, |opened| now.saturating_duration_since(opened));
         stats.queued = self.schedule.len();
         stats.echoing = self.exchange.echoes();
+        stats.worst_case_stop = self.learned_worst_case_stop();
         stats.slaves = self
             .stations
             .iter()

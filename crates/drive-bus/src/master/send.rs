@@ -8,8 +8,9 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use super::{
-    AGING, Flight, Job, Master, Purpose, Sending, Sent, Station,
+    Flight, Job, Master, Purpose, Sending, Sent, Station,
     link::Link,
+    probing,
     station::{shape_of, wants_settling},
 };
 use crate::{
@@ -17,9 +18,6 @@ use crate::{
     schedule::{Choice, Entry, Readiness},
     shape,
 };
-
-/// A line on which nobody has asked for anything for so long is idle.
-const IDLE: Duration = Duration::from_secs(1);
 
 /// A line without any silence for so long has somebody else on it that sends for ever.
 const NEVER_QUIET: Duration = Duration::from_secs(1);
@@ -48,7 +46,7 @@ impl<C> Master<C> {
         let waits_long = |entry: &Entry<Job<C>>| self.waits_long(now, entry);
         let stop_at =
             self.schedule.first_stop(|entry| !waits_long(entry)).map(|since| self.stop_free_at(since));
-        let probe = self.next_probe().filter(|_| stop_at.is_none() && !self.closing);
+        let probe = self.next_probe(now).filter(|_| stop_at.is_none() && !self.closing);
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
             self.give_up_on_silence(now);
@@ -129,39 +127,6 @@ impl<C> Master<C> {
         self.free_at().min(heard_out)
     }
 
-    /// The next probe that is worth the line's time. What commands or feeds a watchdog goes first, for as long as
-    /// anything may wait before it has aged: on a full line a drive that is back would never be noticed.
-    fn next_probe(&self) -> Option<(u8, Instant)> {
-        let (slave, at) = self.due_probe()?;
-        let urgent = self.schedule.any(|entry| entry.terms.class >= Class::KeepAlive);
-        Some((slave, if urgent { at + AGING } else { at }))
-    }
-
-    fn due_probe(&self) -> Option<(u8, Instant)> {
-        let soonest = |idle: bool| {
-            let at = |slave: &u8| self.stations.get(slave)?.wanted_probe_at(idle, &self.config);
-            let idle_ones = self.offline.iter().filter(|slave| !self.aside.contains_key(slave));
-            idle_ones.filter_map(|slave| Some((*slave, at(slave)?))).min_by_key(|(_, at)| *at)
-        };
-        let (slave, at) = soonest(false)?;
-        let rested = (slave, self.probe_free_at.map_or(at, |free| free.max(at)));
-        if !self.schedule.is_empty() {
-            return Some(rested);
-        }
-        // Nobody has asked for anything for a while: what probes take is taken from nobody.
-        let idle_from = self.called_at.map(|called| called + IDLE);
-        let (slave, at) = soonest(true)?;
-        let idle = (slave, idle_from.map_or(at, |from| from.max(at)));
-        Some(if idle.1 < rested.1 { idle } else { rested })
-    }
-
-    /// How long it takes until the slave that is off-line and due at `at` is probed, as far as is known.
-    pub(super) fn probe_in(&self, now: Instant, at: Instant) -> Duration {
-        let under_way = self.flight.as_ref().and_then(|flight| flight.sent).map(|sent| sent.answer_by);
-        let soonest = [Some(at), self.probe_free_at, under_way].into_iter().flatten().max();
-        soonest.map_or(Duration::ZERO, |at| at.saturating_duration_since(now))
-    }
-
     /// There has been no silence for so long that there will be none: what waits for it ends, but for a Stop.
     fn give_up_on_silence(&mut self, now: Instant) {
         let longest = NEVER_QUIET.max(self.config.longest_stray() * 2);
@@ -212,6 +177,7 @@ impl<C> Master<C> {
 
     fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
         let request = self.station(slave).harmless_read();
+        let request = if let Purpose::Probe = purpose { probing::shortest(request) } else { request };
         let pdu = pdu::encode(&request).ok()?;
         self.note_start(now, slave, now);
         Some(self.fly(now, slave, purpose, request, &pdu, 0))
@@ -248,6 +214,9 @@ impl<C> Master<C> {
         if is_write {
             doubt.written(shape);
         }
+        let answer = answer::likely_len(&request);
+        self.longest = (self.longest.0.max(pdu.len()), self.longest.1.max(answer));
+        let (patience, question) = self.patience(now, slave, &purpose);
         self.flight = Some(Flight {
             purpose,
             slave,
@@ -256,6 +225,8 @@ impl<C> Master<C> {
             more,
             suspect,
             stalled: false,
+            patience,
+            question,
             started: now,
             sent: None,
         });
@@ -289,12 +260,7 @@ impl<C> Master<C> {
             Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
         });
         station.stats.sent += 1;
-        // What waits while others are served may wait as long as it was configured.
-        let timeout = if self.exchange.frees_the_line() {
-            station.timeout.ceiling()
-        } else {
-            station.timeout.current()
-        };
+        let timeout = flight.patience;
         let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
         let answer_by = end + timeout + characters;
         flight.sent = Some(Sent {

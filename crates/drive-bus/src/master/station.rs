@@ -34,6 +34,8 @@ pub(super) struct Station {
     pub(super) ready_at: Option<Instant>,
     pub(super) doubt: Doubt,
     failures: u32,
+    /// It was heard when its time was over.
+    slow: bool,
     offline: Option<Offline>,
     /// What a probe asks: the last read that was asked of this slave.
     last_read: Option<Arc<Request<'static>>>,
@@ -59,6 +61,7 @@ impl Station {
             ready_at: None,
             doubt: Doubt::default(),
             failures: 0,
+            slow: false,
             offline: None,
             last_read: None,
             asked: None,
@@ -86,6 +89,7 @@ impl Station {
     /// It has answered, at `now`. True: it had been off-line.
     pub(super) fn answered(&mut self, now: Instant) -> bool {
         self.failures = 0;
+        self.slow = false;
         self.ready_at = Some(now + self.settings.turnaround);
         self.stats.offline = false;
         self.offline.take().is_some()
@@ -132,15 +136,16 @@ impl Station {
         self.offline.is_some_and(|offline| offline.stopped_in_vain)
     }
 
-    /// It did not answer. True: it goes off-line with this.
-    pub(super) fn missed(&mut self, now: Instant, config: &LineConfig) -> bool {
+    /// It did not answer a question, `short` or not. True: it goes off-line with this.
+    pub(super) fn missed(&mut self, now: Instant, config: &LineConfig, short: bool) -> bool {
         self.timeout.missed();
-        self.failures = self.failures.saturating_add(1);
+        // A short question was one in the first place because it has never answered.
+        self.failures = if short { config.offline_after } else { self.failures.saturating_add(1) };
         let (first, longest) = config.probe_backoff;
         match &mut self.offline {
             Some(offline) => {
                 offline.missed_at = now;
-                offline.backoff = offline.backoff.saturating_mul(2).min(longest);
+                offline.backoff = offline.backoff.saturating_mul(2).clamp(first, longest);
                 offline.probe_at = now + offline.backoff;
                 false
             }
@@ -175,6 +180,25 @@ impl Station {
             _ => self.probe_at()?,
         };
         self.asked.is_some_and(|asked| at <= asked + INTEREST).then_some(at)
+    }
+
+    /// An answer came when its time was over: it is there, and slow.
+    pub(super) fn heard_late(&mut self, now: Instant) {
+        self.slow = true;
+        self.hope(now);
+    }
+
+    /// Whether only a long question is worth asking, because its own time was set or because it was heard late.
+    pub(super) const fn wants_long(&self) -> bool {
+        self.slow || self.settings.response_timeout.is_some()
+    }
+
+    /// Its neighbour is back: it is asked at once, and soon again.
+    pub(super) fn hope(&mut self, now: Instant) {
+        if let Some(offline) = &mut self.offline {
+            offline.probe_at = now;
+            offline.backoff = Duration::ZERO;
+        }
     }
 
     /// A probe that was under way is given up.

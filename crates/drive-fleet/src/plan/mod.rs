@@ -16,8 +16,14 @@ use crate::supervisor::checks::FEED_PART;
 const STOP_EXCHANGES: u32 = 3;
 /// A whole line, in millionths.
 const WHOLE_PPM: u64 = 1_000_000;
-/// What the line gives to the probes of dead drives at the most, in millionths.
-const PROBES_PPM: u64 = 50_000;
+/// What the line gives to the probes of so many dead drives at the most, in millionths.
+const fn probes_ppm(dead: usize) -> u64 {
+    match dead {
+        0 => 0,
+        1..=10 => 50_000,
+        _ => 100_000,
+    }
+}
 /// What the line gives to its lowest class, to which the measurements belong, even when there is no room: every
 /// twentieth turn, in millionths.
 const BACKGROUND_PPM: u64 = 50_000;
@@ -179,7 +185,7 @@ pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
     living.sort_by_key(|(_, load)| load.status_ppm.saturating_add(load.slow_ppm));
     living.drain(..dead.min(living.len()));
 
-    let probes = if dead > 0 { PROBES_PPM } else { 0 };
+    let probes = probes_ppm(dead);
     let sum =
         |of: fn(&Load) -> u64| living.iter().fold(probes, |sum, (_, load)| sum.saturating_add(of(load)));
     let slow_ppm = sum(|load| load.slow_ppm) - probes;

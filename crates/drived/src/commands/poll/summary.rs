@@ -21,6 +21,8 @@ pub(super) struct Summary {
     pub(super) utilisation_ppm: u32,
     /// Intact frames of somebody else, and bytes that made no frame.
     pub(super) strange: (u64, u64),
+    /// The longest wait of a stop, as the line has gone so far.
+    pub(super) stop_within: Duration,
     pub(super) silences: u64,
     pub(super) shortest_silence: Duration,
     /// The silence that the protocol needs before each request, and how it is called; `None` where it needs none.
@@ -41,6 +43,7 @@ impl Summary {
             sweeps: answered.values().copied().min().unwrap_or_default(),
             utilisation_ppm: stats.utilisation_ppm(),
             strange: (stats.foreign, stats.noise_bytes),
+            stop_within: stats.worst_case_stop,
             silences: stats.silence.count(),
             shortest_silence: stats.silence.min(),
             needed: line_spec::needed_silence(config),
@@ -82,10 +85,11 @@ impl Summary {
     pub(super) fn of_line(&self) -> String {
         let rate = self.sweeps_per_1000_s();
         let used = format!(
-            "line: {}.{:03} sweeps/s, utilisation {}",
+            "line: {}.{:03} sweeps/s, utilisation {}, a stop on the wire within {}",
             rate / 1_000,
             rate % 1_000,
             output::percent(self.utilisation_ppm.into()),
+            output::milliseconds(self.stop_within),
         );
         let (frames, bytes) = self.strange;
         let used = match frames + bytes {
