@@ -50,7 +50,9 @@ async fn main() -> Result<(), Box<dyn Error>> {
         _ = tokio::signal::ctrl_c() => "Ctrl-C",
     };
     println!("{end}, all stop: {}", fleet.stop_all(StopMode::Ramp).await);
-    fleet.shutdown(Duration::from_secs(30)).await;
+    for (drive, action) in fleet.shutdown(Duration::from_secs(30)).await {
+        println!("{drive}: {action}");
+    }
     line.close().await;
     Ok(())
 }

@@ -287,6 +287,7 @@ impl fmt::Display for Limit {
 
 /// What was done to a drive when the fleet shut down.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[must_use = "only a confirmed stop is known to have been carried out"]
 pub enum ExitAction {
     /// It was left as it was, because its policy says so or because this fleet had not started it.
     Left,

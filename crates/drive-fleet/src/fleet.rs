@@ -93,6 +93,7 @@ impl Fleet {
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
     /// a drive that is still stopping then has [`ExitAction::TimeOver`].
+    #[must_use = "a drive that was not stopped may run"]
     pub async fn shutdown(&self, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
         let entries = &self.inner.entries;
         let tell = |message: fn() -> Urgent| {

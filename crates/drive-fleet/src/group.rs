@@ -19,7 +19,7 @@ use tokio_modbus::{Request, client::Client};
 use crate::{
     fleet::{Fleet, LineEntry},
     handle::{DriveHandle, Entry},
-    outcome::{Order, Outcome, Refused, Unconfirmed, Until},
+    outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     snapshot::{Link, Snapshot, has_reached},
     supervisor::Leave,
 };
@@ -251,6 +251,7 @@ impl Group {
     }
 
     /// Gives every drive of the group a setpoint, on each line one drive after the other as in [`start`](Self::start).
+    #[must_use = "only a confirmed setpoint is known to be in force"]
     pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Vec<(Arc<str>, Outcome)> {
         let order = Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce };
         let commands = self.members.iter().map(|member| async move {
@@ -354,8 +355,12 @@ async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Ou
         Ok(snapshot) if is_there(&snapshot) => Outcome::Confirmed,
         Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),
         Err(_) => {
-            let last = member.snapshot().status.as_ref().map(|status| status.seen(Instant::now()));
-            Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
+            let (now, snapshot) = (Instant::now(), member.snapshot());
+            let last = snapshot.status.as_ref().map(|status| status.seen(now));
+            match snapshot.fresh_status(now) {
+                Some(_) => Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last }),
+                None => Outcome::OutcomeUnknown(Unknown { error: snapshot.error.clone(), last }),
+            }
         }
     };
     (Arc::clone(member.name()), outcome)

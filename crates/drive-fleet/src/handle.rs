@@ -162,7 +162,7 @@ impl DriveHandle {
     }
 
     /// Stops the motor. It goes ahead of everything, interrupts what is asked of this drive, and is repeated until the
-    /// drive shows standstill. A mode that the drive does not have is replaced by its ramp; an event says so.
+    /// drive shows standstill. A mode that the drive does not have is replaced by its driver; an event says so.
     ///
     /// The outcome comes at standstill, or when the time of the settings is over: the stop goes on being repeated then.
     pub async fn stop(&self, mode: StopMode) -> Outcome {

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// What whoever waits for a stop has to know.
-pub(crate) const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
+const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
 
 /// How long a drive may take to answer for the first time, over a line that is disturbed or comes and goes.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(5);
@@ -28,7 +28,7 @@ const CONNECTED_WITHIN: Duration = Duration::from_secs(5);
 const RESTART: Duration = Duration::from_secs(10);
 
 /// From the call of a stop until its lack of a confirmation is an alarm.
-pub(crate) const STOP_TIME: Duration = Duration::from_secs(5);
+const STOP_TIME: Duration = Duration::from_secs(5);
 
 /// Between two words about a stop that is not confirmed.
 const SECOND: Duration = Duration::from_secs(1);
@@ -162,19 +162,19 @@ impl Commanded {
                 _ = seconds.tick(), if !taken => {
                     waited += 1;
                     let sent = match self.handle.snapshot().stop.map_or(0, |stop| stop.attempts) {
-                        0 => String::new(),
-                        1 => ", sent 1 time".to_owned(),
-                        times => format!(", sent {times} times"),
+                        0 => "no attempt has ended yet".to_owned(),
+                        1 => "sent 1 time".to_owned(),
+                        times => format!("sent {times} times"),
                     };
                     let _ = output::say(format_args!(
-                        "{name} has not confirmed the stop after {waited} s{sent}: it goes on being sent"
+                        "{name} has not confirmed the stop after {waited} s, {sent}: it goes on"
                     ));
                 }
             }
         };
         match outcome {
             Outcome::Confirmed => Ok(self.status()),
-            outcome if taken => {
+            outcome @ Outcome::NotConfirmed(_) if taken => {
                 Err(Failure::Drive(format!("{name} has taken the stop and does not stand: {outcome}")))
             }
             outcome => Err(Failure::Drive(format!("{UNCONFIRMED}. {}", self.failure(&outcome)))),

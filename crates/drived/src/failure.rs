@@ -8,9 +8,6 @@ pub(crate) enum Failure {
     /// What was asked for cannot be: a family, an address, a port. Exit code 2.
     #[error("{0}")]
     Input(String),
-    /// A port cannot be opened. Exit code 2, unless a drive was to be stopped over it.
-    #[error("{0}")]
-    Port(String),
     /// A drive did not answer, refused, or did not do it. Exit code 1.
     #[error("{0}")]
     Drive(String),
@@ -23,13 +20,8 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Drive(_) | Self::OutputClosed => ExitCode::FAILURE,
-            Self::Input(_) | Self::Port(_) => ExitCode::from(2),
+            Self::Input(_) => ExitCode::from(2),
         }
-    }
-
-    /// Whether a port cannot be opened.
-    pub(crate) const fn is_of_port(&self) -> bool {
-        matches!(self, Self::Port(_))
     }
 
     /// Writing to our output failed.

@@ -63,6 +63,13 @@ impl OneDriveArgs {
         Commanded::over(name, line, config, &options, accepted)
     }
 
+    /// The same for a stop, which is sent as soon as the port can be opened.
+    pub(crate) fn stop(&self) -> Result<Commanded, Failure> {
+        let (name, options, config) = self.parts()?;
+        let line = Line::start(config.clone()).map_err(|error| Failure::Input(error.to_string()))?;
+        Commanded::over(name, line, config, &options, Vec::new())
+    }
+
     fn parts(&self) -> Result<(DriveName, Options, LineConfig), Failure> {
         let name = self.name()?;
         let options = self.options.of(&[name])?;
@@ -109,7 +116,7 @@ pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> Stri
 
 /// Opens a line; a port that is missing or in use is the caller's input.
 pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
-    Line::open(config).await.map_err(|error| Failure::Port(error.to_string()))
+    Line::open(config).await.map_err(|error| Failure::Input(error.to_string()))
 }
 
 /// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.

@@ -9,7 +9,7 @@ use super::{Asker, CallId, Job, Output, Supervisor};
 use crate::{
     event::EventKind,
     outcome::{Outcome, Refused, Unconfirmed},
-    snapshot::PendingStop,
+    snapshot::{Link, PendingStop},
 };
 
 /// The shortest and the longest pause between two attempts of a stop.
@@ -189,20 +189,7 @@ impl Supervisor {
                     Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
                     _ => None,
                 };
-                let asked = stopping.mode;
-                let lacks = error.kind() == ErrorKind::Unsupported;
                 stopping.error = Some(error);
-                if lacks {
-                    // Better another stop than none.
-                    let used = match asked {
-                        StopMode::DcInjection | StopMode::Freewheel => StopMode::Ramp,
-                        StopMode::Ramp => StopMode::Fast,
-                        StopMode::Fast => StopMode::Freewheel,
-                    };
-                    (stopping.mode, stopping.used) = (used, used);
-                    stopping.next_try = Some(now);
-                    self.emit(EventKind::StopModeReplaced { asked, used, why: None });
-                }
                 status
             }
         };
@@ -254,11 +241,14 @@ impl Supervisor {
         }
     }
 
-    /// What is known of a stop that is not confirmed: only a status that is younger than it says anything of it.
+    /// What is known of a stop that is not confirmed: only a status that is fresh, and younger than it, says anything of it.
     fn unconfirmed_stop(&self, now: Instant) -> Outcome {
         let Some(stopping) = &self.stopping else { return Outcome::Confirmed };
-        let error = stopping.error.clone();
-        let said = self.status.as_ref().filter(|status| status.at >= stopping.since);
+        let error = stopping.error.clone().or_else(|| self.last_error.clone());
+        let max_age = self.settings.periods.max_age;
+        let said = self.status.as_ref().filter(|status| {
+            self.link == Link::Connected && status.at >= stopping.since && status.age(now) <= max_age
+        });
         match (said, &error) {
             (Some(status), None | Some(Error::NotConfirmed { .. })) if stopping.attempts > 0 => {
                 let after = now.saturating_duration_since(stopping.since);

@@ -2,17 +2,8 @@
 
 use clap::ValueEnum;
 use drive_core::StopMode;
-use tokio::time::{Instant, sleep};
 
-use crate::{
-    commanded::{STOP_TIME, UNCONFIRMED},
-    failure::Failure,
-    one_drive::OneDriveArgs,
-    output,
-};
-
-/// Between two attempts to open a port.
-const OPEN_AGAIN: std::time::Duration = std::time::Duration::from_millis(200);
+use crate::{failure::Failure, one_drive::OneDriveArgs, output};
 
 /// Stop the motor of one drive, again and again until the drive confirms it
 ///
@@ -51,21 +42,9 @@ impl From<Mode> for StopMode {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let name = args.one.name()?;
-    let until = Instant::now() + STOP_TIME;
-    let mut one = loop {
-        match args.one.command(Vec::new()).await {
-            Ok(one) => break one,
-            // What was typed is no better a moment later; a port may be.
-            Err(failure) if !failure.is_of_port() => return Err(failure),
-            Err(failure) if Instant::now() >= until => {
-                return Err(Failure::Drive(format!("{UNCONFIRMED}. {name}: {failure}")));
-            }
-            Err(_) => sleep(OPEN_AGAIN).await,
-        }
-    };
+    let mut one = args.one.stop()?;
     let status = one.stop(args.mode.into()).await?;
-    output::say(format_args!("{name} stands still: the drive shows {status}"))?;
+    output::say(format_args!("{} stands still: the drive shows {status}", one.name))?;
     one.close().await;
     Ok(())
 }

@@ -140,6 +140,24 @@ fn the_alarm_of_a_stop_over_a_cut_cable_says_what_is_not_known_and_how_old_the_l
 }
 
 #[test]
+fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    let id = rig.stop(StopMode::Ramp);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    rig.drive.status.state = State::Stopping;
+    let stopping = rig.drive.status.clone();
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
+    rig.pass(200 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(60_000 * MS);
+    let said = rig.outcome(id).map(ToString::to_string).unwrap_or_default();
+    assert!(said.starts_with("outcome unknown: slave 1, reading"), "{said}");
+    assert!(said.contains("the drive was last seen stopping") && said.ends_with(" s ago"), "{said}");
+}
+
+#[test]
 fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
     for (started, policy, expected) in [
         (true, OnExit::Stop(StopMode::Ramp), ExitAction::Stopped(Outcome::Confirmed)),
