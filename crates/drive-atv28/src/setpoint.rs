@@ -39,14 +39,16 @@ impl<P: Port> Atv28<P> {
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
     }
 
-    /// Sees the setpoint in force: the motor that runs by a command of the bus follows it. What one that stands will follow,
-    /// the drive does not tell; its start sees that.
+    /// Sees the setpoint in force: the motor that runs by a command of the bus follows it, and one that somebody else runs
+    /// does not. What one that stands will follow, the drive does not tell; its start sees that.
     async fn see_setpoint(&mut self, setpoint: Setpoint, frequency: Option<Frequency>) -> Result<()> {
         let mut confirming = Confirming::begin();
         loop {
             let status = self.read_status(Class::Command).await?;
             let words = FastWords::of_raw(&status.raw);
+            let refusal = words.state_words().refuses_reference();
             let follows = match frequency {
+                _ if refusal.is_some() => false,
                 _ if !self.runs_by_bus(&words) => return Ok(()),
                 Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
                 None => self.follows_speed().await?,
@@ -54,9 +56,9 @@ impl<P: Port> Atv28<P> {
             if follows {
                 return Ok(());
             }
-            if !confirming.again().await {
+            if refusal.is_some() || !confirming.again().await {
                 let (slave, command) = (self.registers.slave(), Command::Setpoint(setpoint));
-                let (status, because) = (Box::new(status), Some(OTHER_REFERENCE));
+                let (status, because) = (Box::new(status), refusal.or(Some(OTHER_REFERENCE)));
                 return Err(Error::NotConfirmed { slave, command, status, because });
             }
         }

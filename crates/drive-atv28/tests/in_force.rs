@@ -48,6 +48,15 @@ async fn a_start_and_a_setpoint_are_confirmed_only_by_the_reference_of_the_bus()
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_setpoint_of_a_motor_that_the_terminals_run_is_not_confirmed() {
+    // Operation enabled and the motor running, bits 13 and 14 of ETI 0: the terminals (BBV51701 p. 20).
+    let mut drive = drive(&[&STANDS, &RUNS, &[(450, 500), (451, 500), (459, 0x0012)]]);
+    let error = drive.set_setpoint(THIRTY).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_motor_that_does_not_turn_is_not_called_started() {
     let mut drive = drive(&[&STANDS, &RUNS, &[(459, 0x5002), (451, 0)]]);
     let error = drive.start(Direction::Forward).await.unwrap_err();

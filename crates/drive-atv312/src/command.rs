@@ -224,6 +224,12 @@ impl<P: Port> Drivecom for Atv312<P> {
         if words.is_driving() && words.chart() == Some(ChartState::QuickStopActive) {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
+        if self.known.settings.has_stop_inputs() {
+            let inputs = self.registers.at(Class::Command).read(IOLR).await?;
+            if let Some(reason) = self.known.settings.stopped_by(inputs) {
+                return Ok(Some(reason));
+            }
+        }
         match self.refuses_variables(controls).await? {
             None => self.other_reference().await,
             refusal => Ok(refusal),

@@ -1,7 +1,8 @@
 //! Setpoints: `LFr` in hertz, `LFRD` in rpm, both as magnitudes. The direction is the run command's.
 
 use drive_core::{
-    Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
+    Class, Command, Confirming, Control, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem,
+    Speed,
     drivecom::{self, ChartState, follows_frequency},
 };
 
@@ -10,7 +11,7 @@ use crate::{
     command::OTHER_REFERENCE,
     reading::{FastWords, Resolution},
     registers::{LFR, LFRD},
-    words::ControlWord,
+    words::{AccessLevel, ControlWord, StatusWord},
 };
 
 impl<P: Port> Atv312<P> {
@@ -58,13 +59,21 @@ impl<P: Port> Atv312<P> {
             if running && confirming.again().await {
                 continue;
             }
-            let other = self.other_reference().await?;
+            let other = self.refuses_reference(&words).or(self.other_reference().await?);
             let because = if running { other.or(Some(OTHER_REFERENCE)) } else { other };
             return match because {
                 None => Ok(()),
                 because => Err(self.not_confirmed(Command::Setpoint(setpoint), status, because)),
             };
         }
+    }
+
+    /// Whose the drive is, where its reference is his too: at L3 that of the command channel is another matter.
+    fn refuses_reference(&self, words: &FastWords) -> Option<Refusal> {
+        let words = words.state_words();
+        let at_l3 = self.known.settings.level() == Some(AccessLevel::L3);
+        let forced_local = !words.eta.contains(StatusWord::NOT_FORCED_LOCAL);
+        words.refuses_reference().filter(|_| !at_l3 || forced_local)
     }
 
     /// Whether a run command of the bus is in force.

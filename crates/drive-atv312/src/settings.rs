@@ -12,7 +12,7 @@ use crate::{
     Atv312,
     reading::Resolution,
     registers::{
-        ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
+        ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, NST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
     },
     words::{AccessLevel, ControlWord, ExtendedControl},
 };
@@ -331,6 +331,28 @@ impl Settings {
         (self.level() == Some(AccessLevel::L3) && self.word(channel) != REFERENCE_BY_MODBUS).then_some(
             Refusal::Overridden { by, remedy: "set rFC so that the channel which is Mdb is selected" },
         )
+    }
+
+    /// Whether a logic input is assigned to a stop.
+    pub(crate) fn has_stop_inputs(&self) -> bool {
+        self.stop_inputs().next().is_some()
+    }
+
+    /// The stop that an input asks for: the freewheel stop and the fast stop while it is 0, the injection while it is 1
+    /// (p. 40 and 41).
+    pub(crate) fn stopped_by(&self, inputs: u16) -> Option<Refusal> {
+        let asks = |(bit, level): (u16, bool)| (inputs >> bit & 1 == 1) == level;
+        self.stop_inputs().any(asks).then_some(Refusal::Overridden {
+            by: "a stop by a logic input (nSt, FSt or dCI)",
+            remedy: "close the input of nSt or FSt, or open that of dCI",
+        })
+    }
+
+    /// The bits of the inputs that stop, and the level at which they do.
+    fn stop_inputs(&self) -> impl Iterator<Item = (u16, bool)> {
+        let stops = [(self.word(NST), false), (self.word(FST), false), (self.word(DCI), true)];
+        let bit = |source: u16| source.checked_sub(LI1).filter(|&bit| bit < 6);
+        stops.into_iter().filter_map(move |(source, level)| Some((bit(source)?, level)))
     }
 
     /// Whether an input or a bit of the control word is assigned to a preset speed or to jog operation.

@@ -196,6 +196,34 @@ async fn a_status_at_rest_is_one_exchange_and_of_a_motor_that_runs_two_until_its
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_setpoint_of_a_motor_that_somebody_else_has_is_not_confirmed() {
+    // LAC = L1; ETA and ETI (p. 16, 20): a motor that the terminals run, and one at rest in forced local mode.
+    for (settings, eta, eti) in
+        [(&[(3006, 0)][..], 0x0627, 0x0012), (&[(3006, 0)], 0x0427, 0x0002), (&[], 0x0427, 0x4002)]
+    {
+        let mut drive = drive(&[&FOR_THE_BUS, settings, &[(3201, eta), (3206, eti)]]);
+        let error = drive.set_setpoint(THIRTY).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
+        assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_is_refused_while_a_logic_input_asks_for_a_stop() {
+    // p. 40 and 41: FSt and nSt stop while their input is 0, dCI while it is 1.
+    for (function, stops, runs) in [(11204, 0, 1 << 3), (11202, 0, 1 << 3), (11203, 1 << 3, 0)] {
+        for (inputs, refused) in [(stops, true), (runs, false)] {
+            // LI4.
+            let mut drive = drive(&[&FOR_THE_BUS, &RUNS, &[(function, 132), (5240, inputs)]]);
+            let outcome = drive.start(Direction::Forward).await;
+            let is_refused = outcome.as_ref().is_err_and(|error| overridden_by(error, "nSt, FSt or dCI"));
+            assert_eq!(is_refused, refused, "{function}, inputs {inputs:06b}: {outcome:?}");
+            assert_eq!(commands(drive).is_empty(), refused);
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_is_confirmed_only_by_the_reference_of_the_bus() {
     let mut drive = drive(&[&FOR_THE_BUS, &RUNS]);
     drive.start(Direction::Forward).await.unwrap();

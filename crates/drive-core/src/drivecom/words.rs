@@ -255,7 +255,8 @@ impl StatusWords {
     #[must_use]
     pub fn shows_run(self, direction: Direction, reference: Frequency) -> RunShown {
         let asked = self.eti.contains(ExtendedStatus::REVERSE_REQUESTED);
-        if self.control() != Control::Bus || self.chart() != Some(ChartState::OperationEnabled) {
+        let enabled = self.control() == Control::Bus && self.chart() == Some(ChartState::OperationEnabled);
+        if !enabled || self.is_stopping() {
             RunShown::NotYet
         } else if reference == Frequency::ZERO {
             RunShown::InForce
@@ -268,6 +269,11 @@ impl StatusWords {
         }
     }
 
+    /// Whether a fast stop or an injection of direct current is under way, whoever has asked for it.
+    fn is_stopping(self) -> bool {
+        self.eti.intersects(ExtendedStatus::FAST_STOP.union(ExtendedStatus::DC_INJECTION))
+    }
+
     /// What keeps a run command of the bus from acting, as far as these words tell it.
     #[must_use]
     pub fn prevents_run(self) -> Option<Refusal> {
@@ -275,14 +281,19 @@ impl StatusWords {
             by: "a stop at the drive, by an input or a key,",
             remedy: "release it, and start again",
         };
-        let stops = ExtendedStatus::FAST_STOP.union(ExtendedStatus::DC_INJECTION);
         match self.control() {
-            Control::Bus if self.eti.intersects(stops) || self.eta.contains(StatusWord::STOP_KEY) => {
-                Some(STOP)
-            }
+            Control::Bus if self.is_stopping() || self.eta.contains(StatusWord::STOP_KEY) => Some(STOP),
             Control::Bus => None,
             somebody => Some(Refusal::NotInControl(somebody)),
         }
+    }
+
+    /// Why a reference of the bus has no effect in a drive that manages the priorities of its channels itself: somebody else
+    /// has its motor running, or has it for himself.
+    #[must_use]
+    pub fn refuses_reference(self) -> Option<Refusal> {
+        let another = self.is_driving() && self.control() != Control::Bus;
+        self.refuses_to_take_over().or_else(|| another.then(|| Refusal::NotInControl(self.control())))
     }
 
     /// Why the bus does not take command of a drive that manages the priorities of its channels itself (p. 11): it takes
