@@ -44,6 +44,12 @@ pub const fn a_trip(family: Family) -> u16 {
     }
 }
 
+/// The number of [`a_trip`] as the simulator's lines name it.
+#[must_use]
+pub fn a_trip_name(family: Family) -> String {
+    a_trip(family).to_string()
+}
+
 /// What the drive reports as present after its watchdog has tripped it.
 #[must_use]
 pub const fn communication_trips(family: Family) -> &'static [u16] {

@@ -1,0 +1,142 @@
+//! A drive in a plant: the simulated machine with its world, the drive that commands it, and a twin of the machine that
+//! lives in the same world and hears nothing from this side. What the twin does too, the plant has done.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, SlaveSettings};
+use drive_core::{Drive, SlaveAddress, registers::Row};
+use drive_families::{Family, Options};
+use drive_sim::{Model, Observation, Panel, SimLine, SimSlave, Wiring};
+use tokio::time::{Instant, sleep};
+
+use crate::drives;
+
+/// Where the drive is.
+const ADDRESS: u8 = 1;
+/// How often the drive is asked while time passes, so that no watchdog trips.
+const POLL: Duration = Duration::from_millis(400);
+
+/// A drive, its machine and its twin.
+pub struct Scene {
+    /// The drive as a user holds it.
+    pub drive: Box<dyn Drive>,
+    /// The machine as somebody beside it sees it.
+    pub machine: SimSlave,
+    /// The line that the drive is on.
+    pub line: Line,
+    simulated: SimLine,
+    family: Family,
+    twin: Twin,
+}
+
+/// The same machine on a line of its own.
+struct Twin {
+    machine: SimSlave,
+    simulated: SimLine,
+    drive: Box<dyn Drive>,
+}
+
+impl Scene {
+    /// A machine and its twin, each made by `model`, in a quiet world.
+    ///
+    /// # Panics
+    /// Only when the scene itself is wrong.
+    #[must_use]
+    pub fn new(family: Family, model: fn() -> Box<dyn Model>, options: &Options) -> Self {
+        let (simulated, machine, line, drive) = stage(family, model(), options);
+        let (twin_line, twin_machine, _, twin_drive) = stage(family, model(), options);
+        let twin = Twin { machine: twin_machine, simulated: twin_line, drive: twin_drive };
+        Self { drive, machine, line, simulated, family, twin }
+    }
+
+    /// Has something happen around the drive, and around its twin: a line of the simulator's text without the drive's
+    /// name.
+    ///
+    /// # Panics
+    /// When the simulator does not know it.
+    pub fn happens(&self, deed: &str) {
+        for (line, machine) in [(&self.simulated, &self.machine), (&self.twin.simulated, &self.twin.machine)]
+        {
+            let told = line.control(&format!("{} {deed}", machine.name()));
+            told.unwrap_or_else(|error| panic!("{} {deed}: {error}", self.family));
+        }
+    }
+
+    /// Sets a setting at the drive and at its twin. False: it does not take the value.
+    #[must_use]
+    pub fn is_set_to(&self, row: &Row, value: u16) -> bool {
+        self.machine.poke(row.address, value) && self.twin.machine.poke(row.address, value)
+    }
+
+    /// Somebody at the twin's panel resets its fault, as this side has reset the drive's.
+    pub fn twin_is_reset(&self) {
+        self.twin.machine.panel(Panel::Reset);
+    }
+
+    /// Gives the control of the twin back, by a side of its own that has never commanded it. False: it is refused.
+    pub async fn release_twin(&mut self) -> bool {
+        self.twin.drive.release().await.is_ok()
+    }
+
+    /// Lets time pass with the drive asked all the while, as a plant does.
+    pub async fn live(&mut self, time: Duration) {
+        let end = Instant::now() + time;
+        while Instant::now() < end {
+            // What it says is nobody's concern here, nor whether it says anything.
+            let _ = self.drive.status().await;
+            let _ = self.twin.drive.status().await;
+            sleep(POLL).await;
+        }
+    }
+
+    /// The family.
+    #[must_use]
+    pub const fn family(&self) -> Family {
+        self.family
+    }
+
+    /// What the machine does.
+    #[must_use]
+    pub fn seen(&self) -> Observation {
+        self.machine.observe()
+    }
+
+    /// What the twin does in the same world without this side.
+    #[must_use]
+    pub fn twin(&self) -> Observation {
+        self.twin.machine.observe()
+    }
+
+    /// How often something was written to the drive.
+    #[must_use]
+    pub fn writes(&self) -> u64 {
+        [0x06, 0x10].into_iter().map(|function| self.machine.requests(function)).sum()
+    }
+}
+
+fn stage(
+    family: Family,
+    model: Box<dyn Model>,
+    options: &Options,
+) -> (SimLine, SimSlave, Line, Box<dyn Drive>) {
+    let capabilities = family.capabilities();
+    let simulated = SimLine::new(Wiring::rtu(capabilities.factory));
+    let machine = simulated.add_boxed(ADDRESS, model).expect("the address is free");
+    let pause = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
+    let config = LineConfig::stream(capabilities.factory).slave(ADDRESS, pause);
+    let line = Line::over(simulated.in_memory(), config);
+    let slave = SlaveAddress::try_from(ADDRESS).expect("it is an address");
+    let drive = family.open_with(line.slave(ADDRESS), slave, options).expect("the options are the family's");
+    (simulated, machine, line, drive)
+}
+
+/// What the owner of every 3G3EV of these tests says of it.
+#[must_use]
+pub fn options(family: Family) -> Options {
+    match family {
+        Family::Omron3g3ev => {
+            Options { fault_reset_function: Some(drives::RESET_FUNCTION), ..Options::default() }
+        }
+        _ => Options::default(),
+    }
+}
