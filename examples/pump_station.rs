@@ -10,10 +10,8 @@ use std::{error::Error, time::Duration};
 
 use drive_atv312::Atv312;
 use drive_bus::{Line, LineConfig};
-use drive_core::{Direction, Frequency, Reaction, SerialSettings, SlaveAddress, StopMode};
-use drive_fleet::{
-    DriveHandle, DriveSettings, EventKind, Fleet, LineBudget, Order, Received, Until, WatchdogContract,
-};
+use drive_core::{Direction, Frequency, Reaction, SerialSettings, StopMode};
+use drive_fleet::{DriveHandle, DriveSettings, EventKind, Fleet, Order, Received, Until, WatchdogContract};
 use drive_sim::{SimLine, Wiring, models};
 use tokio::time::{interval, sleep};
 
@@ -29,16 +27,15 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let port = std::env::args().nth(1);
     let config = LineConfig::serial(port.clone().unwrap_or_default(), SerialSettings::MODBUS_DEFAULT);
     let config = LineConfig { response_timeout: Duration::from_millis(200), ..config };
-    let budget = LineBudget::of(&config);
     let line = if port.is_some() { Line::open(config).await? } else { simulated()? };
 
-    let mut station = Fleet::builder().line("station", line.clone(), budget);
+    let mut station = Fleet::builder().line("station", line.clone());
     for (name, address) in PUMPS.into_iter().zip(1..) {
         // Should this program die, each pump stops by itself after 3 s.
         let watchdog = WatchdogContract { timeout: Duration::from_secs(3), reaction: Reaction::Ramp };
         let settings = DriveSettings { watchdog: Some(watchdog), ..DriveSettings::controlled(name) };
-        let pump = Atv312::new(line.slave(address), SlaveAddress::try_from(address)?);
-        station = station.drive("station", settings, Box::new(pump));
+        station =
+            station.drive("station", address, settings, |port, slave| Box::new(Atv312::new(port, slave)));
     }
     let fleet = station.start()?;
     for pump in fleet.drives() {

@@ -4,10 +4,10 @@
 
 use std::{env, path::Path, process::Stdio, time::Duration};
 
-use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
+use drive_bus::{Line, LineConfig};
+use drive_core::{Direction, Frequency, SerialSettings, State};
 use drive_families::Family;
-use drive_fleet::{Fleet, GroupStart, LineBudget, Link, Until, WatchdogCheck};
+use drive_fleet::{Fleet, GroupStart, Link, Until, WatchdogCheck};
 use drive_sim::{SimLine, Wiring};
 use support::{drives, plant};
 use tokio::process::Command;
@@ -25,17 +25,11 @@ async fn open(link: &Path) -> (Fleet, Line) {
         response_timeout: Duration::from_millis(200),
         ..LineConfig::serial(link, SerialSettings::MODBUS_DEFAULT)
     };
-    let config = MEMBERS.iter().fold(config, |config, (family, address)| {
-        let turnaround = family.capabilities().turnaround;
-        config.slave(*address, SlaveSettings { turnaround, ..SlaveSettings::default() })
-    });
-    let budget = LineBudget::of(&config);
     let line = Line::open(config).await.expect("the pty is there");
-    let builder = Fleet::builder().line("pty", line.clone(), budget);
+    let builder = Fleet::builder().line("pty", line.clone());
     let builder = MEMBERS.iter().fold(builder, |builder, (family, address)| {
-        let slave = SlaveAddress::try_from(*address).expect("it is an address");
         let settings = plant::controlled(*family, &family.to_string());
-        builder.drive("pty", settings, drives::drive(*family, line.slave(*address), slave))
+        builder.drive("pty", *address, settings, |port, slave| drives::drive(*family, port, slave))
     });
     (builder.start().expect("it can be fed"), line)
 }

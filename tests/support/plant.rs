@@ -2,10 +2,8 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{
-    Frequency, Reaction, SerialSettings, SlaveAddress, WatchdogCapability, serial::CharacterFormat,
-};
+use drive_bus::{Line, LineConfig};
+use drive_core::{Frequency, Reaction, SerialSettings, WatchdogCapability, serial::CharacterFormat};
 use drive_families::Family;
 use drive_fleet::{
     DriveHandle, DriveSettings, EventKind, Events, Fleet, FleetError, LineBudget, Received, WatchdogContract,
@@ -71,14 +69,10 @@ impl Site {
     /// How a line to this site is configured.
     #[must_use]
     pub fn config(&self) -> LineConfig {
-        let config = LineConfig {
+        LineConfig {
             response_timeout: Duration::from_millis(150),
             ..LineConfig::stream(self.simulated.wiring().settings)
-        };
-        self.members.iter().fold(config, |config, (family, address, _)| {
-            let turnaround = family.capabilities().turnaround;
-            config.slave(*address, SlaveSettings { turnaround, ..SlaveSettings::default() })
-        })
+        }
     }
 }
 
@@ -107,18 +101,18 @@ impl Plant {
         for (number, site) in sites.iter().enumerate() {
             let config = site.config();
             // With a repeater in the middle: an Altivar 28 allows 18 stations on a segment.
-            let budget = LineBudget { segments: 2, ..LineBudget::of(&config) };
             let line = Line::over(site.simulated.in_memory(), config);
             let name = format!("line {number}");
-            builder = builder.line(name.clone(), line.clone(), budget);
+            let in_halves = |budget| LineBudget { segments: 2, ..budget };
+            builder = builder.line_with(name.clone(), line.clone(), in_halves);
             for (family, address, settings) in &site.members {
-                let slave = SlaveAddress::try_from(*address).expect("it is an address");
-                let drive = drives::drive(*family, line.slave(*address), slave);
                 machines.insert(
                     settings.name.clone(),
                     site.simulated.slave(*address).expect("the machine is there"),
                 );
-                builder = builder.drive(name.clone(), settings.clone(), drive);
+                builder = builder.drive(&name, *address, settings.clone(), |port, slave| {
+                    drives::drive(*family, port, slave)
+                });
             }
             lines.push(line);
         }

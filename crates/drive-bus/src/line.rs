@@ -99,6 +99,12 @@ impl Line {
         self.slave(0)
     }
 
+    /// How the line is configured now.
+    #[must_use]
+    pub fn config(&self) -> LineConfig {
+        self.handle.shared.master().config().clone()
+    }
+
     /// Sets what is special about one slave, from its next request on.
     pub fn configure_slave(&self, address: u8, settings: SlaveSettings) {
         self.handle.shared.master().configure_slave(address, settings);

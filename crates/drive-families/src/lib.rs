@@ -82,33 +82,18 @@ impl Family {
     /// A drive of this family behind a port. Nothing is sent by it.
     #[must_use]
     pub fn open(self, port: impl Port + 'static, slave: SlaveAddress) -> Box<dyn Drive> {
-        self.build(port, slave, &Options::default())
+        self.open_with(port, slave, &Options::default())
     }
 
-    /// A drive of this family of which its owner says more than the bus can tell. Nothing is sent by it.
-    ///
-    /// # Errors
-    /// [`OptionError::Family`] for an option that is another family's.
+    /// A drive of this family of which its owner says more than the bus can tell, by those of the options that are the
+    /// family's: see [`Options::check`]. Nothing is sent by it.
+    #[must_use]
     pub fn open_with(
         self,
         port: impl Port + 'static,
         slave: SlaveAddress,
         options: &Options,
-    ) -> Result<Box<dyn Drive>, OptionError> {
-        options.check(self)?;
-        Ok(self.build(port, slave, options))
-    }
-
-    /// The communication watchdog of a drive of this family on its line, of which those of the options hold that are the
-    /// family's: [`Drive::watchdog_capability`], asked without a line.
-    #[must_use]
-    pub fn watchdog(self, ascii: bool, options: &Options) -> Option<WatchdogCapability> {
-        let slave = SlaveAddress::try_from(1).ok()?;
-        self.build(Nowhere { ascii }, slave, &options.of(self)).watchdog_capability()
-    }
-
-    /// The drive with those of the options that are its family's.
-    fn build(self, port: impl Port + 'static, slave: SlaveAddress, options: &Options) -> Box<dyn Drive> {
+    ) -> Box<dyn Drive> {
         match self {
             Self::Atv21 => {
                 Box::new(Atv21::new(port, slave).with_authority(options.authority.unwrap_or_default()))
@@ -124,6 +109,14 @@ impl Family {
                 })
             }
         }
+    }
+
+    /// The communication watchdog of a drive of this family on its line, of which those of the options hold that are the
+    /// family's: [`Drive::watchdog_capability`], asked without a line.
+    #[must_use]
+    pub fn watchdog(self, ascii: bool, options: &Options) -> Option<WatchdogCapability> {
+        let slave = SlaveAddress::try_from(1).ok()?;
+        self.open_with(Nowhere { ascii }, slave, options).watchdog_capability()
     }
 }
 

@@ -1,13 +1,11 @@
 //! [`FleetBuilder`]: lines and drives become a fleet, after everything that can be checked beforehand is.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use drive_bus::Line;
-use drive_core::{Capabilities, Drive, LineMismatch, SlaveAddress, StopMode, WatchdogCapability};
+use drive_bus::{Line, Slave, SlaveSettings};
+use drive_core::{
+    Capabilities, Drive, LineMismatch, SlaveAddress, SlaveAddressError, StopMode, WatchdogCapability,
+};
 use tokio::{
     sync::{Mutex, Semaphore, broadcast, mpsc, watch},
     time::Instant,
@@ -43,6 +41,24 @@ pub enum FleetError {
         drive: String,
         /// The line that it names.
         line: String,
+    },
+    /// A drive's address is none.
+    #[error("{drive}: {problem}")]
+    NoAddress {
+        /// The drive.
+        drive: String,
+        /// Why.
+        problem: SlaveAddressError,
+    },
+    /// What was made for an address talks to another one.
+    #[error("{drive}: registered at address {slave}, and made for address {made_for}")]
+    OtherAddress {
+        /// The drive.
+        drive: String,
+        /// Where it is registered.
+        slave: SlaveAddress,
+        /// Where it talks to.
+        made_for: SlaveAddress,
     },
     /// Two drives of one line have one address.
     #[error("{drive}: address {slave} of line {line:?} is taken")]
@@ -90,6 +106,13 @@ pub struct SettingProblem {
     pub reason: String,
 }
 
+/// What a line is before the fleet starts.
+struct Wire {
+    name: String,
+    line: Line,
+    budget: LineBudget,
+}
+
 /// What a drive is before the fleet starts.
 struct Member {
     line: usize,
@@ -100,8 +123,10 @@ struct Member {
 /// Lines and drives that become a [`Fleet`].
 #[must_use]
 pub struct FleetBuilder {
-    lines: Vec<(String, Line, LineBudget)>,
-    members: Vec<(String, DriveSettings, Box<dyn Drive>)>,
+    lines: Vec<Wire>,
+    members: Vec<Member>,
+    /// The first thing that cannot be.
+    problem: Option<FleetError>,
     events: usize,
     refuses_plans: bool,
 }
@@ -109,25 +134,103 @@ pub struct FleetBuilder {
 impl Fleet {
     /// Begins a fleet.
     pub const fn builder() -> FleetBuilder {
-        FleetBuilder::new()
+        FleetBuilder {
+            lines: Vec::new(),
+            members: Vec::new(),
+            problem: None,
+            events: EVENTS,
+            refuses_plans: true,
+        }
     }
 }
 
 impl FleetBuilder {
-    pub(crate) const fn new() -> Self {
-        Self { lines: Vec::new(), members: Vec::new(), events: EVENTS, refuses_plans: true }
+    /// Adds a line. What it gives follows from its configuration, as [`LineBudget::of`] says.
+    pub fn line(self, name: impl Into<String>, line: Line) -> Self {
+        self.line_with(name, line, |budget| budget)
     }
 
-    /// Adds a line. The budget says what it gives, see [`LineBudget::of`].
-    pub fn line(mut self, name: impl Into<String>, line: Line, budget: LineBudget) -> Self {
-        self.lines.push((name.into(), line, budget));
+    /// Adds a line of which more is known than its configuration says: how fast its drives answer, how many segments it
+    /// has.
+    pub fn line_with(
+        mut self,
+        name: impl Into<String>,
+        line: Line,
+        budget: impl FnOnce(LineBudget) -> LineBudget,
+    ) -> Self {
+        let (name, budget) = (name.into(), budget(LineBudget::of(&line.config())));
+        if self.lines.iter().any(|other| other.name == name) {
+            self.problem.get_or_insert(FleetError::NameTaken(name.clone()));
+        }
+        self.lines.push(Wire { name, line, budget });
         self
     }
 
-    /// Adds a drive that talks over a line named so.
-    pub fn drive(mut self, line: impl Into<String>, settings: DriveSettings, drive: Box<dyn Drive>) -> Self {
-        self.members.push((line.into(), settings, drive));
+    /// Adds a drive at this address of a line that was added before. `open` makes it over the port that it is given, so
+    /// that it is commanded where it is registered. The line keeps the pause that the family needs after each answer.
+    ///
+    /// ```no_run
+    /// # use drive_core::{Drive, SlaveAddress};
+    /// # fn atv312(port: drive_bus::Slave, slave: SlaveAddress) -> Box<dyn Drive> { unimplemented!() }
+    /// # fn example(line: drive_bus::Line) -> Result<(), Box<dyn std::error::Error>> {
+    /// use drive_fleet::{DriveSettings, Fleet};
+    ///
+    /// let fleet = Fleet::builder()
+    ///     .line("north", line)
+    ///     .drive("north", 2, DriveSettings::controlled("pump 2"), |port, slave| atv312(port, slave))
+    ///     .start()?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn drive(
+        mut self,
+        line: &str,
+        address: u8,
+        settings: DriveSettings,
+        open: impl FnOnce(Slave, SlaveAddress) -> Box<dyn Drive>,
+    ) -> Self {
+        match self.member(line, address, settings, open) {
+            Ok(member) => self.members.push(member),
+            Err(problem) => {
+                self.problem.get_or_insert(problem);
+            }
+        }
         self
+    }
+
+    fn member(
+        &self,
+        line_name: &str,
+        address: u8,
+        settings: DriveSettings,
+        open: impl FnOnce(Slave, SlaveAddress) -> Box<dyn Drive>,
+    ) -> Result<Member, FleetError> {
+        let drive = || settings.name.clone();
+        if self.members.iter().any(|other| other.settings.name == settings.name) {
+            return Err(FleetError::NameTaken(drive()));
+        }
+        let Some((line, wire)) = self.lines.iter().enumerate().find(|(_, wire)| wire.name == line_name)
+        else {
+            return Err(FleetError::NoSuchLine { drive: drive(), line: line_name.to_owned() });
+        };
+        let slave = SlaveAddress::try_from(address)
+            .map_err(|problem| FleetError::NoAddress { drive: drive(), problem })?;
+        if self.members.iter().any(|other| other.line == line && other.drive.slave() == slave) {
+            return Err(FleetError::AddressTaken { drive: drive(), line: line_name.to_owned(), slave });
+        }
+        let opened = open(wire.line.slave(address), slave);
+        let made_for = opened.slave();
+        if made_for != slave {
+            return Err(FleetError::OtherAddress { drive: drive(), slave, made_for });
+        }
+        let capabilities = opened.capabilities();
+        if let Some(serial) = wire.budget.serial {
+            let fits = capabilities.check_line(slave, serial);
+            fits.map_err(|problem| FleetError::Mismatch { drive: drive(), problem })?;
+        }
+        check_settings(&settings, capabilities, opened.watchdog_capability())
+            .map_err(|problem| FleetError::Setting { drive: drive(), problem })?;
+        Ok(Member { line, settings, drive: opened })
     }
 
     /// How many events are kept for a reader that is slow; 4096 unless said.
@@ -164,53 +267,44 @@ impl FleetBuilder {
     }
 
     fn check(self) -> Result<(Vec<LineEntry>, Vec<Member>), FleetError> {
-        let mut numbers = BTreeMap::new();
-        for (number, (name, ..)) in self.lines.iter().enumerate() {
-            if numbers.insert(name.clone(), number).is_some() {
-                return Err(FleetError::NameTaken(name.clone()));
-            }
+        let Self { lines, members, problem, refuses_plans, .. } = self;
+        if let Some(problem) = problem {
+            return Err(problem);
         }
-        let mut demands: Vec<Vec<Demand>> = self.lines.iter().map(|_| Vec::new()).collect();
-        let mut names = BTreeSet::new();
-        let mut addresses = BTreeSet::new();
-        let mut members = Vec::with_capacity(self.members.len());
-        for (line_name, settings, drive) in self.members {
-            let name = settings.name.clone();
-            if !names.insert(name.clone()) {
-                return Err(FleetError::NameTaken(name));
-            }
-            let found = numbers.get(&line_name).and_then(|&number| Some((number, self.lines.get(number)?)));
-            let Some((line, (_, _, budget))) = found else {
-                return Err(FleetError::NoSuchLine { drive: name, line: line_name });
-            };
-            let slave = drive.slave();
-            if !addresses.insert((line, slave)) {
-                return Err(FleetError::AddressTaken { drive: name, line: line_name, slave });
-            }
-            let capabilities = drive.capabilities();
-            if let Some(serial) = budget.serial {
-                let fits = capabilities.check_line(slave, serial);
-                fits.map_err(|problem| FleetError::Mismatch { drive: name.clone(), problem })?;
-            }
-            let watchdog_capability = drive.watchdog_capability();
-            check_settings(&settings, capabilities, watchdog_capability)
-                .map_err(|problem| FleetError::Setting { drive: name.clone(), problem })?;
-            if let Some(demands) = demands.get_mut(line) {
-                let (periods, watchdog) = (settings.periods, settings.watchdog);
-                demands.push(Demand { drive: name, capabilities, watchdog_capability, periods, watchdog });
-            }
-            members.push(Member { line, settings, drive });
-        }
-        let mut lines = Vec::with_capacity(self.lines.len());
-        for ((name, line, budget), demands) in self.lines.into_iter().zip(demands) {
+        let mut entries = Vec::with_capacity(lines.len());
+        for (number, Wire { name, line, budget }) in lines.into_iter().enumerate() {
+            let members = || members.iter().filter(|member| member.line == number);
+            let demands: Vec<_> = members().map(Member::demand).collect();
             let Reckoning { plan, problem } = reckon(budget, &demands, 0);
-            if let Some(problem) = problem.filter(|_| self.refuses_plans) {
+            if let Some(problem) = problem.filter(|_| refuses_plans) {
                 return Err(FleetError::Plan { line: name, problem });
             }
+            members().for_each(|member| member.keep_pause(&line));
             let commands = Mutex::new(Instant::now());
-            lines.push(LineEntry { name: Arc::from(name), line, plan, commands });
+            entries.push(LineEntry { name: Arc::from(name), line, plan, commands });
         }
-        Ok((lines, members))
+        Ok((entries, members))
+    }
+}
+
+impl Member {
+    fn demand(&self) -> Demand {
+        Demand {
+            drive: self.settings.name.clone(),
+            capabilities: self.drive.capabilities(),
+            watchdog_capability: self.drive.watchdog_capability(),
+            periods: self.settings.periods,
+            watchdog: self.settings.watchdog,
+        }
+    }
+
+    /// Has the line keep the pause that the drive needs after its answers, unless it keeps a longer one.
+    fn keep_pause(&self, line: &Line) {
+        let (slave, pause) = (self.drive.slave().number(), self.drive.capabilities().turnaround);
+        let kept = line.config().slaves.get(&slave).copied().unwrap_or_default();
+        if kept.turnaround < pause {
+            line.configure_slave(slave, SlaveSettings { turnaround: pause, ..kept });
+        }
     }
 }
 

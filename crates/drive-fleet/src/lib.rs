@@ -8,17 +8,14 @@
 //! ```no_run
 //! use drive_bus::{Line, LineConfig};
 //! use drive_core::{Direction, Drive, Frequency, SerialSettings, StopMode};
-//! use drive_fleet::{DriveSettings, Fleet, LineBudget};
+//! use drive_fleet::{DriveSettings, Fleet};
 //!
-//! # fn some_drive(port: drive_bus::Slave) -> Box<dyn Drive> { unimplemented!() }
+//! # fn atv312(port: drive_bus::Slave, slave: drive_core::SlaveAddress) -> Box<dyn Drive> { unimplemented!() }
 //! # async fn example() -> Result<(), Box<dyn std::error::Error>> {
-//! let config = LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT);
-//! let budget = LineBudget::of(&config);
-//! let line = Line::open(config).await?;
-//! let pump = some_drive(line.slave(1));
+//! let line = Line::open(LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT)).await?;
 //! let fleet = Fleet::builder()
-//!     .line("north", line, budget)
-//!     .drive("north", DriveSettings::controlled("pump 1"), pump)
+//!     .line("north", line)
+//!     .drive("north", 1, DriveSettings::controlled("pump 1"), |port, slave| atv312(port, slave))
 //!     .start()?;
 //!
 //! let pump = fleet.drive("pump 1").ok_or("no such pump")?;

@@ -6,17 +6,11 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{ErrorKind, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
-    DriveHandle, DriveSettings, Fleet, LastSeen, LineBudget, Link, Outcome, Periods, Refused, Times, Unknown,
+    DriveHandle, DriveSettings, Fleet, LastSeen, Link, Outcome, Periods, Refused, Times, Unknown,
 };
 use tokio::time::{Instant, interval_at, timeout};
 
-use crate::{
-    drive_spec::DriveName,
-    failure::Failure,
-    one_drive::{self, open_drive},
-    output,
-    signals::Ending,
-};
+use crate::{drive_spec::DriveName, failure::Failure, one_drive, output, signals::Ending};
 
 /// What whoever waits for a stop has to know.
 const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
@@ -66,11 +60,14 @@ impl Commanded {
             },
             ..DriveSettings::controlled(name.to_string())
         };
-        let drive = open_drive(&line, name, options)?;
         let input = |error: &dyn fmt::Display| Failure::Input(error.to_string());
-        let builder =
-            Fleet::builder().line("line", line.clone(), LineBudget::of(&config)).whatever_the_plan();
-        let fleet = builder.drive("line", settings, drive).start().map_err(|error| input(&error))?;
+        let builder = Fleet::builder().line("line", line.clone()).whatever_the_plan();
+        let fleet = builder
+            .drive("line", name.slave.number(), settings, |port, slave| {
+                name.family.open_with(port, slave, options)
+            })
+            .start()
+            .map_err(|error| input(&error))?;
         let Some(handle) = fleet.drives().pop() else { return Err(input(&"the fleet has no drive")) };
         Ok(Self { name, handle, config, line, ending })
     }
@@ -244,7 +241,7 @@ mod tests {
                 let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
                 let line = Line::over(simulated.in_memory(), config.clone());
                 let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
-                let options = simulated::options().of(family);
+                let options = simulated::options();
                 let mut one = Commanded::over(name, line, config, &options, Vec::new()).unwrap();
                 let setpoint = Frequency::from_hertz(20);
                 let held = one.command(async |drive| drive.set_setpoint(setpoint).await).await.unwrap();

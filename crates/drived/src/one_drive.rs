@@ -51,7 +51,7 @@ impl OneDriveArgs {
     pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
         let (name, options, config) = self.parts()?;
         let line = open_line(config.clone()).await?;
-        let mut drive = open_drive(&line, name, &options)?;
+        let mut drive = open_drive(&line, name, &options);
         wait_at_most(&mut *drive);
         Ok(OneDrive { name, drive, config, line })
     }
@@ -120,10 +120,8 @@ pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
 }
 
 /// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.
-pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Result<Box<dyn Drive>, Failure> {
-    let DriveName { family, slave } = name;
-    let drive = family.open_with(line.slave(slave.number()), slave, &options.of(family));
-    drive.map_err(|error| Failure::Input(format!("{name}: {error}")))
+pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Box<dyn Drive> {
+    name.family.open_with(line.slave(name.slave.number()), name.slave, options)
 }
 
 /// Waits for what became of something that a drive was told. Whoever asks the program to end meanwhile has to know that

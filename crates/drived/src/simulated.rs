@@ -75,13 +75,13 @@ mod tests {
             let machine = simulated.add_boxed(1, model(family, SetUp::ForTheBus)).unwrap();
             let line = Line::over(simulated.in_memory(), config.clone());
             let slave = SlaveAddress::try_from(1).unwrap();
-            let mut drive = family.open_with(line.slave(1), slave, &options().of(family)).unwrap();
+            let mut drive = family.open_with(line.slave(1), slave, &options());
             assert!(!drive.status().await.unwrap().is_fault(), "{family}");
             machine.trip(trip_code(family));
             assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
             assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
             let name = DriveName { family, slave };
-            let mut one = Commanded::over(name, line, config, &options().of(family), Vec::new()).unwrap();
+            let mut one = Commanded::over(name, line, config, &options(), Vec::new()).unwrap();
             let outcome = one.command(async |drive| drive.reset_faults().await).await.unwrap();
             assert!(outcome.is_confirmed() && !one.status().is_fault(), "{family}: {outcome}");
         }

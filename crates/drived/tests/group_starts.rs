@@ -3,11 +3,10 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{Direction, Frequency, SerialSettings, Setpoint, SlaveAddress, StopMode};
+use drive_core::{Direction, Frequency, SerialSettings, Setpoint, StopMode};
 use drive_families::Family;
 use drive_fleet::{
-    DriveSettings, Fleet, GroupFailure, GroupStart, IdentityCheck, LineBudget, Outcome, Periods, Refused,
-    Until,
+    DriveSettings, Fleet, GroupFailure, GroupStart, IdentityCheck, Outcome, Periods, Refused, Until,
 };
 use drive_sim::{SimLine, SimSlave, Wiring, models::atv312::Atv312};
 use tokio::{
@@ -34,15 +33,14 @@ impl FullLine {
     async fn ready(periods: Periods) -> Self {
         let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
         let config = LineConfig::stream(SerialSettings::MODBUS_DEFAULT);
-        let budget = LineBudget::of(&config);
         let line = Line::over(simulated.in_memory(), config);
-        let mut builder = Fleet::builder().line("north", line.clone(), budget);
+        let mut builder = Fleet::builder().line("north", line.clone());
         let mut machines = Vec::new();
         for number in 1..=DRIVES {
             machines.push(simulated.add(number, Atv312::under_bus_control()).expect("the address is free"));
-            let slave = SlaveAddress::try_from(number).expect("it is an address");
             let settings = DriveSettings { periods, ..DriveSettings::controlled(format!("fan {number}")) };
-            builder = builder.drive("north", settings, Family::Atv312.open(line.slave(number), slave));
+            builder =
+                builder.drive("north", number, settings, |port, slave| Family::Atv312.open(port, slave));
         }
         let fleet = builder.start().expect("it is planned to work");
         for drive in fleet.drives() {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{Direction, Frequency, Reaction, SerialSettings, SlaveAddress};
+use drive_core::{Direction, Frequency, Reaction, SerialSettings};
 use drive_families::Family;
 use drive_fleet::{
     Demand, DriveHandle, DriveSettings, Fleet, GroupStart, LineBudget, Periods, Reckoning, Until,
@@ -47,13 +47,12 @@ async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_
     };
     let budget = LineBudget::of(&config);
     let line = Line::over(simulated.in_memory(), config);
-    let mut builder = Fleet::builder().line("north", line.clone(), budget);
+    let mut builder = Fleet::builder().line("north", line.clone());
     let mut demands = Vec::new();
     let mut machines = Vec::new();
     let watchdog = Some(WatchdogContract { timeout: 10 * SECOND, reaction: Reaction::Ramp });
     for number in 1..=31 {
         machines.push(simulated.add(number, Atv312::under_bus_control()).expect("the address is free"));
-        let slave = SlaveAddress::try_from(number).expect("it is an address");
         let name = format!("fan {number}");
         let capabilities = family.capabilities();
         demands.push(Demand {
@@ -64,7 +63,7 @@ async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_
             watchdog,
         });
         let settings = DriveSettings { periods: PERIODS, watchdog, ..DriveSettings::controlled(name) };
-        builder = builder.drive("north", settings, family.open(line.slave(number), slave));
+        builder = builder.drive("north", number, settings, |port, slave| family.open(port, slave));
     }
     let fleet = builder.start().expect("it is planned to work");
     for drive in fleet.drives() {

@@ -12,7 +12,7 @@ use self::report::{Form, Report};
 use crate::{
     config::{Config, DrivePart},
     failure::Failure,
-    one_drive::{open_drive, open_line},
+    one_drive::open_line,
     signals::Ending,
 };
 
@@ -36,7 +36,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
     let mut ending = Ending::listen()?;
     let lines = open_lines(&config).await?;
-    let fleet = build(&config, &lines)?.start().map_err(|error| Failure::Input(error.to_string()))?;
+    let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
@@ -74,14 +74,15 @@ async fn open_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     Ok(lines)
 }
 
-fn build(config: &Config, lines: &[Line]) -> Result<FleetBuilder, Failure> {
+fn build(config: &Config, lines: &[Line]) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
-        builder = builder.line(part.name.as_str(), line.clone(), part.budget);
+        builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
         for DrivePart { name, settings, options } in &part.drives {
-            let drive = open_drive(line, *name, &options.values)?;
-            builder = builder.drive(part.name.as_str(), settings.clone(), drive);
+            builder = builder.drive(&part.name, name.slave.number(), settings.clone(), |port, slave| {
+                name.family.open_with(port, slave, &options.values)
+            });
         }
     }
-    Ok(builder)
+    builder
 }

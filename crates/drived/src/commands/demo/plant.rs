@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc, time::Duration};
 use drive_bus::{Line, LineConfig};
 use drive_core::{SerialSettings, SlaveAddress, serial::CharacterFormat};
 use drive_families::Family;
-use drive_fleet::{DriveSettings, ExitAction, Fleet, LineBudget, Periods};
+use drive_fleet::{DriveSettings, ExitAction, Fleet, Periods};
 use drive_sim::{SimLine, Wiring};
 use tokio::{sync::watch, task::AbortHandle};
 
@@ -13,7 +13,6 @@ use super::{STOPPING, story, unit::Unit};
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
-    line_spec, one_drive,
     simulated::{self, SetUp},
 };
 
@@ -62,8 +61,6 @@ impl Plant {
                 response_timeout: RESPONSE_TIMEOUT,
                 ..LineConfig::stream(settings)
             };
-            let config = line_spec::with_turnarounds(config, &names);
-            let budget = LineBudget::of(&config);
             let first = members.len();
             for name in &names {
                 let model = simulated::model(name.family, SetUp::ForTheBus);
@@ -71,12 +68,16 @@ impl Plant {
                 members.push((*name, machine.map_err(|error| Failure::Input(error.to_string()))?));
             }
             let line = Line::over(simulated.in_memory_precise(), config);
-            builder = builder.line(settings.to_string(), line.clone(), budget);
+            builder = builder.line(settings.to_string(), line.clone());
             for name in names {
-                let drive = one_drive::open_drive(&line, name, &simulated::options())?;
                 let drive_settings =
                     DriveSettings { periods: PERIODS, ..DriveSettings::controlled(name.to_string()) };
-                builder = builder.drive(settings.to_string(), drive_settings, drive);
+                builder = builder.drive(
+                    &settings.to_string(),
+                    name.slave.number(),
+                    drive_settings,
+                    |port, slave| name.family.open_with(port, slave, &simulated::options()),
+                );
             }
             lines.push(PlantLine { settings, line, units: first..members.len() });
         }

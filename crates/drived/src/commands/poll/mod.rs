@@ -71,7 +71,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let (readings, mut incoming) = mpsc::channel(WAITING);
     let mut polls = JoinSet::new();
     for &name in &names {
-        let drive = one_drive::open_drive(&line, name, &options)?;
+        let drive = one_drive::open_drive(&line, name, &options);
         polls.spawn(poll(name, drive, args.period.0, readings.clone()));
     }
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
