@@ -126,7 +126,7 @@ fn stage(
     let config = LineConfig::stream(capabilities.factory).slave(ADDRESS, pause);
     let line = Line::over(simulated.in_memory(), config);
     let slave = SlaveAddress::try_from(ADDRESS).expect("it is an address");
-    let drive = family.open_with(line.slave(ADDRESS), slave, options).expect("the options are the family's");
+    let drive = family.open_with(line.slave(ADDRESS), slave, options);
     (simulated, machine, line, drive)
 }
 
