@@ -20,7 +20,7 @@ pub const MOTOR: &str = "motor";
 pub const ADDRESS: u8 = 5;
 
 /// How long anything may take here, in virtual time.
-const PATIENCE: Duration = Duration::from_secs(300);
+pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Speed and format that all families have.
 #[must_use]
@@ -156,6 +156,20 @@ impl Plant {
     #[must_use]
     pub fn machine(&self) -> &SimSlave {
         self.machine_of(MOTOR)
+    }
+
+    /// Has something happen to the one motor's drive or its line: a line of the simulator's text without the drive's name.
+    ///
+    /// # Panics
+    /// When the simulator does not know it.
+    pub fn happens(&self, deed: &str) {
+        let text = match deed.strip_prefix("line ") {
+            Some(_) => deed.to_owned(),
+            None => format!("{} {deed}", self.machine().name()),
+        };
+        for site in &self.sites {
+            site.simulated.control(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
+        }
     }
 
     /// A drive.

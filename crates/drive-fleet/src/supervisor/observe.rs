@@ -20,6 +20,11 @@ const SWITCHED_OFF: Duration = Duration::from_secs(1);
 /// How often the explanation of a trip is asked for.
 const EXPLANATIONS: u8 = 3;
 
+/// Who has control of a drive, where that is somebody else. Some drives tell it only then.
+fn somebody_else(status: &Status) -> Option<Control> {
+    status.control.filter(|control| *control != Control::Bus)
+}
+
 impl Supervisor {
     pub(super) fn handle_status(&mut self, now: Instant, result: Result<Status>) {
         let in_time = self.pace.status_ended(now, self.is_busy());
@@ -108,19 +113,20 @@ impl Supervisor {
         {
             self.emit(EventKind::Warning { present });
         }
-        let (Some(was), Some(is)) = (before.and_then(|before| before.control), status.control) else {
-            return;
-        };
-        if was != Control::Bus && is == Control::Bus {
-            self.emit(EventKind::ControlReturned);
-            self.control_returned(now);
-        } else if was != is {
-            // Whoever has control now may give another reference.
-            self.given = None;
-            self.emit(EventKind::ControlTaken(is));
-            let ran = self.started_here || before.is_some_and(|before| before.state == State::Running);
-            if was == Control::Bus && ran {
-                self.control_taken(now);
+        let Some(before) = before else { return };
+        match (somebody_else(before), somebody_else(status)) {
+            (was, is) if was == is => {}
+            (_, None) => {
+                self.emit(EventKind::ControlReturned);
+                self.control_returned(now);
+            }
+            (was, Some(is)) => {
+                // Whoever has control now may give another reference.
+                self.given = None;
+                self.emit(EventKind::ControlTaken(is));
+                if was.is_none() && (self.started_here || before.state == State::Running) {
+                    self.control_taken(now);
+                }
             }
         }
     }

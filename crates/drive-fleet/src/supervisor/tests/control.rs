@@ -28,6 +28,20 @@ fn the_run_command_is_withdrawn_when_somebody_else_takes_control() {
 }
 
 #[test]
+fn control_that_a_drive_tells_only_when_somebody_else_has_it_is_seen_to_be_taken_and_given_back() {
+    let mut rig = running(settings());
+    rig.drive.status.control = None;
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.events(), [""; 0]);
+    rig.drive.status.control = Some(Control::Local);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.events(), ["control taken", "command"]);
+    rig.drive.status.control = None;
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.events().last(), Some(&"control returned"));
+}
+
+#[test]
 fn a_withdrawal_that_is_not_heard_is_repeated_and_becomes_an_alarm_in_its_time() {
     let mut rig = running(settings());
     rig.machine.control_taken(rig.now);
