@@ -1,34 +1,26 @@
-//! One drive on a plain tokio-modbus context: read it, start it, change its setpoint, stop it.
+//! One drive on a line: read it, start it, change its setpoint, stop it.
 //!
 //! ```console
 //! $ cargo run -p examples --example hello_drive                 # a simulated Altivar 312
 //! $ cargo run -p examples --example hello_drive /dev/ttyUSB0    # the one at address 1, 19200 8E1: ITS MOTOR TURNS
 //! ```
 //!
-//! A plain context is enough for one drive on its own line. For several drives, or a line with other slaves, take
-//! `drive_bus::Line`: see `polling_daemon.rs`.
+//! Further drives of the same line are further slaves of the same `Line`: see `polling_daemon.rs`.
 
 use std::{error::Error, time::Duration};
 
 use drive_atv312::Atv312;
+use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Drive, Frequency, SerialSettings, SlaveAddress, StopMode};
 use drive_sim::{SimLine, Wiring, models};
-use tokio_modbus::{
-    Slave,
-    client::{Context, rtu},
-};
-use tokio_serial::{Parity, SerialPortBuilderExt};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn Error>> {
-    let context = match std::env::args().nth(1) {
-        Some(path) => {
-            let port = tokio_serial::new(path, 19_200).parity(Parity::Even).open_native_async()?;
-            rtu::attach_slave(port, Slave(1))
-        }
+    let line = match std::env::args().nth(1) {
+        Some(path) => Line::open(LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT)).await?,
         None => simulated()?,
     };
-    let mut drive = Atv312::new(context, SlaveAddress::try_from(1)?);
+    let mut drive = Atv312::new(line.slave(1), SlaveAddress::try_from(1)?);
 
     println!("before:   {}", drive.status().await?);
     drive.set_setpoint(Frequency::from_hertz(20).into()).await?;
@@ -61,9 +53,10 @@ async fn run(drive: &mut impl Drive) -> drive_core::Result<()> {
     Ok(())
 }
 
-/// A simulated Altivar 312 on a simulated line, behind the same kind of context.
-fn simulated() -> Result<Context, Box<dyn Error>> {
-    let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
-    line.add(1, models::atv312::Atv312::new())?;
-    Ok(rtu::attach_slave(line.in_memory(), Slave(1)))
+/// A simulated Altivar 312 on a simulated line.
+fn simulated() -> Result<Line, Box<dyn Error>> {
+    let settings = SerialSettings::MODBUS_DEFAULT;
+    let plant = SimLine::new(Wiring::rtu(settings));
+    plant.add(1, models::atv312::Atv312::new())?;
+    Ok(Line::over(plant.in_memory(), LineConfig::stream(settings)))
 }

@@ -95,9 +95,9 @@ pub const fn turnaround(baud: u32) -> Duration {
 /// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
 /// use drive_3g3ev::Drive3g3ev;
 /// use drive_core::{Direction, Drive, Frequency, StopMode};
-/// # let context: tokio_modbus::client::Context = unimplemented!();
+/// # let port: drive_core::Reconnecting<fn() -> std::future::Ready<std::io::Result<drive_core::tokio_modbus::client::Context>>> = unimplemented!();
 ///
-/// let mut drive = Drive3g3ev::new(context, 1.try_into()?);
+/// let mut drive = Drive3g3ev::new(port, 1.try_into()?);
 /// drive.set_setpoint(Frequency::from_hertz(60).into()).await?;
 /// drive.start(Direction::Forward).await?;
 /// drive.stop(StopMode::Ramp).await?;

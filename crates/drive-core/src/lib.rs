@@ -20,12 +20,16 @@ mod error;
 mod faults;
 mod identity;
 pub mod port;
+mod reconnecting;
 pub mod registers;
 pub mod serial;
 mod setpoint;
 mod status;
 mod stopped;
 mod units;
+
+pub use async_trait::async_trait;
+pub use tokio_modbus;
 
 pub use access::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
@@ -38,6 +42,7 @@ pub use error::{
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use port::{Class, Effect, Port, PortError, Terms};
+pub use reconnecting::Reconnecting;
 pub use registers::{Row, Written};
 pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};

@@ -3,7 +3,7 @@
 use std::{fmt, io, time::Duration};
 
 use tokio::time::Instant;
-use tokio_modbus::client::{Client, Context};
+use tokio_modbus::client::Client;
 
 /// How urgent a call is. A line serves a higher class first, always.
 ///
@@ -109,9 +109,8 @@ impl Terms {
 /// Set the terms, then call. The terms hold until they are set anew.
 ///
 /// # For implementors
-/// A line with a schedule **must** honour class, lifetime, effect and key as [`Terms`] says. A plain connection has
-/// nothing to schedule and keeps the default body, which ignores them; that is how a drive runs on any tokio-modbus
-/// [`Context`]. What is special about a failure is carried as a [`PortError`] inside
+/// A line with a schedule **must** honour class, lifetime, effect and key as [`Terms`] says; a connection of one drive has
+/// nothing to schedule, see [`Reconnecting`](crate::Reconnecting). Every call **must** end in a bounded time. What is special about a failure is carried as a [`PortError`] inside
 /// [`tokio_modbus::Error::Transport`], see [`PortError::into_io`]. `call` **should** be safe to drop: the exchange
 /// that is under way finishes on the line and its answer is discarded.
 pub trait Port: Client {
@@ -131,8 +130,6 @@ pub trait Port: Client {
         false
     }
 }
-
-impl Port for Context {}
 
 /// Why a call brought no answer, as far as the line knows.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
