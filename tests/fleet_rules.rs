@@ -2,14 +2,21 @@
 
 use std::time::Duration;
 
-use drive_core::{Class, Direction, Frequency, Identity, Reaction, Refusal, SerialSettings, State, StopMode};
+use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
+use drive_core::{
+    Class, Direction, Frequency, Identity, Reaction, Refusal, SerialSettings, State, StopMode,
+    serial::CharacterFormat,
+};
 use drive_families::Family;
 use drive_fleet::{
-    DriveSettings, EventKind, ExitAction, Link, OnExit, OnFault, Outcome, Periods, Refused, Times,
+    DriveSettings, EventKind, ExitAction, Fleet, Link, OnExit, OnFault, Outcome, Periods, Refused, Times,
     WatchdogContract,
 };
-use drive_sim::{Fault, Panel};
-use support::plant::{ADDRESS, MOTOR, Plant, Site, common_settings, contract, controlled};
+use drive_sim::{Fault, Panel, SimLine, Wiring};
+use support::{
+    drives,
+    plant::{ADDRESS, MOTOR, Plant, Site, common_settings, contract, controlled},
+};
 use tokio::time::{Instant, sleep};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -508,4 +515,41 @@ async fn rule_11_without_control_nothing_is_ever_written() {
         assert_eq!(Plant::writes(plant.machine()), 0, "{family}");
     })
     .await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_9_the_watchdog_of_an_altivar_58_on_ascii_is_fed_within_its_second_or_the_line_is_refused() {
+    let family = Family::Atv58;
+    let settings = SerialSettings::new(19_200, CharacterFormat::F7E1).expect("it is a speed");
+    let wiring = Wiring { protocol: drive_sim::Protocol::Ascii, ..Wiring::rtu(settings) };
+    let fleet_of = |drives: u8| {
+        let simulated = SimLine::new(wiring);
+        let protocol = Protocol::Ascii(AsciiSettings::default());
+        let config = LineConfig {
+            protocol,
+            response_timeout: Duration::from_millis(150),
+            ..LineConfig::stream(settings)
+        };
+        let line = Line::over(simulated.in_memory(), config);
+        let builder = (1..=drives).fold(Fleet::builder().line("ascii", line), |builder, address| {
+            simulated.add_boxed(address, drives::machine(family)).expect("the address is free");
+            let settings = DriveSettings::controlled(format!("fan {address}"));
+            builder.drive("ascii", address, settings, |port, slave| family.open(port, slave))
+        });
+        (simulated, builder.start())
+    };
+    let (simulated, fleet) = fleet_of(3);
+    let fleet = fleet.expect("three can be fed");
+    for drive in fleet.drives() {
+        drive.ready(60 * SECOND).await.expect("it gets ready");
+        assert!(drive.run(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+    }
+    sleep(600 * SECOND).await;
+    for machine in simulated.slaves() {
+        let seen = machine.observe();
+        assert_eq!((seen.trip, seen.running), (None, true), "{}", machine.name());
+    }
+    let (_, refused) = fleet_of(16);
+    let text = refused.expect_err("16 cannot be fed").to_string();
+    assert!(text.contains("the watchdog of fan 1 is 1s"), "{text}");
 }

@@ -122,6 +122,14 @@ pub struct WatchdogCapability {
     pub settable: bool,
 }
 
+impl WatchdogCapability {
+    /// The time of a watchdog that the bus cannot set: the drive has it whether anybody wants it or not, and has to be fed.
+    #[must_use]
+    pub const fn fixed(&self) -> Option<Duration> {
+        if self.settable { None } else { Some(self.max) }
+    }
+}
+
 /// What a drive does when its communication watchdog runs out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Reaction {

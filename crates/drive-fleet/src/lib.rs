@@ -70,3 +70,4 @@ pub use settings::{
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,
 };
+pub use supervisor::checks::FEED_PART;

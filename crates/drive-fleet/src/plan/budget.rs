@@ -5,10 +5,7 @@ use std::time::Duration;
 use drive_bus::{Endpoint, LineConfig, Protocol};
 use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
-use crate::{
-    settings::{Periods, WatchdogContract},
-    supervisor::checks::fixed_watchdog,
-};
+use crate::settings::{Periods, WatchdogContract};
 
 /// Words that an exchange of a status or of measurements is reckoned with.
 const WORDS: usize = 8;
@@ -103,7 +100,7 @@ impl Demand {
     /// The time of the watchdog that has to be fed: that of the settings, or the one that the drive has anyway.
     #[must_use]
     pub fn watchdog_timeout(&self) -> Option<Duration> {
-        self.watchdog.map(|contract| contract.timeout).or_else(|| fixed_watchdog(self.watchdog_capability))
+        self.watchdog.map(|contract| contract.timeout).or_else(|| self.watchdog_capability?.fixed())
     }
 
     /// The longer of the times from one status to the next.

@@ -19,7 +19,7 @@ const AGAIN: Duration = Duration::from_secs(1);
 
 /// The part of a watchdog's time after which it is fed by a frame of its own, if no poll has fed it: a half. The
 /// plan reckons with the same part.
-pub(crate) const FEED_PART: u32 = 2;
+pub const FEED_PART: u32 = 2;
 
 #[derive(Debug)]
 pub(crate) struct Checks {
@@ -57,7 +57,7 @@ impl Checks {
             contract: settings.watchdog,
             readable: capability.is_some(),
             settable: capability.is_some_and(|watchdog| watchdog.settable),
-            fixed: fixed_watchdog(capability),
+            fixed: capability.and_then(|watchdog| watchdog.fixed()),
             watchdog,
             watchdog_at: None,
             armed: false,
@@ -289,11 +289,6 @@ impl Checks {
             self.feed_again = Some(now + at.saturating_duration_since(heard) / FEED_PART);
         }
     }
-}
-
-/// The time of a watchdog that the bus cannot set and the drive therefore has as it is.
-pub(crate) fn fixed_watchdog(capability: Option<WatchdogCapability>) -> Option<Duration> {
-    capability.filter(|watchdog| !watchdog.settable).map(|watchdog| watchdog.max)
 }
 
 /// Whether a family or a drive has nothing to say of what it is.

@@ -116,7 +116,7 @@ impl Args {
     fn demand(&self, name: DriveName, protocol: Protocol) -> Demand {
         let watchdog_capability = line_spec::watchdog(name, &Options::default(), protocol);
         // A watchdog that the bus cannot set has its own time, whatever is wished here.
-        let fixed = watchdog_capability.is_some_and(|watchdog| !watchdog.settable);
+        let fixed = watchdog_capability.is_some_and(|watchdog| watchdog.fixed().is_some());
         let wished = !self.watchdog.0.is_zero() && !fixed;
         Demand {
             drive: name.to_string(),

@@ -10,6 +10,7 @@ use std::{
 };
 
 use drive_core::{Drive, Error, ErrorKind, PortError, Status};
+use drive_fleet::FEED_PART;
 use tokio::{sync::mpsc, task::JoinSet, time};
 
 use self::summary::Summary;
@@ -31,7 +32,7 @@ const NOT_SENT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Poll the status of many drives on one line, and say how well it went; nothing is written
 ///
-/// A drive's line is printed when what it says has changed. The summary counts the exchanges of the line, repeated ones
+/// Between two polls each drive gets a frame for its communication watchdog, where that needs one. A drive's line is printed when what it says has changed. The summary counts the exchanges of the line, repeated ones
 /// included. Exit code 1 when a drive has not answered once, however short the time was.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -114,11 +115,21 @@ async fn reached(until: Option<time::Instant>) {
     }
 }
 
-/// Polls one drive until nobody listens any more. Each drive has its own loop, so that a mute one delays only itself.
+/// Polls one drive until nobody listens any more, and feeds its communication watchdog in between. Each drive has its own
+/// loop, so that a mute one delays only itself.
 async fn poll(name: DriveName, mut drive: Box<dyn Drive>, period: Duration, readings: mpsc::Sender<Reading>) {
     let mut due = time::Instant::now();
+    let capability = drive.watchdog_capability();
+    let mut watchdog = capability.and_then(|watchdog| watchdog.fixed());
+    let mut is_read = capability.is_none_or(|watchdog| period * FEED_PART <= watchdog.min);
     loop {
         let outcome = drive.status().await;
+        if outcome.is_ok() && !is_read {
+            // As it is found it is fed; where nobody can read it there is nothing to feed but what the family always has.
+            let found = drive.watchdog().await;
+            is_read = !matches!(found, Err(Error::Port { .. }));
+            watchdog = found.ok().and_then(|found| found.timeout).or(watchdog);
+        }
         let pause = match &outcome {
             Err(Error::Port { problem: PortError::Offline { retry_in }, .. }) => {
                 (*retry_in).max(NOT_SENT_PAUSE)
@@ -133,6 +144,13 @@ async fn poll(name: DriveName, mut drive: Box<dyn Drive>, period: Duration, read
         }
         // A poll that took longer than the period is followed by the next at once, and none is made up for.
         due = (due + period).max(time::Instant::now() + pause);
+        while let Some(feed_at) = watchdog.map(|time| time::Instant::now() + time / FEED_PART)
+            && feed_at < due
+        {
+            time::sleep_until(feed_at).await;
+            // Whether it was heard the next status tells.
+            let _ = drive.keep_alive().await;
+        }
         time::sleep_until(due).await;
     }
 }
@@ -178,5 +196,51 @@ impl Book {
             "no status from {}: see that it is switched on, wired, and set to this address, speed and format",
             silent.join(", ")
         )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
+    use drive_core::{Reaction, SlaveAddress};
+    use drive_families::{Family, Options};
+    use drive_sim::{SimLine, Wiring};
+    use tokio::time::sleep;
+
+    use super::*;
+    use crate::simulated::{self, SetUp};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_poll_that_is_rarer_than_a_watchdog_wants_feeds_it_in_between() {
+        let ascii = Protocol::Ascii(AsciiSettings::default());
+        for (family, protocol, wired) in [
+            (Family::Atv58, ascii, drive_sim::Protocol::Ascii),
+            (Family::Atv58, Protocol::Rtu, drive_sim::Protocol::Rtu),
+            (Family::Atv312, Protocol::Rtu, drive_sim::Protocol::Rtu),
+            (Family::Omron3g3ev, Protocol::Rtu, drive_sim::Protocol::Rtu),
+        ] {
+            let settings = family.capabilities().factory;
+            let simulated = SimLine::new(Wiring { protocol: wired, ..Wiring::rtu(settings) });
+            let machine = simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            let config = LineConfig { protocol, ..LineConfig::stream(settings) };
+            let line = Line::over(simulated.in_memory(), config);
+            let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
+            let mut drive = one_drive::open_drive(&line, name, &Options::default());
+            // What the bus cannot set is as it is.
+            let _ = drive.arm_watchdog(Duration::from_secs(2), Reaction::Trip).await;
+            let (readings, mut incoming) = mpsc::channel(WAITING);
+            let period = Duration::from_secs(25);
+            let polls = tokio::spawn(poll(name, drive, period, readings));
+            sleep(8 * period).await;
+            assert_eq!(machine.observe().trip, None, "{family} {protocol:?}");
+            let mut read = 0;
+            while incoming.try_recv().is_ok_and(|reading| reading.outcome.is_ok()) {
+                read += 1;
+            }
+            assert_eq!(read, 8, "{family} {protocol:?}");
+            polls.abort();
+            sleep(2 * period).await;
+            assert!(machine.observe().trip.is_some(), "{family} {protocol:?}: nobody feeds it any more");
+        }
     }
 }
