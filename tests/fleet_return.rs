@@ -6,7 +6,11 @@ use std::time::Duration;
 use drive_core::{Command, Direction, Frequency, StopMode};
 use drive_families::Family;
 use drive_fleet::{EventKind, Link, OnControlTaken, Outcome};
-use support::plant::{PATIENCE, Plant};
+use drive_sim::Panel;
+use support::{
+    drives,
+    plant::{PATIENCE, Plant},
+};
 use tokio::time::{sleep, timeout};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -130,6 +134,30 @@ async fn a_run_command_is_withdrawn_when_somebody_else_takes_control_or_is_an_al
                 "{family}: {withdrawn}"
             ),
         }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_trip_that_somebody_resets_at_the_drive_starts_nothing() {
+    for family in Family::ALL {
+        let mut plant = Plant::single(family, |_| ());
+        if family == Family::Omron3g3ev {
+            // The reading of the manual under which a run command acts again.
+            plant.happens("reading after-reset runs");
+        }
+        plant.run_at(30).await;
+        plant.happens(&format!("trip {}", drives::a_trip_name(family)));
+        let command =
+            |kind: &EventKind| matches!(kind, EventKind::Command { command: Command::Withdraw, .. });
+        let withdrawn = plant.event("the withdrawal", command).await;
+        assert!(
+            matches!(withdrawn, EventKind::Command { outcome: Outcome::Confirmed, .. }),
+            "{family}: {withdrawn}"
+        );
+        plant.machine().panel(Panel::Reset);
+        sleep(60 * SECOND).await;
+        let seen = plant.machine().observe();
+        assert!(!seen.running && seen.trip.is_none(), "{family}: {seen:?}");
     }
 }
 

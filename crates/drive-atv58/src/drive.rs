@@ -5,7 +5,7 @@ use drive_core::{
     BroadcastWrite, Capabilities, Class, Direction, Drive, Error, Fault, Faults, Identity, Lifetimes,
     Measurements, Port, Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog,
     WatchdogCapability, Written,
-    drivecom::{self, Drivecom},
+    drivecom::{self, ChartState, Drivecom},
     registers::refuse_commands,
 };
 use tokio_modbus::prelude::ReadCode;
@@ -78,6 +78,19 @@ impl<P: Port> Drive for Atv58<P> {
     /// the manual names no bit, is replaced by that ramp.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
         drivecom::stop(self, mode).await
+    }
+
+    /// A drive that has left "operation enabled", such as a tripped one, has no run command any more. For one that has not the
+    /// manual names no word that ends it and nothing else.
+    async fn withdraw(&mut self) -> Result<Status> {
+        let status = self.read_status(Class::Command).await?;
+        match status.raw(self.map.status).and_then(ChartState::of) {
+            None | Some(ChartState::OperationEnabled) => Err(Error::Unsupported {
+                what: "withdrawal of the run command",
+                reason: "the manual names no word that ends it and nothing else",
+            }),
+            Some(_) => Ok(status),
+        }
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {

@@ -170,6 +170,10 @@ impl Supervisor {
         };
         let on_turn = urgent.is_none();
         let lifetime = self.lifetime(now, job);
+        if let Job::Start(_) = job {
+            // A new run command takes the place of the one that was to be withdrawn.
+            self.withdrawal = None;
+        }
         self.in_flight = Some(job);
         self.changed = true;
         Step::Do { job, on_turn, lifetime, until }

@@ -133,6 +133,11 @@ impl Supervisor {
 
     fn record_trip(&mut self, now: Instant, trip: Trip) {
         self.counters.trips += 1;
+        if self.started_here
+            || trip.before.as_ref().is_some_and(|before| before.value.state == State::Running)
+        {
+            self.run_ended_by_trip(now);
+        }
         self.explanations = EXPLANATIONS;
         self.emit(EventKind::Tripped(Box::new(trip.clone())));
         let by_watchdog = trip.watchdog_after.is_some();

@@ -1,5 +1,5 @@
-//! Control that somebody else takes of a drive that runs by our command: the run command is withdrawn, so that nothing
-//! starts by it when he gives control back (rule 5).
+//! Control that somebody else takes of a drive that runs by our command, and a trip of such a drive: the run command is
+//! withdrawn, so that nothing starts by it when he gives control back or resets the fault at the drive (rule 5).
 
 use std::time::Duration;
 
@@ -10,11 +10,13 @@ use super::{Asker, Job, Supervisor, stopping::REPEAT};
 use crate::{event::EventKind, outcome::Outcome, settings::OnControlTaken};
 
 /// Who withdraws and stops here, as events name it.
-const POLICY: Asker = Asker::Policy("control taken");
+const TAKEN: Asker = Asker::Policy("control taken");
+const TRIPPED: Asker = Asker::Policy("tripped");
 
 /// A run command that is to be withdrawn.
 #[derive(Debug)]
 pub(super) struct Withdrawal {
+    asker: Asker,
     /// When it is tried next; `None` where the family cannot.
     next_try: Option<Instant>,
     pause: Duration,
@@ -31,18 +33,30 @@ impl Withdrawal {
 impl Supervisor {
     /// Somebody else has taken control while the drive ran by our command.
     pub(super) fn control_taken(&mut self, now: Instant) {
-        let withdraws = self.settings.on_control_taken == OnControlTaken::Withdraw;
+        if self.settings.on_control_taken == OnControlTaken::Withdraw {
+            self.withdraw(now, TAKEN);
+        }
+    }
+
+    /// The drive has tripped while it ran by our command. Where its own restart is accepted the command stands for that.
+    pub(super) fn run_ended_by_trip(&mut self, now: Instant) {
+        if self.settings.accept_self_restart.is_empty() {
+            self.withdraw(now, TRIPPED);
+        }
+    }
+
+    fn withdraw(&mut self, now: Instant, asker: Asker) {
         // A stop that is under way ends the run command anyhow.
-        if withdraws && self.settings.control && self.stopping.is_none() {
+        if self.settings.control && self.stopping.is_none() && self.withdrawal.is_none() {
             let alarm_at = Some(now + self.settings.times.stop_alarm);
-            self.withdrawal = Some(Withdrawal { next_try: Some(now), pause: REPEAT.0, alarm_at });
+            self.withdrawal = Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at });
         }
     }
 
     /// Control is back. A run command that could not be withdrawn acts again now.
     pub(super) fn control_returned(&mut self, now: Instant) {
-        if self.withdrawal.take().is_some() {
-            self.stop_by_policy(now, POLICY, StopMode::Ramp);
+        if let Some(withdrawal) = self.withdrawal.take() {
+            self.stop_by_policy(now, withdrawal.asker, StopMode::Ramp);
         }
     }
 
@@ -55,9 +69,10 @@ impl Supervisor {
         let Some(withdrawal) = &mut self.withdrawal else { return };
         match result {
             Ok(status) => {
+                let asker = withdrawal.asker.clone();
                 self.withdrawal = None;
                 self.started_here = false;
-                self.conclude(POLICY, Command::Withdraw, Outcome::Confirmed);
+                self.conclude(asker, Command::Withdraw, Outcome::Confirmed);
                 self.accept_status(now, status);
             }
             Err(error) => {

@@ -45,7 +45,9 @@ fn a_drive_may_go_from_any_state_to_any_other_by_itself() {
                 let status = snapshot.status.expect("it answers");
                 assert_eq!((status.value.state, snapshot.link), (state, Link::Connected), "{from} to {to}");
             }
-            assert_eq!(rig.drive.writes(), [], "{from} to {to}");
+            let trips = from == State::Running && matches!(to, State::Fault | State::FaultReaction);
+            let withdrawal = if trips { &[Job::Withdraw][..] } else { &[] };
+            assert_eq!(rig.drive.writes(), withdrawal, "{from} to {to}");
         }
     }
 }
@@ -100,7 +102,7 @@ fn nothing_restarts_after_a_loss_a_trip_or_a_reset() {
     let reset = rig.order(Order::ResetFaults);
     rig.pass(10_000 * MS);
     assert_eq!(rig.outcome(reset), Some(&Outcome::Confirmed));
-    assert_eq!(rig.drive.writes(), [Job::ResetFaults]);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw, Job::ResetFaults]);
     assert_eq!(rig.drive.status.state, State::Ready);
 }
 

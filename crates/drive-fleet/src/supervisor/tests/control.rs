@@ -28,6 +28,17 @@ fn the_run_command_is_withdrawn_when_somebody_else_takes_control() {
 }
 
 #[test]
+fn the_run_command_is_withdrawn_after_a_trip_unless_the_drive_may_start_again_by_itself() {
+    let accepting = DriveSettings { accept_self_restart: vec!["Atr".to_owned()], ..settings() };
+    for (settings, writes) in [(settings(), &[Job::Withdraw][..]), (accepting, &[])] {
+        let mut rig = running(settings);
+        rig.drive.trip(9);
+        rig.pass(2_000 * MS);
+        assert_eq!(rig.drive.writes(), writes);
+    }
+}
+
+#[test]
 fn control_that_a_drive_tells_only_when_somebody_else_has_it_is_seen_to_be_taken_and_given_back() {
     let mut rig = running(settings());
     rig.drive.status.control = None;
