@@ -188,6 +188,8 @@ async fn rule_4_motion_needs_a_drive_without_a_fault() {
         plant.run_at(30).await;
         plant.machine().trip(support::drives::a_trip(family));
         plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
+        // The run command of before is withdrawn.
+        sleep(5 * SECOND).await;
         let writes = Plant::writes(plant.machine());
         let outcome = plant.motor().start(Direction::Forward).await;
         assert!(
