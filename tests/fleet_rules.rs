@@ -555,3 +555,20 @@ async fn rule_9_the_watchdog_of_an_altivar_58_on_ascii_is_fed_within_its_second_
     let text = refused.expect_err("16 cannot be fed").to_string();
     assert!(text.contains("the watchdog of fan 1 is 1s"), "{text}");
 }
+
+#[tokio::test(start_paused = true)]
+async fn rule_1_a_stop_that_is_the_first_thing_a_drive_hears_is_confirmed_when_the_motor_stands_and_not_before()
+ {
+    for mode in StopMode::ALL {
+        each(async |family| {
+            let plant = Plant::single(family, |_| {});
+            plant.run_at(30).await;
+            let plant = plant.restarted().await;
+            let outcome = plant.motor().stop(mode).await;
+            assert!(outcome.is_confirmed(), "{family} {mode}: {outcome}");
+            let seen = plant.machine().observe();
+            assert_eq!((seen.running, seen.output_frequency), (false, 0), "{family} {mode}");
+        })
+        .await;
+    }
+}

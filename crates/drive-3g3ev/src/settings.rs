@@ -43,7 +43,7 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn reference_unit(&mut self, command: Command) -> Result<FrequencyUnit> {
         if self.settings.unit_changed {
             let reason = Refusal::Settings(
-                "n39 was changed, and acts when the drive has been switched off and on; forget() reads it again",
+                "n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again",
             );
             return Err(self.refused(command, reason));
         }

@@ -19,7 +19,7 @@ impl<P: Port> Atv21<P> {
         }
         let terminals = self.terminals().await?;
         if terminals.command_mode == BY_SERIAL_LINK {
-            let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus");
+            let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus: set CMOD to 0 or 1");
             return Err(self.refused(Command::Release, reason));
         }
         if let Some(reason) = terminals.would_start() {

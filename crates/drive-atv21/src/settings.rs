@@ -122,7 +122,9 @@ impl<P: Port> Atv21<P> {
     pub async fn set_stall_level(&mut self, level: StallLevel) -> Result<()> {
         let command = CommandWord::from_bits_retain(self.read_background(map::COMMAND_WORD).await?);
         if !command.contains(CommandWord::COMMAND_PRIORITY) {
-            let reason = Refusal::Settings("FA20 bit 12 works only with FA00 bit 15, the command priority");
+            let reason = Refusal::Settings(
+                "FA20 bit 12 works only with FA00 bit 15, the command priority: open the drive with Authority::Priority",
+            );
             return Err(self.refused(STALL_LEVEL, reason));
         }
         let mut word = CommandWord2::from_bits_retain(self.read_background(map::COMMAND_WORD_2).await?);

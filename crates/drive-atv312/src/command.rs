@@ -137,7 +137,9 @@ impl<P: Port> Atv312<P> {
         match self.known.settings.level() {
             Some(AccessLevel::L1 | AccessLevel::L2) => words.refuses_to_take_over(),
             Some(AccessLevel::L3) => (control != Control::Bus).then_some(Refusal::NotInControl(control)),
-            _ => Some(Refusal::Settings("the access level LAC is none that the manual lists")),
+            _ => Some(Refusal::Settings(
+                "the access level is none that the manual lists: set LAC to L1, L2 or L3",
+            )),
         }
     }
 
@@ -145,9 +147,11 @@ impl<P: Port> Atv312<P> {
     async fn refuses_variables(&mut self, controls: Controls) -> Result<Option<Refusal>> {
         let rpm = self.registers.at(Class::Command).read(LFRD).await?;
         Ok(if controls.cmi.contains(ExtendedControl::NO_CONSISTENCY_CHECK) {
-            Some(Refusal::Settings("CMI bit 15: no consistency check, and locked on standstill"))
+            Some(Refusal::Settings(
+                "the drive checks no consistency and is locked on standstill (CMI bit 15): clear that bit",
+            ))
         } else if controls.cmi.contains(ExtendedControl::LOCK) {
-            Some(Refusal::Settings("CMI bit 13: locked on standstill"))
+            Some(Refusal::Settings("the drive is locked on standstill (CMI bit 13): clear that bit"))
         } else if controls.reference.cast_signed() < 0 || rpm.cast_signed() < 0 {
             Some(Refusal::Settings("the reference on the bus is negative: give a setpoint before the start"))
         } else {

@@ -99,10 +99,9 @@ impl FastWords {
         if words.is_driving() {
             return Some(Refusal::MotorRunning);
         }
-        words
-            .eti
-            .contains(ExtendedStatus::EEPROM_BUSY)
-            .then_some(Refusal::Settings("ETI bit 0: the drive is saving its parameters to EEPROM"))
+        words.eti.contains(ExtendedStatus::EEPROM_BUSY).then_some(Refusal::Settings(
+            "the drive is saving its parameters to EEPROM (ETI bit 0): try again in a moment",
+        ))
     }
 
     /// The status. `command` is the control word that the drive was last seen to hold, if any: see

@@ -281,9 +281,9 @@ impl Settings {
 
     /// Why the drive, as it is set up, cannot be reversed by the control word.
     pub(crate) fn refuses_reverse(&self) -> Option<Refusal> {
-        self.others()
-            .contains(ControlWord::REVERSE)
-            .then_some(Refusal::Settings("a function is assigned to bit 11 of CMD, so it does not reverse"))
+        self.others().contains(ControlWord::REVERSE).then_some(Refusal::Settings(
+            "a function is assigned to bit 11 of CMD, so it does not reverse: free that bit",
+        ))
     }
 
     /// Why a reference of the bus has no effect, whatever the inputs say.

@@ -169,7 +169,7 @@ pub enum Refusal {
     State(State),
     /// This direction is not authorised by the drive's settings.
     DirectionForbidden,
-    /// The drive's settings do not let the bus command it; the text says which setting.
+    /// The drive's settings do not let the bus command it; the text says which setting, and after a colon what to do.
     Settings(&'static str),
     /// Something else than this command decides what the motor does.
     Overridden {
@@ -189,26 +189,58 @@ pub enum Refusal {
     MotorRunning,
 }
 
+/// What is done about a trip.
+const MEND: &str = "remove the cause, then reset it";
+
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fault(code) => write!(f, "the drive has tripped (fault {code}); reset it first"),
-            Self::Tripped => f.write_str("the drive has tripped; reset it first"),
-            Self::NotInControl(control) => write!(f, "the drive is controlled by {control}"),
-            Self::State(state) => write!(f, "the drive is in state {state}"),
-            Self::DirectionForbidden => f.write_str("the drive's settings forbid this direction"),
-            Self::Settings(which) => write!(f, "the drive's settings do not allow it: {which}"),
+            Self::Fault(code) => write!(f, "the drive has tripped (fault {code}): {MEND}"),
+            Self::Tripped => write!(f, "the drive has tripped: {MEND}"),
+            Self::NotInControl(control) => f.write_str(match control {
+                Control::Bus => "this bus commands the drive already: stop it first",
+                Control::Terminals => {
+                    "the terminals command the drive: switch off the input that gives them command, or set the channel of \
+                     commands to the bus"
+                }
+                Control::Panel => {
+                    "the panel commands the drive: give command back at the panel, or set the channel of commands to the bus"
+                }
+                Control::Local => {
+                    "the terminals or the panel command the drive: switch off what forces local control, or set the channel \
+                     of commands to the bus"
+                }
+                Control::OtherBus => {
+                    "another bus commands the drive: give command back there, or set the channel of commands to this one"
+                }
+            }),
+            Self::State(state) => {
+                let remedy = match state {
+                    State::NotReady => "switch on the supply of its power part and wait until it is ready",
+                    State::Stopping | State::QuickStop | State::FaultReaction => "wait until the motor stands",
+                    State::Running => "stop it first",
+                    State::Fault => MEND,
+                    State::Disabled | State::Ready => "start it first",
+                    State::Unknown => "see what its display says, for its manual does not explain its status word",
+                };
+                write!(f, "the drive's state is \"{state}\": {remedy}")
+            }
+            Self::DirectionForbidden => {
+                f.write_str("the drive's settings forbid this direction: allow it there, or start the other way")
+            }
+            Self::Settings(which) => f.write_str(which),
             Self::Overridden { by, remedy } => write!(f, "{by} decides instead: {remedy}"),
             Self::RestartsItself(restart) => {
-                write!(
-                    f,
-                    "{restart}; switch that off, or accept {} by name in the drive's settings",
-                    restart.code
-                )
+                let code = restart.code;
+                write!(f, "{restart}: switch {code} off, or accept it by name (accept-self-restart {code})")
             }
-            Self::NothingToSave => f.write_str("nothing has changed since the last save"),
-            Self::EepromLife => f.write_str("the EEPROM's life is used up"),
-            Self::MotorRunning => f.write_str("the motor runs; stop it first"),
+            Self::NothingToSave => {
+                f.write_str("nothing has changed since the last save: change a parameter first")
+            }
+            Self::EepromLife => f.write_str(
+                "the saves that were counted have used up the EEPROM's life: replace the drive, or correct the count",
+            ),
+            Self::MotorRunning => f.write_str("the motor runs: stop it first"),
         }
     }
 }
@@ -463,6 +495,43 @@ mod tests {
             Error::Answer { slave, exchange, reason: "the answer is of another function" },
         ] {
             assert_eq!(error.after_write().kind(), ErrorKind::OutcomeUnknown);
+        }
+    }
+
+    #[test]
+    fn each_refusal_says_what_is_so_and_what_to_do() {
+        let overridden = Refusal::Overridden { by: "input F", remedy: "switch it off" };
+        let restart = SelfRestart { code: "Atr", meaning: "starts the motor again by itself" };
+        let control = [Control::Bus, Control::Terminals, Control::Panel, Control::Local, Control::OtherBus];
+        let states = [
+            State::NotReady,
+            State::Disabled,
+            State::Ready,
+            State::Running,
+            State::Stopping,
+            State::QuickStop,
+            State::FaultReaction,
+            State::Fault,
+            State::Unknown,
+        ];
+        let others = [
+            Refusal::Fault(17),
+            Refusal::Tripped,
+            Refusal::DirectionForbidden,
+            overridden,
+            Refusal::RestartsItself(restart),
+            Refusal::NothingToSave,
+            Refusal::EepromLife,
+            Refusal::MotorRunning,
+        ];
+        let controlled = control.map(Refusal::NotInControl);
+        for refusal in others.into_iter().chain(controlled).chain(states.map(Refusal::State)) {
+            let text = refusal.to_string();
+            let (_, remedy) = text.split_once(": ").unwrap_or_else(|| panic!("{text}"));
+            let verb = remedy.split(' ').next().unwrap_or_default();
+            let verbs =
+                ["allow", "change", "give", "remove", "replace", "see", "start", "stop", "switch", "wait"];
+            assert!(verbs.contains(&verb), "{text}");
         }
     }
 

@@ -145,14 +145,17 @@ impl Status {
     }
 
     /// Whether the drive itself shows that the motor is not driven: a state without motion, and an output of zero
-    /// where the drive tells one.
+    /// where the drive tells one. A quick stop drives the motor until its output is told to be zero.
     #[must_use]
     pub fn is_standstill(&self) -> bool {
-        let turning = self.output_frequency.is_some_and(|frequency| frequency > Frequency::ZERO);
-        matches!(
-            self.state,
-            State::NotReady | State::Disabled | State::Ready | State::Fault | State::QuickStop
-        ) && !turning
+        let output = self.output_frequency;
+        match self.state {
+            State::NotReady | State::Disabled | State::Ready | State::Fault => {
+                output.is_none_or(|output| output == Frequency::ZERO)
+            }
+            State::QuickStop => output == Some(Frequency::ZERO),
+            _ => false,
+        }
     }
 }
 
@@ -254,6 +257,14 @@ mod tests {
         assert!(!status.is_standstill());
         status.output_frequency = Some(Frequency::ZERO);
         assert!(status.is_standstill());
+    }
+
+    #[test]
+    fn a_quick_stop_is_no_standstill_until_the_output_is_told_to_be_zero() {
+        let of = |output_frequency| Status { state: State::QuickStop, output_frequency, ..Status::default() };
+        assert!(!of(None).is_standstill());
+        assert!(!of(Some(Frequency::from_hertz(3))).is_standstill());
+        assert!(of(Some(Frequency::ZERO)).is_standstill());
     }
 
     #[test]

@@ -358,7 +358,7 @@ async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Ou
             let (now, snapshot) = (Instant::now(), member.snapshot());
             let last = snapshot.status.as_ref().map(|status| status.seen(now));
             match snapshot.fresh_status(now) {
-                Some(_) => Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last }),
+                Some(_) => Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None }),
                 None => Outcome::OutcomeUnknown(Unknown { error: snapshot.error.clone(), last }),
             }
         }

@@ -126,8 +126,17 @@ pub struct LastSeen {
 
 impl fmt::Display for LastSeen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let tenths = self.age.as_millis() / 100;
-        write!(f, "{}, {}.{} s ago", self.status, tenths / 10, tenths % 10)
+        write!(f, "{}, {} ago", self.status, Tenths(self.age))
+    }
+}
+
+/// A time as a person reads it.
+struct Tenths(Duration);
+
+impl fmt::Display for Tenths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let tenths = self.0.as_millis() / 100;
+        write!(f, "{}.{} s", tenths / 10, tenths % 10)
     }
 }
 
@@ -162,6 +171,8 @@ pub enum Unconfirmed {
         after: Duration,
         /// What the drive said since, if anything.
         last: Option<LastSeen>,
+        /// What keeps the command from being in force, where the drive tells it.
+        because: Option<Refusal>,
     },
     /// The drive's words deny it.
     Denied(Error),
@@ -178,8 +189,18 @@ pub enum Unconfirmed {
 impl fmt::Display for Unconfirmed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TimeOver { after, last: Some(last) } => write!(f, "after {after:?} the drive says {last}"),
-            Self::TimeOver { after, last: None } => write!(f, "the drive has said nothing for {after:?}"),
+            Self::TimeOver { after, last, because } => {
+                let after = Tenths(*after);
+                match last {
+                    Some(last) => write!(f, "after {after} the drive says {last}")?,
+                    None => write!(f, "the drive has said nothing for {after}")?,
+                }
+                because.map_or(Ok(()), |because| write!(f, "; {because}"))
+            }
+            Self::Denied(Error::NotConfirmed { status, because, .. }) => {
+                write!(f, "the drive says {status}")?;
+                because.map_or(Ok(()), |because| write!(f, "; {because}"))
+            }
             Self::Denied(error) => error.fmt(f),
             Self::Superseded => f.write_str("a later command took its place"),
             Self::Stopped => f.write_str("a stop came"),

@@ -253,7 +253,11 @@ impl Supervisor {
             (Some(status), None | Some(Error::NotConfirmed { .. })) if stopping.attempts > 0 => {
                 let after = now.saturating_duration_since(stopping.since);
                 let last = Some(status.seen(now));
-                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
+                let because = match &error {
+                    Some(Error::NotConfirmed { because, .. }) => *because,
+                    _ => None,
+                };
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because })
             }
             _ => self.unknown(now, error),
         }

@@ -178,7 +178,7 @@ impl Supervisor {
             Phase::Awaiting { since, until } if *until <= now => {
                 let after = now.saturating_duration_since(*since);
                 let last = self.status.as_ref().map(|status| status.seen(now));
-                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last })
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None })
             }
             _ => return,
         };

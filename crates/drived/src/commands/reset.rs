@@ -15,7 +15,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     if !outcome.is_confirmed() {
         return Err(one.failure(&outcome));
     }
-    output::say(format_args!("{} has no fault any more: the drive shows {}", one.name, one.status()))?;
+    output::say(format_args!("{} has no fault: the drive shows {}", one.name, one.status()))?;
     one.close().await;
     Ok(())
 }
