@@ -36,23 +36,17 @@ pub const TIME_OVER: Duration = Duration::from_secs(2);
 
 /// What a 3G3EV can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
-    key: "3g3ev",
-    name: "Omron 3G3EV",
     functions: &[0x03, 0x08, 0x10],
     read_words: 8,
     blocks: ROWS,
     write_words: 8,
     highest_address: 31,
-    stations: 31,
     speeds: &[2_400, 4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1],
     factory: match SerialSettings::new(9_600, CharacterFormat::F8E1) {
         Ok(settings) => settings,
         Err(_) => SerialSettings::MODBUS_DEFAULT,
     },
-    stop_modes: &[StopMode::Ramp],
-    speed_setpoint: false,
-    frequency_step: "0.1 Hz",
     fault_reset: "the input of n06 to n08 that is set to fault reset, where the number for it is given",
     watchdog: Some(WatchdogCapability {
         min: TIME_OVER,
@@ -61,14 +55,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         reactions: &[Reaction::Ignore, Reaction::Trip],
         settable: false,
     }),
-    identification: None,
-    release: false,
     persist: Some("ENTER, a write to 0900h"),
     broadcast_stops: &[StopMode::Ramp],
-    fault_history: 0,
     turnaround: turnaround(2_400),
     status_exchanges: 2,
     measurement_exchanges: 2,
+    ..Capabilities::least("3g3ev", "Omron 3G3EV")
 };
 
 /// The silence that the drive needs between its answer and the next request at a speed in bit/s: 24 bits and 10 ms

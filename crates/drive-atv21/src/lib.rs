@@ -38,7 +38,7 @@ use std::time::Duration;
 
 use drive_core::{
     Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Reaction, Refusal, Registers,
-    SerialSettings, SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
+    SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
 use crate::{blocks::WriteSlot, in_effect::ReadBlock};
@@ -56,18 +56,11 @@ pub use crate::{
 
 /// What an Altivar 21 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
-    key: "atv21",
-    name: "Schneider Altivar 21",
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 5,
-    blocks: &[],
     write_words: 2,
-    highest_address: 247,
-    stations: 31,
-    speeds: &[9_600, 19_200],
     // The manual names the parity and no number of stop bits; without parity Modbus has two and many masters send one.
     formats: &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1, CharacterFormat::F8N2],
-    factory: SerialSettings::MODBUS_DEFAULT,
     stop_modes: &[StopMode::Ramp, StopMode::Freewheel, StopMode::DcInjection],
     speed_setpoint: true,
     frequency_step: "0.01 Hz",
@@ -81,13 +74,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     }),
     identification: Some("function 43/14; FB05, FB72"),
     release: true,
-    persist: None,
     broadcast_stops: &[StopMode::Ramp, StopMode::Freewheel, StopMode::DcInjection],
     fault_history: 4,
-    turnaround: Duration::ZERO,
     // Two where the read block is used; it never is from the first status on.
     status_exchanges: 4,
     measurement_exchanges: reading::SLOW_SET.len() as u8 + 1,
+    ..Capabilities::least("atv21", "Schneider Altivar 21")
 };
 
 const WATCHDOG_LONGEST: Duration = Duration::from_secs(100);

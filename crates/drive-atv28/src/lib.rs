@@ -11,8 +11,6 @@ pub mod registers;
 mod setpoint;
 pub mod words;
 
-use std::time::Duration;
-
 use drive_core::{
     Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress, StopMode,
     serial::CharacterFormat,
@@ -23,15 +21,12 @@ use crate::{setpoint::Limits, words::ControlWord};
 
 /// What an Altivar 28 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
-    key: "atv28",
-    name: "Schneider Altivar 28",
     functions: &[0x03, 0x06, 0x10],
     read_words: 7,
     blocks: ROWS,
     write_words: 7,
     highest_address: 31,
     stations: 18,
-    speeds: &[9_600, 19_200],
     formats: &[CharacterFormat::F8N1],
     factory: match SerialSettings::new(19_200, CharacterFormat::F8N1) {
         Ok(settings) => settings,
@@ -39,17 +34,13 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     },
     stop_modes: &StopMode::ALL,
     speed_setpoint: true,
-    frequency_step: "0.1 Hz",
     fault_reset: "CMD bit 7, rising edge",
-    watchdog: None,
     identification: Some("nominal current INV (W555)"),
-    release: false,
-    persist: None,
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,
-    turnaround: Duration::ZERO,
     status_exchanges: 2,
     measurement_exchanges: 6,
+    ..Capabilities::least("atv28", "Schneider Altivar 28")
 };
 
 /// An Altivar 28 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise.

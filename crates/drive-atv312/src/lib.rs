@@ -14,10 +14,8 @@ mod setpoint;
 mod settings;
 pub mod words;
 
-use std::time::Duration;
-
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress, StopMode,
+    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SlaveAddress, StopMode,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
@@ -30,17 +28,12 @@ pub use crate::{
 
 /// What an Altivar 312 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
-    key: "atv312",
-    name: "Schneider Altivar 312",
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 29,
     blocks: ROWS,
     write_words: 27,
-    highest_address: 247,
-    stations: 31,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8O1, CharacterFormat::F8E1, CharacterFormat::F8N1, CharacterFormat::F8N2],
-    factory: SerialSettings::MODBUS_DEFAULT,
     stop_modes: &StopMode::ALL,
     speed_setpoint: true,
     frequency_step: "0.1 Hz (with CMI bit 9: 600/32767 Hz)",
@@ -51,9 +44,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     persist: Some("CMI bit 1"),
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,
-    turnaround: Duration::ZERO,
-    status_exchanges: 1,
     measurement_exchanges: 6,
+    ..Capabilities::least("atv312", "Schneider Altivar 312")
 };
 
 /// An Altivar 312 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise, and the crate's page for what is special

@@ -32,14 +32,10 @@ const fn watchdog(time: Duration) -> WatchdogCapability {
 
 /// What an Altivar 58 with the card VW3-A58303 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
-    key: "atv58",
-    name: "Schneider Altivar 58 with card VW3-A58303",
     functions: &[0x03, 0x04, 0x06, 0x08, 0x0B, 0x10],
     read_words: 63,
-    blocks: &[],
     write_words: 60,
     highest_address: 31,
-    stations: 31,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[
         CharacterFormat::F8O1,
@@ -57,18 +53,13 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         Err(_) => SerialSettings::MODBUS_DEFAULT,
     },
     stop_modes: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
-    speed_setpoint: false,
     frequency_step: "one count of W401 (0.1 Hz unless set otherwise)",
     fault_reset: "CMD bit 7, rising edge",
     watchdog: Some(watchdog(MESSAGE_WATCH)),
     identification: Some("UNI-TE request 0Fh, on a UNI-TELWAY line"),
-    release: false,
-    persist: None,
     broadcast_stops: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
-    fault_history: 0,
-    turnaround: Duration::ZERO,
-    status_exchanges: 1,
     measurement_exchanges: 2,
+    ..Capabilities::least("atv58", "Schneider Altivar 58 with card VW3-A58303")
 };
 
 /// An Altivar 58 behind a port. See [`Drive`](drive_core::Drive) for what its methods promise, and [`Atv58Map`] for what they rest on.

@@ -442,33 +442,15 @@ mod tests {
     use tokio_modbus::{ExceptionCode, client::Client, slave::SlaveContext};
 
     use super::*;
-    use crate::{SerialSettings, StopMode, serial::CharacterFormat};
 
     const CAPABILITIES: Capabilities = Capabilities {
-        key: "test",
-        name: "Test drive",
         functions: &[3, 6, 16],
         read_words: 16,
-        blocks: &[],
         write_words: 16,
         highest_address: 31,
-        stations: 31,
         speeds: &[19_200],
-        formats: &[CharacterFormat::F8E1],
-        factory: SerialSettings::MODBUS_DEFAULT,
-        stop_modes: &[StopMode::Ramp],
-        speed_setpoint: false,
-        frequency_step: "0.1 Hz",
         fault_reset: "a bit",
-        watchdog: None,
-        identification: None,
-        release: false,
-        persist: None,
-        broadcast_stops: &[],
-        fault_history: 0,
-        turnaround: Duration::ZERO,
-        status_exchanges: 1,
-        measurement_exchanges: 1,
+        ..Capabilities::least("test", "Test drive")
     };
 
     /// A slave that answers by a script and then by holding the last word that it was given.

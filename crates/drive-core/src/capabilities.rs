@@ -69,6 +69,51 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
+    /// A family that does the least: functions 03 and 06, one word at a time, addresses up to 247, 9600 and 19200 bit/s, 8E1,
+    /// a stop along the ramp, one exchange for a status and one for the measurements; nothing else. A family of your own says
+    /// what is different and ends with `..Capabilities::least(…)`, so that what is added here later breaks nothing:
+    ///
+    /// ```
+    /// use drive_core::{Capabilities, StopMode};
+    ///
+    /// pub const CAPABILITIES: Capabilities = Capabilities {
+    ///     functions: &[0x03, 0x06, 0x10],
+    ///     read_words: 8,
+    ///     stop_modes: &[StopMode::Ramp, StopMode::Freewheel],
+    ///     ..Capabilities::least("fan1", "Somebody's fan drive")
+    /// };
+    /// # assert_eq!(CAPABILITIES.highest_address, 247);
+    /// ```
+    #[must_use]
+    pub const fn least(key: &'static str, name: &'static str) -> Self {
+        Self {
+            key,
+            name,
+            functions: &[0x03, 0x06],
+            read_words: 1,
+            blocks: &[],
+            write_words: 1,
+            highest_address: 247,
+            stations: 31,
+            speeds: &[9_600, 19_200],
+            formats: &[CharacterFormat::F8E1],
+            factory: SerialSettings::MODBUS_DEFAULT,
+            stop_modes: &[StopMode::Ramp],
+            speed_setpoint: false,
+            frequency_step: "0.1 Hz",
+            fault_reset: "as its manual says",
+            watchdog: None,
+            identification: None,
+            release: false,
+            persist: None,
+            broadcast_stops: &[],
+            fault_history: 0,
+            turnaround: Duration::ZERO,
+            status_exchanges: 1,
+            measurement_exchanges: 1,
+        }
+    }
+
     /// How many words a read of `count` words from `first` on may take along at its end.
     #[must_use]
     pub fn spare_words(&self, first: u16, count: u16) -> u8 {
