@@ -21,6 +21,8 @@ impl Exception {
     pub const ILLEGAL_VALUE: Self = Self(3);
     /// 04: the request cannot be carried out now.
     pub const FAILURE: Self = Self(4);
+    /// 06: the slave is busy and has not carried the request out.
+    pub const BUSY: Self = Self(6);
 }
 
 /// To whom a request was sent.

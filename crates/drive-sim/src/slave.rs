@@ -132,6 +132,7 @@ impl Slave {
             _ if !allowed => return None,
             DIAGNOSTICS if !self.model.rules().diagnostics.is_empty() => self.diagnose(request, line),
             _ if self.listen_only => return None,
+            _ if cast == Cast::Unicast && self.is_busy(now) => Err(Exception::BUSY),
             EVENT_COUNTER if self.model.rules().event_counter => {
                 let [high, low] = self.counters.events.to_be_bytes();
                 Ok(Some(vec![EVENT_COUNTER, 0, 0, high, low]))

@@ -255,3 +255,77 @@ fn lines_on_standard_input_act_on_the_world_of_the_simulated_drives() {
     sim.say("line cut", "done");
     sim.on("atv21@2", &["status"]).assert_refused(1, "atv21@2 does not answer");
 }
+
+#[test]
+fn a_stop_goes_on_against_a_drive_that_says_that_it_is_busy_and_is_an_alarm_in_its_time() {
+    let mut sim = Sim::serve("busy", &["atv28@1"]);
+    sim.on("atv28@1", &["setpoint", "30Hz"]).assert_done();
+    sim.on("atv28@1", &["start"]).assert_done();
+    sim.say("atv28@1 busy on", "done");
+    let stop = sim.on("atv28@1", &["stop"]);
+    stop.assert_refused(1, "STOP NOT CONFIRMED, the motor may turn: use the emergency stop");
+    assert!(sim.say("atv28@1 show", "output").starts_with("fed"), "nothing has stopped it");
+
+    let mut stop = Running::start(&["stop", "--line", sim.link(), "--drive", "atv28@1"]);
+    stop.wait_for("has not confirmed the stop after 1 s");
+    sim.say("atv28@1 busy off", "done");
+    let (code, rest) = stop.end();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains("stands still"), "{rest}");
+    assert!(sim.say("atv28@1 show", "output").starts_with("not fed"));
+}
+
+#[test]
+fn a_refusal_says_what_decides_instead_and_what_to_set() {
+    /// What happens around the drive, the subcommand, and what is said of it.
+    type Case = (&'static [&'static str], &'static [&'static str], &'static [&'static str]);
+    let cases: [(&str, &[Case]); 5] = [
+        (
+            "atv21@1",
+            &[
+                (
+                    &["terminal F on", "set CMOD 0"],
+                    &["start"],
+                    &["terminals command the drive", "switch off"],
+                ),
+                (&["set FMOD 1"], &["setpoint", "20Hz"], &["input VIA (FE46 = 1) decides", "set FMOD = 4"]),
+                (&["trip 14"], &["reset"], &["input F, which is on", "set CMOD = 2"]),
+            ],
+        ),
+        ("atv28@1", &[(&["panel takes"], &["start"], &["terminals or the panel command", "local control"])]),
+        ("atv58@1", &[(&["panel takes"], &["start"], &["terminals or the panel command", "local control"])]),
+        (
+            "atv312@1",
+            &[
+                (&["set Atr 1"], &["start"], &["by Atr", "switch Atr off", "accept-self-restart Atr"]),
+                (&["set Atr 0", "set Fr1 1"], &["start"], &["the reference channel Fr1", "set Fr1 to Mdb"]),
+                (
+                    &["set Fr1 164", "set PS2 131", "terminal LI3 on"],
+                    &["start"],
+                    &["a preset speed (PS2 to PS16)", "open the input, or set PS2 to PS16 to nO"],
+                ),
+                (&["set nSt 132"], &["start"], &["a stop by a logic input (nSt", "close the input of nSt"]),
+            ],
+        ),
+        (
+            "3g3ev@1",
+            &[
+                (&["panel takes"], &["start"], &["the panel or the terminals", "give the command back"]),
+                (&["panel releases", "trip 9"], &["start"], &["tripped (fault 9)", "remove the cause"]),
+            ],
+        ),
+    ];
+    for (drive, cases) in cases {
+        let mut sim = Sim::serve("refusals", &[drive]);
+        for (deeds, subcommand, said) in cases {
+            for deed in *deeds {
+                sim.say(&format!("{drive} {deed}"), "done");
+            }
+            let refused = sim.on(drive, subcommand);
+            assert_eq!(refused.code, Some(1), "{drive} {deeds:?}: {refused:?}");
+            for words in *said {
+                refused.assert_refused(1, words);
+            }
+        }
+    }
+}

@@ -2,6 +2,8 @@
 
 mod words;
 
+use std::time::Duration;
+
 use drive_core::registers::Row;
 
 use self::words::{Deed, Words};
@@ -28,10 +30,14 @@ DRIVE motor-supply on | off       the supply of the power stage alone
 DRIVE trip OCF                    a fault by its mnemonic or its number
 DRIVE load 80%                    the load at the shaft
 DRIVE cable cut | join            the cable of this drive
+DRIVE busy on | off               whether it answers every request that it is busy, exception 06
 DRIVE get CMOD                    a register by its mnemonic or address, without the line
 DRIVE set CMOD 2                  a setting made at the panel, without the line
 DRIVE master 0xFA00 0400h         a word that another master of the line writes
 DRIVE reading NAME READING        how the drive does what its manual leaves open";
+
+/// Longer than anybody simulates.
+const FOR_GOOD: Duration = Duration::from_secs(365 * 86_400);
 
 /// Why a line was not carried out.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -149,6 +155,7 @@ impl SimSlave {
             Deed::Load(percent) => self.set_load(percent),
             Deed::Cable(true) => self.unmute(),
             Deed::Cable(false) => self.mute(),
+            Deed::Busy(on) => self.keep_busy(if on { FOR_GOOD } else { Duration::ZERO }),
             Deed::Set(register, value) if self.poke(register, value) => {}
             Deed::Set(register, _) => return Err(self.no_register(register)),
             Deed::Master(register, value) => {

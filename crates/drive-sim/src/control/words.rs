@@ -21,6 +21,7 @@ pub(super) enum Deed {
     Trip(u16),
     Load(u16),
     Cable(bool),
+    Busy(bool),
     Get(u16),
     Set(u16, u16),
     Master(u16, u16),
@@ -88,6 +89,7 @@ impl<'a> Words<'a> {
                 Deed::Load(percent.ok_or_else(|| not(word, "a load such as 80%"))?)
             }
             "cable" => Deed::Cable(self.either("join", "cut")?),
+            "busy" => Deed::Busy(self.either("on", "off")?),
             "get" => Deed::Get(self.register(around)?.0),
             "set" => {
                 let (register, row) = self.register(around)?;

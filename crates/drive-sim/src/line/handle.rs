@@ -91,8 +91,8 @@ impl SimSlave {
         self.order(|slave, _| slave.set_habits(habits));
     }
 
-    /// Keeps it busy for this long: on a UNI-TELWAY line it refuses (NAK) every request; in the other protocols it has no
-    /// effect.
+    /// Keeps it busy for this long: it carries nothing out, refuses (NAK) every request on a UNI-TELWAY line, and answers
+    /// exception 06 in the other protocols.
     pub fn keep_busy(&self, time: Duration) {
         self.order(|slave, _| slave.busy_until(Instant::now() + time));
     }
