@@ -145,6 +145,27 @@ fn what_is_owed_is_asked_for_by_nobody_for_a_minute() {
 }
 
 #[test]
+fn what_is_owed_is_not_forgotten_behind_many_writes_of_other_values() {
+    let mut line = ByHand::new(once());
+    line.ask(1, 1, READ, Terms::default().sparing(3));
+    line.sent();
+    nothing_is_sent_for(&mut line, 2_000 * MS);
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    for value in 0..40 {
+        line.ask(2, 1, Request::WriteSingleRegister(8502, value), Terms::default());
+        let write = line.sent();
+        line.answers(&write, &write[1..6]);
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+        line.ask(3, 1, READ, Terms::default().sparing(3));
+        let request = line.sent();
+        assert_ne!(asked(&request), 2, "behind {value} writes");
+        line.answers(&request, &words(&vec![7; asked(&request).into()]));
+        assert_eq!(line.ended(), Some((3, read(&[7, 7]))));
+        nothing_is_sent_for(&mut line, 300 * MS);
+    }
+}
+
+#[test]
 fn a_read_that_cannot_differ_waits_out_the_late_window() {
     let mut line = ByHand::new(config());
     line.ask(1, 1, READ, Terms::default());

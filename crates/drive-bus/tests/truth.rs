@@ -49,6 +49,7 @@ fn tell_slowly(name: &str, config: &LineConfig, spare: u8, faults: Faults, pause
         sum.right += counts.right;
         sum.failed += counts.failed;
         sum.writes += counts.writes;
+        sum.faults += counts.faults;
         if sum.exchanges >= exchanges {
             break;
         }
@@ -99,6 +100,13 @@ fn adapters_that_echo_now_and_then_and_damage_their_echoes() {
         let faults = Faults { echo: 3, lost: 40, damaged: (40, 15), ..Faults::default() };
         tell("echoes", &config, 1, faults);
     }
+}
+
+#[test]
+fn a_far_end_that_does_not_pace_doubles_stalls_and_is_late() {
+    let faults =
+        Faults { double: (15, 17), late: (40, 20_000), lost: 100, stall: (200, 3_000), ..Faults::default() };
+    tell("unpaced", &LineConfig { far_end_paces: None, ..line() }, 3, faults);
 }
 
 #[test]

@@ -149,7 +149,9 @@ impl Doubt {
 
     fn remember(&mut self, known: Known) {
         if self.known.len() >= MOST {
-            self.known.remove(0);
+            // What will come outlasts what has come: every value that is written has a shape of its own.
+            let least = self.known.iter().position(|known| !known.will_come).unwrap_or(0);
+            self.known.remove(least);
         }
         self.known.push(known);
     }

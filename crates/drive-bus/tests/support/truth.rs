@@ -55,6 +55,8 @@ pub(crate) struct Counts {
     pub(crate) writes: u64,
     /// Writes that were confirmed and never reached the slave.
     pub(crate) unfounded: u64,
+    /// How often anything went wrong on the way.
+    pub(crate) faults: u64,
 }
 
 struct Call {
@@ -157,7 +159,7 @@ impl TruthLine {
             let Some(next) = next.into_iter().flatten().min().filter(|next| *next <= until) else { break };
             self.now = self.now.max(next);
             // Nobody notices that time goes on.
-            if self.master.is_busy() && self.random.one_in(self.faults.stall.0) {
+            if self.master.is_busy() && self.strikes(self.faults.stall.0) {
                 self.stand_still();
             }
         }
@@ -184,7 +186,7 @@ impl TruthLine {
         self.master.handle_timeout(self.now);
         self.collect();
         if let Some(frame) = self.master.poll_transmit(self.now) {
-            if self.random.one_in(self.faults.stall.0.saturating_mul(20)) {
+            if self.strikes(self.faults.stall.0.saturating_mul(20)) {
                 self.stand_still();
             }
             self.transmitted(&frame);
@@ -204,7 +206,7 @@ impl TruthLine {
         self.last = (slave, *number);
         let end = self.now + self.characters(frame.len());
         self.sent_until = end;
-        if !self.mbap && self.random.one_in(self.faults.echo) {
+        if !self.mbap && self.strikes(self.faults.echo) {
             let mut echo = frame.to_vec();
             if self.random.one_in(3) {
                 self.flip(&mut echo);
@@ -214,13 +216,13 @@ impl TruthLine {
         let Some(answer) = self.answer(slave, &pdu) else { return };
         let answer =
             if self.mbap { mbap(&head, slave, &answer) } else { rtu::frame(slave, &answer).to_vec() };
-        let guesses = self.random.one_in(self.faults.guessed);
+        let guesses = self.strikes(self.faults.guessed);
         let guess = guesses.then(|| {
             let next = u16::from_be_bytes([head[0], head[1]]).wrapping_add(1).to_be_bytes();
             mbap(&[next[0], next[1], 0, 0], slave, &[3, 4, 0xBA, 0xD0, 0xBA, 0xD0])
         });
         self.deliver_answer(end, slave, answer, guess);
-        if self.random.one_in(self.faults.second_master) {
+        if self.strikes(self.faults.second_master) {
             self.stranger = Some((end + Duration::from_micros(self.random.below(100_000)), slave));
         }
     }
@@ -228,7 +230,7 @@ impl TruthLine {
     /// What a slave answers to a request that it has heard.
     fn answer(&mut self, slave: u8, pdu: &[u8]) -> Option<Vec<u8>> {
         let number = self.numbers.get(&slave).copied().unwrap_or_default();
-        if self.random.one_in(self.faults.refused) {
+        if self.strikes(self.faults.refused) {
             return Some(vec![pdu[0] | 0x80, 4]);
         }
         match *pdu {
@@ -254,8 +256,16 @@ impl TruthLine {
         owed.retain(|at| *at + Duration::from_secs(62) > self.now);
         owed.len() < 3 && {
             owed.push(self.now);
+            self.counts.faults += 1;
             true
         }
+    }
+
+    /// Whether one of the faults that happen once in so many happens now.
+    fn strikes(&mut self, one_in: u64) -> bool {
+        let strikes = self.random.one_in(one_in);
+        self.counts.faults += u64::from(strikes);
+        strikes
     }
 
     fn deliver_answer(&mut self, end: Instant, slave: u8, answer: Vec<u8>, guess: Option<Vec<u8>>) {
@@ -277,7 +287,7 @@ impl TruthLine {
             self.deliver(whole, answer);
             return;
         }
-        if self.random.one_in(self.faults.double.0) {
+        if self.strikes(self.faults.double.0) {
             let again = at + Duration::from_micros(1_000 + self.random.below(self.faults.double.1 * 1_000));
             self.deliver(again, answer.clone());
         }
