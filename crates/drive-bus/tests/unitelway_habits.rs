@@ -1,8 +1,8 @@
 //! A line of UNI-TELWAY slaves with lawful habits of their own, and a link that loses what it can: every value is right
 //! and fresh, no drive is shut out, a stop is confirmed in its bound. The slaves are `support/telway.rs`.
 //!
-//! `HABITS_SEEDS=40000 cargo test --release -p drive-bus --test unitelway_habits` runs so many seeds of each property
-//! (40 000 are more than 1 000 000 exchanges); `HABITS_SEED=n` runs one seed again.
+//! Each property lives through 100 000 requests or more. `HABITS_TIMES=10 cargo test --release -p drive-bus --test
+//! unitelway_habits` is ten times as many, 1 000 000 each; `HABITS_SEED=n` runs one seed again.
 
 mod support;
 
@@ -50,16 +50,31 @@ fn faults() -> [(&'static str, Faults); 3] {
     ]
 }
 
-fn seeds(few: u64) -> Range<u64> {
+/// So many seeds, or as many times as many as somebody wants.
+fn seeds(count: u64) -> Range<u64> {
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
-    match (number("HABITS_SEED"), number("HABITS_SEEDS")) {
-        (Some(seed), _) => seed..seed + 1,
-        (None, seeds) => 0..seeds.unwrap_or(few),
+    match number("HABITS_SEED") {
+        Some(seed) => seed..seed + 1,
+        None => 0..count * number("HABITS_TIMES").unwrap_or(1),
     }
 }
 
 fn is_ok(ended: &Ended) -> bool {
     matches!(ended.outcome, Ok(Ok(_)))
+}
+
+/// What one property lived through.
+#[derive(Debug, Default)]
+struct Lived {
+    requests: usize,
+    spoilt: usize,
+}
+
+impl Lived {
+    fn add(&mut self, line: &Telway) {
+        self.requests += line.requests.len();
+        self.spoilt += line.spoilt;
+    }
 }
 
 /// Reads, writes and stops at random for so many calls, each checked for being right and fresh; then the line gets well.
@@ -90,21 +105,25 @@ fn work(line: &mut Telway, slaves: u8, calls: u32) {
 
 #[test]
 fn every_habit_with_every_fault_gives_right_and_fresh_values_and_shuts_nobody_out() {
+    let mut lived = Lived::default();
     for (habit, habits) in habits() {
         for (fault, faults) in faults() {
-            for seed in seeds(4) {
+            for seed in seeds(75) {
                 eprintln!("{habit}, {fault}, seed {seed}");
                 let mut line = Telway::new(seed, patient(habits.header), [habits; 2]);
                 line.faults = faults;
                 work(&mut line, 2, 40);
+                lived.add(&line);
             }
         }
     }
+    println!("each habit with each fault: {lived:?}");
 }
 
 #[test]
 fn any_habits_on_one_line_where_anything_may_be_lost_give_right_and_fresh_values() {
-    for seed in seeds(60) {
+    let mut lived = Lived::default();
+    for seed in seeds(900) {
         eprintln!("seed {seed}");
         let header = if seed % 2 == 0 { NetworkHeader::Simplified } else { NetworkHeader::default() };
         let mut line = Telway::new(seed, patient(header), []);
@@ -131,14 +150,17 @@ fn any_habits_on_one_line_where_anything_may_be_lost_give_right_and_fresh_values
         line.faults =
             Faults { lost_ack: 4, lost_reply: 5, damaged_reply: 5, anything: 20, ..Faults::default() };
         work(&mut line, 3, 40);
+        lived.add(&line);
     }
+    println!("any habits: {lived:?}");
 }
 
 #[test]
 fn a_stop_is_confirmed_in_its_bound_whatever_the_slave_does_and_the_link_loses() {
+    let mut lived = Lived::default();
     for (habit, habits) in habits() {
         for (fault, faults) in faults() {
-            for seed in seeds(4) {
+            for seed in seeds(125) {
                 eprintln!("{habit}, {fault}, seed {seed}");
                 let config = patient(habits.header);
                 // Two losses, so three attempts at the most: each a number that is mirrored and the stop itself, of four
@@ -163,9 +185,11 @@ fn a_stop_is_confirmed_in_its_bound_whatever_the_slave_does_and_the_link_loses()
                     }
                     assert!(line.now - called <= bound, "{:?} of {bound:?}", line.now - called);
                 }
+                lived.add(&line);
             }
         }
     }
+    println!("stops: {lived:?}");
 }
 
 /// A slave of each kind with whose reply to an earlier master nothing is known yet.

@@ -141,6 +141,8 @@ pub(crate) struct Telway {
     pub(crate) requests: Vec<(u8, Instant, Vec<u8>)>,
     /// The slaves have the line until then.
     spoken_until: Instant,
+    /// How often anything was lost or damaged.
+    pub(crate) spoilt: usize,
 }
 
 pub(crate) fn config(settings: UniTelwaySettings) -> LineConfig {
@@ -168,6 +170,7 @@ impl Telway {
             done: Vec::new(),
             requests: Vec::new(),
             spoken_until: start,
+            spoilt: 0,
         }
     }
 
@@ -291,6 +294,7 @@ impl Telway {
             self.happened = happens;
         }
         if happens {
+            self.spoilt += 1;
             self.faults.left = left.map(|left| left - 1);
         }
         happens
@@ -301,6 +305,7 @@ impl Telway {
         if !self.random.one_in(self.faults.anything) || bytes.is_empty() {
             return false;
         }
+        self.spoilt += 1;
         let bit = self.random.below(bytes.len() as u64 * 8) as usize;
         bytes[bit / 8] ^= 1 << (bit % 8);
         self.random.one_in(2)
@@ -315,13 +320,15 @@ impl Telway {
         let slave = &self.slaves[&address];
         let end = at + slave.habits.delay + serial().characters(bytes.len());
         let is_reply = bytes.len() > 1;
-        if is_reply && self.happens(self.faults.damaged_reply) {
+        let damaged = is_reply && self.happens(self.faults.damaged_reply);
+        if damaged {
             // Not its beginning, which would make nothing of it: that is a lost one.
             let at = 4 + self.random.below(bytes.len() as u64 - 4) as usize;
             bytes[at] ^= 1 << self.random.below(8);
         }
         let lost = is_reply && self.happens(self.faults.lost_reply);
-        if !(lost || self.spoils(&mut bytes)) {
+        // Two bits that change can undo each other in the check, which is a sum.
+        if !(lost || !damaged && self.spoils(&mut bytes)) {
             self.put(end, true, bytes);
         }
         self.spoken_until = end;

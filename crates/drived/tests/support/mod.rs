@@ -145,9 +145,19 @@ impl Running {
 
     /// Asks it to end as Ctrl-C does.
     pub(crate) fn ask_to_end(&mut self) {
+        self.signal("-INT");
+    }
+
+    /// Sends it a signal, such as `-STOP`.
+    pub(crate) fn signal(&mut self, signal: &str) {
         let pid = self.child.id().to_string();
-        let sent = Command::new("kill").args(["-INT", &pid]).status().expect("kill runs");
+        let sent = Command::new("kill").args([signal, &pid]).status().expect("kill runs");
         assert!(sent.success());
+    }
+
+    /// Whether it has ended.
+    pub(crate) fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("it can be waited for").is_some()
     }
 
     /// Asks it to end as Ctrl-C does, and waits for it: its exit code and its last lines.
