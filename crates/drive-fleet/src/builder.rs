@@ -127,20 +127,13 @@ pub struct FleetBuilder {
     members: Vec<Member>,
     /// The first thing that cannot be.
     problem: Option<FleetError>,
-    events: usize,
     refuses_plans: bool,
 }
 
 impl Fleet {
     /// Begins a fleet.
     pub const fn builder() -> FleetBuilder {
-        FleetBuilder {
-            lines: Vec::new(),
-            members: Vec::new(),
-            problem: None,
-            events: EVENTS,
-            refuses_plans: true,
-        }
+        FleetBuilder { lines: Vec::new(), members: Vec::new(), problem: None, refuses_plans: true }
     }
 }
 
@@ -233,12 +226,6 @@ impl FleetBuilder {
         Ok(Member { line, settings, drive: opened })
     }
 
-    /// How many events are kept for a reader that is slow; 4096 unless said.
-    pub const fn event_capacity(mut self, events: usize) -> Self {
-        self.events = events;
-        self
-    }
-
     /// Starts also if a line cannot keep its periods or feed its watchdogs: for a tool that commands a drive for a moment,
     /// whatever its line is like.
     pub const fn whatever_the_plan(mut self) -> Self {
@@ -252,7 +239,7 @@ impl FleetBuilder {
     /// # Errors
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
     pub fn start(self) -> Result<Fleet, FleetError> {
-        let (events, first) = broadcast::channel(self.events.max(1));
+        let (events, first) = broadcast::channel(EVENTS);
         let (lines, members) = self.check()?;
         let turns: Vec<_> = lines.iter().map(|_| Arc::new(Semaphore::new(1))).collect();
         let entries = members

@@ -214,12 +214,6 @@ impl Snapshot {
             Freshness::Stale | Freshness::Never => None,
         }
     }
-
-    /// Whether the drive's words show that the output has reached the setpoint that this fleet gave it.
-    #[must_use]
-    pub fn is_at_setpoint(&self) -> bool {
-        self.status.as_ref().is_some_and(|status| has_reached(self.setpoint, &status.value))
-    }
 }
 
 /// Whether a status shows that the output has reached a setpoint.

@@ -257,10 +257,10 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
     match job {
         Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
         Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
-        Job::Start(direction) => Reply::Started(drive.start(direction).await),
+        Job::Start(direction) => Reply::Ordered(drive.start(direction).await),
         Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
-        Job::ResetFaults => Reply::Reset(drive.reset_faults().await),
-        Job::Release => Reply::Released(drive.release().await),
+        Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
+        Job::Release => Reply::Ordered(drive.release().await),
         Job::Persist => Reply::Saved(drive.persist().await),
         Job::ArmWatchdog(timeout, reaction) => Reply::Watchdog(drive.arm_watchdog(timeout, reaction).await),
         Job::KeepAlive => Reply::KeptAlive(drive.keep_alive().await),

@@ -84,14 +84,7 @@ impl Commanded {
         command: impl AsyncFnOnce(DriveHandle) -> Outcome,
     ) -> Result<Outcome, Failure> {
         self.connected().await?;
-        tokio::select! {
-            biased;
-            outcome = command(self.handle.clone()) => Ok(outcome),
-            () = self.ending.asked() => Err(Failure::Drive(format!(
-                "{}: asked to end before it was confirmed: nobody knows whether it was carried out, read it back",
-                self.name
-            ))),
-        }
+        one_drive::told(self.name, &mut self.ending, command(self.handle.clone())).await
     }
 
     /// The same for a start: whoever asks the program to end before it is confirmed wants a motor that stands.

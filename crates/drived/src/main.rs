@@ -10,6 +10,7 @@ mod drive_options;
 mod drive_spec;
 mod duration;
 mod failure;
+mod json;
 mod line_spec;
 mod logging;
 mod one_drive;

@@ -126,8 +126,11 @@ pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Box
 
 /// Waits for what became of something that a drive was told. Whoever asks the program to end meanwhile has to know that
 /// it may have been sent.
-pub(crate) async fn told<T>(name: DriveName, command: impl Future<Output = T>) -> Result<T, Failure> {
-    let mut ending = Ending::listen()?;
+pub(crate) async fn told<T>(
+    name: DriveName,
+    ending: &mut Ending,
+    command: impl Future<Output = T>,
+) -> Result<T, Failure> {
     tokio::select! {
         biased;
         outcome = command => Ok(outcome),

@@ -83,10 +83,9 @@ impl Job {
 pub(crate) enum Reply {
     Stopped(Result<Stopped>),
     Withdrawn(Result<Status>),
-    Started(Result<Status>),
+    /// Of a start, a reset or a release.
+    Ordered(Result<Status>),
     Setpoint(Result<()>),
-    Reset(Result<Status>),
-    Released(Result<Status>),
     Saved(Result<u32>),
     KeptAlive(Result<()>),
     Status(Result<Status>),
@@ -102,11 +101,7 @@ impl Reply {
     pub(crate) fn error(&self) -> Option<&Error> {
         let error = match self {
             Self::Stopped(result) => result.as_ref().err(),
-            Self::Withdrawn(result)
-            | Self::Started(result)
-            | Self::Reset(result)
-            | Self::Released(result)
-            | Self::Status(result) => result.as_ref().err(),
+            Self::Withdrawn(result) | Self::Ordered(result) | Self::Status(result) => result.as_ref().err(),
             Self::Setpoint(result) | Self::KeptAlive(result) => result.as_ref().err(),
             Self::Saved(result) => result.as_ref().err(),
             Self::Identity(result) => result.as_ref().err(),

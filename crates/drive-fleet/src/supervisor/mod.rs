@@ -318,9 +318,7 @@ impl Supervisor {
             Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
             Reply::Stopped(result) => self.handle_stopped(now, result),
             Reply::Setpoint(result) => self.handle_setpoint_reply(now, result),
-            Reply::Started(result) => self.handle_order_reply(now, result.map(Some)),
-            Reply::Reset(result) => self.handle_order_reply(now, result.map(Some)),
-            Reply::Released(result) => self.handle_order_reply(now, result.map(Some)),
+            Reply::Ordered(result) => self.handle_order_reply(now, result.map(Some)),
             Reply::Saved(result) => {
                 if let Ok(saves) = result {
                     self.counters.saves = u64::from(saves);

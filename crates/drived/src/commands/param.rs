@@ -11,6 +11,7 @@ use crate::{
     failure::Failure,
     one_drive::{OneDrive, OneDriveArgs, told},
     output::{self, Table},
+    signals::Ending,
 };
 
 /// List, read and write the registers of a drive, by mnemonic or address
@@ -117,7 +118,7 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
     }
     let word = wanted(row, value)?;
     let mut one = args.open().await?;
-    let written = told(name, one.drive.write_parameter(row, word)).await?;
+    let written = told(name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
     let written = written.map_err(|error| one.failure(&error))?;
     let what = if written.changed { "is now" } else { "was already" };
     let kept = match written.storage {
@@ -161,7 +162,9 @@ fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
 async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
     let by = saving(one.name, "")?;
     one.drive.assume_changed();
-    let saves = told(one.name, one.drive.persist()).await?.map_err(|error| one.failure(&error))?;
+    let saves = told(one.name, &mut Ending::listen()?, one.drive.persist())
+        .await?
+        .map_err(|error| one.failure(&error))?;
     output::say(format_args!(
         "{} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}",
         one.name

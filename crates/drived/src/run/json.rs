@@ -1,11 +1,13 @@
-//! Events and snapshots for programs: one JSON object a line. Numbers are integers with their unit in their name.
+//! Events and snapshots for programs.
 
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
-use drive_core::{Current, Frequency, Percent};
+use drive_core::Percent;
 use drive_fleet::{Event, EventKind, ExitAction, Freshness, Link, Outcome, Snapshot, Trip};
 use serde::Serialize;
 use tokio::time::Instant;
+
+use crate::json::{Motor, line, milliseconds};
 
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -65,20 +67,10 @@ struct SnapshotObject<'a> {
     age_ms: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measurements_age_ms: Option<u64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    state: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    direction: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    output_frequency_centihertz: Option<u32>,
+    #[serde(flatten)]
+    motor: Motor,
     #[serde(skip_serializing_if = "Option::is_none")]
     setpoint: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    current_deciamperes: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fault_code: Option<u16>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    control: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     motor_thermal_hundredths_of_percent: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -102,7 +94,7 @@ pub(super) fn event(event: &Event) -> String {
         EventKind::Exit(action) => (None, None, Some(of_exit(action))),
         _ => (None, None, None),
     };
-    text(&Object::Event(EventObject {
+    line(&Object::Event(EventObject {
         time_unix_ms: unix(event.at),
         drive: &event.drive,
         event: event.kind.name(),
@@ -117,9 +109,8 @@ pub(super) fn event(event: &Event) -> String {
 /// A snapshot as a line.
 pub(super) fn snapshot(snapshot: &Snapshot) -> String {
     let now = Instant::now();
-    let status = snapshot.status.as_ref().map(|status| &*status.value);
     let measured = snapshot.measurements.as_ref().map(|measurements| &*measurements.value);
-    text(&Object::Snapshot(SnapshotObject {
+    line(&Object::Snapshot(SnapshotObject {
         time_unix_ms: unix(now),
         drive: &snapshot.name,
         link: match snapshot.link {
@@ -134,15 +125,8 @@ pub(super) fn snapshot(snapshot: &Snapshot) -> String {
         },
         age_ms: snapshot.status.as_ref().map(|status| milliseconds(status.age(now))),
         measurements_age_ms: snapshot.measurements.as_ref().map(|values| milliseconds(values.age(now))),
-        state: status.map(|status| status.state.to_string()),
-        direction: status.and_then(|status| status.direction).map(|direction| direction.to_string()),
-        output_frequency_centihertz: status
-            .and_then(|status| status.output_frequency)
-            .map(Frequency::centihertz),
+        motor: snapshot.status.as_ref().map(|status| Motor::from(&*status.value)).unwrap_or_default(),
         setpoint: snapshot.setpoint.map(|setpoint| setpoint.to_string()),
-        current_deciamperes: status.and_then(|status| status.current).map(Current::deciamperes),
-        fault_code: status.and_then(|status| status.fault_code),
-        control: status.and_then(|status| status.control).map(|control| control.to_string()),
         motor_thermal_hundredths_of_percent: measured
             .and_then(|measured| measured.motor_thermal)
             .map(Percent::hundredths),
@@ -165,7 +149,7 @@ pub(super) fn snapshot(snapshot: &Snapshot) -> String {
 
 /// How many events a slow reader missed, as a line.
 pub(super) fn missed(events: u64) -> String {
-    text(&Object::Missed { time_unix_ms: unix(Instant::now()), events })
+    line(&Object::Missed { time_unix_ms: unix(Instant::now()), events })
 }
 
 fn of_command<'a>(command: &drive_core::Command, commander: &'a str, outcome: &Outcome) -> CommandObject<'a> {
@@ -199,15 +183,6 @@ fn unix(at: Instant) -> u64 {
     milliseconds(now.saturating_sub(Instant::now().saturating_duration_since(at)))
 }
 
-fn text(object: &Object<'_>) -> String {
-    // Strings, integers and lists always have a JSON form.
-    serde_json::to_string(object).unwrap_or_default()
-}
-
-fn milliseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
-}
-
 #[cfg(test)]
 mod tests {
     use drive_core::{Command, Direction};
@@ -216,7 +191,7 @@ mod tests {
 
     #[test]
     fn an_outcome_is_an_object_that_names_command_commander_and_outcome() {
-        let line = event(&Event {
+        let told = event(&Event {
             drive: "pump 1".into(),
             at: Instant::now(),
             kind: EventKind::Command {
@@ -225,7 +200,7 @@ mod tests {
                 outcome: Outcome::Expired,
             },
         });
-        let object: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let object: serde_json::Value = serde_json::from_str(&told).unwrap();
         assert_eq!((&object["kind"], &object["event"]), (&"event".into(), &"command".into()));
         assert_eq!(object["command"]["command"], "start forward");
         assert_eq!(object["command"]["outcome"], "expired");

@@ -137,13 +137,13 @@ impl Paper {
                 if self.status.is_fault() {
                     let reason = Refusal::Tripped;
                     let command = Command::Start(direction);
-                    return Reply::Started(Err(Error::Refused { slave: slave(), command, reason }));
+                    return Reply::Ordered(Err(Error::Refused { slave: slave(), command, reason }));
                 }
                 if reached && self.obeys {
                     self.run();
                     self.status.direction = Some(direction);
                 }
-                Reply::Started(self.status())
+                Reply::Ordered(self.status())
             }
             Job::SetSetpoint(setpoint) => {
                 if reached && self.obeys {
@@ -159,11 +159,11 @@ impl Paper {
                     self.stand();
                     self.status.fault_code = None;
                 }
-                Reply::Reset(self.status())
+                Reply::Ordered(self.status())
             }
             Job::Release => {
                 self.status.control = Some(Control::Terminals);
-                Reply::Released(self.status())
+                Reply::Ordered(self.status())
             }
             Job::Persist => Reply::Saved(self.result(1)),
             Job::ArmWatchdog(timeout, reaction) => {

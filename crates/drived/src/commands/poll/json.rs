@@ -1,11 +1,12 @@
-//! The same for programs: one JSON object a line. Numbers are integers with their unit in their name.
+//! The same for programs.
 
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use drive_core::Status;
 use serde::Serialize;
 
 use super::{Reading, summary::Summary};
+use crate::json::{self, Motor, microseconds, milliseconds};
 
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -19,23 +20,14 @@ enum Object {
 struct StatusObject {
     time_unix_ms: u64,
     drive: String,
-    state: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    direction: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    output_frequency_centihertz: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    current_deciamperes: Option<u32>,
+    #[serde(flatten)]
+    motor: Motor,
     #[serde(skip_serializing_if = "Option::is_none")]
     current_hundredths_of_percent: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_reference: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fault_code: Option<u16>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    control: Option<String>,
     words: Vec<WordObject>,
 }
 
@@ -82,7 +74,7 @@ struct LineObject {
 pub(super) fn reading(reading: &Reading) -> String {
     let time_unix_ms = milliseconds(reading.at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default());
     let drive = reading.name.to_string();
-    text(&match &reading.outcome {
+    json::line(&match &reading.outcome {
         Ok(status) => Object::Status(of_status(time_unix_ms, drive, status)),
         Err(error) => Object::Error { time_unix_ms, drive, error: error.to_string() },
     })
@@ -112,7 +104,7 @@ pub(super) fn summary(summary: &Summary) -> String {
         shortest_silence_us: microseconds(summary.shortest_silence),
         needed_silence_us: summary.needed.as_ref().map_or(0, |(silence, _)| microseconds(*silence)),
     };
-    text(&Object::Summary(SummaryObject { drives: drives.collect(), line }))
+    json::line(&Object::Summary(SummaryObject { drives: drives.collect(), line }))
 }
 
 fn of_status(time_unix_ms: u64, drive: String, status: &Status) -> StatusObject {
@@ -124,34 +116,18 @@ fn of_status(time_unix_ms: u64, drive: String, status: &Status) -> StatusObject 
     StatusObject {
         time_unix_ms,
         drive,
-        state: status.state.to_string(),
-        direction: status.direction.map(|direction| direction.to_string()),
-        output_frequency_centihertz: status.output_frequency.map(drive_core::Frequency::centihertz),
-        current_deciamperes: status.current.map(drive_core::Current::deciamperes),
+        motor: Motor::from(status),
         current_hundredths_of_percent: status.current_share.map(drive_core::Percent::hundredths),
         at_reference: status.at_reference,
         warning: status.warning,
-        fault_code: status.fault_code,
-        control: status.control.map(|control| control.to_string()),
         words: status.raw.iter().map(word).collect(),
     }
 }
 
-fn text(object: &Object) -> String {
-    // Strings, integers and lists always have a JSON form.
-    serde_json::to_string(object).unwrap_or_default()
-}
-
-fn milliseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
-}
-
-fn microseconds(time: Duration) -> u64 {
-    u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use drive_core::{Control, Error, Exchange, Frequency, PortError, RawWord, State};
 
     use super::*;
