@@ -372,35 +372,38 @@ impl Cell {
     }
 }
 
-/// The cells of a family: how many were lived through, and those that contradict themselves. When `DRIVED_FULL` is set that
-/// is each of them, under every reading of the manual; else one in five, every other time under one of the doubtful readings
-/// in turn.
+/// Of so many cells under a doubtful reading of the manual one is lived through: `DRIVED_ONE_IN`, 1 for all of them.
+fn one_in() -> usize {
+    let given = std::env::var("DRIVED_ONE_IN").map_or(Ok(61), |one_in| one_in.parse());
+    given.expect("DRIVED_ONE_IN is a number")
+}
+
+/// The cells of a family: how many were lived through, and those that contradict themselves. Those under the usual reading
+/// are taken twelve times as often as those under a doubtful one.
 async fn matrix(family: Family) -> (usize, Vec<String>) {
-    let full = std::env::var_os("DRIVED_FULL").is_some();
+    let doubtful_one_in = one_in();
+    let usual_one_in = doubtful_one_in.div_ceil(12);
     let mut outcomes: BTreeMap<(Ask, &'static str), usize> = BTreeMap::new();
     let mut wrong = Vec::new();
-    let (mut place, mut seen) = (0_usize, 0_usize);
+    let (mut usual, mut doubtful, mut seen) = (0_usize, 0_usize, 0_usize);
     for configuration in configurations(family) {
         let around = Scene::new(family, configuration.model, &configuration.options).machine.surroundings();
-        let doubts: Vec<String> = (around.switches.iter())
-            .flat_map(|switch| {
-                let others = switch.readings.iter().skip(1);
-                others.map(|reading| format!("reading {} {reading}", switch.name))
-            })
-            .collect();
-        let mut in_turn = doubts.iter().cycle();
+        let doubts = around.switches.iter().flat_map(|switch| {
+            let others = switch.readings.iter().skip(1);
+            others.map(|reading| format!("reading {} {reading}", switch.name))
+        });
+        let readings: Vec<Option<String>> = std::iter::once(None).chain(doubts.map(Some)).collect();
         for world in worlds(around) {
             for ask in asks() {
-                let mut readings = vec![None];
-                place += 1;
-                if full {
-                    readings.extend(doubts.iter().map(Some));
-                } else if place % 5 != 0 {
-                    continue;
-                } else if place % 2 == 1 {
-                    readings = vec![in_turn.next()];
-                }
-                for reading in readings {
+                for reading in &readings {
+                    let (count, one_in) = match reading {
+                        None => (&mut usual, usual_one_in),
+                        Some(_) => (&mut doubtful, doubtful_one_in),
+                    };
+                    *count += 1;
+                    if !count.is_multiple_of(one_in) {
+                        continue;
+                    }
                     let cell = Cell::new(&configuration, &world).await;
                     if let Some(reading) = reading {
                         cell.scene.happens(reading);

@@ -82,6 +82,10 @@ impl<P: Port> Atv312<P> {
         const COMMAND: Command = Command::Release;
         let words = self.check_standing(COMMAND).await?;
         if words.state_words().control() != Control::Bus && self.set_up_before.is_empty() {
+            // The reference may be the bus's all the same: whoever commands finds no setpoint of before.
+            if self.registers.at(Class::Command).read(LFR).await? != 0 {
+                self.registers.at(Class::Command).write(LFR, 0).await?;
+            }
             return self.fast_status(Class::Command).await;
         }
         self.read_settings(Class::Command).await?;

@@ -209,6 +209,14 @@ async fn a_setpoint_of_a_motor_that_somebody_else_has_is_not_confirmed() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_release_leaves_no_setpoint_to_the_terminals_that_command_already() {
+    // Cd1 = tEr, Fr1 = Mdb, and the terminals command (p. 20, 36, 37).
+    let mut drive = drive(&[&FOR_THE_BUS, &[(8423, 1), (3201, 0x0240), (3206, 0x0002)]]);
+    drive.release().await.unwrap();
+    assert_eq!(drive.into_port().written(), [(LFR, 0)]);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_is_refused_while_a_logic_input_asks_for_a_stop() {
     // p. 40 and 41: FSt and nSt stop while their input is 0, dCI while it is 1.
     for (function, stops, runs) in [(11204, 0, 1 << 3), (11202, 0, 1 << 3), (11203, 1 << 3, 0)] {
