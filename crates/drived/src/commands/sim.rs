@@ -1,9 +1,13 @@
 //! `drived sim`: serves simulated drives on a pty.
 
-use std::{io, path::PathBuf, thread};
+use std::{
+    io,
+    path::{Path, PathBuf},
+    thread,
+};
 
 use drive_families::Options;
-use drive_sim::{SimLine, Wiring};
+use drive_sim::{Serving, SimLine, Wiring};
 use tokio::sync::mpsc;
 
 use crate::{
@@ -53,7 +57,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         let model = simulated::model(name.family, set_up);
         line.add_boxed(name.slave.number(), model).map_err(|error| input(&error))?;
     }
-    let served = line.serve_pty(&args.pty);
+    let served = serve(&line, &args.pty);
     let mut serving = served.map_err(|error| Failure::Input(format!("--pty: {error}")))?;
 
     output::say(format_args!("serving {settings} {protocol} on {} (Ctrl-C ends it)", args.pty.display()))?;
@@ -89,6 +93,16 @@ fn standard_input() -> mpsc::Receiver<String> {
         io::stdin().lines().map_while(Result::ok).try_for_each(|line| lines.blocking_send(line))
     });
     read
+}
+
+#[cfg(unix)]
+fn serve(line: &SimLine, pty: &Path) -> io::Result<Serving> {
+    line.serve_pty(pty)
+}
+
+#[cfg(not(unix))]
+fn serve(_: &SimLine, _: &Path) -> io::Result<Serving> {
+    Err(io::Error::new(io::ErrorKind::Unsupported, "this system has no pseudo-terminals"))
 }
 
 /// The drive, and with what it has to be told of to whoever opens it.
