@@ -43,6 +43,16 @@ fn an_altivar_58_is_started_and_stopped_on_each_protocol_of_its_card() {
 }
 
 #[test]
+fn a_simulated_drive_does_not_understand_a_master_at_another_speed() {
+    let sim = Sim::serve("speeds", &["atv312@7"]);
+    for (baud, code) in [("19200", 0), ("9600", 1), ("4800", 1), ("19200", 0)] {
+        let line = format!("{},{baud},8E1", sim.link());
+        let status = run(&["status", "--line", &line, "--drive", "atv312@7"]);
+        assert_eq!(status.code, Some(code), "{baud}: {status:?}");
+    }
+}
+
+#[test]
 fn a_drive_without_a_fault_says_so() {
     let sim = Sim::serve("faults", &["atv312@1"]);
     let faults = sim.on("atv312@1", &["faults"]);
