@@ -211,7 +211,7 @@ impl fmt::Display for EventKind {
                 write!(f, ": {} ({judged})", settings.join(", "))
             }
             Self::StopModeReplaced { asked, used, why } => {
-                write!(f, ": {used} instead of {asked}")?;
+                write!(f, ": {used} stop instead of {asked}")?;
                 why.map_or(Ok(()), |why| write!(f, ", {why}"))
             }
             Self::StopTookCommand(other) => write!(f, " from {other}, and keeps it until it is released"),

@@ -3,8 +3,8 @@
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use drive_core::{
-    Control, Error, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status,
-    StopMode, Watchdog,
+    Error, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status, StopMode,
+    Watchdog,
 };
 use tokio::time::Instant;
 
@@ -115,8 +115,6 @@ impl WatchdogCheck {
 pub struct PendingStop {
     /// By which mode: the one that was asked for, or the one that took its place.
     pub mode: StopMode,
-    /// Who commanded the drive until this stop took the command from him.
-    pub taken_from: Option<Control>,
     /// Since when.
     pub since: Instant,
     /// How often it was sent, or may have been.

@@ -7,7 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        check, demo, families, faults, param, plan, poll, reset, scan, setpoint, sim, start, status, stop,
+        check, demo, families, faults, param, plan, poll, release, reset, scan, setpoint, sim, start, status,
+        stop,
     },
     failure::Failure,
     output, run,
@@ -18,7 +19,7 @@ const NOTES: &str = "\
 To try it:          demo; or sim in one terminal and poll, status, start in another
 Before wiring:      families, plan
 One drive, read:    status, faults, param get, param dump
-One drive, write:   setpoint, start, stop, reset, param set, param save
+One drive, write:   setpoint, start, stop, reset, release, param set, param save
 One line, read:     scan, poll
 The plant's drives: check, plan, run, each with --config FILE
 
@@ -51,6 +52,7 @@ pub(crate) enum Command {
     Setpoint(setpoint::Args),
     Faults(faults::Args),
     Reset(reset::Args),
+    Release(release::Args),
     #[command(subcommand)]
     Param(param::Command),
     Families(families::Args),
@@ -83,6 +85,7 @@ impl Command {
             Self::Setpoint(args) => setpoint::run(args).await,
             Self::Faults(args) => faults::run(args).await,
             Self::Reset(args) => reset::run(args).await,
+            Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
         }

@@ -6,7 +6,8 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{ErrorKind, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
-    DriveHandle, DriveSettings, Fleet, LastSeen, Link, Outcome, Periods, Refused, Times, Unknown,
+    DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
+    Refused, Times, Unknown,
 };
 use tokio::time::{Instant, interval_at, timeout};
 
@@ -34,6 +35,7 @@ const PERIOD: Duration = Duration::from_millis(500);
 pub(crate) struct Commanded {
     pub(crate) name: DriveName,
     handle: DriveHandle,
+    events: Events,
     config: LineConfig,
     line: Line,
     ending: Ending,
@@ -69,7 +71,7 @@ impl Commanded {
             .start()
             .map_err(|error| input(&error))?;
         let Some(handle) = fleet.drives().pop() else { return Err(input(&"the fleet has no drive")) };
-        Ok(Self { name, handle, config, line, ending })
+        Ok(Self { name, handle, events: fleet.events(), config, line, ending })
     }
 
     /// What is known of the drive now.
@@ -139,13 +141,11 @@ impl Commanded {
                 Ok(()) = watch.changed() => {
                     let Some(pending) = watch.borrow_and_update().stop else { continue };
                     let first = pending.taken && !std::mem::replace(&mut taken, pending.taken);
-                    let from = pending.taken_from.map_or_else(String::new, |other| {
-                        format!(", command taken from {other} and kept until it is released")
-                    });
                     if first {
+                        tell_what_it_took(name, &mut self.events).await;
                         // A reader who went away ends no stop.
                         let _ = output::say(format_args!(
-                            "{name} is stopping ({} stop{from}): the drive shows {}", pending.mode, self.status()
+                            "{name} is stopping ({} stop): the drive shows {}", pending.mode, self.status()
                         ));
                     }
                 }
@@ -162,6 +162,7 @@ impl Commanded {
                 }
             }
         };
+        tell_what_it_took(name, &mut self.events).await;
         match outcome {
             Outcome::Confirmed => Ok(self.status()),
             outcome @ Outcome::NotConfirmed(_) if taken => {
@@ -206,6 +207,15 @@ impl Commanded {
     /// Closes the port, if it lets itself be closed.
     pub(crate) async fn close(self) {
         one_drive::close(&self.line).await;
+    }
+}
+
+/// Tells what a stop has taken besides: another mode's place, or the command from somebody else.
+async fn tell_what_it_took(name: DriveName, events: &mut Events) {
+    while let Ok(Received::Event(Event { kind, .. })) = timeout(Duration::ZERO, events.recv()).await {
+        if matches!(kind, EventKind::StopModeReplaced { .. } | EventKind::StopTookCommand(_)) {
+            let _ = output::say(format_args!("{name}: {kind}"));
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 use drive_bus::{Line, LineConfig};
 use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError};
 use drive_families::Options;
+use drive_fleet::Order;
 use tokio::time::timeout;
 
 use crate::{
@@ -13,6 +14,7 @@ use crate::{
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
+    output,
     signals::Ending,
 };
 
@@ -63,7 +65,19 @@ impl OneDriveArgs {
         Commanded::over(name, line, config, &options, accepted)
     }
 
-    /// The same for a stop, which is sent as soon as the port can be opened.
+    /// Gives the drive an order and says what it has done when that is confirmed.
+    pub(crate) async fn order(&self, order: Order, done: &str) -> Result<(), Failure> {
+        let mut one = self.command(Vec::new()).await?;
+        let outcome = one.command(async |drive| drive.order(order).await).await?;
+        if !outcome.is_confirmed() {
+            return Err(one.failure(&outcome));
+        }
+        output::say(format_args!("{} {done}: the drive shows {}", one.name, one.status()))?;
+        one.close().await;
+        Ok(())
+    }
+
+    /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.
     pub(crate) fn stop(&self) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
         let line = Line::start(config.clone()).map_err(|error| Failure::Input(error.to_string()))?;

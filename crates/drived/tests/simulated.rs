@@ -339,3 +339,22 @@ fn a_refusal_says_what_decides_instead_and_what_to_set() {
         }
     }
 }
+
+#[test]
+fn a_stop_that_takes_the_place_of_another_says_why_and_control_is_given_back() {
+    let never = run(&["release", "--line", "/dev/nowhere", "--drive", "atv28@3"]);
+    never.assert_refused(2, "cannot give control back: take it at the drive");
+    let sim = Sim::serve("replaced", &["atv312@2"]);
+    sim.on("atv312@2", &["setpoint", "5Hz"]).assert_done();
+    sim.on("atv312@2", &["start"]).assert_done();
+    sim.on("atv312@2", &["release"]).assert_refused(1, "the motor runs: stop it first");
+    let stop = sim.on("atv312@2", &["stop"]);
+    let told =
+        "stop mode replaced: fast stop instead of ramp, the settings that decide what the control word does";
+    assert!(stop.assert_done().contains(told), "{stop:?}");
+    let released = sim.on("atv312@2", &["release"]);
+    assert!(
+        released.assert_done().starts_with("atv312@2 has given control back: the drive shows"),
+        "{released:?}"
+    );
+}

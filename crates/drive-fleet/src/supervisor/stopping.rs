@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Control, Error, ErrorKind, Frequency, Result, State, Status, StopMode, Stopped};
+use drive_core::{Command, Error, ErrorKind, Frequency, Result, State, Status, StopMode, Stopped};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
@@ -25,8 +25,6 @@ pub(super) struct Stopping {
     mode: StopMode,
     /// The mode by which the drive says that it stops; that which is sent until it has said so.
     used: StopMode,
-    /// From whom it took the command.
-    taken_from: Option<Control>,
     since: Instant,
     attempts: u32,
     /// The drive has shown that no run command is in force.
@@ -49,13 +47,7 @@ struct Waiter {
 
 impl Stopping {
     pub(super) const fn pending(&self) -> PendingStop {
-        PendingStop {
-            taken_from: self.taken_from,
-            mode: self.used,
-            since: self.since,
-            attempts: self.attempts,
-            taken: self.taken,
-        }
+        PendingStop { mode: self.used, since: self.since, attempts: self.attempts, taken: self.taken }
     }
 
     pub(super) fn wake_at(&self) -> Option<Instant> {
@@ -124,7 +116,6 @@ impl Supervisor {
                 self.stopping = Some(Stopping {
                     mode,
                     used: mode,
-                    taken_from: None,
                     since: now,
                     attempts: 0,
                     taken: false,
@@ -173,7 +164,6 @@ impl Supervisor {
                     }
                 }
                 if let Some(other) = taken_from {
-                    stopping.taken_from = taken_from;
                     self.emit(EventKind::StopTookCommand(other));
                 }
                 if used != asked && used != told {

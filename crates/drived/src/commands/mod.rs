@@ -7,6 +7,7 @@ pub(crate) mod faults;
 pub(crate) mod param;
 pub(crate) mod plan;
 pub(crate) mod poll;
+pub(crate) mod release;
 pub(crate) mod reset;
 pub(crate) mod scan;
 pub(crate) mod setpoint;

@@ -3,8 +3,9 @@
 use std::str::FromStr;
 
 use drive_core::{Frequency, Setpoint, Speed};
+use drive_fleet::{Order, Until};
 
-use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{failure::Failure, one_drive::OneDriveArgs};
 
 /// Give one drive a setpoint; a motor that runs follows its ramp to it
 #[derive(Debug, clap::Args)]
@@ -56,14 +57,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             "{name}: a {family} takes no speed in rpm: give a frequency, such as 47.5Hz"
         )));
     }
-    let mut one = args.one.command(Vec::new()).await?;
-    let outcome = one.command(async |drive| drive.set_setpoint(setpoint).await).await?;
-    if !outcome.is_confirmed() {
-        return Err(one.failure(&outcome));
-    }
-    output::say(format_args!("{name} holds the setpoint {setpoint}: the drive shows {}", one.status()))?;
-    one.close().await;
-    Ok(())
+    let order = Order::Setpoint { setpoint, until: Until::InForce };
+    args.one.order(order, &format!("holds the setpoint {setpoint}")).await
 }
 
 #[cfg(test)]
