@@ -74,8 +74,8 @@ async fn ask_everything(family: Family, drive: &mut dyn Drive) {
     let _ = drive.arm_watchdog(Duration::from_secs(2), Reaction::Ramp).await;
     let _ = drive.release().await;
     // The register of the control word among them: it is no parameter.
-    let control = family.rows().iter().filter(|row| row.address == control(family).register);
-    for row in control.chain(family.rows().iter().step_by(7)) {
+    let control = family.capabilities().rows.iter().filter(|row| row.address == control(family).register);
+    for row in control.chain(family.capabilities().rows.iter().step_by(7)) {
         let _ = drive.read_parameter(row).await;
         let _ = drive.write_parameter(row, 1).await;
     }
@@ -191,7 +191,7 @@ async fn each_exception_has_the_meaning_that_its_manual_gives() {
                 (0x22, NotNow),
             ],
         };
-        let row = family.rows().iter().find(|row| row.access.is_readable()).expect("it has one");
+        let row = family.capabilities().rows.iter().find(|row| row.access.is_readable()).expect("it has one");
         for code in 1..=u8::MAX {
             let mut words = Words::new(family.capabilities(), &[]);
             words.refused.insert(row.address, code);

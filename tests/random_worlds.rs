@@ -264,7 +264,7 @@ impl Run {
 
 /// A setting at random: a value of its list, or of its range.
 fn a_setting(rng: &mut Rng, family: Family) -> Option<(&'static Row, u16)> {
-    let rows = family.rows();
+    let rows = family.capabilities().rows;
     let row = &rows[rng.usize(..rows.len())];
     if !row.access.is_writable() || LEFT_ALONE.contains(&row.code) || row.storage == Storage::Volatile {
         return None;

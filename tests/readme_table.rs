@@ -41,9 +41,9 @@ fn table_of_families() -> String {
         }
     };
     row("name in configurations", &|_, drive| format!("`{}`", drive.key));
-    row("registers listed", &|family, _| family.rows().len().to_string());
+    row("registers listed", &|family, _| family.capabilities().rows.len().to_string());
     row("of them writable", &|family, _| {
-        family.rows().iter().filter(|row| row.access.is_writable()).count().to_string()
+        family.capabilities().rows.iter().filter(|row| row.access.is_writable()).count().to_string()
     });
     row("Modbus functions", &|_, drive| {
         join(drive.functions.iter().map(|function| format!("{function:02X}")))

@@ -8,7 +8,7 @@ use drive_core::{
     Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, Written,
 };
 
-use crate::{CAPABILITIES, Drive3g3ev, ROWS, broadcast, settings::Settings};
+use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
 
 /// What loop-backs carry: the data of the manual's sample (§4.1.2).
 const LOOP_BACK: u16 = 0xA537;
@@ -21,10 +21,6 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     fn capabilities(&self) -> &'static Capabilities {
         &CAPABILITIES
-    }
-
-    fn rows(&self) -> &'static [Row] {
-        ROWS
     }
 
     fn lifetimes_mut(&mut self) -> &mut Lifetimes {

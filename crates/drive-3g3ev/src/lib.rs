@@ -38,7 +38,8 @@ pub const TIME_OVER: Duration = Duration::from_secs(2);
 pub const CAPABILITIES: Capabilities = Capabilities {
     functions: &[0x03, 0x08, 0x10],
     read_words: 8,
-    blocks: ROWS,
+    rows: ROWS,
+    reads_across: true,
     write_words: 8,
     highest_address: 31,
     speeds: &[2_400, 4_800, 9_600, 19_200],

@@ -8,7 +8,7 @@ use drive_core::{
     Port, Reaction, Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, Written,
 };
 
-use crate::{Atv21, CAPABILITIES, CommandWord, ROWS, registers};
+use crate::{Atv21, CAPABILITIES, CommandWord, registers};
 
 #[async_trait]
 impl<P: Port> Drive for Atv21<P> {
@@ -18,10 +18,6 @@ impl<P: Port> Drive for Atv21<P> {
 
     fn capabilities(&self) -> &'static Capabilities {
         &CAPABILITIES
-    }
-
-    fn rows(&self) -> &'static [Row] {
-        ROWS
     }
 
     fn lifetimes_mut(&mut self) -> &mut Lifetimes {

@@ -56,6 +56,7 @@ pub use crate::{
 
 /// What an Altivar 21 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
+    rows: ROWS,
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 5,
     write_words: 2,

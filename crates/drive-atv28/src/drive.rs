@@ -12,7 +12,7 @@ use drive_core::{
 };
 
 use crate::{
-    Atv28, CAPABILITIES, FAULTS, ROWS, WARNINGS, command,
+    Atv28, CAPABILITIES, FAULTS, WARNINGS, command,
     reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK},
     registers::{DP1, DP2, DP3, DP4, ETA, INV, IOLR, OPR, OTR, RFRD, RTH},
     setpoint::Limits,
@@ -27,10 +27,6 @@ impl<P: Port> Drive for Atv28<P> {
 
     fn capabilities(&self) -> &'static Capabilities {
         &CAPABILITIES
-    }
-
-    fn rows(&self) -> &'static [Row] {
-        ROWS
     }
 
     fn lifetimes_mut(&mut self) -> &mut Lifetimes {

@@ -23,7 +23,8 @@ use crate::{setpoint::Limits, words::ControlWord};
 pub const CAPABILITIES: Capabilities = Capabilities {
     functions: &[0x03, 0x06, 0x10],
     read_words: 7,
-    blocks: ROWS,
+    rows: ROWS,
+    reads_across: true,
     write_words: 7,
     highest_address: 31,
     stations: 18,

@@ -10,7 +10,7 @@ use drive_core::{
 };
 
 use crate::{
-    Atv312, CAPABILITIES, ROWS, command,
+    Atv312, CAPABILITIES, command,
     registers::{ATR, ETA},
     settings::Known,
     words::ControlWord,
@@ -24,10 +24,6 @@ impl<P: Port> Drive for Atv312<P> {
 
     fn capabilities(&self) -> &'static Capabilities {
         &CAPABILITIES
-    }
-
-    fn rows(&self) -> &'static [Row] {
-        ROWS
     }
 
     fn lifetimes_mut(&mut self) -> &mut Lifetimes {

@@ -30,7 +30,8 @@ pub use crate::{
 pub const CAPABILITIES: Capabilities = Capabilities {
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 29,
-    blocks: ROWS,
+    rows: ROWS,
+    reads_across: true,
     write_words: 27,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8O1, CharacterFormat::F8E1, CharacterFormat::F8N1, CharacterFormat::F8N2],

@@ -60,7 +60,7 @@ async fn a_write_that_cannot_be_read_back_is_unknown_and_never_called_not_sent()
 
     for answers_write in [false, true] {
         let mut drive = Atv312::new(Lost { answers_write, written: false }, slave);
-        let row = Row::find(drive.rows(), "ACC").unwrap();
+        let row = Row::find(drive.capabilities().rows, "ACC").unwrap();
         let error = drive.write_parameter(row, 50).await.unwrap_err();
         assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     }

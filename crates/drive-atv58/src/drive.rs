@@ -11,7 +11,7 @@ use drive_core::{
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{
-    Atv58, CAPABILITIES, ROWS,
+    Atv58, CAPABILITIES,
     reading::Words,
     registers::{CMD, W401, W402, W463},
     watchdog,
@@ -25,10 +25,6 @@ impl<P: Port> Drive for Atv58<P> {
 
     fn capabilities(&self) -> &'static Capabilities {
         &CAPABILITIES
-    }
-
-    fn rows(&self) -> &'static [Row] {
-        ROWS
     }
 
     fn lifetimes_mut(&mut self) -> &mut Lifetimes {

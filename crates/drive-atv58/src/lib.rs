@@ -32,6 +32,9 @@ const fn watchdog(time: Duration) -> WatchdogCapability {
 
 /// What an Altivar 58 with the card VW3-A58303 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
+    rows: ROWS,
+    // VVDED397054 p. 2 and 26.
+    protocols: &["rtu", "ascii", "unitelway"],
     functions: &[0x03, 0x04, 0x06, 0x08, 0x0B, 0x10],
     read_words: 63,
     write_words: 60,

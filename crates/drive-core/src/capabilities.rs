@@ -17,14 +17,18 @@ pub struct Capabilities {
     pub key: &'static str,
     /// The vendor's name, such as `Schneider Altivar 312`.
     pub name: &'static str,
+    /// The serial protocols that it speaks, by the names that configurations use: `rtu`, `ascii`, `unitelway`.
+    pub protocols: &'static [&'static str],
     /// The Modbus functions it answers.
     pub functions: &'static [u8],
     /// Words that one read may ask for.
     pub read_words: u16,
-    /// The registers of which one read may take any that stand in a row, up to [`read_words`](Self::read_words). Where an
-    /// answer must differ from one that may still come, a read takes some more of them along. Empty where each read has its
-    /// own fixed form, or where what stands behind it is not known.
-    pub blocks: &'static [Row],
+    /// Every register that the manual lists.
+    pub rows: &'static [Row],
+    /// Whether one read may take any of the [`rows`](Self::rows) that stand in a row, up to [`read_words`](Self::read_words).
+    /// Where an answer must differ from one that may still come, a read takes some more of them along. Not where each read
+    /// has its own fixed form, or where what stands behind it is not known.
+    pub reads_across: bool,
     /// Words that one write (function 16) may carry.
     pub write_words: u16,
     /// The highest slave address it can have; the lowest is 1.
@@ -89,9 +93,11 @@ impl Capabilities {
         Self {
             key,
             name,
+            protocols: &["rtu"],
             functions: &[0x03, 0x06],
             read_words: 1,
-            blocks: &[],
+            rows: &[],
+            reads_across: false,
             write_words: 1,
             highest_address: 247,
             stations: 31,
@@ -118,12 +124,12 @@ impl Capabilities {
     #[must_use]
     pub fn spare_words(&self, first: u16, count: u16) -> u8 {
         let is_readable =
-            |address: u16| self.blocks.iter().any(|row| row.address == address && row.access.is_readable());
+            |address: u16| self.rows.iter().any(|row| row.address == address && row.access.is_readable());
         let behind =
             (1..=self.read_words.saturating_sub(count)).take(usize::from(u8::MAX)).take_while(|more| {
                 first.checked_add(count - 1).and_then(|last| last.checked_add(*more)).is_some_and(is_readable)
             });
-        if count == 0 { 0 } else { behind.count() as u8 }
+        if count == 0 || !self.reads_across { 0 } else { behind.count() as u8 }
     }
 
     /// Checks that a drive of this family can have this address on a line with these settings.

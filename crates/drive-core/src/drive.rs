@@ -68,9 +68,6 @@ pub trait Drive: Send {
     /// What this family can do.
     fn capabilities(&self) -> &'static Capabilities;
 
-    /// Every register of the family.
-    fn rows(&self) -> &'static [Row];
-
     /// How long its calls may wait on the line until they are sent.
     fn lifetimes_mut(&mut self) -> &mut Lifetimes;
 

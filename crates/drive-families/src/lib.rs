@@ -21,7 +21,7 @@ use drive_atv21::Atv21;
 use drive_atv28::Atv28;
 use drive_atv58::Atv58;
 use drive_atv312::Atv312;
-use drive_core::{Capabilities, Drive, Port, Row, SlaveAddress, WatchdogCapability};
+use drive_core::{Capabilities, Drive, Port, SlaveAddress, WatchdogCapability};
 
 use crate::nowhere::Nowhere;
 pub use crate::options::{OPTIONS, OptionEntry, OptionError, Options};
@@ -54,28 +54,6 @@ impl Family {
             Self::Atv58 => &drive_atv58::CAPABILITIES,
             Self::Atv312 => &drive_atv312::CAPABILITIES,
             Self::Omron3g3ev => &drive_3g3ev::CAPABILITIES,
-        }
-    }
-
-    /// Its registers.
-    #[must_use]
-    pub const fn rows(self) -> &'static [Row] {
-        match self {
-            Self::Atv21 => drive_atv21::ROWS,
-            Self::Atv28 => drive_atv28::ROWS,
-            Self::Atv58 => drive_atv58::ROWS,
-            Self::Atv312 => drive_atv312::ROWS,
-            Self::Omron3g3ev => drive_3g3ev::ROWS,
-        }
-    }
-
-    /// The serial protocols that it speaks, by the names that configurations use: `rtu`, `ascii`, `unitelway`.
-    #[must_use]
-    pub const fn protocols(self) -> &'static [&'static str] {
-        match self {
-            // Card VW3-A58303 (VVDED397054 p. 2 and 26).
-            Self::Atv58 => &["rtu", "ascii", "unitelway"],
-            Self::Atv21 | Self::Atv28 | Self::Atv312 | Self::Omron3g3ev => &["rtu"],
         }
     }
 

@@ -159,7 +159,7 @@ fn check_serial(
     drives: &[DriveName],
 ) -> Result<(), LineSpecError> {
     for name in drives {
-        let spoken = name.family.protocols();
+        let spoken = name.family.capabilities().protocols;
         if !spoken.contains(&protocol.name()) {
             let problem = format!("it speaks {} and not {}", spoken.join(", "), protocol.name());
             return Err(LineSpecError::Drive(*name, problem));

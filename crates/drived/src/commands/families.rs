@@ -32,7 +32,7 @@ fn all() -> Result<(), Failure> {
             (*name).to_owned(),
             format!("1-{highest_address}"),
             list(speeds),
-            list(family.protocols()),
+            list(family.capabilities().protocols),
         ]);
     }
     output::say_table(table)
@@ -46,7 +46,7 @@ fn one(family: Family) -> Result<(), Failure> {
     fact("addresses", format!("1 to {}", capabilities.highest_address));
     fact("speeds", list(capabilities.speeds));
     fact("formats", list(capabilities.formats));
-    fact("protocols", list(family.protocols()));
+    fact("protocols", list(family.capabilities().protocols));
     fact("factory setting", capabilities.factory.to_string());
     fact("stop modes", list(capabilities.stop_modes));
     fact("fault reset", capabilities.fault_reset.to_owned());

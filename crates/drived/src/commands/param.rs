@@ -74,7 +74,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
 fn list(family: Family) -> Table {
     let mut table =
         Table::new(["register", "mnemonic", "name and range", "access, kept in", "factory", "source"]);
-    for row in family.rows() {
+    for row in family.capabilities().rows {
         table.row([
             row.address.to_string(),
             row.code.to_owned(),
@@ -174,7 +174,7 @@ async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
     let mut one = args.open().await?;
     let mut table = value_table();
-    for row in one.drive.rows().iter().filter(|row| row.access.is_readable()) {
+    for row in one.drive.capabilities().rows.iter().filter(|row| row.access.is_readable()) {
         let shown = match one.drive.read_parameter(row).await {
             Ok(word) => row.show(word),
             // A drive refuses what its model or its settings do not have; the rest is still worth reading.
@@ -207,7 +207,7 @@ fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
 }
 
 fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
-    Row::find(family.rows(), text).ok_or_else(|| {
+    Row::find(family.capabilities().rows, text).ok_or_else(|| {
         Failure::Input(format!("a {family} has no register {text:?}: see drived param list {family}"))
     })
 }
