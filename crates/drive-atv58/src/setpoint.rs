@@ -35,8 +35,8 @@ impl<P: Port> Atv58<P> {
         self.see_setpoint(setpoint).await.map_err(Error::after_write)
     }
 
-    /// Sees the setpoint in force: a motor that runs follows it. What one that stands will follow, the drive does not tell;
-    /// its start sees that.
+    /// Sees the setpoint in force: a motor that runs follows it, and local control is not forced. What one that stands will
+    /// follow, the drive does not tell; its start sees that.
     async fn see_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         let mut confirming = Confirming::begin();
         loop {
@@ -45,12 +45,14 @@ impl<P: Port> Atv58<P> {
                 status.raw(self.map.status).and_then(ChartState::of) == Some(ChartState::OperationEnabled);
             let turns = status.output_frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
             let runs = enabled && turns && self.read_control().await? & ENABLE_OPERATION == ENABLE_OPERATION;
-            if !runs || self.follows(&status).await? {
+            // It is told only while local control is forced, in which no reference of the line counts.
+            let forced = status.control.map(Refusal::NotInControl);
+            if forced.is_none() && (!runs || self.follows(&status).await?) {
                 return Ok(());
             }
-            if !confirming.again().await {
+            if forced.is_some() || !confirming.again().await {
                 let (slave, command) = (self.registers.slave(), Command::Setpoint(setpoint));
-                let because = status.control.map(Refusal::NotInControl).or(Some(OTHER_REFERENCE));
+                let because = forced.or(Some(OTHER_REFERENCE));
                 return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because });
             }
         }

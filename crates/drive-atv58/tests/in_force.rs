@@ -85,3 +85,11 @@ async fn a_stop_in_forced_local_mode_is_told_at_once() {
     assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
     assert_eq!(drive.into_port().written(), [(CMD, 7)]);
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_in_forced_local_mode_is_not_confirmed() {
+    let mut drive = drive(&[&STANDS, &[(458, 0x0040)]]);
+    let error = drive.set_setpoint(Frequency::from_hertz(30).into()).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed);
+    assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+}
