@@ -241,7 +241,8 @@ impl Run {
         } else {
             let withdrawn = self.scene.drive.withdraw().await;
             self.tell("withdraw", &withdrawn);
-            self.started &= withdrawn.is_err();
+            // A panel that has taken a running motor may have it run on.
+            self.started &= withdrawn.is_err() || self.scene.seen().local;
         }
     }
 
