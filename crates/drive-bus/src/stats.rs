@@ -12,10 +12,13 @@ const SUB: usize = 8;
 /// Octaves, from 1 µs on: up to 67 s.
 const OCTAVES: usize = 26;
 
-/// A histogram of durations with a resolution of 9 to 12 %, from 1 µs to 67 s, in less than a kilobyte.
+/// A histogram of durations with a resolution of 9 to 12 %, from 1 µs to 67 s. It keeps the buckets from the shortest to
+/// the longest that was counted: a drive that answers steadily needs few, and there are thirty thousand drives on a
+/// thousand lines.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Histogram {
-    buckets: [u32; SUB * OCTAVES],
+    first: usize,
+    buckets: Vec<u32>,
     count: u64,
     sum: Duration,
     min: Duration,
@@ -27,7 +30,8 @@ impl Histogram {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            buckets: [0; SUB * OCTAVES],
+            first: 0,
+            buckets: Vec::new(),
             count: 0,
             sum: Duration::ZERO,
             min: Duration::MAX,
@@ -37,9 +41,7 @@ impl Histogram {
 
     /// Counts one duration.
     pub fn record(&mut self, duration: Duration) {
-        if let Some(bucket) = self.buckets.get_mut(bucket_of(duration)) {
-            *bucket = bucket.saturating_add(1);
-        }
+        self.count_in(bucket_of(duration), 1);
         self.count += 1;
         self.sum = self.sum.saturating_add(duration);
         self.min = self.min.min(duration);
@@ -80,7 +82,7 @@ impl Histogram {
         for (index, &bucket) in self.buckets.iter().enumerate() {
             seen += u64::from(bucket);
             if seen >= rank {
-                return end_of(index).min(self.max);
+                return end_of(self.first + index).min(self.max);
             }
         }
         self.max
@@ -88,13 +90,29 @@ impl Histogram {
 
     /// Adds what another one counted.
     pub fn add(&mut self, other: &Self) {
-        for (mine, theirs) in self.buckets.iter_mut().zip(other.buckets) {
-            *mine = mine.saturating_add(theirs);
+        for (index, &theirs) in other.buckets.iter().enumerate() {
+            self.count_in(other.first + index, theirs);
         }
         self.count += other.count;
         self.sum = self.sum.saturating_add(other.sum);
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
+    }
+
+    fn count_in(&mut self, bucket: usize, times: u32) {
+        if self.buckets.is_empty() {
+            self.first = bucket;
+        }
+        let missing = self.first.saturating_sub(bucket);
+        if missing > 0 {
+            self.buckets.splice(0..0, std::iter::repeat_n(0, missing));
+            self.first = bucket;
+        }
+        let at = bucket - self.first;
+        self.buckets.resize(self.buckets.len().max(at + 1), 0);
+        if let Some(counted) = self.buckets.get_mut(at) {
+            *counted = counted.saturating_add(times);
+        }
     }
 }
 

@@ -153,6 +153,8 @@ impl Doubt {
             let least = self.known.iter().position(|known| !known.will_come).unwrap_or(0);
             self.known.remove(least);
         }
+        // Nearly always it is one.
+        self.known.reserve_exact(1);
         self.known.push(known);
     }
 }

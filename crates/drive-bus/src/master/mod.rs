@@ -57,7 +57,8 @@ pub struct Master<C> {
     config: LineConfig,
     exchange: Box<dyn Exchange>,
     schedule: Schedule<Job<C>>,
-    stations: BTreeMap<u8, Station>,
+    /// Boxed, because a node of the map has room for eleven.
+    stations: BTreeMap<u8, Box<Station>>,
     /// Those that do not answer: they are probed.
     offline: BTreeSet<u8>,
     flight: Option<Flight<C>>,
@@ -496,8 +497,8 @@ impl<C> Master<C> {
 
     fn station(&mut self, slave: u8) -> &mut Station {
         let config = &self.config;
-        self.stations
-            .entry(slave)
-            .or_insert_with(|| Station::new(config, config.slaves.get(&slave).copied().unwrap_or_default()))
+        self.stations.entry(slave).or_insert_with(|| {
+            Box::new(Station::new(config, config.slaves.get(&slave).copied().unwrap_or_default()))
+        })
     }
 }

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use super::{
-    Flight, Job, Master, Purpose, Sending, Sent, Station,
+    Flight, Job, Master, Purpose, Sending, Sent,
     link::Link,
     probing,
     station::{shape_of, wants_settling},
@@ -256,10 +256,9 @@ impl<C> Master<C> {
         let away = taken_in > self.config.chunk_gap;
         flight.suspect |= away && self.exchange.confuses_late_answers();
         let unanswered = flight.slave == 0 || pdu::is_unanswered(&flight.request);
-        let station = self.stations.entry(flight.slave).or_insert_with(|| {
-            Station::new(&self.config, self.config.slaves.get(&flight.slave).copied().unwrap_or_default())
-        });
-        station.stats.sent += 1;
+        if let Some(station) = self.stations.get_mut(&flight.slave) {
+            station.stats.sent += 1;
+        }
         let timeout = flight.patience;
         let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
         let answer_by = end + timeout + characters;
