@@ -9,7 +9,8 @@ import time
 from pymodbus.client import ModbusSerialClient
 
 port, drives, first, quantity, seconds = sys.argv[1], *map(int, sys.argv[2:5]), float(sys.argv[5])
-client = ModbusSerialClient(port, baudrate=19200, parity="E", timeout=0.5)
+# A pty has no parity; the silence follows from the speed, eight data bits and one stop bit.
+client = ModbusSerialClient(port, baudrate=19200, timeout=0.5)
 if not client.connect():
     sys.exit(f"no connection to {port}")
 end = time.monotonic() + seconds

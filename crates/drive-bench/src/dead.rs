@@ -10,18 +10,24 @@ use crate::{
     report::{Goal, Report, Unit, millis},
     rig::{DRIVES, Rig, runtime},
     simulator::{Order, Plant},
-    virtual_line::sweep,
+    virtual_line::{found, sweep},
 };
 
 const SECTION: &str = "dead";
 
 const DEAD: [u8; 3] = [3, 14, 25];
 
+/// How many are lost where it is measured how soon they are found.
+const LOST: u8 = 20;
+
 /// What the dead may cost.
-const GOAL: Goal = Goal::AtMost(1.05);
+const GOAL: Goal = Goal::AtMost(1.02);
 
 /// Until the dead are known to be dead they cost their timeouts, once.
 const SETTLE: Duration = Duration::from_secs(5);
+
+/// A question that nobody answers: request, 50 ms, the characters of the answer that does not come, silence.
+const SHORT_QUESTION: Duration = Duration::from_micros(68_623);
 
 /// The time that is measured in virtual time.
 const HOUR: Duration = Duration::from_secs(3_600);
@@ -56,6 +62,22 @@ pub(crate) fn measure(report: &mut Report, time: Duration) -> Result<(), Error> 
     let without = sweep(&living, &[], SETTLE, HOUR)?;
     let with = sweep(&living, &DEAD, SETTLE, HOUR)?;
     describe(report, "an hour of virtual time", without, with);
+
+    let found = found(DRIVES, LOST)?;
+    let two_sweeps = without / u32::try_from(living.len())? * 2 * u32::from(DRIVES - LOST);
+    let goal = two_sweeps + SHORT_QUESTION * u32::from(LOST);
+    for (what, time, goal) in [
+        ("20 of 31 never answered: the last of the living has told its status after", found.living, goal),
+        (
+            "20 of 31 lost and back together: the last of them has after",
+            found.together,
+            Duration::from_secs(5),
+        ),
+        ("one of 20 that are lost comes back alone: it has after", found.alone, Duration::from_secs(12)),
+    ] {
+        let what = format!("{what}, virtual time");
+        report.row(SECTION, what, Unit::Millis, millis(time), Goal::AtMost(millis(goal)));
+    }
     Ok(())
 }
 
