@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Drive, SlaveAddress, registers::Row};
+use drive_core::{Direction, Drive, Frequency, SlaveAddress, StopMode, registers::Row};
 use drive_families::{Family, Options};
 use drive_sim::{Model, Observation, Panel, SimLine, SimSlave, Wiring};
 use tokio::time::{Instant, sleep};
@@ -73,7 +73,16 @@ impl Scene {
         self.twin.machine.panel(Panel::Reset);
     }
 
-    /// Gives the control of the twin back, by a side of its own that has never commanded it. False: it is refused.
+    /// Starts the twin at another setpoint by a side of its own, and stops it.
+    pub async fn run_twin(&mut self, hertz: u16) {
+        let drive = &mut self.twin.drive;
+        // Where the bus decides nothing there is nothing to leave behind.
+        let _ = drive.set_setpoint(Frequency::from_hertz(hertz).into()).await;
+        let _ = drive.start(Direction::Forward).await;
+        let _ = drive.stop(StopMode::Ramp).await;
+    }
+
+    /// Gives the control of the twin back, by a side of its own. False: it is refused.
     pub async fn release_twin(&mut self) -> bool {
         self.twin.drive.release().await.is_ok()
     }
