@@ -124,12 +124,12 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     /// # Errors
     /// Also [`Unsupported`](drive_core::Error::Unsupported) for 0001h, 0002h and 0900h, which have methods of their
-    /// own, and exception 22h ([`ExceptionMeaning::NotNow`]) for a constant while the motor runs.
+    /// own, and exception 22h ([`ExceptionMeaning::NotNow`](drive_core::ExceptionMeaning::NotNow)) for a constant while the motor runs.
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
         self.change_parameter(row, word).await
     }
 
-    /// ENTER. The EEPROM takes 100 000 of them ([`EEPROM_LIFE`]); what this value has sent counts, also when its
+    /// ENTER. The EEPROM takes 100 000 of them ([`EEPROM_LIFE`](crate::EEPROM_LIFE)); what this value has sent counts, also when its
     /// outcome is unknown, and [`with_saves`](Self::with_saves) adds what came before.
     ///
     /// # Errors
