@@ -13,6 +13,9 @@ use crate::simulated;
 /// The story is told again from the beginning after this time.
 const LENGTH: Duration = Duration::from_secs(30);
 
+/// It begins when every drive can be started, and at the latest after this time.
+const PATIENCE: Duration = Duration::from_secs(15);
+
 /// Somebody at the plant does something with one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Deed {
@@ -29,6 +32,10 @@ struct Scene {
 
 /// Tells the story again and again.
 pub(super) async fn tell(units: Vec<Unit>) {
+    let ready_by = Instant::now() + PATIENCE;
+    for unit in &units {
+        unit.is_ready_by(ready_by).await;
+    }
     let families: Vec<Family> = units.iter().map(|unit| unit.name.family).collect();
     loop {
         let began = Instant::now();

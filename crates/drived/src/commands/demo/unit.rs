@@ -77,6 +77,11 @@ impl Unit {
         });
     }
 
+    /// Waits until the drive can be started, until `by` at the latest. Why it cannot, its first order is told.
+    pub(super) async fn is_ready_by(&self, by: Instant) {
+        drop(self.handle.ready(by.saturating_duration_since(Instant::now())).await);
+    }
+
     pub(super) fn view(&self) -> View {
         let snapshot = self.handle.snapshot();
         let fresh = snapshot.freshness(Instant::now()) == Freshness::Fresh;
