@@ -1,10 +1,8 @@
 //! Start, stop and withdrawal: what is written to 0001h, and how it is seen to be in force.
 
-use std::time::Duration;
-
 use drive_core::{
     Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Port, RawWord, Refusal,
-    Result, State, Status, StopMode, Stopped,
+    Result, SETTLED_WITHIN, State, Status, StopMode, Stopped,
 };
 use tokio::time::Instant;
 
@@ -13,9 +11,6 @@ use crate::{
     registers::address,
     words::{Command, DriveState, Signals},
 };
-
-/// How long the drive may take to show a word that it holds in its other words, before what they show counts.
-pub(crate) const SETTLED_WITHIN: Duration = Duration::from_millis(250);
 
 pub(crate) const OTHER_COMMAND: Refusal = Refusal::Overridden {
     by: "the panel or the terminals (run command, bit A of 002Ch)",

@@ -2,13 +2,13 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Error, ErrorKind, Frequency, Percent, Port, RawWord, Refusal,
-    Result, Setpoint, Status,
+    Result, SETTLED_WITHIN, Setpoint, Status,
 };
 use tokio::time::Instant;
 
 use crate::{
     Drive3g3ev,
-    command::{LOCAL_REFERENCE, OTHER_REFERENCE, SETTLED_WITHIN, is_run, state_word},
+    command::{LOCAL_REFERENCE, OTHER_REFERENCE, is_run, state_word},
     registers::{REFERENCE, REFERENCE_SEEN, STATE},
     words::DriveState,
 };

@@ -1,10 +1,8 @@
 //! What moves the motor and what stops it.
 
-use std::time::Duration;
-
 use drive_core::{
     Class, Command, Confirming, Control, Direction, Error, ErrorKind, Frequency, Port, Refusal, Result,
-    Setpoint, State, Status, StopMode, Stopped,
+    SETTLED_WITHIN, Setpoint, State, Status, StopMode, Stopped,
 };
 use tokio::time::Instant;
 
@@ -16,9 +14,6 @@ use crate::{
     setpoint::is_same,
     words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
 };
-
-/// How long the drive may take to show a word that it holds in its other words, before what they show counts.
-pub(crate) const SETTLED_WITHIN: Duration = Duration::from_millis(250);
 
 const ST_OFF: Refusal = Refusal::Overridden {
     by: "a freewheel stop that the bus has not ordered (ST = OFF, FD01 bit 11)",

@@ -1,11 +1,11 @@
 //! What is given back: command and reference to whom the settings name, and a run command of ours that is no longer in
 //! force.
 
-use drive_core::{Class, Command, Confirming, Error, Port, Refusal, Result, Status};
+use drive_core::{Class, Command, Confirming, Error, Port, Refusal, Result, SETTLED_WITHIN, Status};
 
 use crate::{
     Atv21,
-    command::{OTHER_WORD, SETTLED_WITHIN},
+    command::OTHER_WORD,
     control::{BY_SERIAL_LINK, commanded_by_other},
     registers as map,
     words::CommandWord,

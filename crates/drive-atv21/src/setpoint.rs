@@ -2,14 +2,14 @@
 
 use drive_core::{
     Class, Command, Confirming, Error, ErrorKind, ExceptionMeaning, Frequency, Port, Refusal, Result,
-    Setpoint, SetpointProblem, Speed, Status,
+    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, Status,
     registers::{Register, access::ReadWrite},
 };
 use tokio::time::Instant;
 
 use crate::{
     Atv21, Authority,
-    command::{OTHER_REFERENCE, SETTLED_WITHIN},
+    command::OTHER_REFERENCE,
     control::{other_reference, status_word},
     registers as map,
     words::{CommandWord, ReferenceSource, StatusWord},

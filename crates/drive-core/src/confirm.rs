@@ -9,6 +9,9 @@ use tokio::time::{self, Instant};
 /// no manual puts above 0.1 s; the rest is for a line that thirty other drives use too.
 pub const CONFIRMED_WITHIN: Duration = Duration::from_secs(2);
 
+/// How long a drive may take to show a word that it holds in its other words, before what they show counts.
+pub const SETTLED_WITHIN: Duration = Duration::from_millis(250);
+
 /// The pauses between two readings that do not show a command: the first and the longest.
 const PAUSE: (Duration, Duration) = (Duration::from_millis(10), Duration::from_millis(100));
 

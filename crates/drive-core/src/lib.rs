@@ -33,7 +33,7 @@ pub use tokio_modbus;
 
 pub use access::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
-pub use confirm::{CONFIRMED_WITHIN, Confirming};
+pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
 pub use drive::{BroadcastWrite, Drive};
 pub use error::{
     Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SelfRestart, SetpointProblem,
