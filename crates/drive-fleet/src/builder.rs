@@ -385,20 +385,20 @@ fn check_watchdog(
 
 fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore>) -> Arc<Entry> {
     let Member { line, settings, mut drive } = member;
-    let (slave, capabilities, control) = (drive.slave(), drive.capabilities(), settings.control);
-    let reference = settings.times.reference;
+    let (slave, capabilities) = (drive.slave(), drive.capabilities());
     let broadcasts = StopMode::ALL
         .into_iter()
         .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
         .collect();
     let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
     drive.accept_self_restart(&accepted);
-    let supervisor = Supervisor::new(Instant::now(), settings, drive.watchdog_capability());
+    let now = Instant::now();
+    let supervisor = Supervisor::new(now, settings.clone(), drive.watchdog_capability());
     let name = supervisor.name();
     let (messages, message_box) = mpsc::channel(MAILBOX);
     // Unbounded, because a stop must never be refused for want of room: each entry is a caller that waits.
     let (urgent, urgent_box) = mpsc::unbounded_channel();
-    let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot()));
+    let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
     let desk =
         Desk { supervisor, events: events.clone(), snapshots, exit, callers: BTreeMap::new(), next_call: 0 };
@@ -408,8 +408,7 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore
         line,
         slave,
         capabilities,
-        control,
-        reference,
+        settings,
         broadcasts,
         messages,
         urgent,

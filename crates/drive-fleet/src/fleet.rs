@@ -78,6 +78,20 @@ impl Fleet {
         self.inner.entries.iter().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
+    /// The lines by their names, in the order in which they were added.
+    #[must_use]
+    pub fn lines(&self) -> Vec<(Arc<str>, Line)> {
+        self.inner.lines.iter().map(|entry| (Arc::clone(&entry.name), entry.line.clone())).collect()
+    }
+
+    /// The drives of a line, in the order in which they were added.
+    #[must_use]
+    pub fn drives_on(&self, line: &str) -> Vec<DriveHandle> {
+        let number = self.inner.lines.iter().position(|entry| &*entry.name == line);
+        let on_line = self.inner.entries.iter().filter(|entry| Some(entry.line) == number);
+        on_line.map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
+    }
+
     /// What happens to the drives, from now on; the first reader gets it from the start of the fleet.
     #[must_use]
     pub fn events(&self) -> Events {
@@ -114,7 +128,7 @@ impl Fleet {
         entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
     }
 
-    pub(crate) fn lines(&self) -> &[LineEntry] {
+    pub(crate) fn line_entries(&self) -> &[LineEntry] {
         &self.inner.lines
     }
 

@@ -173,10 +173,10 @@ impl Group {
     async fn stop_each(&self, mode: StopMode, anyhow: bool) -> StopReport {
         let mut report = StopReport::default();
         let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
-            self.members.iter().cloned().partition(|member| member.entry.control);
+            self.members.iter().cloned().partition(|member| member.entry.settings.control);
         report.read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
         let mut stops = Vec::new();
-        for (number, line) in self.fleet.lines().iter().enumerate() {
+        for (number, line) in self.fleet.line_entries().iter().enumerate() {
             let members = members.iter().filter(|member| member.entry.line == number);
             let write = self.common_write(number, mode).filter(|_| !anyhow);
             stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow));
@@ -199,7 +199,7 @@ impl Group {
         let group: BTreeSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
         let mut on_line = self.fleet.entries().iter().filter(|entry| entry.line == line);
         let write = |entry: &Arc<Entry>| {
-            let allowed = entry.control && group.contains(&entry.name);
+            let allowed = entry.settings.control && group.contains(&entry.name);
             let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
             write.filter(|_| allowed)
         };
@@ -288,7 +288,7 @@ impl Group {
     /// Commands a drive when its line is free for it: no other group's command is under way there, and the polls have had
     /// their share since the last.
     async fn on_line<T>(&self, member: &DriveHandle, command: impl AsyncFnOnce() -> T) -> T {
-        let Some(line) = self.fleet.lines().get(member.entry.line) else { return command().await };
+        let Some(line) = self.fleet.line_entries().get(member.entry.line) else { return command().await };
         let mut free_at = line.commands.lock().await;
         sleep_until(*free_at).await;
         let begun = Instant::now();
@@ -344,7 +344,7 @@ async fn stop_one(
 /// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it
 /// was given before. What is remembered of the setpoint for later commands ends with a lost status, and this does not.
 async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Outcome) {
-    let after = member.entry.reference;
+    let after = member.entry.settings.times.reference;
     let setpoint = setpoint.or(member.snapshot().setpoint);
     let is_there = |snapshot: &Snapshot| {
         let status = snapshot.fresh_status(Instant::now());

@@ -11,6 +11,7 @@ use tokio::{
 use crate::{
     event::ExitAction,
     outcome::{Order, Outcome, Refused, Until},
+    settings::DriveSettings,
     snapshot::Snapshot,
     supervisor::Leave,
     task::{Message, Urgent},
@@ -22,9 +23,7 @@ pub(crate) struct Entry {
     pub(crate) line: usize,
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
-    pub(crate) control: bool,
-    /// How long it may take to its reference.
-    pub(crate) reference: Duration,
+    pub(crate) settings: DriveSettings,
     /// The writes that stop every drive of its family on a line, by mode.
     pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
     pub(crate) messages: mpsc::Sender<Message>,
@@ -80,6 +79,12 @@ impl DriveHandle {
     #[must_use]
     pub fn capabilities(&self) -> &'static Capabilities {
         self.entry.capabilities
+    }
+
+    /// What it was told.
+    #[must_use]
+    pub fn settings(&self) -> &DriveSettings {
+        &self.entry.settings
     }
 
     /// What is known of it now.

@@ -68,6 +68,6 @@ pub use settings::{
     WatchdogContract,
 };
 pub use snapshot::{
-    Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,
+    Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,
 };
 pub use supervisor::checks::FEED_PART;

@@ -8,7 +8,7 @@ use drive_core::{
 };
 use tokio::time::Instant;
 
-use crate::outcome::LastSeen;
+use crate::outcome::{LastSeen, Refused};
 
 /// How far the output may be from a setpoint that it has reached by its frequency alone.
 const NEAR: Frequency = Frequency::from_centihertz(50);
@@ -183,6 +183,8 @@ pub struct Snapshot {
     pub stop: Option<PendingStop>,
     /// Whether this fleet started the motor and has not seen it stand since.
     pub started_here: bool,
+    /// Why a start would be refused, whoever asks for it and whatever the setpoint; `None` when it would be sent.
+    pub start_refused: Option<Refused>,
     /// The last trips, the newest last.
     pub trips: Arc<VecDeque<Trip>>,
     /// Counters.
@@ -214,8 +216,9 @@ impl Snapshot {
     }
 }
 
-/// Whether a status shows that the output has reached a setpoint.
-pub(crate) fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
+/// Whether a status shows that the output has reached a setpoint; without a setpoint, whether the drive says so itself.
+#[must_use]
+pub fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
     if status.state != State::Running || status.at_reference == Some(false) {
         return false;
     }

@@ -217,7 +217,7 @@ impl Desk {
 
     /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.
     fn publish(&mut self) {
-        if let Some(snapshot) = self.supervisor.take_snapshot() {
+        if let Some(snapshot) = self.supervisor.take_snapshot(Instant::now()) {
             self.snapshots.send_replace(Arc::new(snapshot));
         }
         while let Some(output) = self.supervisor.poll_output() {

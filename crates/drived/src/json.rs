@@ -1,9 +1,10 @@
 //! What objects for programs have in common: one JSON object a line, numbers as integers with their unit in their name.
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use drive_core::{Current, Frequency, Status};
 use serde::Serialize;
+use tokio::time::Instant;
 
 /// What a status tells of the motor, beside what each kind of object adds.
 #[derive(Debug, Default, Serialize)]
@@ -39,6 +40,12 @@ impl From<&Status> for Motor {
 pub(crate) fn line(object: &impl Serialize) -> String {
     // Strings, integers and lists always have a JSON form.
     serde_json::to_string(object).unwrap_or_default()
+}
+
+/// A moment of the runtime's clock on the wall's, in milliseconds since 1970.
+pub(crate) fn unix(at: Instant) -> u64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    milliseconds(now.saturating_sub(Instant::now().saturating_duration_since(at)))
 }
 
 pub(crate) fn milliseconds(time: Duration) -> u64 {

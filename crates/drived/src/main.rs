@@ -2,10 +2,12 @@
 
 #![forbid(unsafe_code)]
 
+mod api;
 mod cli;
 mod commanded;
 mod commands;
 mod config;
+mod doors;
 mod drive_options;
 mod drive_spec;
 mod duration;
@@ -15,6 +17,7 @@ mod line_spec;
 mod logging;
 mod one_drive;
 mod output;
+mod plant;
 mod run;
 mod signals;
 mod simulated;

@@ -350,12 +350,12 @@ impl Supervisor {
     }
 
     /// The snapshot, if anything changed since this was last asked.
-    pub(crate) fn take_snapshot(&mut self) -> Option<Snapshot> {
-        std::mem::take(&mut self.changed).then(|| self.snapshot())
+    pub(crate) fn take_snapshot(&mut self, now: Instant) -> Option<Snapshot> {
+        std::mem::take(&mut self.changed).then(|| self.snapshot(now))
     }
 
     /// What is known now.
-    pub(crate) fn snapshot(&self) -> Snapshot {
+    pub(crate) fn snapshot(&self, now: Instant) -> Snapshot {
         Snapshot {
             name: self.name(),
             link: self.link,
@@ -368,6 +368,7 @@ impl Supervisor {
             self_restarts: self.checks.restarts().cloned(),
             stop: self.stopping.as_ref().map(Stopping::pending),
             started_here: self.started_here,
+            start_refused: self.start_refused(now),
             trips: Arc::clone(&self.trips),
             counters: self.counters,
             max_age: self.settings.periods.max_age,

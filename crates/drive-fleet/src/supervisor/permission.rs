@@ -65,6 +65,16 @@ impl Supervisor {
         }
     }
 
+    /// Why a start would not be sent now, whoever asks for it.
+    pub(super) fn start_refused(&self, now: Instant) -> Option<Refused> {
+        let order = Order::Start { direction: Direction::Forward, setpoint: None, until: Until::InForce };
+        let refused = self
+            .refuse_commander(None, &order)
+            .or_else(|| self.allow(now, order, None).map_err(Blocked::reason).err());
+        // Whether a setpoint is allowed is not a matter of the drive.
+        refused.filter(|refused| !matches!(refused, Refused::Limit(_)))
+    }
+
     /// Why nobody of this name may give this order now.
     fn refuse_commander(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
         if !self.settings.control {

@@ -3,6 +3,8 @@
 //! Read in two steps: the keys one by one ([`raw`], [`values`]), then seen together, against the families and against the
 //! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
 
+mod groups;
+mod http;
 mod place;
 mod raw;
 mod values;
@@ -17,13 +19,13 @@ use drive_fleet::{
     OnLoss, Periods, WatchdogContract, check_settings, plan,
 };
 
-pub(crate) use self::place::ConfigError;
+pub(crate) use self::{groups::Group, place::ConfigError};
 use self::{
     place::Source,
     raw::{DriveEntry, File, LineEntry},
     values::Exit,
 };
-use crate::{drive_spec::DriveName, failure::Failure, line_spec};
+use crate::{doors::Http, drive_spec::DriveName, failure::Failure, line_spec};
 
 /// How often snapshots are printed unless the file says otherwise.
 const SNAPSHOTS: Duration = Duration::from_secs(5);
@@ -48,6 +50,9 @@ pub(crate) struct Config {
     /// How long the exit may take.
     pub(crate) shutdown: Duration,
     pub(crate) lines: Vec<LinePart>,
+    pub(crate) groups: Vec<Group>,
+    /// Where the page and the API are served.
+    pub(crate) http: Http,
 }
 
 /// A line and its drives.
@@ -110,16 +115,21 @@ impl Config {
             Some(span) => source.error(span, error.message()),
             None => source.error_of_file(error.message()),
         })?;
-        let groups = Groups::of(source, &raw)?;
+        let members = Members::of(source, &raw)?;
         let mut lines = Vec::new();
         for (name, entry) in &raw.lines {
-            lines.push(line_part(source, name.get_ref(), name.span(), entry, &groups)?);
+            lines.push(line_part(source, name.get_ref(), name.span(), entry, &members)?);
         }
         check_ports(source, &raw, &lines)?;
+        let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
+        let names = drives.map(|drive| drive.settings.name.as_str());
+        let groups = groups::groups(source, &raw.groups, names)?;
         Ok(Self {
             snapshots: raw.snapshots.map_or(SNAPSHOTS, |time| time.0.0),
             shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
             lines,
+            groups,
+            http: raw.http.and_then(|http| http.listen).map_or_else(Http::default, |http| http.0),
         })
     }
 
@@ -133,7 +143,7 @@ impl Config {
 }
 
 /// The drives of the file, by line.
-struct Groups(BTreeMap<String, Vec<Member>>);
+struct Members(BTreeMap<String, Vec<Member>>);
 
 /// One drive of a line.
 struct Member {
@@ -144,7 +154,7 @@ struct Member {
     has_own_periods: bool,
 }
 
-impl Groups {
+impl Members {
     fn of(source: Source<'_>, raw: &File) -> Result<Self, ConfigError> {
         let none = DriveEntry::default();
         let defaults = raw.defaults.as_ref().unwrap_or(&none);
@@ -203,9 +213,9 @@ fn line_part(
     name: &str,
     span: Range<usize>,
     entry: &LineEntry,
-    groups: &Groups,
+    members: &Members,
 ) -> Result<LinePart, ConfigError> {
-    let Some(group) = groups.0.get(name) else {
+    let Some(group) = members.0.get(name) else {
         return Err(source.error(span, "no drive is on this line: expected a [[drives]] that names it"));
     };
     let names: Vec<DriveName> = group.iter().map(|member| member.drive).collect();

@@ -5,9 +5,13 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::values::{
-    BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue, Parsed,
-    PercentValue, ReactionValue, TakenPolicy,
+use super::{
+    groups::Entries,
+    http::HttpEntry,
+    values::{
+        BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue,
+        Parsed, PercentValue, ReactionValue, TakenPolicy,
+    },
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
 
@@ -23,6 +27,9 @@ pub(super) struct File {
     pub(super) defaults: Option<DriveEntry>,
     #[serde(default)]
     pub(super) lines: BTreeMap<Spanned<String>, LineEntry>,
+    #[serde(default)]
+    pub(super) groups: Entries,
+    pub(super) http: Option<HttpEntry>,
     #[serde(default)]
     pub(super) drives: Vec<Spanned<DriveEntry>>,
 }

@@ -274,3 +274,25 @@ fn the_example_is_a_configuration_that_works() {
     let config = read(include_str!("../../../../examples/drives.toml")).unwrap();
     assert_eq!(config.lines.iter().map(|line| line.drives.len()).collect::<Vec<_>>(), [31, 3]);
 }
+
+#[test]
+fn a_group_names_drives_of_the_file_in_its_own_order() {
+    let text = format!("{FULL}\n[groups]\nfans = [\"fan 3\", \"fan 1\"]\n");
+    let config = Config::read(Path::new("drives.toml"), &text).unwrap();
+    let [group] = &*config.groups else { panic!("{:?}", config.groups) };
+    assert_eq!(
+        (group.name.as_str(), &*group.drives),
+        ("fans", &["fan 3".to_owned(), "fan 1".to_owned()][..])
+    );
+    for (groups, reason) in [
+        ("fans = [\"fan 99\"]", "there is no drive \"fan 99\""),
+        ("fans = [\"fan 1\", \"fan 1\"]", "is in this group twice"),
+        ("fans = []", "has no drive"),
+        ("\"fan 1\" = [\"fan 2\"]", "is a drive too"),
+        ("\" \" = [\"fan 2\"]", "expected a name"),
+    ] {
+        let text = format!("{FULL}\n[groups]\n{groups}\n");
+        let error = Config::read(Path::new("drives.toml"), &text).unwrap_err().to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+}

@@ -1,13 +1,11 @@
 //! Events and snapshots for programs.
 
-use std::time::SystemTime;
-
 use drive_core::Percent;
 use drive_fleet::{Event, EventKind, ExitAction, Freshness, Link, Outcome, Snapshot, Trip};
 use serde::Serialize;
 use tokio::time::Instant;
 
-use crate::json::{Motor, line, milliseconds};
+use crate::json::{Motor, line, milliseconds, unix};
 
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -175,12 +173,6 @@ const fn of_exit(action: &ExitAction) -> &'static str {
         ExitAction::Released(_) => "released",
         ExitAction::TimeOver => "time over",
     }
-}
-
-/// A moment of the runtime's clock on the wall's.
-fn unix(at: Instant) -> u64 {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    milliseconds(now.saturating_sub(Instant::now().saturating_duration_since(at)))
 }
 
 #[cfg(test)]

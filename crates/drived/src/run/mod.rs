@@ -10,9 +10,12 @@ use drive_fleet::{Fleet, FleetBuilder};
 
 use self::report::{Form, Report};
 use crate::{
+    api,
     config::{Config, DrivePart},
+    doors::{Doors, Http, Rights},
     failure::Failure,
     one_drive::open_line,
+    plant::Plant,
     signals::Ending,
 };
 
@@ -27,6 +30,9 @@ pub(crate) struct Args {
     /// The configuration, in TOML
     #[arg(long, value_name = "FILE", default_value = "drives.toml")]
     config: PathBuf,
+    /// Where the page and the API are served: an address and a port, or off; by default as the configuration says
+    #[arg(long, value_name = "ADDRESS")]
+    http: Option<Http>,
     /// Print JSON objects on a terminal too
     #[arg(long)]
     json: bool,
@@ -40,6 +46,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
+    let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
+    let rights = Rights { view: true, stop: true, ..Rights::default() };
+    let doors = Doors::open(args.http.unwrap_or(config.http), rights, api::router(plant)).await;
     let result = tokio::select! {
         () = ending.asked() => Ok(()),
         result = report.ended() => {
@@ -49,6 +58,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             result
         }
     };
+    doors.close();
     let in_order = tokio::select! {
         // Each drive's event tells what was done.
         _ = fleet.shutdown(config.shutdown) => true,

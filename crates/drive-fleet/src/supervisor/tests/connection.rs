@@ -18,8 +18,8 @@ fn a_running_drive_is_adopted_without_a_write() {
     rig.drive.run();
     rig.pass(60_000 * MS);
     assert_eq!(rig.drive.writes(), []);
-    assert!(!rig.machine.snapshot().started_here);
-    assert!(matches!(rig.machine.snapshot().watchdog, WatchdogCheck::WaitsForStandstill(_)));
+    assert!(!rig.snapshot().started_here);
+    assert!(matches!(rig.snapshot().watchdog, WatchdogCheck::WaitsForStandstill(_)));
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn a_drive_may_go_from_any_state_to_any_other_by_itself() {
             for state in [from, to] {
                 rig.drive.status.state = state;
                 rig.pass(3_000 * MS);
-                let snapshot = rig.machine.snapshot();
+                let snapshot = rig.snapshot();
                 let status = snapshot.status.expect("it answers");
                 assert_eq!((status.value.state, snapshot.link), (state, Link::Connected), "{from} to {to}");
             }
@@ -118,7 +118,7 @@ fn a_trip_after_a_lost_line_is_told_as_the_watchdogs_and_reset_once_by_policy() 
         rig.drive.failing = None;
         rig.drive.trip(18);
         rig.pass(10_000 * MS);
-        let snapshot = rig.machine.snapshot();
+        let snapshot = rig.snapshot();
         let trip = snapshot.trips.back().unwrap();
         assert!(trip.watchdog_after.unwrap() >= CONTRACT.timeout);
         assert_eq!(trip.before.as_ref().unwrap().value.state, State::Running, "the frame before the trip");
@@ -135,7 +135,7 @@ fn a_trip_without_a_lost_line_is_not_the_watchdogs() {
     rig.pass(1_000 * MS);
     rig.drive.trip(4);
     rig.pass(5_000 * MS);
-    let snapshot = rig.machine.snapshot();
+    let snapshot = rig.snapshot();
     assert_eq!(snapshot.trips.back().unwrap().watchdog_after, None);
     assert_eq!(rig.drive.status.state, State::Fault);
     assert!(rig.drive.log.contains(&Job::Faults), "its explanation is read");
@@ -151,7 +151,7 @@ fn the_last_trips_are_kept_and_their_number_is_bounded() {
         rig.drive.stand();
         rig.pass(1_500 * MS);
     }
-    let snapshot = rig.machine.snapshot();
+    let snapshot = rig.snapshot();
     assert_eq!(snapshot.trips.len(), 16);
     assert_eq!(snapshot.trips.back().unwrap().status.value.fault_code, Some(39));
     assert_eq!(snapshot.counters.trips, 40);
@@ -226,7 +226,7 @@ fn after_a_silence_in_which_it_can_have_been_switched_off_a_drive_is_checked_aga
     let mut rig = Rig::ready();
     rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
     rig.pass(1_500 * MS);
-    assert_eq!(rig.machine.snapshot().link, Link::Connected, "it is not lost yet");
+    assert_eq!(rig.snapshot().link, Link::Connected, "it is not lost yet");
     rig.drive.failing = None;
     rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
     rig.drive.log.clear();
@@ -243,7 +243,7 @@ fn a_status_is_as_old_as_the_exchange_that_brought_it_and_not_as_its_call() {
     rig.now += 2_000 * MS;
     let status = rig.drive.status.clone();
     rig.machine.accept_status(rig.now, status);
-    let snapshot = rig.machine.snapshot();
+    let snapshot = rig.snapshot();
     assert_eq!(snapshot.status.as_ref().map(|status| status.at), Some(read));
     assert_eq!(snapshot.freshness(read + snapshot.max_age), Freshness::Fresh);
     assert_eq!(snapshot.freshness(read + snapshot.max_age + MS), Freshness::Stale);

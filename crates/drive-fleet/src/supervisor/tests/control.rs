@@ -8,7 +8,7 @@ fn running(settings: DriveSettings) -> Rig {
     rig.pass(1_500 * MS);
     rig.order(run_at(40));
     rig.pass(1_500 * MS);
-    assert!(rig.machine.snapshot().started_here);
+    assert!(rig.snapshot().started_here);
     rig.outputs.clear();
     rig.drive.log.clear();
     rig
@@ -110,6 +110,6 @@ fn a_drive_that_starts_again_by_itself_is_told_at_each_connect_and_is_an_alarm_u
         let told = EventKind::RestartsItself { by: [restart].into(), accepted };
         assert_eq!(told.is_alarm(), !accepted);
         assert_eq!(rig.outputs.iter().filter(|output| **output == Output::Event(told.clone())).count(), 1);
-        assert_eq!(rig.machine.snapshot().self_restarts.as_deref(), Some(&[restart][..]));
+        assert_eq!(rig.snapshot().self_restarts.as_deref(), Some(&[restart][..]));
     }
 }

@@ -226,6 +226,10 @@ impl Rig {
         rig
     }
 
+    fn snapshot(&self) -> Snapshot {
+        self.machine.snapshot(self.now)
+    }
+
     /// Lets the machine work for a time; each job takes 20 ms.
     fn pass(&mut self, time: Duration) {
         let until = self.now + time;

@@ -10,8 +10,8 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
     assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
     let setpoint = Frequency::from_hertz(40).into();
     assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint), Job::Start(Direction::Forward)]);
-    assert!(rig.machine.snapshot().started_here);
-    assert_eq!(rig.machine.snapshot().setpoint, Some(setpoint));
+    assert!(rig.snapshot().started_here);
+    assert_eq!(rig.snapshot().setpoint, Some(setpoint));
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn a_start_whose_drive_goes_mute_has_an_unknown_outcome_and_the_drive_is_stopped
     rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
     rig.pass(8_000 * MS);
     assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(id));
-    assert!(rig.machine.snapshot().stop.is_some());
+    assert!(rig.snapshot().stop.is_some());
     rig.drive.failing = None;
     rig.pass(20_000 * MS);
     let (start, stops) =
@@ -62,7 +62,7 @@ fn a_start_whose_drive_goes_mute_has_an_unknown_outcome_and_the_drive_is_stopped
         !stops.is_empty() && stops.iter().all(|job| *job == Job::Stop(StopMode::Ramp)),
         "nothing is replayed"
     );
-    assert_eq!(rig.machine.snapshot().stop, None);
+    assert_eq!(rig.snapshot().stop, None);
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn a_stop_is_repeated_until_the_drive_shows_standstill() {
     rig.pass(2_000 * MS);
     assert!(rig.events().contains(&"stop confirmed"));
     assert_eq!(rig.drive.status.state, State::Ready);
-    assert_eq!(rig.machine.snapshot().stop, None);
+    assert_eq!(rig.snapshot().stop, None);
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn a_stop_that_never_left_for_the_line_is_no_attempt_and_is_sent_when_the_port_i
     let id = rig.stop(StopMode::Ramp);
     rig.pass(300 * MS);
     assert!(rig.drive.log.len() >= 3, "it is tried meanwhile: {:?}", rig.drive.log);
-    assert_eq!(rig.machine.snapshot().stop.map(|stop| stop.attempts), Some(0));
+    assert_eq!(rig.snapshot().stop.map(|stop| stop.attempts), Some(0));
     rig.drive.failing = None;
     rig.pass(1_000 * MS);
     assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));

@@ -19,6 +19,8 @@ use tracing::Level;
 
 use self::plant::Plant;
 use crate::{
+    api,
+    doors::{Doors, Http, Rights},
     failure::Failure,
     output::{self, Table},
     signals::Ending,
@@ -36,6 +38,9 @@ pub(crate) struct Args {
     /// End after so many seconds instead of at Ctrl-C
     #[arg(long, value_name = "N")]
     seconds: Option<u32>,
+    /// Where the page and the API are served: an address and a port, or off
+    #[arg(long, value_name = "ADDRESS", default_value_t)]
+    http: Http,
 }
 
 impl Args {
@@ -48,10 +53,15 @@ impl Args {
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut ending = Ending::listen()?;
     let plant = Plant::start()?;
+    let groups = plant.groups();
+    let rights = Rights { view: true, stop: true, operate: true, engineer: false };
+    let faces = crate::plant::Plant::start(plant.fleet.clone(), groups, true);
+    let doors = Doors::open(args.http, rights, api::router(faces)).await;
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, incoming, until, ending: &mut ending };
     let why = if io::stdout().is_terminal() { screen::run(show).await? } else { plain::run(show).await? };
+    doors.close();
     farewell(&plant, why)
 }
 

@@ -11,6 +11,7 @@ use tokio::{sync::watch, task::AbortHandle};
 
 use super::{STOPPING, story, unit::Unit};
 use crate::{
+    config::Group,
     drive_spec::DriveName,
     failure::Failure,
     simulated::{self, SetUp},
@@ -22,11 +23,11 @@ const EACH: u8 = 2;
 /// Simulated drives answer soon. A short limit makes the probes of a drive that restarts cheap, and so frequent.
 const RESPONSE_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// As often as the line allows.
+/// As often as leaves the line room for measurements and commands.
 const PERIODS: Periods = Periods {
-    running: Duration::from_millis(300),
-    rest: Duration::from_millis(300),
-    slow: Duration::ZERO,
+    running: Duration::from_millis(500),
+    rest: Duration::from_secs(1),
+    slow: Duration::from_secs(5),
     max_age: Duration::from_secs(5),
 };
 
@@ -89,6 +90,15 @@ impl Plant {
             .collect();
         let story = tokio::spawn(story::tell(units.clone())).abort_handle();
         Ok(Self { lines, units, fleet, story, ended: watch::Sender::new(None) })
+    }
+
+    /// The drives of each family, as groups.
+    pub(super) fn groups(&self) -> Vec<Group> {
+        let of = |family: Family| {
+            let units = self.units.iter().filter(|unit| unit.name.family == family);
+            Group { name: format!("all {family}"), drives: units.map(|unit| unit.name.to_string()).collect() }
+        };
+        Family::ALL.into_iter().map(of).collect()
     }
 
     /// Ends the story and stops every motor that it has started.

@@ -1,0 +1,163 @@
+//! One line.
+
+use drive_bus::{
+    Line,
+    stats::{Histogram, SlaveStats, Stats},
+};
+use drive_fleet::{DriveHandle, LinePlan};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{
+    json::{microseconds, milliseconds},
+    line_spec,
+};
+
+/// A line since it was opened.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct LineView {
+    pub(crate) name: String,
+    /// As `--line` takes it.
+    pub(crate) port: String,
+    pub(crate) protocol: String,
+    pub(crate) link: LineLink,
+    /// The share of the time in which it was needed.
+    pub(crate) utilisation_percent: f64,
+    /// The longest time from a stop to its first bit on the line, whatever happens.
+    pub(crate) worst_case_stop_ms: u64,
+    /// One status of every living drive, by the plan.
+    pub(crate) cycle_ms: u64,
+    /// Requests that were sent.
+    pub(crate) exchanges: u64,
+    pub(crate) errors: LineErrors,
+    pub(crate) slaves: Vec<SlaveView>,
+}
+
+/// Whether the port is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum LineLink {
+    Connected,
+    /// It is not, and is tried again.
+    Away,
+}
+
+/// What went wrong, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub(crate) struct LineErrors {
+    pub(crate) no_answer: u64,
+    /// Answers that failed their check.
+    pub(crate) damaged: u64,
+    /// Answers after their time.
+    pub(crate) late: u64,
+    /// Answers that did not fit their request.
+    pub(crate) mismatched: u64,
+    /// Refusals by the slave.
+    pub(crate) exception: u64,
+    /// Intact frames of somebody else; of the line only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) foreign: Option<u64>,
+    /// Requests that the adapter gave back, which is no error where it always does; of the line only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) echo: Option<u64>,
+}
+
+/// A slave that was asked.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct SlaveView {
+    pub(crate) slave: u8,
+    /// The drive; absent where none of the configuration has this address.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) drive: Option<String>,
+    pub(crate) exchanges: u64,
+    /// From the end of a request to the first character of its answer; absent before the first answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) answer_ms: Option<AnswerTimes>,
+    pub(crate) errors: LineErrors,
+    /// Whether it has not answered for so long that it is only probed.
+    pub(crate) off_line: bool,
+    pub(crate) probes: u64,
+    /// How long its answers are waited for now.
+    pub(crate) timeout_ms: u64,
+}
+
+/// How long answers took.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct AnswerTimes {
+    pub(crate) p50: f64,
+    pub(crate) p99: f64,
+    pub(crate) max: f64,
+}
+
+impl LineView {
+    pub(crate) fn of(name: &str, line: &Line, plan: LinePlan, drives: &[DriveHandle]) -> Self {
+        let (config, stats) = (line.config(), line.stats());
+        let slaves: Vec<SlaveView> =
+            stats.slaves.iter().map(|(&slave, of)| SlaveView::of(slave, of, drives)).collect();
+        Self {
+            name: name.to_owned(),
+            port: line_spec::written(&config),
+            protocol: config.protocol.to_string(),
+            link: if stats.opened > stats.lost { LineLink::Connected } else { LineLink::Away },
+            utilisation_percent: f64::from(stats.utilisation_ppm() / 100) / 100.0,
+            worst_case_stop_ms: milliseconds(line.worst_case_stop()),
+            cycle_ms: milliseconds(plan.sweep),
+            exchanges: slaves.iter().map(|slave| slave.exchanges).sum(),
+            errors: LineErrors::of_line(&stats),
+            slaves,
+        }
+    }
+}
+
+impl LineErrors {
+    fn of_line(stats: &Stats) -> Self {
+        let sum = stats.slaves.values().map(Self::of_slave).fold(Self::default(), |sum, of| Self {
+            no_answer: sum.no_answer + of.no_answer,
+            damaged: sum.damaged + of.damaged,
+            late: sum.late + of.late,
+            mismatched: sum.mismatched + of.mismatched,
+            exception: sum.exception + of.exception,
+            ..sum
+        });
+        Self { foreign: Some(stats.foreign), echo: Some(stats.echoes), ..sum }
+    }
+
+    fn of_slave(stats: &SlaveStats) -> Self {
+        let outcomes = &stats.outcomes;
+        Self {
+            no_answer: outcomes.timeouts,
+            damaged: outcomes.damaged,
+            late: stats.late,
+            mismatched: outcomes.mismatches,
+            exception: outcomes.exceptions,
+            ..Self::default()
+        }
+    }
+}
+
+impl SlaveView {
+    fn of(slave: u8, stats: &SlaveStats, drives: &[DriveHandle]) -> Self {
+        let drive = drives.iter().find(|drive| drive.slave().number() == slave);
+        Self {
+            slave,
+            drive: drive.map(|drive| drive.name().to_string()),
+            exchanges: stats.sent,
+            answer_ms: AnswerTimes::of(&stats.response),
+            errors: LineErrors::of_slave(stats),
+            off_line: stats.offline,
+            probes: stats.probes,
+            timeout_ms: milliseconds(stats.response_timeout),
+        }
+    }
+}
+
+impl AnswerTimes {
+    fn of(response: &Histogram) -> Option<Self> {
+        let milliseconds = |time| (microseconds(time) / 10) as f64 / 100.0;
+        (response.count() > 0).then(|| Self {
+            p50: milliseconds(response.quantile(500)),
+            p99: milliseconds(response.quantile(990)),
+            max: milliseconds(response.max()),
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! What every face tells of the plant, as JSON: units in the names of the keys, an age and a quality with every value.
+//!
+//! A key whose value is not known, or that a family does not have, is left out: nothing is 0 because it is missing.
+
+mod drive;
+mod line;
+mod status;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+pub(crate) use self::{
+    drive::DriveView,
+    line::LineView,
+    status::{MeasurementsView, Quality, StatusView},
+};
+use crate::{config::Group, doors::Rights};
+
+/// Everything at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct StateView {
+    /// The last revision that is in it: events after this one complete it.
+    pub(crate) revision: u64,
+    /// Now, in milliseconds since 1970.
+    pub(crate) time_unix_ms: u64,
+    pub(crate) daemon: DaemonView,
+    pub(crate) lines: Vec<LineView>,
+    pub(crate) drives: Vec<DriveView>,
+    pub(crate) groups: Vec<Group>,
+}
+
+/// The program that answers, and what it lets the asker do.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct DaemonView {
+    pub(crate) version: &'static str,
+    pub(crate) started_unix_ms: u64,
+    /// Whether its drives are simulated.
+    pub(crate) demo: bool,
+    /// What the asker may do.
+    pub(crate) rights: Rights,
+    /// Who the asker is: the name of his token, `local` on the socket, or `anonymous`.
+    pub(crate) caller: String,
+}
+
+/// A word of the library as the API writes it: `not ready` is `not_ready`.
+fn word(word: impl std::fmt::Display) -> String {
+    word.to_string().to_lowercase().replace(' ', "_")
+}
