@@ -31,9 +31,9 @@ fn ascii() -> Protocol {
 fn line(protocol: Protocol, addresses: &[u8], delivery: Delivery) -> (SimLine, Line) {
     let settings: SerialSettings = Family::Atv58.capabilities().factory;
     let spoken = match protocol {
-        Protocol::Rtu => drive_sim::Protocol::Rtu,
         Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
         Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
+        _ => drive_sim::Protocol::Rtu,
     };
     let simulated = SimLine::new(Wiring { protocol: spoken, delivery, ..Wiring::rtu(settings) });
     for &address in addresses {

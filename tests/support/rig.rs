@@ -47,9 +47,9 @@ impl Rig {
         protocol.check(settings).expect("the protocol has these characters");
         let capabilities = family.capabilities();
         let spoken = match protocol {
-            Protocol::Rtu => drive_sim::Protocol::Rtu,
             Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
             Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
+            _ => drive_sim::Protocol::Rtu,
         };
         let simulated = SimLine::new(Wiring { protocol: spoken, ..Wiring::rtu(settings) });
         let machine = simulated.add_boxed(ADDRESS, drives::machine(family)).expect("the address is free");

@@ -59,9 +59,11 @@ pub enum Dissector {
 impl Dissector {
     pub(crate) const fn of(config: &LineConfig) -> Self {
         match config.protocol {
-            _ if config.is_mbap() => Self::Tcp,
             Protocol::Rtu => Self::Rtu,
-            Protocol::Ascii(_) | Protocol::UniTelway(_) => Self::Data,
+            #[cfg(feature = "tcp")]
+            Protocol::Tcp => Self::Tcp,
+            #[cfg(any(feature = "ascii", feature = "unitelway"))]
+            _ => Self::Data,
         }
     }
 

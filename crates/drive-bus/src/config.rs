@@ -1,29 +1,26 @@
 //! What a line is: where it goes, its timing, its limits.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+#[cfg(feature = "serial")]
+use std::path::{Path, PathBuf};
+use std::{collections::BTreeMap, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
 pub use crate::exchange::echo::Echo;
-use crate::{
-    exchange::{ascii, rtu, unitelway},
-    pdu::MAX_PDU,
-    protocol::Protocol,
-};
+#[cfg(feature = "unitelway")]
+use crate::exchange::unitelway;
+use crate::{pdu::MAX_PDU, protocol::Protocol};
 
-/// Where a line goes.
+/// Where a line goes. Ways whose feature is not compiled in do not exist.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Endpoint {
-    /// A serial port, by its path (`/dev/ttyUSB0`, `COM3`, a pty), opened exclusively.
+    /// A serial port, by its path (`/dev/ttyUSB0`, `COM3`, a pty), opened exclusively. Feature `serial`.
+    #[cfg(feature = "serial")]
     Serial(PathBuf),
-    /// RTU frames over a TCP connection to `host:port`: a serial server.
-    RtuOverTcp(String),
-    /// Modbus TCP to `host:port`: a gateway or a device.
-    ModbusTcp(String),
+    /// A TCP connection to `host:port`: a serial server, or with [`Protocol::Tcp`] a gateway or a device. Feature `tcp`.
+    #[cfg(feature = "tcp")]
+    Tcp(String),
     /// A stream that the caller brings, see [`Line::over`](crate::Line::over).
     Stream,
 }
@@ -34,8 +31,27 @@ impl Endpoint {
     #[must_use]
     pub fn far_end_paces(&self) -> bool {
         match self {
+            #[cfg(feature = "serial")]
             Self::Serial(path) => !is_pseudo_terminal(path),
-            Self::RtuOverTcp(_) | Self::ModbusTcp(_) | Self::Stream => false,
+            _ => false,
+        }
+    }
+
+    /// Whether it is a serial port.
+    pub(crate) const fn is_serial(&self) -> bool {
+        match self {
+            #[cfg(feature = "serial")]
+            Self::Serial(_) => true,
+            _ => false,
+        }
+    }
+
+    /// Whether it is a connection, whose bytes the runtime hands over when it has looked.
+    pub(crate) const fn is_connection(&self) -> bool {
+        match self {
+            #[cfg(feature = "tcp")]
+            Self::Tcp(_) => true,
+            _ => false,
         }
     }
 }
@@ -44,12 +60,14 @@ impl Endpoint {
 pub(crate) const DOUBLE: Duration = Duration::from_millis(50);
 
 /// Linux keeps pseudo-terminals in a directory of their own; the path may be a link to one.
+#[cfg(feature = "serial")]
 fn is_pseudo_terminal(path: &Path) -> bool {
     path.canonicalize().is_ok_and(|path| path.starts_with("/dev/pts"))
 }
 
 /// The kernel's RS-485 mode: it switches the transmitter with RTS (Linux `TIOCSRS485`). For UARTs whose driver has it;
-/// USB adapters switch by themselves and have none.
+/// USB adapters switch by themselves and have none. Feature `serial`.
+#[cfg(feature = "serial")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Rs485 {
     /// RTS is low while we transmit, high otherwise; usually it is the other way round.
@@ -81,9 +99,10 @@ pub struct Rs485 {
 pub struct LineConfig {
     /// Where the line goes.
     pub endpoint: Endpoint,
-    /// What the line speaks; on Modbus TCP it has no effect.
+    /// What the line speaks.
     pub protocol: Protocol,
-    /// Speed and format. On RTU over TCP: those of the far serial side; all silences follow from them.
+    /// Speed and format. On RTU over TCP: those of the far serial side; all silences follow from them. On Modbus TCP they
+    /// have no effect.
     pub serial: SerialSettings,
     /// The longest time from the end of a request to the first character of its answer. The ceiling of what the line
     /// learns for each slave, and what holds for a slave that has not answered yet.
@@ -104,12 +123,14 @@ pub struct LineConfig {
     pub chunk_gap: Duration,
     /// Whether the adapter echoes.
     pub echo: Echo,
-    /// The kernel's RS-485 mode, where the port has it. `None`: left as it is.
+    /// The kernel's RS-485 mode, where the port has it. `None`: left as it is. Feature `serial`.
+    #[cfg(feature = "serial")]
     pub rs485: Option<Rs485>,
     /// Make a USB adapter deliver at once (FTDI: 16 ms as delivered, which is longer than most answers), as far as
     /// the system lets us: the port's `low_latency` flag, and the driver's latency timer where the user may write it.
     /// What came of it can be read with [`adapter_latency`](crate::adapter_latency); where the adapter goes on holding
-    /// answers back the log says so, once.
+    /// answers back the log says so, once. Feature `serial`.
+    #[cfg(feature = "serial")]
     pub low_latency: bool,
     /// How many requests may wait; more are refused with [`PortError::QueueFull`](drive_core::PortError::QueueFull).
     pub queue_limit: usize,
@@ -139,22 +160,26 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
-    /// A serial port, echo found out by the line.
+    /// A serial port, echo found out by the line. Feature `serial`.
+    #[cfg(feature = "serial")]
     #[must_use]
     pub fn serial(path: impl Into<PathBuf>, serial: SerialSettings) -> Self {
         Self { echo: Echo::Auto, ..Self::to(Endpoint::Serial(path.into()), serial) }
     }
 
-    /// RTU over TCP to `host:port`; `serial` is the far side's speed and format.
+    /// RTU over TCP to `host:port`; `serial` is the far side's speed and format. Feature `tcp`.
+    #[cfg(feature = "tcp")]
     #[must_use]
     pub fn rtu_over_tcp(address: impl Into<String>, serial: SerialSettings) -> Self {
-        Self::to(Endpoint::RtuOverTcp(address.into()), serial)
+        Self::to(Endpoint::Tcp(address.into()), serial)
     }
 
-    /// Modbus TCP to `host:port`. The protocol has no silences; an answer is known by its transaction number.
+    /// Modbus TCP to `host:port`. The protocol has no silences; an answer is known by its transaction number. Feature `tcp`.
+    #[cfg(feature = "tcp")]
     #[must_use]
     pub fn modbus_tcp(address: impl Into<String>) -> Self {
-        Self::to(Endpoint::ModbusTcp(address.into()), SerialSettings::MODBUS_DEFAULT)
+        let endpoint = Endpoint::Tcp(address.into());
+        Self { protocol: Protocol::Tcp, ..Self::to(endpoint, SerialSettings::MODBUS_DEFAULT) }
     }
 
     /// RTU on a stream for [`Line::over`](crate::Line::over).
@@ -175,7 +200,9 @@ impl LineConfig {
             slave_change_gap: Duration::ZERO,
             chunk_gap: Duration::from_millis(20),
             echo: Echo::Off,
+            #[cfg(feature = "serial")]
             rs485: None,
+            #[cfg(feature = "serial")]
             low_latency: true,
             queue_limit: 1_024,
             retries: 2,
@@ -212,8 +239,7 @@ impl LineConfig {
         let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
         let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
         let timeout = timeout.max(self.broadcast_turnaround);
-        let settles =
-            self.echo == Echo::Auto && !self.is_mbap() && !matches!(self.protocol, Protocol::UniTelway(_));
+        let settles = self.echo == Echo::Auto && self.protocol.asks_for_echo();
         self.stop_bound((longest_request, longest_answer), timeout, settles, true)
     }
 
@@ -243,18 +269,13 @@ impl LineConfig {
     ) -> Duration {
         let (request, answer) = (self.request_len(request), self.answer_len(answer));
         let alone = self.characters(request + answer) + timeout;
-        let overtime = match self.protocol {
-            _ if self.is_mbap() => Duration::ZERO,
+        #[cfg(feature = "unitelway")]
+        if let Protocol::UniTelway(settings) = self.protocol {
             // Its slaves are waited for while others are served.
-            Protocol::UniTelway(settings) => {
-                let all = unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
-                return if disturbed { all } else { all.min(alone) };
-            }
-            _ if !disturbed => Duration::ZERO,
-            Protocol::Rtu => rtu::overtime(self.serial, self.chunk_gap),
-            Protocol::Ascii(settings) => ascii::overtime(self.serial, settings),
-        };
-        alone + overtime
+            let all = unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
+            return if disturbed { all } else { all.min(alone) };
+        }
+        alone + if disturbed { self.protocol.overtime(self.serial, self.chunk_gap) } else { Duration::ZERO }
     }
 
     /// How long what belongs to no exchange, the frame of a foreign master or noise, may hold a Stop up.
@@ -289,12 +310,7 @@ impl LineConfig {
 
     /// Whether frames need silences between them.
     pub(crate) const fn is_paced(&self) -> bool {
-        !self.unpaced && !self.is_mbap()
-    }
-
-    /// Whether the line speaks Modbus TCP.
-    pub(crate) const fn is_mbap(&self) -> bool {
-        matches!(self.endpoint, Endpoint::ModbusTcp(_))
+        !self.unpaced && self.protocol.is_paced()
     }
 }
 

@@ -72,11 +72,16 @@ pub mod stats;
 mod task;
 pub mod timeout;
 mod transport;
+#[cfg(feature = "unitelway")]
 pub mod unite;
 
-pub use config::{Echo, Endpoint, LineConfig, Rs485, SlaveSettings};
+#[cfg(feature = "serial")]
+pub use config::Rs485;
+pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
 pub use line::Line;
 pub use protocol::Protocol;
 pub use slave::Slave;
 pub use stats::Stats;
-pub use transport::{OpenError, adapter_latency};
+pub use transport::OpenError;
+#[cfg(feature = "serial")]
+pub use transport::adapter_latency;

@@ -1,4 +1,4 @@
-//! Which protocol a serial line speaks.
+//! Which protocol a line speaks, and everything that follows from that.
 
 mod text;
 
@@ -7,21 +7,36 @@ use std::time::Duration;
 use drive_core::serial::{CharacterFormat, SerialSettings};
 
 pub use self::text::ProtocolError;
-use crate::exchange::{ascii, unitelway};
-pub use crate::exchange::{
-    ascii::AsciiSettings,
-    unitelway::{NetworkHeader, UniTelwaySettings},
-};
+#[cfg(feature = "ascii")]
+use crate::exchange::ascii;
+#[cfg(feature = "ascii")]
+pub use crate::exchange::ascii::AsciiSettings;
+#[cfg(feature = "tcp")]
+use crate::exchange::mbap;
+use crate::exchange::rtu;
+#[cfg(feature = "unitelway")]
+use crate::exchange::unitelway;
+#[cfg(feature = "unitelway")]
+pub use crate::exchange::unitelway::{NetworkHeader, UniTelwaySettings};
 
-/// The protocol of a serial line. Families never see which one it is.
+/// The last address that a slave on a line can have; the rest is reserved (MODBUS over Serial Line V1.02 p. 7).
+const LAST_ON_A_LINE: u8 = 247;
+
+/// The protocol of a line. Families never see which one it is. Those whose feature is not compiled in do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Protocol {
     /// Modbus RTU.
     #[default]
     Rtu,
-    /// Modbus ASCII, see [`ascii`].
+    /// Modbus TCP: no characters and no silences, a transaction number in each frame, and 255 units. Feature `tcp`.
+    #[cfg(feature = "tcp")]
+    Tcp,
+    /// Modbus ASCII. Feature `ascii`.
+    #[cfg(feature = "ascii")]
     Ascii(AsciiSettings),
-    /// UNI-TELWAY, see [`unitelway`].
+    /// UNI-TELWAY. Feature `unitelway`.
+    #[cfg(feature = "unitelway")]
     UniTelway(UniTelwaySettings),
 }
 
@@ -31,8 +46,32 @@ impl Protocol {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Rtu => "rtu",
+            #[cfg(feature = "tcp")]
+            Self::Tcp => "tcp",
+            #[cfg(feature = "ascii")]
             Self::Ascii(_) => "ascii",
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(_) => "unitelway",
+        }
+    }
+
+    /// Whether its frames are characters on a line, which take time and need silences between them. Modbus TCP has none.
+    #[must_use]
+    pub const fn is_paced(&self) -> bool {
+        match self {
+            #[cfg(feature = "tcp")]
+            Self::Tcp => false,
+            _ => true,
+        }
+    }
+
+    /// Whether it is Modbus ASCII.
+    #[must_use]
+    pub const fn is_ascii(&self) -> bool {
+        match self {
+            #[cfg(feature = "ascii")]
+            Self::Ascii(_) => true,
+            _ => false,
         }
     }
 
@@ -42,7 +81,11 @@ impl Protocol {
     pub const fn silence(&self, serial: SerialSettings) -> Duration {
         match self {
             Self::Rtu => serial.t3_5(),
+            #[cfg(feature = "tcp")]
+            Self::Tcp => Duration::ZERO,
+            #[cfg(feature = "ascii")]
             Self::Ascii(_) => serial.bits(serial.format().bits()),
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(settings) => serial.bits(settings.turnaround_bits),
         }
     }
@@ -51,32 +94,46 @@ impl Protocol {
     /// these lengths, all that goes with them, and the silences.
     #[must_use]
     pub fn exchange_time(&self, serial: SerialSettings, request: usize, answer: usize) -> Duration {
-        let characters = self.request_len(request) + self.answer_len(answer);
-        // Ours are a request, in UNI-TELWAY two polls and an acknowledgement too.
-        let silences = if let Self::UniTelway(_) = self { 4 } else { 1 };
-        serial.characters(characters) + self.silence(serial) * silences
+        let silences = match self {
+            // Ours are a request, two polls and an acknowledgement.
+            #[cfg(feature = "unitelway")]
+            Self::UniTelway(_) => 4,
+            _ => 1,
+        };
+        self.characters(serial, self.request_len(request) + self.answer_len(answer))
+            + self.silence(serial) * silences
     }
 
     /// What a request takes with the silence before it.
     #[must_use]
     pub fn request_time(&self, serial: SerialSettings, request: usize) -> Duration {
-        serial.characters(self.request_len(request)) + self.silence(serial)
+        self.characters(serial, self.request_len(request)) + self.silence(serial)
+    }
+
+    /// The time that so many characters of its frames take.
+    fn characters(&self, serial: SerialSettings, characters: usize) -> Duration {
+        if self.is_paced() { serial.characters(characters) } else { Duration::ZERO }
     }
 
     /// How often the slave speaks in one exchange.
     #[must_use]
     pub const fn turns(&self) -> u32 {
         match self {
-            Self::Rtu | Self::Ascii(_) => 1,
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(_) => 3,
+            _ => 1,
         }
     }
 
     /// How many characters the frame of a request with a PDU of this length has.
     pub(crate) const fn request_len(&self, pdu: usize) -> usize {
         match self {
-            Self::Rtu => pdu + 3,
+            Self::Rtu => pdu + rtu::OVERHEAD,
+            #[cfg(feature = "tcp")]
+            Self::Tcp => pdu + mbap::HEADER,
+            #[cfg(feature = "ascii")]
             Self::Ascii(_) => ascii::len(pdu),
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(_) => unitelway::request_len(pdu),
         }
     }
@@ -84,10 +141,37 @@ impl Protocol {
     /// How many characters come and go from the end of the request until the answer with a PDU of this length has come.
     pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
         match self {
-            Self::Rtu => pdu + 3,
-            Self::Ascii(_) => ascii::len(pdu),
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(_) => unitelway::reply_len(pdu),
+            _ => self.request_len(pdu),
         }
+    }
+
+    /// How long an exchange may go on after the time of its answer is over, because something is still coming in.
+    pub(crate) fn overtime(&self, serial: SerialSettings, chunk_gap: Duration) -> Duration {
+        match self {
+            Self::Rtu => rtu::overtime(serial, chunk_gap),
+            #[cfg(feature = "ascii")]
+            Self::Ascii(settings) => ascii::overtime(serial, *settings),
+            #[cfg(any(feature = "tcp", feature = "unitelway"))]
+            _ => Duration::ZERO,
+        }
+    }
+
+    /// Whether an answer may equal its request, so that an adapter may have to be asked for its echo.
+    pub(crate) const fn asks_for_echo(&self) -> bool {
+        match self {
+            #[cfg(feature = "tcp")]
+            Self::Tcp => false,
+            #[cfg(feature = "unitelway")]
+            Self::UniTelway(_) => false,
+            _ => true,
+        }
+    }
+
+    /// The last address that a slave can have. Gateways use those behind 247 for themselves.
+    pub(crate) const fn last_address(&self) -> u8 {
+        if self.is_paced() { LAST_ON_A_LINE } else { u8::MAX }
     }
 
     /// Whether the protocol can be spoken with these characters.
@@ -98,7 +182,9 @@ impl Protocol {
         let format = serial.format();
         match self {
             Self::Rtu if format.data_bits() != 8 => Err(ProtocolMismatch::Rtu(format)),
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(_) if format != CharacterFormat::F8O1 => Err(ProtocolMismatch::UniTelway(format)),
+            #[cfg(feature = "unitelway")]
             Self::UniTelway(settings) if !settings.is_category() => {
                 Err(ProtocolMismatch::Category(settings.category))
             }
@@ -109,19 +195,26 @@ impl Protocol {
 
 /// Settings that a protocol cannot have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProtocolMismatch {
     /// Bytes do not fit into the characters.
     #[error("Modbus RTU needs characters of 8 data bits, not {0}; 7 are for Modbus ASCII")]
     Rtu(CharacterFormat),
+    /// Modbus TCP has no characters.
+    #[cfg(all(feature = "serial", feature = "tcp"))]
+    #[error("Modbus TCP is for connections, not for a serial port")]
+    Tcp,
     /// UNI-TELWAY has one format.
+    #[cfg(feature = "unitelway")]
     #[error("UNI-TELWAY needs the format 8O1, not {0}")]
     UniTelway(CharacterFormat),
     /// Requests have categories from 0 to 7.
+    #[cfg(feature = "unitelway")]
     #[error("{0} is no category of a UNI-TE request: expected 0 to 7")]
     Category(u8),
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "ascii", feature = "unitelway"))]
 mod tests {
     use super::*;
 

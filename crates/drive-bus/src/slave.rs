@@ -12,10 +12,8 @@ use tokio_modbus::{
 };
 
 use crate::{
-    protocol::Protocol,
     schedule::Ticket,
     shared::{Caller, Handle},
-    unite::LinkCounters,
 };
 
 /// One slave of a [`Line`](crate::Line): a tokio-modbus [`Client`] and a drive's [`Port`]. Cheap to clone; each clone has
@@ -30,9 +28,9 @@ use crate::{
 /// [`tokio_modbus::Error::Transport`]; [`PortError::from_modbus`] takes it out.
 #[derive(Clone)]
 pub struct Slave {
-    handle: Arc<Handle>,
+    pub(crate) handle: Arc<Handle>,
     address: u8,
-    terms: Terms,
+    pub(crate) terms: Terms,
     answered_at: Option<Instant>,
 }
 
@@ -45,18 +43,6 @@ impl Slave {
     #[must_use]
     pub const fn address(&self) -> u8 {
         self.address
-    }
-
-    pub(crate) const fn terms(&self) -> Terms {
-        self.terms
-    }
-
-    pub(crate) fn speaks_unite(&self) -> bool {
-        matches!(self.handle.shared.master().config().protocol, Protocol::UniTelway(_))
-    }
-
-    pub(crate) fn note_link_counters(&self, counters: LinkCounters) {
-        self.handle.shared.master().note_link_counters(self.address, counters);
     }
 
     /// This slave under other terms.
@@ -122,7 +108,7 @@ impl Port for Slave {
     }
 
     fn is_ascii(&self) -> bool {
-        matches!(self.handle.shared.master().config().protocol, Protocol::Ascii(_))
+        self.handle.shared.master().config().protocol.is_ascii()
     }
 }
 

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use drive_core::Class;
 
+#[cfg(feature = "unitelway")]
 use crate::unite::LinkCounters;
 
 /// Buckets of an octave.
@@ -198,7 +199,8 @@ pub struct SlaveStats {
     /// The response timeout that holds now.
     pub response_timeout: Duration,
     /// What its own link had counted when it was last read, by
-    /// [`link_counters`](crate::unite::UniTe::link_counters) on a UNI-TELWAY line.
+    /// [`link_counters`](crate::unite::UniTe::link_counters) on a UNI-TELWAY line. Feature `unitelway`.
+    #[cfg(feature = "unitelway")]
     pub link: Option<LinkCounters>,
     /// From the end of a request to the first character of its answer, as computed from the answer's end and length.
     pub response: Histogram,

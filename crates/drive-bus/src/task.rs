@@ -70,8 +70,8 @@ impl Task {
         connector: Connector,
         stream: Option<BoxedStream>,
     ) -> Self {
-        let on_descriptor = matches!(config.endpoint, Endpoint::Serial(_) | Endpoint::RtuOverTcp(_));
-        let precise = on_descriptor || config.precise_timer;
+        let on_descriptor = config.endpoint.is_serial() || config.endpoint.is_connection();
+        let precise = on_descriptor && config.protocol.is_paced() || config.precise_timer;
         let port = match stream {
             Some(stream) => {
                 up(&shared, &config.endpoint);
@@ -167,7 +167,7 @@ impl Task {
             (master.is_over(now), master.may_send())
         };
         let Port::Open(_) = self.port else { return };
-        if is_over || (may_send && !matches!(self.endpoint, Endpoint::Serial(_) | Endpoint::Stream)) {
+        if is_over || (may_send && self.endpoint.is_connection()) {
             // The runtime itself may have been away, or has not looked at the port since the last answer.
             yield_now().await;
         } else if !may_send {

@@ -9,6 +9,7 @@ use tokio_modbus::{ExceptionCode, Request, Response, client::Client};
 
 use crate::{
     exchange::unitelway::{UNITE, code},
+    protocol::Protocol,
     slave::Slave,
 };
 
@@ -134,14 +135,14 @@ impl UniTe {
             words(&reply, 1)?;
         let counters =
             LinkCounters { sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused };
-        self.slave.note_link_counters(counters);
+        self.note_link_counters(counters);
         Ok(counters)
     }
 
     /// Request A4h: sets the counters to 0.
     pub async fn clear_link_counters(&mut self) -> Result<(), UniTeError> {
         self.ask(code::CLEAR_COUNTERS, &[]).await?;
-        self.slave.note_link_counters(LinkCounters::default());
+        self.note_link_counters(LinkCounters::default());
         Ok(())
     }
 
@@ -160,7 +161,7 @@ impl UniTe {
             body.extend(word.to_le_bytes());
         }
         let mut commands = self.clone();
-        let terms = self.slave.terms();
+        let terms = self.slave.terms;
         if terms.class < Class::Command {
             let lifetime = terms.lifetime.map_or(COMMAND_LIFETIME, |own| own.min(COMMAND_LIFETIME));
             commands.slave.set_terms(Terms { class: Class::Command, lifetime: Some(lifetime), ..terms });
@@ -174,8 +175,13 @@ impl UniTe {
         Ok(SpecificReport { frh, eta, flt, lcr })
     }
 
+    fn note_link_counters(&self, counters: LinkCounters) {
+        self.slave.handle.shared.master().note_link_counters(self.slave.address(), counters);
+    }
+
     async fn ask(&mut self, code: u8, body: &[u8]) -> Result<Bytes, UniTeError> {
-        if !self.slave.speaks_unite() {
+        let protocol = self.slave.handle.shared.master().config().protocol;
+        if !matches!(protocol, Protocol::UniTelway(_)) {
             return Err(PortError::NotCarried("the line does not speak UNI-TELWAY".to_owned()).into());
         }
         let request = Request::Custom(UNITE, Cow::Owned([&[code], body].concat()));

@@ -1,5 +1,7 @@
 //! Modbus ASCII: frames byte for byte, and what becomes of everything else.
 
+#![cfg(feature = "ascii")]
+
 mod support;
 
 use std::{borrow::Cow, time::Duration};

@@ -1,5 +1,7 @@
 //! A line that stays awake for its answers, over a pty in real time. Nothing here looks at how long anything took.
 
+#![cfg(feature = "serial")]
+
 use std::{
     sync::{
         Arc,

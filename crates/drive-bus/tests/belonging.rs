@@ -1,6 +1,8 @@
 //! Which request an answer belongs to: doubles, stalls, late answers, strays, echoes, refusals, on a line that has no
 //! transaction numbers. Each test is one fault, fed by hand.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use std::time::Duration;

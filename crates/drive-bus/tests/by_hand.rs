@@ -1,5 +1,7 @@
 //! What a line makes of late and damaged answers, of exceptions and of addresses, fed by hand.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};

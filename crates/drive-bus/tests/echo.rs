@@ -1,5 +1,7 @@
 //! Adapters that echo, and echoes that are damaged.
 
+#![cfg(feature = "ascii")]
+
 mod support;
 
 use std::borrow::Cow;

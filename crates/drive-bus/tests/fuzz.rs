@@ -1,5 +1,7 @@
 //! Whatever comes in: no panic, no buffer without bound, and the next good frame is understood.
 
+#![cfg(feature = "tcp")]
+
 use std::{sync::Arc, time::Duration};
 
 use drive_bus::{

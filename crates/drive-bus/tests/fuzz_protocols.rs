@@ -1,6 +1,8 @@
 //! Whatever comes in on a line in Modbus ASCII or UNI-TELWAY: no panic, no wait without end, no wrong answer, and the next
 //! good frame is understood.
 
+#![cfg(all(feature = "ascii", feature = "unitelway"))]
+
 mod support;
 
 use std::borrow::Cow;

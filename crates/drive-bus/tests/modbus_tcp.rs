@@ -1,5 +1,7 @@
 //! Modbus TCP: which answer belongs to which request, and what becomes of calls when the connection ends.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use drive_bus::{LineConfig, SlaveSettings};

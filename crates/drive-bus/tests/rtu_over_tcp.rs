@@ -1,6 +1,8 @@
 //! Modbus RTU to a serial server over TCP: the simulated line behind one, and what becomes of answers and calls when the
 //! connection cuts them, joins them, or ends.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use drive_bus::{Line, LineConfig, OpenError, SlaveSettings, exchange::rtu};

@@ -1,5 +1,7 @@
 //! A port that is lost, comes back, or never comes.
 
+#![cfg(feature = "serial")]
+
 mod support;
 
 use std::{

@@ -1,7 +1,7 @@
 //! A master's process that is stopped and continued from outside, in real time over a pty: no value of one request is given
 //! as that of another, neither in statuses, which ask the same again and again, nor in a dump of parameters, which asks for
 //! what lies behind. Nothing here asserts a duration. `DRIVED_STANDING_STILL` is how many calls there are.
-#![cfg(target_os = "linux")]
+#![cfg(all(target_os = "linux", feature = "serial"))]
 
 mod support;
 

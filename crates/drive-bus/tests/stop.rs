@@ -1,5 +1,7 @@
 //! A stop is never late: not for a dead drive, not for noise, not for a probe, and never later than the line says.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use std::time::Duration;

@@ -2,6 +2,8 @@
 //! story that can be told again. `DRIVED_TRUTH_EXCHANGES` is how many exchanges each story has: 100 000 by default,
 //! 1 000 000 for the full count; `DRIVED_TRUTH_SEED` is where its seeds begin.
 
+#![cfg(feature = "tcp")]
+
 mod support;
 
 use std::{env, time::Duration};

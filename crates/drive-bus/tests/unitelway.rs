@@ -1,6 +1,8 @@
 //! The exchange machine of UNI-TELWAY: frames byte for byte, and what becomes of everything else. `unitelway_line.rs`
 //! has the line above it.
 
+#![cfg(feature = "unitelway")]
+
 mod support;
 
 use std::borrow::Cow;

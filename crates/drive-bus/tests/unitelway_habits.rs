@@ -4,6 +4,8 @@
 //! Each property lives through 100 000 requests or more. `HABITS_TIMES=10 cargo test --release -p drive-bus --test
 //! unitelway_habits` is ten times as many, 1 000 000 each; `HABITS_SEED=n` runs one seed again.
 
+#![cfg(feature = "unitelway")]
+
 mod support;
 
 use std::{ops::Range, time::Duration};

@@ -1,6 +1,8 @@
 //! A line that speaks UNI-TELWAY: what its callers get, and how long a stop waits. `unitelway.rs` has the exchange machine
 //! below it.
 
+#![cfg(feature = "unitelway")]
+
 mod support;
 
 use std::time::Duration;

@@ -74,7 +74,7 @@ pub(crate) fn at(
     drives: &[DriveName],
     baud: u32,
 ) -> Option<(LineConfig, Option<LineSpecError>)> {
-    if matches!(config.endpoint, Endpoint::ModbusTcp(_)) {
+    if !config.protocol.is_paced() {
         return None;
     }
     let serial = SerialSettings::new(baud, config.serial.format()).ok()?;
@@ -87,9 +87,11 @@ pub(crate) fn at(
 pub(crate) fn describe(config: &LineConfig) -> String {
     match &config.endpoint {
         Endpoint::Serial(path) => format!("{}, {} {}", path.display(), config.serial, config.protocol),
-        Endpoint::RtuOverTcp(address) => format!("rtu+tcp://{address}, {}", config.serial),
-        Endpoint::ModbusTcp(address) => format!("tcp://{address}"),
-        Endpoint::Stream => config.serial.to_string(),
+        Endpoint::Tcp(address) if config.protocol.is_paced() => {
+            format!("rtu+tcp://{address}, {}", config.serial)
+        }
+        Endpoint::Tcp(address) => format!("tcp://{address}"),
+        _ => config.serial.to_string(),
     }
 }
 
@@ -99,9 +101,9 @@ pub(crate) fn written(config: &LineConfig) -> String {
     match (&config.endpoint, config.protocol) {
         (Endpoint::Serial(path), Protocol::Rtu) => format!("{},{baud},{format}", path.display()),
         (Endpoint::Serial(path), protocol) => format!("{},{baud},{format},{protocol}", path.display()),
-        (Endpoint::RtuOverTcp(address), _) => format!("rtu+tcp://{address},{baud},{format}"),
-        (Endpoint::ModbusTcp(address), _) => format!("tcp://{address}"),
-        (Endpoint::Stream, _) => format!("{baud},{format}"),
+        (Endpoint::Tcp(address), Protocol::Tcp) => format!("tcp://{address}"),
+        (Endpoint::Tcp(address), _) => format!("rtu+tcp://{address},{baud},{format}"),
+        _ => format!("{baud},{format}"),
     }
 }
 
@@ -110,9 +112,9 @@ pub(crate) fn needed_silence(config: &LineConfig) -> Option<(Duration, String)> 
     let silence = config.silence();
     let name = match config.protocol {
         _ if silence.is_zero() => return None,
-        Protocol::Rtu => "t3.5 is".to_owned(),
         Protocol::Ascii(_) => "a character in ASCII is".to_owned(),
         Protocol::UniTelway(settings) => format!("UNI-TELWAY's {} bits are", settings.turnaround_bits),
+        _ => "t3.5 is".to_owned(),
     };
     Some((silence, name))
 }
@@ -146,10 +148,10 @@ impl SerialSpec {
 
 /// Whether every drive can live on a line; Modbus TCP has nothing that could not be.
 pub(crate) fn check(config: &LineConfig, drives: &[DriveName]) -> Result<(), LineSpecError> {
-    match config.endpoint {
-        Endpoint::ModbusTcp(_) => Ok(()),
-        _ => check_serial(config.serial, config.protocol, drives),
+    if !config.protocol.is_paced() {
+        return Ok(());
     }
+    check_serial(config.serial, config.protocol, drives)
 }
 
 /// Whether every drive can be set to this.
@@ -325,12 +327,12 @@ mod tests {
         assert_eq!(config("COM3,9600", &["atv312@1"]).unwrap().serial.to_string(), "9600 8E1");
         assert_eq!(config("COM3,9600,8N1", &["atv312@1"]).unwrap().serial.to_string(), "9600 8N1");
         let far = config("rtu+tcp://plant:4001,9600,8N1", &["atv312@1"]).unwrap();
-        assert_eq!(far.endpoint, Endpoint::RtuOverTcp("plant:4001".into()));
+        assert_eq!(far.endpoint, Endpoint::Tcp("plant:4001".into()));
+        assert_eq!(far.protocol, Protocol::Rtu);
         assert_eq!(far.serial.to_string(), "9600 8N1");
-        assert_eq!(
-            config("tcp://plant:502", &["atv312@1"]).unwrap().endpoint,
-            Endpoint::ModbusTcp("plant:502".into())
-        );
+        let gateway = config("tcp://plant:502", &["atv312@1"]).unwrap();
+        assert_eq!(gateway.endpoint, Endpoint::Tcp("plant:502".into()));
+        assert_eq!(gateway.protocol, Protocol::Tcp);
     }
 
     #[test]

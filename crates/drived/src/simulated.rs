@@ -41,9 +41,9 @@ pub(crate) fn options() -> Options {
 /// The simulator's name of a protocol.
 pub(crate) const fn protocol(protocol: Protocol) -> drive_sim::Protocol {
     match protocol {
-        Protocol::Rtu => drive_sim::Protocol::Rtu,
         Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
         Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
+        _ => drive_sim::Protocol::Rtu,
     }
 }
 

@@ -1,6 +1,9 @@
 //! Modbus TCP: a header with transaction number, length and unit, then the PDU.
 
-use std::sync::Arc;
+use std::{
+    hash::{BuildHasher, RandomState},
+    sync::Arc,
+};
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 use tokio::time::Instant;
@@ -10,7 +13,7 @@ use super::{Answer, Exchange, Failure, Step, Stray};
 use crate::{answer, pdu::MAX_PDU};
 
 /// Transaction number, protocol number, length (2 bytes each), unit.
-const HEADER: usize = 7;
+pub(crate) const HEADER: usize = 7;
 
 /// The machine: one request at a time, because behind a gateway there is one line.
 #[derive(Debug, Default)]
@@ -36,7 +39,7 @@ impl Mbap {
     /// is none to its own.
     #[must_use]
     pub fn new() -> Self {
-        Self { transaction: fastrand::u16(..), ..Self::default() }
+        Self { transaction: RandomState::new().hash_one(()) as u16, ..Self::default() }
     }
 
     /// The next whole frame: transaction, unit, PDU. The transaction is none where the frame began before the request.

@@ -2,11 +2,14 @@
 //!
 //! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
 
+#[cfg(feature = "ascii")]
 pub mod ascii;
 pub(crate) mod echo;
+#[cfg(feature = "tcp")]
 pub mod mbap;
 mod pace;
 pub mod rtu;
+#[cfg(feature = "unitelway")]
 pub mod unitelway;
 
 use std::{sync::Arc, time::Duration};
@@ -16,7 +19,21 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response};
 
-use crate::{pdu, shape::Shape};
+use crate::{config::LineConfig, pdu, protocol::Protocol, shape::Shape};
+
+/// The machine of what a line of this configuration speaks.
+pub(crate) fn of(config: &LineConfig) -> Box<dyn Exchange> {
+    let (serial, chunk_gap, echo) = (config.serial, config.chunk_gap, config.echo);
+    match config.protocol {
+        Protocol::Rtu => Box::new(rtu::Rtu::new(serial, chunk_gap, echo)),
+        #[cfg(feature = "tcp")]
+        Protocol::Tcp => Box::new(mbap::Mbap::new()),
+        #[cfg(feature = "ascii")]
+        Protocol::Ascii(settings) => Box::new(ascii::Ascii::new(serial, settings, echo)),
+        #[cfg(feature = "unitelway")]
+        Protocol::UniTelway(settings) => Box::new(unitelway::UniTelway::new(serial, settings, chunk_gap)),
+    }
+}
 
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
@@ -139,7 +156,7 @@ pub trait Exchange: Send {
 
     /// The bytes that [`start`](Self::start) or [`Step::Send`] gave have been written; their last bit ends at `end` at
     /// the earliest. The first character of the answer, and as many more as the answer likely has, are due at `answer_by`,
-    /// which is     /// reckoned from the end of what opened the exchange.
+    /// counted from the end of what opened the exchange.
     fn handle_sent(&mut self, end: Instant, answer_by: Instant);
 
     /// Bytes came in at `now`. Bytes that come when no exchange is under way are strays.

@@ -14,6 +14,7 @@ use drive_core::serial::SerialSettings;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
+pub(crate) use self::frame::OVERHEAD;
 pub use self::frame::{frame, is_frame};
 
 use self::frame::MAX_FRAME;

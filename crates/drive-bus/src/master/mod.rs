@@ -24,14 +24,12 @@ use tokio_modbus::Request;
 
 use crate::{
     answer,
-    config::{Endpoint, LineConfig, SlaveSettings},
-    exchange::{Answer, Exchange, Step, Stray, ascii::Ascii, mbap::Mbap, rtu::Rtu, unitelway::UniTelway},
+    config::{LineConfig, SlaveSettings},
+    exchange::{self, Answer, Exchange, Step, Stray},
     pdu,
-    protocol::Protocol,
     schedule::{Entry, Rules, Schedule, Ticket},
     shape::Shape,
     stats::Stats,
-    unite::LinkCounters,
 };
 
 use aside::Aside;
@@ -41,9 +39,6 @@ use station::Station;
 
 /// How a call ends.
 pub type Outcome = Result<Answer, PortError>;
-
-/// The last address a slave on a line can have; the rest is reserved (MODBUS over Serial Line V1.02 p. 7).
-const LAST_SLAVE: u8 = 247;
 
 /// How long a request waits before it may take an aged turn.
 const AGING: Duration = Duration::from_secs(1);
@@ -159,18 +154,8 @@ impl<C> Master<C> {
     /// A line whose port is not open yet.
     #[must_use]
     pub fn new(config: LineConfig) -> Self {
-        let exchange: Box<dyn Exchange> = if config.is_mbap() {
-            Box::new(Mbap::new())
-        } else {
-            let (serial, chunk_gap, echo) = (config.serial, config.chunk_gap, config.echo);
-            match config.protocol {
-                Protocol::Rtu => Box::new(Rtu::new(serial, chunk_gap, echo)),
-                Protocol::Ascii(settings) => Box::new(Ascii::new(serial, settings, echo)),
-                Protocol::UniTelway(settings) => Box::new(UniTelway::new(serial, settings, chunk_gap)),
-            }
-        };
         let mut master = Self {
-            exchange,
+            exchange: exchange::of(&config),
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
             offline: BTreeSet::new(),
@@ -196,7 +181,7 @@ impl<C> Master<C> {
             stats: Stats::default(),
             config,
         };
-        master.set_far_end_paces(matches!(master.config.endpoint, Endpoint::Serial(_)));
+        master.set_far_end_paces(master.config.endpoint.is_serial());
         master
     }
 
@@ -276,9 +261,10 @@ impl<C> Master<C> {
                 "nobody answers a broadcast, so that it cannot read".to_owned(),
             ));
         }
-        if slave > LAST_SLAVE && !self.config.is_mbap() {
+        let last = self.config.protocol.last_address();
+        if slave > last {
             return Err(PortError::NotCarried(format!(
-                "{slave} is no address of a slave on a line: 1 to {LAST_SLAVE}"
+                "{slave} is no address of a slave on a line: 1 to {last}"
             )));
         }
         self.exchange.carries(slave, request, terms.class).map_err(PortError::NotCarried)?;
@@ -470,7 +456,8 @@ impl<C> Master<C> {
     }
 
     /// A slave has said what its link has counted.
-    pub(crate) fn note_link_counters(&mut self, slave: u8, counters: LinkCounters) {
+    #[cfg(feature = "unitelway")]
+    pub(crate) fn note_link_counters(&mut self, slave: u8, counters: crate::unite::LinkCounters) {
         self.station(slave).stats.link = Some(counters);
     }
 

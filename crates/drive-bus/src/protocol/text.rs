@@ -1,21 +1,26 @@
 //! A protocol and its settings as a text: the name, and behind it what differs from the default.
 
-use std::{fmt, str::FromStr, time::Duration};
+#[cfg(any(feature = "ascii", feature = "unitelway"))]
+mod settings;
 
-use super::{AsciiSettings, NetworkHeader, Protocol, UniTelwaySettings};
+use std::{fmt, str::FromStr};
 
-/// Milliseconds that a setting can have: longer ones are somebody's mistake.
-const LONGEST: u64 = 60_000;
-const NUMBER: &str = "a whole number";
-const TIME: &str = "a time such as 150ms or 2s, at most 60s";
-const HEADER: &str = "simplified, standard, or five bytes such as 00FE000000";
-const CHARACTER: &str = "a character such as 0Ah";
+use super::Protocol;
+
+/// What the protocols of a serial line are called here.
+const NAMES: &[&str] = &[
+    "rtu",
+    #[cfg(feature = "ascii")]
+    "ascii",
+    #[cfg(feature = "unitelway")]
+    "unitelway",
+];
 
 /// A text that is no protocol.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ProtocolError {
     /// No protocol has this name.
-    #[error("{0:?} is not a protocol: expected rtu, ascii or unitelway")]
+    #[error("{0:?} is not a protocol: expected {expected}", expected = or(NAMES))]
     Unknown(String),
     /// The protocol has no such setting.
     #[error("{setting:?} is not a setting of {protocol}: expected NAME=VALUE with one of {names}", names = names(protocol))]
@@ -37,94 +42,16 @@ pub enum ProtocolError {
     },
 }
 
-/// One setting of the protocol whose settings are an `S`.
-struct Setting<S> {
-    name: &'static str,
-    expected: &'static str,
-    set: fn(&mut S, &str) -> Option<()>,
-    say: fn(&S) -> String,
-}
-
-const ASCII: &[Setting<AsciiSettings>] = &[
-    Setting {
-        name: "character-gap",
-        expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.character_gap = value),
-        say: |settings| said(settings.character_gap),
-    },
-    Setting {
-        name: "delimiter",
-        expected: CHARACTER,
-        set: |settings, text| {
-            let digits = text.strip_suffix(['h', 'H'])?;
-            let value = u8::from_str_radix(digits, 16).ok()?;
-            (value.is_ascii() && value != b':').then(|| settings.delimiter = value)
-        },
-        say: |settings| format!("{:02X}h", settings.delimiter),
-    },
-];
-
-const UNI_TELWAY: &[Setting<UniTelwaySettings>] = &[
-    Setting {
-        name: "header",
-        expected: HEADER,
-        set: |settings, text| header(text).map(|value| settings.header = value),
-        say: |settings| match settings.header {
-            NetworkHeader::Simplified => "simplified".to_owned(),
-            NetworkHeader::Standard { network, station, gate, extensions: [first, second] } => {
-                format!("{network:02X}{station:02X}{gate:02X}{first:02X}{second:02X}")
-            }
-        },
-    },
-    Setting {
-        name: "category",
-        expected: "a category from 0 to 7",
-        set: |settings, text| {
-            settings.category = text.parse().ok()?;
-            settings.is_category().then_some(())
-        },
-        say: |settings| settings.category.to_string(),
-    },
-    Setting {
-        name: "turnaround-bits",
-        expected: NUMBER,
-        set: |settings, text| text.parse::<u16>().ok().map(|value| settings.turnaround_bits = value.into()),
-        say: |settings| settings.turnaround_bits.to_string(),
-    },
-    Setting {
-        name: "link-timeout",
-        expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.link_timeout = value),
-        say: |settings| said(settings.link_timeout),
-    },
-    Setting {
-        name: "poll-pause",
-        expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.poll_pause = value),
-        say: |settings| said(settings.poll_pause),
-    },
-    Setting {
-        name: "repeats",
-        expected: NUMBER,
-        set: |settings, text| text.parse::<u8>().ok().map(|value| settings.repeats = value.into()),
-        say: |settings| settings.repeats.to_string(),
-    },
-    Setting {
-        name: "busy-timeout",
-        expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.busy_timeout = value),
-        say: |settings| said(settings.busy_timeout),
-    },
-];
-
 /// It is written `NAME[,SETTING=VALUE]...` with the settings that differ from the default.
 impl fmt::Display for Protocol {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())?;
         match self {
-            Self::Rtu => Ok(()),
-            Self::Ascii(settings) => write(f, ASCII, settings),
-            Self::UniTelway(settings) => write(f, UNI_TELWAY, settings),
+            #[cfg(feature = "ascii")]
+            Self::Ascii(settings) => settings::write(f, settings::ASCII, settings),
+            #[cfg(feature = "unitelway")]
+            Self::UniTelway(settings) => settings::write(f, settings::UNI_TELWAY, settings),
+            _ => Ok(()),
         }
     }
 }
@@ -132,91 +59,51 @@ impl fmt::Display for Protocol {
 impl FromStr for Protocol {
     type Err = ProtocolError;
 
-    /// `NAME[,SETTING=VALUE]...`; what is not said has its default.
+    /// `NAME[,SETTING=VALUE]...` of what a serial line can speak; what is not said has its default. Modbus TCP is chosen
+    /// by the address of its server.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (name, settings) = text.split_once(',').map_or((text, None), |(name, rest)| (name, Some(rest)));
+        let (name, said) = text.split_once(',').map_or((text, None), |(name, rest)| (name, Some(rest)));
         match name.trim().to_ascii_lowercase().as_str() {
-            "rtu" => read::<()>("rtu", &[], settings).map(|()| Self::Rtu),
-            "ascii" => read("ascii", ASCII, settings).map(Self::Ascii),
-            "unitelway" | "uni-telway" => read("unitelway", UNI_TELWAY, settings).map(Self::UniTelway),
+            "rtu" => match said {
+                None => Ok(Self::Rtu),
+                Some(said) => Err(ProtocolError::Setting { protocol: "rtu", setting: said.to_owned() }),
+            },
+            #[cfg(feature = "ascii")]
+            "ascii" => settings::read("ascii", settings::ASCII, said).map(Self::Ascii),
+            #[cfg(feature = "unitelway")]
+            "unitelway" | "uni-telway" => {
+                settings::read("unitelway", settings::UNI_TELWAY, said).map(Self::UniTelway)
+            }
             _ => Err(ProtocolError::Unknown(name.to_owned())),
         }
     }
 }
 
-fn write<S: Default>(f: &mut fmt::Formatter<'_>, settings: &[Setting<S>], value: &S) -> fmt::Result {
-    let default = S::default();
-    for setting in settings {
-        let said = (setting.say)(value);
-        if said != (setting.say)(&default) {
-            write!(f, ",{}={said}", setting.name)?;
-        }
+/// The names as an English list.
+fn or(names: &[&str]) -> String {
+    match names {
+        [rest @ .., last] if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => names.concat(),
     }
-    Ok(())
-}
-
-fn read<S: Default>(
-    protocol: &'static str,
-    settings: &[Setting<S>],
-    text: Option<&str>,
-) -> Result<S, ProtocolError> {
-    let mut value = S::default();
-    for said in text.into_iter().flat_map(|text| text.split(',')) {
-        let unknown = || ProtocolError::Setting { protocol, setting: said.to_owned() };
-        let (name, text) = said.split_once('=').ok_or_else(unknown)?;
-        let setting = settings.iter().find(|setting| setting.name == name.trim()).ok_or_else(unknown)?;
-        (setting.set)(&mut value, text.trim()).ok_or_else(|| ProtocolError::Value {
-            setting: setting.name,
-            value: text.to_owned(),
-            expected: setting.expected,
-        })?;
-    }
-    Ok(value)
 }
 
 fn names(protocol: &str) -> String {
     let names: Vec<&str> = match protocol {
-        "ascii" => ASCII.iter().map(|setting| setting.name).collect(),
-        "unitelway" => UNI_TELWAY.iter().map(|setting| setting.name).collect(),
+        #[cfg(feature = "ascii")]
+        "ascii" => settings::ASCII.iter().map(|setting| setting.name).collect(),
+        #[cfg(feature = "unitelway")]
+        "unitelway" => settings::UNI_TELWAY.iter().map(|setting| setting.name).collect(),
         _ => vec!["none"],
     };
     names.join(", ")
 }
 
-fn header(text: &str) -> Option<NetworkHeader> {
-    match text {
-        "simplified" => Some(NetworkHeader::Simplified),
-        "standard" => Some(NetworkHeader::default()),
-        digits if digits.len() == 10 && digits.bytes().all(|digit| digit.is_ascii_hexdigit()) => {
-            let [_, _, _, network, station, gate, first, second] =
-                u64::from_str_radix(digits, 16).ok()?.to_be_bytes();
-            Some(NetworkHeader::Standard { network, station, gate, extensions: [first, second] })
-        }
-        _ => None,
-    }
-}
-
-fn time(text: &str) -> Option<Duration> {
-    let (number, unit) = match text.strip_suffix("ms") {
-        Some(number) => (number, 1),
-        None => (text.strip_suffix('s')?, 1_000),
-    };
-    let millis = number.trim_end().parse::<u32>().ok().map(|number| u64::from(number) * unit)?;
-    (millis <= LONGEST).then(|| Duration::from_millis(millis))
-}
-
-fn said(time: Duration) -> String {
-    let millis = time.as_millis();
-    if millis >= 1_000 && millis.is_multiple_of(1_000) {
-        format!("{}s", millis / 1_000)
-    } else {
-        format!("{millis}ms")
-    }
-}
-
-#[cfg(test)]
+#[cfg(all(test, feature = "ascii", feature = "unitelway"))]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::protocol::{NetworkHeader, UniTelwaySettings};
 
     #[test]
     fn a_protocol_reads_back_as_it_is_written() {
@@ -245,7 +132,7 @@ mod tests {
             busy_timeout: Duration::from_millis(6),
         };
         let written = Protocol::UniTelway(settings).to_string();
-        assert_eq!(written.split(',').count(), 1 + UNI_TELWAY.len(), "{written}");
+        assert_eq!(written.split(',').count(), 1 + settings::UNI_TELWAY.len(), "{written}");
         assert_eq!(written.parse(), Ok(Protocol::UniTelway(settings)));
     }
 

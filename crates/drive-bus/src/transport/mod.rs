@@ -1,8 +1,13 @@
 //! Ways to the line: what can be opened, and what is read and written.
 
+#[cfg(feature = "serial")]
 mod low_latency;
+#[cfg(feature = "serial")]
 mod serial;
+#[cfg(feature = "tcp")]
+mod tcp;
 
+#[cfg(feature = "serial")]
 pub use low_latency::adapter_latency;
 
 use std::{
@@ -10,24 +15,15 @@ use std::{
     io,
     path::PathBuf,
     pin::Pin,
-    sync::{Arc, atomic::AtomicBool},
     task::{Context, Poll},
-    time::Duration,
 };
 
-use tokio::{
-    io::{AsyncRead, AsyncWrite, ReadBuf},
-    net::TcpStream,
-};
-use tokio_serial::SerialStream;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
 use crate::{
     config::{Endpoint, LineConfig},
     protocol::ProtocolMismatch,
 };
-
-/// How long a connection may take to come about.
-const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 
 /// What a line reads and writes.
 pub(crate) trait Stream: AsyncRead + AsyncWrite + Any + Send + Unpin {}
@@ -45,7 +41,8 @@ pub(crate) fn poll_read_now(
     context: &mut Context<'_>,
     buffer: &mut [u8],
 ) -> Poll<io::Result<usize>> {
-    if let Some(port) = (stream as &mut dyn Any).downcast_mut::<SerialStream>() {
+    #[cfg(feature = "serial")]
+    if let Some(port) = (stream as &mut dyn Any).downcast_mut::<tokio_serial::SerialStream>() {
         return match port.try_read(buffer) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Poll::Pending,
             read => Poll::Ready(read),
@@ -111,11 +108,9 @@ pub enum OpenError {
 
 /// Opens the stream of a line, again and again.
 pub(crate) enum Connector {
-    Serial {
-        config: Box<LineConfig>,
-        /// Whether it was said that the adapter holds answers back.
-        warned: Arc<AtomicBool>,
-    },
+    #[cfg(feature = "serial")]
+    Serial(serial::SerialPort),
+    #[cfg(feature = "tcp")]
     Tcp(String),
     Given(Given),
     None,
@@ -123,14 +118,14 @@ pub(crate) enum Connector {
 
 impl Connector {
     pub(crate) fn to(config: &LineConfig) -> Result<Self, OpenError> {
-        if !config.is_mbap() {
-            config.protocol.check(config.serial)?;
-        }
+        config.protocol.check(config.serial)?;
         match &config.endpoint {
-            Endpoint::Serial(_) => {
-                Ok(Self::Serial { config: Box::new(config.clone()), warned: Arc::default() })
-            }
-            Endpoint::RtuOverTcp(address) | Endpoint::ModbusTcp(address) => Ok(Self::Tcp(address.clone())),
+            #[cfg(all(feature = "serial", feature = "tcp"))]
+            Endpoint::Serial(_) if !config.protocol.is_paced() => Err(ProtocolMismatch::Tcp.into()),
+            #[cfg(feature = "serial")]
+            Endpoint::Serial(_) => Ok(Self::Serial(serial::SerialPort::new(config.clone()))),
+            #[cfg(feature = "tcp")]
+            Endpoint::Tcp(address) => Ok(Self::Tcp(address.clone())),
             Endpoint::Stream => Err(OpenError::NoPort),
         }
     }
@@ -138,11 +133,13 @@ impl Connector {
     /// Begins to open the stream; `None` when there is nothing to open.
     pub(crate) fn connect(&mut self) -> Option<Opening<OpenError>> {
         Some(match self {
-            Self::Serial { config, warned } => {
-                let (config, warned) = (config.clone(), Arc::clone(warned));
-                Box::pin(async move { serial::open(&config, &warned) })
+            #[cfg(feature = "serial")]
+            Self::Serial(port) => {
+                let port = port.clone();
+                Box::pin(async move { port.open() })
             }
-            Self::Tcp(address) => Box::pin(connect(address.clone())),
+            #[cfg(feature = "tcp")]
+            Self::Tcp(address) => Box::pin(tcp::connect(address.clone())),
             Self::Given(open) => {
                 let opening = open();
                 Box::pin(async move {
@@ -155,21 +152,4 @@ impl Connector {
             Self::None => return None,
         })
     }
-}
-
-async fn connect(address: String) -> Result<BoxedStream, OpenError> {
-    let connected = tokio::time::timeout(CONNECT_LIMIT, TcpStream::connect(&address)).await;
-    let stream = match connected {
-        Ok(Ok(stream)) => stream,
-        Ok(Err(error)) => return Err(OpenError::Connect { address, reason: error.to_string() }),
-        Err(_) => {
-            return Err(OpenError::Connect {
-                address,
-                reason: format!("no answer within {CONNECT_LIMIT:?}"),
-            });
-        }
-    };
-    // A frame is one small write: it must not wait for the next.
-    let _ = stream.set_nodelay(true);
-    Ok(Box::new(stream))
 }

@@ -5,9 +5,13 @@
 pub(crate) mod by_hand;
 pub(crate) mod rig;
 pub(crate) mod script;
+#[cfg(feature = "tcp")]
 pub(crate) mod server;
+#[cfg(feature = "unitelway")]
 pub(crate) mod telway;
+#[cfg(feature = "tcp")]
 pub(crate) mod truth;
+#[cfg(feature = "unitelway")]
 pub(crate) mod unitelway;
 
 use std::time::Duration;

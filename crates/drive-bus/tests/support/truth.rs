@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_bus::{
-    Endpoint, LineConfig,
+    LineConfig, Protocol,
     exchange::rtu,
     master::{Master, Outcome},
 };
@@ -102,7 +102,7 @@ impl TruthLine {
         let now = Instant::now();
         let mut master = Master::new(config.clone());
         master.handle_up(now);
-        let mbap = matches!(config.endpoint, Endpoint::ModbusTcp(_));
+        let mbap = config.protocol == Protocol::Tcp;
         let paced = config.far_end_paces == Some(true);
         Self {
             master,

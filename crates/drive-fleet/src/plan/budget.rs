@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_bus::{Endpoint, LineConfig, Protocol};
+use drive_bus::{LineConfig, Protocol};
 use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
 use crate::settings::{Periods, WatchdogContract};
@@ -39,10 +39,7 @@ impl LineBudget {
     #[must_use]
     pub const fn of(config: &LineConfig) -> Self {
         Self {
-            serial: match config.endpoint {
-                Endpoint::ModbusTcp(_) => None,
-                _ => Some(config.serial),
-            },
+            serial: if config.protocol.is_paced() { Some(config.serial) } else { None },
             protocol: config.protocol,
             response: Duration::from_millis(10),
             response_timeout: config.response_timeout,

@@ -278,7 +278,7 @@ fn check_ports(source: Source<'_>, raw: &File, lines: &[LinePart]) -> Result<(),
             Endpoint::Serial(path) => {
                 path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string()
             }
-            Endpoint::RtuOverTcp(address) => format!("rtu+tcp://{address}"),
+            Endpoint::Tcp(address) if line.config.protocol.is_paced() => format!("rtu+tcp://{address}"),
             _ => continue,
         };
         if let Some(other) = ports.insert(port, &line.name) {

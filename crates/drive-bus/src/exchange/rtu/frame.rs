@@ -8,7 +8,7 @@ use crate::pdu::MAX_PDU;
 static CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MODBUS);
 
 /// Address and CRC around a PDU.
-pub(super) const OVERHEAD: usize = 3;
+pub(crate) const OVERHEAD: usize = 3;
 
 /// The longest frame.
 pub(super) const MAX_FRAME: usize = MAX_PDU + OVERHEAD;
