@@ -265,7 +265,7 @@ async fn a_start_at_which_something_else_would_decide_the_speed_is_refused_with_
         assert!(overridden_by(&error, by), "{error}");
         let error = drive.set_setpoint(THIRTY).await.unwrap_err();
         assert!(overridden_by(&error, by), "{error}");
-        assert_eq!(commands(drive), [], "{by}");
+        assert!(commands(drive).is_empty(), "{by}");
     }
     // Assigned and silent: nothing decides instead.
     let silent = [(11401, 131), (11801, 2), (5243, 3), (8411, 133)];
@@ -321,7 +321,7 @@ async fn a_run_command_is_withdrawn_by_the_stop_of_bit_12_alone() {
     for settings in [&[(11401, 172)][..], &[(3006, 0), (3201, 0x0627)]] {
         let mut drive = self::drive(&[&FOR_THE_BUS, &local, settings]);
         assert_eq!(drive.withdraw().await.unwrap_err().kind(), ErrorKind::Unsupported);
-        assert_eq!(commands(drive), []);
+        assert!(commands(drive).is_empty());
     }
 }
 

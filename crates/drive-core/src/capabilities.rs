@@ -183,6 +183,8 @@ impl WatchdogCapability {
 
 /// What a drive does when its communication watchdog runs out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Reaction {
     /// Nothing: the watchdog is off.
     Ignore,
@@ -197,6 +199,7 @@ pub enum Reaction {
     /// It trips. How the motor stops is not in its manual.
     Trip,
     /// A value that the manual does not explain.
+    #[cfg_attr(feature = "serde", serde(untagged))]
     Unknown(u16),
 }
 
@@ -216,10 +219,22 @@ impl fmt::Display for Reaction {
 
 /// A drive's communication watchdog as it is set now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Watchdog {
     /// The time without a message after which it acts; `None`: it is off.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "time_ms",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::milliseconds"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
     pub timeout: Option<Duration>,
     /// What it does then; `None` where the drive does not tell.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub reaction: Option<Reaction>,
 }
 

@@ -189,6 +189,25 @@ pub enum Refusal {
     MotorRunning,
 }
 
+impl Refusal {
+    /// Its word for programs.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Fault(_) | Self::Tripped => "fault",
+            Self::NotInControl(_) => "not_remote",
+            Self::State(_) => "not_ready",
+            Self::DirectionForbidden => "forbidden_direction",
+            Self::Settings(_) => "settings",
+            Self::Overridden { .. } => "overridden",
+            Self::RestartsItself(_) => "restarts_itself",
+            Self::NothingToSave => "nothing_to_save",
+            Self::EepromLife => "eeprom_life",
+            Self::MotorRunning => "motor_running",
+        }
+    }
+}
+
 /// What is done about a trip.
 const MEND: &str = "remove the cause, then reset it";
 
@@ -412,6 +431,8 @@ pub enum Error {
 /// The kind of an [`Error`], for a program that decides by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum ErrorKind {
     /// No valid answer: the drive may be mute, the line disturbed.
     NoAnswer,

@@ -4,6 +4,8 @@ use std::fmt;
 
 /// What is known of one fault code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct FaultEntry {
     /// The vendor's code.
     pub code: u16,
@@ -66,6 +68,8 @@ impl fmt::Display for Fault {
 
 /// The faults of a drive.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Faults {
     /// The present faults. Most drives have at most one; the 3G3EV and the Altivar 58 report bits, so several can be
     /// present at once.
@@ -76,5 +80,6 @@ pub struct Faults {
     /// Alarms that do not trip.
     pub warnings: Vec<Fault>,
     /// Whether the drive says that a reset would be accepted; `None` where it does not say.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub reset_allowed: Option<bool>,
 }

@@ -8,6 +8,10 @@
 //! A program that uses drives reads [`Drive`]. A crate that adds a family lists its registers with
 //! [`registers!`](crate::registers!), reaches them through [`Registers`] and implements [`Drive`]. A crate that adds
 //! a line implements [`Port`].
+//!
+//! With the feature `serde` all of this is written as JSON and what is asked is read from it, in the shape that
+//! `drived` has on its own interfaces: words in `snake_case`, numbers in the unit that their key ends with, what a drive
+//! does not tell left out. The feature `schemars` adds the JSON schemas.
 
 #![forbid(unsafe_code)]
 
@@ -23,6 +27,8 @@ pub mod port;
 mod reconnecting;
 pub mod registers;
 pub mod serial;
+#[cfg(feature = "serde")]
+pub mod serialize;
 mod setpoint;
 mod status;
 mod stopped;

@@ -6,6 +6,8 @@ use crate::units::{Frequency, Speed};
 
 /// Direction of rotation, as the drive names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Direction {
     /// Forward.
     Forward,
@@ -24,10 +26,14 @@ impl fmt::Display for Direction {
 
 /// The setpoint: how fast, never which way. The direction is part of [`Drive::start`](crate::Drive::start).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Setpoint {
     /// Output frequency.
+    #[cfg_attr(feature = "serde", serde(rename = "frequency_hz"))]
     Frequency(Frequency),
     /// Motor speed, for drives that take one.
+    #[cfg_attr(feature = "serde", serde(rename = "speed_rpm"))]
     Speed(Speed),
 }
 
@@ -54,6 +60,8 @@ impl fmt::Display for Setpoint {
 
 /// How to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum StopMode {
     /// Along the deceleration ramp.
     Ramp,
@@ -104,6 +112,25 @@ pub enum Command {
     Persist,
     /// Set up something of the family's own, named here.
     Configure(&'static str),
+}
+
+impl Command {
+    /// Its word for programs: what is asked, without its direction, value or register.
+    #[must_use]
+    pub const fn action(&self) -> &'static str {
+        match self {
+            Self::Start(_) => "start",
+            Self::Stop(_) => "stop",
+            Self::Withdraw => "withdraw",
+            Self::Setpoint(_) => "setpoint",
+            Self::ResetFaults => "reset",
+            Self::Release => "release",
+            Self::ArmWatchdog => "watchdog",
+            Self::WriteParameter(_) => "parameter",
+            Self::Persist => "save",
+            Self::Configure(_) => "configure",
+        }
+    }
 }
 
 impl fmt::Display for Command {

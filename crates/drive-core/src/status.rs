@@ -12,6 +12,8 @@ use crate::{
 
 /// The state of a drive, in terms that all families share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum State {
     /// It cannot start now: initialising, undervoltage, or locked by something that is not a fault.
     NotReady,
@@ -66,6 +68,8 @@ impl fmt::Display for State {
 
 /// Who commands the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Control {
     /// This bus.
     Bus,
@@ -93,6 +97,8 @@ impl fmt::Display for Control {
 
 /// One word as the drive sent it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct RawWord {
     /// Its address.
     pub address: u16,
@@ -106,28 +112,53 @@ pub struct RawWord {
 ///
 /// A field is `None` when the family has no such value or it cannot be known in these exchanges. Nothing is guessed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Status {
     /// The state.
     pub state: State,
     /// The direction of the output, or of the run command where the drive only tells that.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub direction: Option<Direction>,
     /// The output frequency.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "output_frequency_hz", skip_serializing_if = "Option::is_none")
+    )]
     pub output_frequency: Option<Frequency>,
     /// The motor current.
+    #[cfg_attr(feature = "serde", serde(rename = "current_a", skip_serializing_if = "Option::is_none"))]
     pub current: Option<Current>,
     /// The motor current as a share of the drive's own base, where that is what the drive gives.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "current_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub current_share: Option<Percent>,
     /// Whether the output has reached the reference.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub at_reference: Option<bool>,
     /// Whether an alarm that does not trip is present.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub warning: Option<bool>,
     /// The vendor's code of the present fault, where the fast set holds it.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub fault_code: Option<u16>,
     /// Who commands the drive.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub control: Option<Control>,
     /// Every word that was read for this status.
     pub raw: Vec<RawWord>,
     /// When the oldest of these words ended on the line; `None` on a port that keeps no time.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "age_ms",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::age"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
     pub at: Option<Instant>,
 }
 
@@ -191,53 +222,134 @@ impl fmt::Display for Status {
 ///
 /// `None` where the family has no such value.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Measurements {
     /// When the oldest of these values ended on the line; `None` on a port that keeps no time.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "age_ms",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::age"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
     pub at: Option<Instant>,
     /// The drive has tripped, and what it holds still since then is not the present: such values are `None`, and their
     /// words, from just before the trip, stand in [`raw`](Self::raw) alone.
     pub before_trip: bool,
     /// The reference before the ramp.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub reference: Option<Setpoint>,
     /// The motor speed.
+    #[cfg_attr(feature = "serde", serde(rename = "speed_rpm", skip_serializing_if = "Option::is_none"))]
     pub speed: Option<Speed>,
     /// The output voltage.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "output_voltage_v", skip_serializing_if = "Option::is_none")
+    )]
     pub output_voltage: Option<Voltage>,
     /// The output voltage as a share of the drive's own base.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "output_voltage_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub output_voltage_share: Option<Percent>,
     /// The line voltage.
+    #[cfg_attr(feature = "serde", serde(rename = "line_voltage_v", skip_serializing_if = "Option::is_none"))]
     pub line_voltage: Option<Voltage>,
     /// The DC bus voltage.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "dc_bus_voltage_v", skip_serializing_if = "Option::is_none")
+    )]
     pub dc_bus_voltage: Option<Voltage>,
     /// The DC bus voltage as a share of the drive's own base.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "dc_bus_voltage_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub dc_bus_voltage_share: Option<Percent>,
     /// The torque as a share of the nominal torque.
+    #[cfg_attr(feature = "serde", serde(rename = "torque_percent", skip_serializing_if = "Option::is_none"))]
     pub torque: Option<Percent>,
     /// The power as a share of the nominal power.
+    #[cfg_attr(feature = "serde", serde(rename = "power_percent", skip_serializing_if = "Option::is_none"))]
     pub power_share: Option<Percent>,
     /// The power taken from the line.
+    #[cfg_attr(feature = "serde", serde(rename = "input_power_kw", skip_serializing_if = "Option::is_none"))]
     pub input_power: Option<Power>,
     /// The power given to the motor.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "output_power_kw", skip_serializing_if = "Option::is_none")
+    )]
     pub output_power: Option<Power>,
     /// The thermal state of the drive; 100 % is nominal.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "drive_thermal_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub drive_thermal: Option<Percent>,
     /// The thermal state of the motor; 100 % is nominal.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "motor_thermal_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub motor_thermal: Option<Percent>,
     /// The load of the drive.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "drive_load_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub drive_load: Option<Percent>,
     /// The load of the motor.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "motor_load_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub motor_load: Option<Percent>,
     /// Energy counted at the input, in the drive's own counts where its manual names no unit.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "input_energy_counts", skip_serializing_if = "Option::is_none")
+    )]
     pub input_energy: Option<u32>,
     /// Energy counted at the output, in the drive's own counts where its manual names no unit.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "output_energy_counts", skip_serializing_if = "Option::is_none")
+    )]
     pub output_energy: Option<u32>,
     /// Hours with the motor running.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "running_time_h",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::hours"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<f64>"))]
     pub running_time: Option<Duration>,
     /// Hours with the drive powered.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "powered_time_h",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::hours"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<f64>"))]
     pub powered_time: Option<Duration>,
     /// The logic inputs, bit by bit as the family's manual lists them.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub inputs: Option<u16>,
     /// The logic outputs, bit by bit as the family's manual lists them.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub outputs: Option<u16>,
     /// Every word that was read.
     pub raw: Vec<RawWord>,

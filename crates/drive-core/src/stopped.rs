@@ -9,6 +9,8 @@ use crate::{
 
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Stopped {
     /// The status in which it shows.
     pub status: Status,
@@ -16,9 +18,11 @@ pub struct Stopped {
     pub mode: StopMode,
     /// Why another mode took the place of the one that was asked for, such as a setting that keeps it from acting; `None`
     /// where the mode is the one that was asked for.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub instead: Option<&'static str>,
     /// Who commanded the drive until this stop took the command from him; it is kept until it is released. `None` where
     /// nothing was taken.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub taken_from: Option<Control>,
 }
 

@@ -2,87 +2,6 @@
 
 use std::fmt;
 
-/// A frequency in hundredths of a hertz, without a sign: the direction is said apart.
-///
-/// ```
-/// use drive_core::Frequency;
-///
-/// assert_eq!(Frequency::from_hertz(50), Frequency::from_centihertz(5_000));
-/// assert_eq!(Frequency::from_centihertz(4_750).to_string(), "47.50 Hz");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Frequency(u32);
-
-impl Frequency {
-    /// Standstill.
-    pub const ZERO: Self = Self(0);
-
-    /// From hundredths of a hertz.
-    #[must_use]
-    pub const fn from_centihertz(centihertz: u32) -> Self {
-        Self(centihertz)
-    }
-
-    /// From tenths of a hertz, the resolution of most Altivar registers.
-    #[must_use]
-    pub const fn from_decihertz(decihertz: u16) -> Self {
-        Self(decihertz as u32 * 10)
-    }
-
-    /// From whole hertz.
-    #[must_use]
-    pub const fn from_hertz(hertz: u16) -> Self {
-        Self(hertz as u32 * 100)
-    }
-
-    /// In hundredths of a hertz.
-    #[must_use]
-    pub const fn centihertz(self) -> u32 {
-        self.0
-    }
-
-    /// In tenths of a hertz, if it is a whole number of them and fits a signed word; a setpoint that the register
-    /// cannot hold is not rounded.
-    #[must_use]
-    pub const fn exact_decihertz(self) -> Option<u16> {
-        if self.0.is_multiple_of(10) && self.0 / 10 <= i16::MAX as u32 {
-            Some((self.0 / 10) as u16)
-        } else {
-            None
-        }
-    }
-}
-
-impl fmt::Display for Frequency {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{:02} Hz", self.0 / 100, self.0 % 100)
-    }
-}
-
-/// A speed in revolutions per minute, without a sign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Speed(u32);
-
-impl Speed {
-    /// From revolutions per minute.
-    #[must_use]
-    pub const fn from_rpm(rpm: u32) -> Self {
-        Self(rpm)
-    }
-
-    /// In revolutions per minute.
-    #[must_use]
-    pub const fn rpm(self) -> u32 {
-        self.0
-    }
-}
-
-impl fmt::Display for Speed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} rpm", self.0)
-    }
-}
-
 /// Declares a unit that is an integer with a fixed number of decimals.
 macro_rules! decimal_unit {
     ($(#[$meta:meta])* $name:ident($inner:ty), $from:ident, $to:ident, $decimals:literal, $symbol:literal) => {
@@ -110,9 +29,59 @@ macro_rules! decimal_unit {
                 f.write_str(concat!(" ", $symbol))
             }
         }
+
+        #[cfg(feature = "serde")]
+        impl serde::Serialize for $name {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                crate::serialize::decimal(i64::from(self.0), $decimals, serializer)
+            }
+        }
+
+        #[cfg(feature = "serde")]
+        impl<'de> serde::Deserialize<'de> for $name {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let counts = crate::serialize::read_decimal(deserializer, $decimals, $symbol)?;
+                let (least, most) = (Self(<$inner>::MIN), Self(<$inner>::MAX));
+                <$inner>::try_from(counts).map(Self).map_err(|_| {
+                    let mut number = String::new();
+                    let _ = write_decimal(&mut number, counts, $decimals);
+                    serde::de::Error::custom(format_args!("{number} {} is outside {least} to {most}", $symbol))
+                })
+            }
+        }
+
+        #[cfg(feature = "schemars")]
+        impl schemars::JsonSchema for $name {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!({ "type": "number" })
+            }
+        }
     };
 }
 
+decimal_unit! {
+    /// A frequency in hundredths of a hertz, without a sign: the direction is said apart.
+    ///
+    /// ```
+    /// use drive_core::Frequency;
+    ///
+    /// assert_eq!(Frequency::from_hertz(50), Frequency::from_centihertz(5_000));
+    /// assert_eq!(Frequency::from_centihertz(4_750).to_string(), "47.50 Hz");
+    /// ```
+    Frequency(u32), from_centihertz, centihertz, 2, "Hz"
+}
+decimal_unit! {
+    /// A speed in revolutions per minute, without a sign.
+    Speed(u32), from_rpm, rpm, 0, "rpm"
+}
 decimal_unit! {
     /// A current in tenths of an ampere.
     Current(u32), from_deciamperes, deciamperes, 1, "A"
@@ -128,6 +97,34 @@ decimal_unit! {
 decimal_unit! {
     /// A power in tens of watts (0.01 kW).
     Power(i32), from_decawatts, decawatts, 2, "kW"
+}
+
+impl Frequency {
+    /// Standstill.
+    pub const ZERO: Self = Self(0);
+
+    /// From tenths of a hertz, the resolution of most Altivar registers.
+    #[must_use]
+    pub const fn from_decihertz(decihertz: u16) -> Self {
+        Self(decihertz as u32 * 10)
+    }
+
+    /// From whole hertz.
+    #[must_use]
+    pub const fn from_hertz(hertz: u16) -> Self {
+        Self(hertz as u32 * 100)
+    }
+
+    /// In tenths of a hertz, if it is a whole number of them and fits a signed word; a setpoint that the register
+    /// cannot hold is not rounded.
+    #[must_use]
+    pub const fn exact_decihertz(self) -> Option<u16> {
+        if self.0.is_multiple_of(10) && self.0 / 10 <= i16::MAX as u32 {
+            Some((self.0 / 10) as u16)
+        } else {
+            None
+        }
+    }
 }
 
 impl Percent {

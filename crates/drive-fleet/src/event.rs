@@ -288,6 +288,8 @@ impl fmt::Display for Limit {
 /// What was done to a drive when the fleet shut down.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[must_use = "only a confirmed stop is known to have been carried out"]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "action", rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum ExitAction {
     /// It was left as it was, because its policy says so or because this fleet had not started it.
     Left,

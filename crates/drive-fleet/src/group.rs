@@ -58,10 +58,14 @@ impl Fleet {
 /// What became of a stop of several drives.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[must_use = "a stop that is not confirmed is an alarm"]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct StopReport {
     /// Drives that show standstill.
     pub confirmed: Vec<Arc<str>>,
     /// Drives that do not, and why. Their stops go on being repeated.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::json::by_drive"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "Vec<crate::json::OfDrive<'static>>"))]
     pub unconfirmed: Vec<(Arc<str>, Outcome)>,
     /// Drives that are only read: nothing was sent to them.
     pub read_only: Vec<Arc<str>>,

@@ -34,6 +34,9 @@
 //! verified and fed, or the configuration is refused; EEPROM is written only when asked; a drive that is not under
 //! control is only read.
 //!
+//! With the feature `serde` a [`Snapshot`], an [`Event`], an [`Outcome`] and the settings are written as JSON, ready for
+//! a service of your own, and the settings are read from it. The feature `schemars` adds the JSON schemas.
+//!
 //! # Inside
 //! One task for each drive owns the conversation with it. What it does next is decided by a supervisor that is a pure
 //! machine: no clock, no port.
@@ -45,6 +48,8 @@ mod event;
 mod fleet;
 mod group;
 mod handle;
+#[cfg(feature = "serde")]
+mod json;
 mod limits;
 mod outcome;
 mod plan;

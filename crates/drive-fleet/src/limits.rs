@@ -7,24 +7,55 @@ use tokio::time::Instant;
 
 /// Limits of the setpoints that a fleet gives to a drive, besides the drive's own.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct FrequencyLimits {
     /// The lowest.
+    #[cfg_attr(feature = "serde", serde(rename = "low_hz", skip_serializing_if = "Option::is_none"))]
     pub low: Option<Frequency>,
     /// The highest.
+    #[cfg_attr(feature = "serde", serde(rename = "high_hz", skip_serializing_if = "Option::is_none"))]
     pub high: Option<Frequency>,
     /// Frequencies that the machine must not be held at, such as resonances.
+    #[cfg_attr(feature = "serde", serde(rename = "forbidden_hz"))]
     pub forbidden: Vec<Band>,
     /// The largest change per second while the motor turns.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "change_hz_per_second", skip_serializing_if = "Option::is_none")
+    )]
     pub change_per_second: Option<Frequency>,
 }
 
 /// A forbidden band. Its edges are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "(Frequency, Frequency)", into = "(Frequency, Frequency)")
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Band {
     /// The lower edge.
     pub low: Frequency,
     /// The upper edge.
     pub high: Frequency,
+}
+
+impl From<(Frequency, Frequency)> for Band {
+    fn from((low, high): (Frequency, Frequency)) -> Self {
+        Self { low, high }
+    }
+}
+
+impl From<Band> for (Frequency, Frequency) {
+    fn from(band: Band) -> Self {
+        (band.low, band.high)
+    }
 }
 
 /// Why a setpoint is not given to a drive.

@@ -8,6 +8,8 @@ use crate::limits::LimitProblem;
 
 /// When a start or a setpoint counts as done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Until {
     /// The drive's words show that it is in force.
     #[default]
@@ -90,7 +92,32 @@ impl Outcome {
         matches!(self, Self::Confirmed)
     }
 
-    /// Its kind in one word, for logs and counters.
+    /// Its word for programs: `confirmed`, `not_confirmed`, `unknown`, `refused`, `expired`, or `superseded` where a later
+    /// command or a stop took its place.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
+            | Self::Refused(Refused::Superseded | Refused::Stopped) => "superseded",
+            Self::Confirmed => "confirmed",
+            Self::NotConfirmed(_) => "not_confirmed",
+            Self::Expired => "expired",
+            Self::OutcomeUnknown(_) => "unknown",
+            Self::Refused(_) => "refused",
+        }
+    }
+
+    /// The reason in one word for programs, where there is one.
+    #[must_use]
+    pub const fn reason(&self) -> Option<&'static str> {
+        match self {
+            Self::Confirmed | Self::Expired | Self::OutcomeUnknown(_) => None,
+            Self::NotConfirmed(why) => Some(why.word()),
+            Self::Refused(why) => Some(why.word()),
+        }
+    }
+
+    /// Its kind in words, for logs.
     #[must_use]
     pub const fn kind(&self) -> &'static str {
         match self {
@@ -186,6 +213,23 @@ pub enum Unconfirmed {
     Lost,
 }
 
+impl Unconfirmed {
+    /// Its word for programs.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::TimeOver { because: Some(because), .. }
+            | Self::Denied(Error::NotConfirmed { because: Some(because), .. }) => because.word(),
+            Self::TimeOver { .. } => "time_over",
+            Self::Denied(_) => "denied",
+            Self::Superseded => "later_command",
+            Self::Stopped => "stop",
+            Self::Tripped => "fault",
+            Self::Lost => "offline",
+        }
+    }
+}
+
 impl fmt::Display for Unconfirmed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -244,6 +288,31 @@ pub enum Refused {
     QueueFull,
     /// The fleet has shut down.
     ShutDown,
+}
+
+impl Refused {
+    /// Its word for programs.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::ReadOnly => "read_only",
+            Self::Commander(_) => "no_right",
+            Self::NotConnected => "offline",
+            Self::Stale => "stale",
+            Self::Because(reason) => reason.word(),
+            Self::IdentityChanged | Self::IdentityUnchecked => "identity",
+            Self::WatchdogUnverified => "watchdog",
+            Self::StopPending => "stop_pending",
+            Self::Stopped => "stop",
+            Self::Superseded => "later_command",
+            Self::Limit(LimitProblem::Forbidden { .. }) => "forbidden_band",
+            Self::Limit(_) | Self::Drive(Error::Setpoint { .. }) => "limit",
+            Self::Drive(Error::Unsupported { .. }) => "unsupported",
+            Self::Drive(_) => "drive",
+            Self::QueueFull => "queue_full",
+            Self::ShutDown => "shut_down",
+        }
+    }
 }
 
 impl From<Error> for Refused {

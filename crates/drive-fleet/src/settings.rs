@@ -8,36 +8,51 @@ use crate::limits::FrequencyLimits;
 
 /// Settings of one drive.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct DriveSettings {
     /// Its name, unique in the fleet.
     pub name: String,
     /// Whether anything is ever written to it. `false`: it is only read, and every command is refused, stops included
     /// (rule 11).
+    #[cfg_attr(feature = "serde", serde(default))]
     pub control: bool,
     /// Who may command it. Anybody may stop it.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub commanders: Commanders,
     /// How often it is asked.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub periods: Periods,
     /// How long its commands may take.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub times: Times,
     /// Which setpoints it may be given.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub limits: FrequencyLimits,
     /// Measured values that are worth an event.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub alarms: Alarms,
     /// Its communication watchdog; `None`: the fleet leaves it alone.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub watchdog: Option<WatchdogContract>,
     /// What happens to it when the fleet shuts down.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub on_exit: OnExit,
     /// What happens to it when it is lost.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub on_loss: OnLoss,
     /// What happens to it after a trip.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub on_fault: OnFault,
     /// What happens to it when somebody else takes control of it while it runs by our command.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub on_control_taken: OnControlTaken,
     /// The settings of the drive by which it may start again by itself, by their mnemonics, such as `Atr`. A start of a
     /// drive that has another such setting active is refused.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub accept_self_restart: Vec<String>,
     /// What it said it was, from an earlier run; `None`: what it says first is remembered.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub identity: Option<Identity>,
 }
 
@@ -73,6 +88,8 @@ impl DriveSettings {
 /// Who may command a drive. Commands carry the name that
 /// [`DriveHandle::commanded_by`](crate::DriveHandle::commanded_by) gave them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Commanders {
     /// Whoever holds a handle.
     #[default]
@@ -94,14 +111,28 @@ impl Commanders {
 
 /// How often a drive is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Periods {
     /// The fast set while it runs or has to confirm something.
+    #[cfg_attr(feature = "serde", serde(rename = "running_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub running: Duration,
     /// The fast set while it stands.
+    #[cfg_attr(feature = "serde", serde(rename = "rest_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub rest: Duration,
     /// The slow set; zero: never.
+    #[cfg_attr(feature = "serde", serde(rename = "slow_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub slow: Duration,
     /// The oldest status that still counts as fresh. A drive without a valid status for longer is lost.
+    #[cfg_attr(feature = "serde", serde(rename = "max_age_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub max_age: Duration,
 }
 
@@ -119,17 +150,45 @@ impl Default for Periods {
 
 /// How long the commands of a drive may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Times {
     /// From the call until it is sent; what is not sent by then never is (rule 2).
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "lifetime_ms", with = "drive_core::serialize::duration_ms")
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub lifetime: Duration,
     /// From sending until the drive's words show that it took effect: run command in force, fault gone, and where an
     /// answer was lost the time to find out.
+    #[cfg_attr(feature = "serde", serde(rename = "effect_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub effect: Duration,
     /// From then until the reference is reached.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "reference_ms", with = "drive_core::serialize::duration_ms")
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub reference: Duration,
     /// From a stop until standstill.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "standstill_ms", with = "drive_core::serialize::duration_ms")
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub standstill: Duration,
     /// How long a stop may go without a confirmation before it raises an alarm.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "stop_alarm_ms", with = "drive_core::serialize::duration_ms")
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub stop_alarm: Duration,
 }
 
@@ -148,19 +207,38 @@ impl Default for Times {
 
 /// Measured values above which an event is raised. None of them stops anything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Alarms {
     /// The motor current.
+    #[cfg_attr(feature = "serde", serde(rename = "current_a", skip_serializing_if = "Option::is_none"))]
     pub current: Option<Current>,
     /// The thermal state of the drive.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "drive_thermal_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub drive_thermal: Option<Percent>,
     /// The thermal state of the motor.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "motor_thermal_percent", skip_serializing_if = "Option::is_none")
+    )]
     pub motor_thermal: Option<Percent>,
 }
 
 /// The drive's own communication watchdog, as it has to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct WatchdogContract {
     /// The time without a message after which it acts.
+    #[cfg_attr(feature = "serde", serde(rename = "time_ms", with = "drive_core::serialize::duration_ms"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub timeout: Duration,
     /// What it does then.
     pub reaction: Reaction,
@@ -168,6 +246,8 @@ pub struct WatchdogContract {
 
 /// What happens to a drive when the fleet shuts down (rule 8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum OnExit {
     /// It is stopped if this fleet started it, and left as it is otherwise.
     Stop(StopMode),
@@ -186,6 +266,8 @@ impl Default for OnExit {
 
 /// What happens to a drive that was lost. While it is lost nothing reaches it; this is for its return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum OnLoss {
     /// An event; its state is adopted when it returns.
     #[default]
@@ -196,6 +278,8 @@ pub enum OnLoss {
 
 /// What happens to a drive that runs by our command when its panel, its terminals or another bus take control of it (rule 5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum OnControlTaken {
     /// Our run command is withdrawn, so that nothing starts by it when control is given back. Where the family has no word
     /// for that it is an alarm; and a drive that has control back before it is withdrawn is stopped along its ramp.
@@ -207,6 +291,8 @@ pub enum OnControlTaken {
 
 /// What happens to a drive after a trip. It never starts again by itself (rule 5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum OnFault {
     /// An event; somebody resets it.
     #[default]

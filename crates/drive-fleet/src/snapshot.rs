@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use drive_core::{
-    Error, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status, StopMode,
+    Error, Fault, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status, StopMode,
     Watchdog,
 };
 use tokio::time::Instant;
@@ -17,19 +17,29 @@ const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
 
 /// A value and when it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(transparent))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Timed<T> {
     /// The value.
     pub value: Arc<T>,
     /// When the exchange that brought it ended on the line; of several the first.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub at: Instant,
 }
 
-impl<T> Timed<T> {
-    /// A value that says itself when it was read, or was told now.
-    pub(crate) fn new(value: T, at: Option<Instant>, now: Instant) -> Self {
-        Self { value: Arc::new(value), at: at.map_or(now, |at| at.min(now)) }
-    }
+/// When a value was read, as it says itself, or else now.
+fn stamp(at: &mut Option<Instant>, now: Instant) -> Instant {
+    *at.insert(at.map_or(now, |at| at.min(now)))
+}
 
+impl Timed<Measurements> {
+    pub(crate) fn new(mut measurements: Measurements, now: Instant) -> Self {
+        let at = stamp(&mut measurements.at, now);
+        Self { value: Arc::new(measurements), at }
+    }
+}
+
+impl<T> Timed<T> {
     /// How old it is at `now`.
     #[must_use]
     pub fn age(&self, now: Instant) -> Duration {
@@ -38,6 +48,11 @@ impl<T> Timed<T> {
 }
 
 impl Timed<Status> {
+    pub(crate) fn new(mut status: Status, now: Instant) -> Self {
+        let at = stamp(&mut status.at, now);
+        Self { value: Arc::new(status), at }
+    }
+
     pub(crate) fn seen(&self, now: Instant) -> LastSeen {
         LastSeen { status: Arc::clone(&self.value), age: self.age(now) }
     }
@@ -45,6 +60,8 @@ impl Timed<Status> {
 
 /// Whether a drive answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Link {
     /// It has not answered yet.
     #[default]
@@ -57,17 +74,23 @@ pub enum Link {
 
 /// The verdict on a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Freshness {
     /// The drive answers and the status is young enough.
+    #[cfg_attr(feature = "serde", serde(rename = "good"))]
     Fresh,
     /// The status is older than the settings allow, or the drive does not answer.
     Stale,
     /// There has been no status yet.
+    #[cfg_attr(feature = "serde", serde(rename = "missing"))]
     Never,
 }
 
 /// What is known of which drive it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "check", rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum IdentityCheck {
     /// Not asked since it was connected.
     #[default]
@@ -81,16 +104,20 @@ pub enum IdentityCheck {
         /// What is remembered.
         remembered: Arc<Identity>,
         /// What it says now.
+        #[cfg_attr(feature = "serde", serde(flatten))]
         found: Arc<Identity>,
     },
 }
 
 /// What is known of the drive's communication watchdog.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "check", rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum WatchdogCheck {
     /// The settings have no contract for it. As it was found it is fed all the same.
     NoContract {
         /// As it was found; `None` where it has not been read, or cannot be.
+        #[cfg_attr(feature = "serde", serde(flatten))]
         found: Option<Watchdog>,
     },
     /// Not read since the drive was connected.
@@ -100,7 +127,11 @@ pub enum WatchdogCheck {
     /// It is as the contract says.
     Verified(Watchdog),
     /// It cannot be brought to what the contract says.
-    Broken(String),
+    Broken(
+        #[cfg_attr(feature = "serde", serde(serialize_with = "crate::json::why"))]
+        #[cfg_attr(feature = "schemars", schemars(with = "crate::json::Why<'static>"))]
+        String,
+    ),
 }
 
 impl WatchdogCheck {
@@ -112,10 +143,14 @@ impl WatchdogCheck {
 
 /// A stop that is not confirmed yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct PendingStop {
     /// By which mode: the one that was asked for, or the one that took its place.
     pub mode: StopMode,
     /// Since when.
+    #[cfg_attr(feature = "serde", serde(rename = "since_ms", serialize_with = "drive_core::serialize::age"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub since: Instant,
     /// How often it was sent, or may have been.
     pub attempts: u32,
@@ -138,9 +173,20 @@ pub struct Trip {
     pub watchdog_after: Option<Duration>,
 }
 
+impl Trip {
+    /// What it tripped by: the first of the faults that it said, or the code alone while they have not been read.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault> {
+        let said = self.faults.as_deref().and_then(|faults| faults.present.first()).copied();
+        said.or_else(|| self.status.value.fault_code.map(|code| Fault { code, entry: None }))
+    }
+}
+
 /// What was counted for a drive since the fleet started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Counters {
     /// Statuses that were due.
     pub polls: u64,
@@ -191,19 +237,50 @@ pub struct Snapshot {
     pub counters: Counters,
     /// The age beyond which a status is stale.
     pub max_age: Duration,
+    /// The age beyond which measurements are stale.
+    pub measurements_max_age: Duration,
 }
 
 impl Snapshot {
     /// The verdict on the status at `now`.
     #[must_use]
     pub fn freshness(&self, now: Instant) -> Freshness {
-        match &self.status {
+        self.judge(self.status.as_ref().map(|status| status.age(now)), self.max_age)
+    }
+
+    /// The verdict on the measurements at `now`.
+    #[must_use]
+    pub fn measurements_freshness(&self, now: Instant) -> Freshness {
+        let age = self.measurements.as_ref().map(|measurements| measurements.age(now));
+        self.judge(age, self.measurements_max_age)
+    }
+
+    fn judge(&self, age: Option<Duration>, max_age: Duration) -> Freshness {
+        match age {
             None => Freshness::Never,
-            Some(status) if self.link == Link::Connected && status.age(now) <= self.max_age => {
-                Freshness::Fresh
-            }
+            Some(age) if self.link == Link::Connected && age <= max_age => Freshness::Fresh,
             Some(_) => Freshness::Stale,
         }
+    }
+
+    /// Whether the output has reached the setpoint; `None` where none is known, or no status that is fresh at `now`.
+    #[must_use]
+    pub fn has_reached_setpoint(&self, now: Instant) -> Option<bool> {
+        let (status, _) = self.fresh_status(now).zip(self.setpoint)?;
+        Some(has_reached(self.setpoint, status))
+    }
+
+    /// Why a start would be refused at `now`, when the status may have grown old since this was taken.
+    #[must_use]
+    pub fn start_refused(&self, now: Instant) -> Option<&Refused> {
+        let stale = (self.freshness(now) != Freshness::Fresh).then_some(&Refused::Stale);
+        self.start_refused.as_ref().or(stale)
+    }
+
+    /// The trip that the last status still shows.
+    #[must_use]
+    pub fn present_trip(&self) -> Option<&Trip> {
+        self.trips.back().filter(|_| self.status.as_ref().is_some_and(|status| status.value.is_fault()))
     }
 
     /// The status, if it is fresh at `now`.

@@ -64,7 +64,7 @@ impl OtherEnd {
     pub async fn is_done(self) {
         self.line.close().await;
         let more = self.played.await.expect("the script is played to its end");
-        assert_eq!(more, [], "sent beyond the script: {more:02X?}");
+        assert!(more.is_empty(), "sent beyond the script: {more:02X?}");
     }
 }
 

@@ -21,14 +21,15 @@ fn a_daemon_tells_events_and_snapshots_and_at_its_end_what_each_drive_did() {
     let connected: serde_json::Value =
         serde_json::from_str(&daemon.wait_for(r#""event":"connected""#)).expect("an object");
     assert!(["pump 1", "pump 2"].map(serde_json::Value::from).contains(&connected["drive"]), "{connected}");
-    daemon.wait_for(r#""event":"watchdog verified""#);
+    daemon.wait_for(r#""event":"watchdog_verified""#);
     let snapshot: serde_json::Value =
         serde_json::from_str(&daemon.wait_for(r#""kind":"snapshot""#)).expect("an object");
-    assert_eq!((&snapshot["link"], &snapshot["freshness"]), (&"connected".into(), &"fresh".into()));
+    assert_eq!((&snapshot["link"], &snapshot["status"]["quality"]), (&"connected".into(), &"good".into()));
     let (code, rest) = daemon.interrupt();
     assert_eq!(code, Some(0), "{rest}");
     for drive in ["pump 1", "pump 2"] {
-        let left = rest.lines().filter(|line| line.contains(drive) && line.contains(r#""exit":"left""#));
+        let left =
+            rest.lines().filter(|line| line.contains(drive) && line.contains(r#""exit":{"action":"left"}"#));
         assert_eq!(left.count(), 1, "{rest}");
     }
 }
@@ -39,7 +40,7 @@ fn a_daemon_whose_stdout_and_log_nobody_reads_any_more_watches_its_drives_on() {
     let control = "control = true\nwatchdog = { time = \"5s\", reaction = \"ramp\" }";
     let file = File::new("unread", &configuration(sim.link(), "atv312@1", control));
     let mut daemon = Running::start(&["run", "--config", file.path()]);
-    daemon.wait_for(r#""event":"watchdog verified""#);
+    daemon.wait_for(r#""event":"watchdog_verified""#);
     daemon.close_stdout();
     daemon.wait_for_log("nobody reads stdout any more");
     daemon.close_log();

@@ -372,6 +372,7 @@ impl Supervisor {
             trips: Arc::clone(&self.trips),
             counters: self.counters,
             max_age: self.settings.periods.max_age,
+            measurements_max_age: self.settings.periods.slow.saturating_add(self.settings.periods.max_age),
         }
     }
 

@@ -48,8 +48,7 @@ impl Supervisor {
     pub(super) fn accept_status(&mut self, now: Instant, status: Status) {
         let was = self.link;
         let before = self.status.take();
-        let at = status.at;
-        let status = Timed::new(status, at, now);
+        let status = Timed::<Status>::new(status, now);
         let silent_for = status.at.saturating_duration_since(self.silent_since);
         self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
@@ -182,8 +181,7 @@ impl Supervisor {
                 .zip(alarms.motor_thermal)
                 .map(|(measured, limit)| (Limit::MotorThermal { measured, limit }, measured > limit))
         });
-        let at = measurements.at;
-        self.measurements = Some(Timed::new(measurements, at, now));
+        self.measurements = Some(Timed::<Measurements>::new(measurements, now));
         self.changed = true;
     }
 

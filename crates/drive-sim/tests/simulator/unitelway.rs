@@ -310,5 +310,5 @@ async fn a_busy_slave_and_one_that_takes_another_header_refuse_and_a_slow_one_ac
     }
     let late = Some(Duration::from_millis(600));
     master.slave(1).set_link_habits(LinkHabits { acknowledges_after: late, ..LinkHabits::default() });
-    assert_eq!(master.send(&request).await, [], "it takes longer than we wait");
+    assert!(master.send(&request).await.is_empty(), "it takes longer than we wait");
 }

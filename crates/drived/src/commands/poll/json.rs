@@ -6,36 +6,23 @@ use drive_core::Status;
 use serde::Serialize;
 
 use super::{Reading, summary::Summary};
-use crate::json::{self, Motor, microseconds, milliseconds};
+use crate::json::{self, microseconds, milliseconds};
 
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-enum Object {
-    Status(StatusObject),
-    Error { time_unix_ms: u64, drive: String, error: String },
+enum Object<'a> {
+    Status {
+        time_unix_ms: u64,
+        drive: String,
+        #[serde(flatten)]
+        status: &'a Status,
+    },
+    Error {
+        time_unix_ms: u64,
+        drive: String,
+        error: String,
+    },
     Summary(SummaryObject),
-}
-
-#[derive(Serialize)]
-struct StatusObject {
-    time_unix_ms: u64,
-    drive: String,
-    #[serde(flatten)]
-    motor: Motor,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    current_hundredths_of_percent: Option<i32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    at_reference: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    warning: Option<bool>,
-    words: Vec<WordObject>,
-}
-
-#[derive(Serialize)]
-struct WordObject {
-    register: u16,
-    code: &'static str,
-    value: u16,
 }
 
 #[derive(Serialize)]
@@ -75,7 +62,7 @@ pub(super) fn reading(reading: &Reading) -> String {
     let time_unix_ms = milliseconds(reading.at.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default());
     let drive = reading.name.to_string();
     json::line(&match &reading.outcome {
-        Ok(status) => Object::Status(of_status(time_unix_ms, drive, status)),
+        Ok(status) => Object::Status { time_unix_ms, drive, status },
         Err(error) => Object::Error { time_unix_ms, drive, error: error.to_string() },
     })
 }
@@ -107,23 +94,6 @@ pub(super) fn summary(summary: &Summary) -> String {
     json::line(&Object::Summary(SummaryObject { drives: drives.collect(), line }))
 }
 
-fn of_status(time_unix_ms: u64, drive: String, status: &Status) -> StatusObject {
-    let word = |word: &drive_core::RawWord| WordObject {
-        register: word.address,
-        code: word.code,
-        value: word.value,
-    };
-    StatusObject {
-        time_unix_ms,
-        drive,
-        motor: Motor::from(status),
-        current_hundredths_of_percent: status.current_share.map(drive_core::Percent::hundredths),
-        at_reference: status.at_reference,
-        warning: status.warning,
-        words: status.raw.iter().map(word).collect(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -149,7 +119,7 @@ mod tests {
         };
         assert_eq!(
             of(Ok(status)),
-            r#"{"kind":"status","time_unix_ms":5,"drive":"atv312@7","state":"running","output_frequency_centihertz":3000,"control":"bus","words":[{"register":3201,"code":"ETA","value":1575}]}"#
+            r#"{"kind":"status","time_unix_ms":5,"drive":"atv312@7","state":"running","output_frequency_hz":30.0,"control":"bus","raw":[{"address":3201,"code":"ETA","value":1575}]}"#
         );
     }
 

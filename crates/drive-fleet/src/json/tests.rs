@@ -1,0 +1,297 @@
+//! The expected objects are written from the words of the fields, by hand.
+
+use std::{
+    collections::VecDeque,
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
+
+use drive_core::{
+    Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Identity,
+    Measurements, Percent, PortError, Reaction, Refusal, SelfRestart, SlaveAddress, Speed, State, Status,
+    StopMode, Watchdog,
+};
+use serde_json::{Value, from_value, json, to_value};
+use tokio::time::{Instant, advance};
+
+use crate::{
+    Alarms, Band, Commanders, Counters, DriveSettings, Event, EventKind, ExitAction, FrequencyLimits,
+    IdentityCheck, LimitProblem, Link, OnExit, OnFault, OnLoss, Outcome, PendingStop, Periods, Refused,
+    Snapshot, StopReport, Timed, Trip, Unconfirmed, Unknown, WatchdogCheck, WatchdogContract,
+};
+
+static OLF: FaultEntry = FaultEntry::new(9, "OLF", "motor overload", "let the motor cool");
+
+fn is(told: impl serde::Serialize, expected: Value) {
+    assert_eq!(to_value(told).unwrap(), expected);
+}
+
+fn status(state: State) -> Timed<Status> {
+    let frequency = Some(Frequency::from_hertz(30));
+    Timed::<Status>::new(Status { state, output_frequency: frequency, ..Status::default() }, Instant::now())
+}
+
+fn nothing_known() -> Snapshot {
+    Snapshot {
+        name: "pump 1".into(),
+        link: Link::Connecting,
+        error: None,
+        status: None,
+        measurements: None,
+        setpoint: None,
+        identity: IdentityCheck::Unchecked,
+        watchdog: WatchdogCheck::NoContract { found: None },
+        self_restarts: None,
+        stop: None,
+        started_here: false,
+        start_refused: Some(Refused::NotConnected),
+        trips: Arc::default(),
+        counters: Counters::default(),
+        max_age: Duration::from_secs(3),
+        measurements_max_age: Duration::from_secs(13),
+    }
+}
+
+#[test]
+fn a_drive_that_was_never_seen_has_no_value() {
+    is(
+        nothing_known(),
+        json!({
+            "name": "pump 1", "link": "connecting", "status": {"quality": "missing"},
+            "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"},
+            "watchdog": {"check": "no_contract"}, "start_refused": "the drive does not answer",
+            "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
+        }),
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value() {
+    let setpoint = Some(Frequency::from_hertz(30).into());
+    let measurements = Measurements { torque: Some(Percent::from_percent(40)), ..Measurements::default() };
+    let identity = Identity { model: Some("ATV312HU15N4".to_owned()), ..Identity::default() };
+    let armed = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
+    let restart = SelfRestart { code: "Atr", meaning: "starts the motor again by itself" };
+    let stop = PendingStop { mode: StopMode::Ramp, since: Instant::now(), attempts: 2, taken: false };
+    let measurements = Some(Timed::<Measurements>::new(measurements, Instant::now()));
+    advance(Duration::from_secs(10)).await;
+    let snapshot = Snapshot {
+        link: Link::Connected,
+        status: Some(status(State::Running)),
+        measurements,
+        setpoint,
+        identity: IdentityCheck::Same(Arc::new(identity)),
+        watchdog: WatchdogCheck::Verified(armed),
+        self_restarts: Some([restart].into()),
+        stop: Some(stop),
+        started_here: true,
+        start_refused: None,
+        ..nothing_known()
+    };
+    advance(Duration::from_millis(120)).await;
+    is(
+        &snapshot,
+        json!({
+            "name": "pump 1", "link": "connected",
+            "status": {"quality": "good", "age_ms": 120, "state": "running", "output_frequency_hz": 30.0, "raw": []},
+            "measurements": {"quality": "good", "age_ms": 10_120, "before_trip": false, "torque_percent": 40.0, "raw": []},
+            "setpoint": {"frequency_hz": 30.0}, "reached": true,
+            "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false},
+            "started_here": true, "starts_by_itself": ["Atr"],
+            "identity": {"check": "same", "model": "ATV312HU15N4", "codes": []},
+            "watchdog": {"check": "verified", "time_ms": 10_000, "reaction": "ramp"},
+            "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
+        }),
+    );
+    advance(Duration::from_secs(3)).await;
+    let told = to_value(&snapshot).unwrap();
+    assert_eq!((&told["status"]["quality"], &told["status"]["age_ms"]), (&json!("stale"), &json!(3_120)));
+    assert_eq!((&told["measurements"]["quality"], told.get("reached")), (&json!("stale"), None));
+    assert_eq!(told["start_refused"], "its status is too old");
+}
+
+#[test]
+fn a_fault_is_told_as_long_as_the_drive_shows_it_with_the_statuses_around_it() {
+    let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
+    let trip = Trip {
+        at: Instant::now(),
+        before: Some(status(State::Running)),
+        status: status(State::Fault),
+        faults: Some(Arc::new(faults)),
+        watchdog_after: None,
+    };
+    let trips = Arc::new(VecDeque::from([trip]));
+    let tripped = Snapshot { link: Link::Lost, status: Some(status(State::Fault)), trips, ..nothing_known() };
+    let fault = to_value(&tripped).unwrap()["fault"].clone();
+    for (key, value) in [
+        ("code", json!(9)),
+        ("mnemonic", json!("OLF")),
+        ("meaning", json!("motor overload")),
+        ("remedy", json!("let the motor cool")),
+        ("by_watchdog", json!(false)),
+    ] {
+        assert_eq!(fault[key], value, "{fault}");
+    }
+    assert_eq!((&fault["before"]["state"], &fault["at_trip"]["state"]), (&json!("running"), &json!("fault")));
+    let cleared = Snapshot { status: Some(status(State::Ready)), ..tripped };
+    assert_eq!(to_value(cleared).unwrap().get("fault"), None);
+}
+
+#[test]
+fn what_could_be_checked_of_identity_and_watchdog_is_told_in_words() {
+    let identity = |model: &str| Arc::new(Identity { model: Some(model.to_owned()), ..Identity::default() });
+    let changed = IdentityCheck::Changed { remembered: identity("A"), found: identity("B") };
+    is(
+        changed,
+        json!({"check": "changed", "model": "B", "codes": [], "remembered": {"model": "A", "codes": []}}),
+    );
+    is(IdentityCheck::CannotSay, json!({"check": "cannot_say"}));
+    let off = Watchdog { timeout: None, reaction: None };
+    is(WatchdogCheck::WaitsForStandstill(off), json!({"check": "waits_for_standstill"}));
+    is(WatchdogCheck::NoContract { found: Some(off) }, json!({"check": "no_contract"}));
+    is(WatchdogCheck::Unchecked, json!({"check": "unchecked"}));
+    is(WatchdogCheck::Broken("not kept".to_owned()), json!({"check": "broken", "why": "not kept"}));
+}
+
+#[test]
+fn an_outcome_is_one_of_six_words_with_its_reason() {
+    let slave = SlaveAddress::try_from(7).unwrap();
+    let because = Some(Refusal::NotInControl(Control::Panel));
+    let over = Unconfirmed::TimeOver { after: Duration::from_secs(2), last: None, because };
+    let asked = Frequency::from_hertz(31);
+    let band = Band { low: Frequency::from_hertz(30), high: Frequency::from_hertz(32) };
+    let setpoint = Speed::from_rpm(900).into();
+    let problem = drive_core::SetpointProblem::TooLarge;
+    let denied =
+        Error::NotConfirmed { slave, command: Command::Release, status: Box::default(), because: None };
+    for (outcome, word, reason) in [
+        (Outcome::Confirmed, "confirmed", None),
+        (Outcome::Expired, "expired", None),
+        (Outcome::OutcomeUnknown(Unknown { error: None, last: None }), "unknown", None),
+        (Outcome::NotConfirmed(over), "not_confirmed", Some("not_remote")),
+        (Outcome::NotConfirmed(Unconfirmed::Denied(denied)), "not_confirmed", Some("denied")),
+        (Outcome::NotConfirmed(Unconfirmed::Lost), "not_confirmed", Some("offline")),
+        (Outcome::NotConfirmed(Unconfirmed::Superseded), "superseded", Some("later_command")),
+        (Outcome::Refused(Refused::Superseded), "superseded", Some("later_command")),
+        (Outcome::Refused(Refused::Stopped), "superseded", Some("stop")),
+        (Outcome::Refused(Refused::Commander("guest".to_owned())), "refused", Some("no_right")),
+        (Outcome::Refused(Refused::Because(Refusal::Fault(9))), "refused", Some("fault")),
+        (
+            Outcome::Refused(Refused::Limit(LimitProblem::Forbidden { asked, band })),
+            "refused",
+            Some("forbidden_band"),
+        ),
+        (
+            Outcome::Refused(Refused::Drive(Error::Setpoint { slave, setpoint, problem })),
+            "refused",
+            Some("limit"),
+        ),
+    ] {
+        let told = to_value(&outcome).unwrap();
+        assert_eq!((&told["outcome"], told.get("reason")), (&json!(word), reason.map(Value::from).as_ref()));
+        assert_eq!(told.get("text").is_some(), !matches!(word, "confirmed" | "expired"), "{told}");
+    }
+    is(
+        Outcome::Refused(Refused::ReadOnly),
+        json!({"outcome": "refused", "reason": "read_only", "text": "the drive is only read: its settings say control = false"}),
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
+    let told = |kind| to_value(Event { drive: "pump 1".into(), at: Instant::now(), kind }).unwrap();
+    let command = EventKind::Command {
+        command: Command::Start(Direction::Forward),
+        commander: "operator".into(),
+        outcome: Outcome::Expired,
+    };
+    let mut event = told(command);
+    event.as_object_mut().unwrap().remove("time_unix_ms").unwrap();
+    assert_eq!(
+        event,
+        json!({
+            "drive": "pump 1", "event": "command", "alarm": false, "text": "command: start forward by operator: expired",
+            "command": {"action": "start", "command": "start forward", "commander": "operator", "outcome": "expired"}
+        })
+    );
+    let exit = told(EventKind::Exit(ExitAction::Stopped(Outcome::Confirmed)));
+    assert_eq!(exit["exit"], json!({"action": "stopped", "outcome": "confirmed"}));
+    assert_eq!(told(EventKind::Exit(ExitAction::TimeOver))["exit"], json!({"action": "time_over"}));
+    assert_eq!(told(EventKind::WatchdogBroken("not kept".to_owned()))["event"], "watchdog_broken");
+
+    let event = Event { drive: "pump 1".into(), at: Instant::now(), kind: EventKind::StopConfirmed };
+    advance(Duration::from_secs(10)).await;
+    let wall = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_millis() as u64;
+    let before = wall();
+    let told = to_value(event).unwrap()["time_unix_ms"].as_u64().unwrap();
+    assert!((before - 10_000..=wall() - 10_000).contains(&told), "{told}");
+}
+
+#[test]
+fn a_stop_of_several_drives_names_each_that_is_not_confirmed() {
+    let lost = Error::Port {
+        slave: SlaveAddress::try_from(2).unwrap(),
+        exchange: drive_core::Exchange { function: 6, register: None },
+        problem: PortError::Closed,
+    };
+    let report = StopReport {
+        confirmed: vec!["pump 1".into()],
+        unconfirmed: vec![("pump 2".into(), Outcome::Refused(Refused::Drive(lost)))],
+        ..StopReport::default()
+    };
+    is(
+        report,
+        json!({
+            "confirmed": ["pump 1"], "read_only": [], "broadcasts": [],
+            "unconfirmed": [{"drive": "pump 2", "outcome": "refused", "reason": "drive", "text": "slave 2, function 06h: the line is closed"}]
+        }),
+    );
+}
+
+#[test]
+fn settings_read_back_as_they_were_told_and_what_is_not_said_is_usual() {
+    let hertz = Frequency::from_hertz;
+    let settings = DriveSettings {
+        commanders: Commanders::Only(vec!["operator".to_owned()]),
+        limits: FrequencyLimits {
+            low: Some(hertz(10)),
+            high: Some(hertz(50)),
+            forbidden: vec![Band { low: hertz(30), high: hertz(32) }],
+            change_per_second: None,
+        },
+        alarms: Alarms { current: Some(Current::from_deciamperes(35)), ..Alarms::default() },
+        watchdog: Some(WatchdogContract { timeout: Duration::from_secs(10), reaction: Reaction::Ramp }),
+        on_exit: OnExit::Release(StopMode::Fast),
+        on_loss: OnLoss::Stop(StopMode::Ramp),
+        on_fault: OnFault::ResetWatchdogTrip,
+        ..DriveSettings::controlled("pump 1")
+    };
+    let told = json!({
+        "name": "pump 1", "control": true, "commanders": {"only": ["operator"]},
+        "periods": {"running_ms": 500, "rest_ms": 1_000, "slow_ms": 10_000, "max_age_ms": 3_000},
+        "times": {"lifetime_ms": 1_000, "effect_ms": 5_000, "reference_ms": 60_000, "standstill_ms": 60_000, "stop_alarm_ms": 2_000},
+        "limits": {"low_hz": 10.0, "high_hz": 50.0, "forbidden_hz": [[30.0, 32.0]]},
+        "alarms": {"current_a": 3.5}, "watchdog": {"time_ms": 10_000, "reaction": "ramp"},
+        "on_exit": {"release": "fast"}, "on_loss": {"stop": "ramp"}, "on_fault": "reset_watchdog_trip",
+        "on_control_taken": "withdraw", "accept_self_restart": []
+    });
+    is(&settings, told.clone());
+    assert_eq!(from_value::<DriveSettings>(told).unwrap(), settings);
+    let least = from_value::<DriveSettings>(json!({"name": "fan"})).unwrap();
+    assert_eq!(least, DriveSettings::watched("fan"));
+    let periods = from_value::<Periods>(json!({"slow_ms": 0})).unwrap();
+    assert_eq!(periods, Periods { slow: Duration::ZERO, ..Periods::default() });
+    for wrong in [json!({"low_hz": 10.005}), json!({"lowest_hz": 10.0}), json!({"forbidden_hz": [[30.0]]})] {
+        assert!(from_value::<FrequencyLimits>(wrong.clone()).is_err(), "{wrong}");
+    }
+}
+
+#[cfg(feature = "schemars")]
+#[test]
+fn the_schema_of_a_snapshot_names_its_keys() {
+    let schema = schemars::schema_for!(Snapshot);
+    let properties = schema.get("properties").and_then(Value::as_object).unwrap();
+    for key in ["name", "link", "status", "identity", "watchdog", "counters"] {
+        assert!(properties.contains_key(key), "{key}");
+    }
+}
