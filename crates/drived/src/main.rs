@@ -17,6 +17,7 @@ mod line_spec;
 mod logging;
 mod one_drive;
 mod output;
+mod page;
 mod plant;
 mod run;
 mod signals;

@@ -15,6 +15,7 @@ use crate::{
     doors::{Doors, Http, Rights},
     failure::Failure,
     one_drive::open_line,
+    page,
     plant::Plant,
     signals::Ending,
 };
@@ -48,7 +49,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let rights = Rights { view: true, stop: true, ..Rights::default() };
-    let doors = Doors::open(args.http.unwrap_or(config.http), rights, api::router(plant)).await;
+    let doors =
+        Doors::open(args.http.unwrap_or(config.http), rights, api::router(plant).merge(page::router())).await;
     let result = tokio::select! {
         () = ending.asked() => Ok(()),
         result = report.ended() => {

@@ -23,6 +23,7 @@ use crate::{
     doors::{Doors, Http, Rights},
     failure::Failure,
     output::{self, Table},
+    page,
     signals::Ending,
 };
 
@@ -56,7 +57,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let groups = plant.groups();
     let rights = Rights { view: true, stop: true, operate: true, engineer: false };
     let faces = crate::plant::Plant::start(plant.fleet.clone(), groups, true);
-    let doors = Doors::open(args.http, rights, api::router(faces)).await;
+    let doors = Doors::open(args.http, rights, api::router(faces).merge(page::router())).await;
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, incoming, until, ending: &mut ending };

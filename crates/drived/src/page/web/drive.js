@@ -1,0 +1,98 @@
+// One drive: its values large, its trend, its fault, its commands, and everything that is known of it.
+
+import { read, path } from './api.js';
+import { el, setAttribute, setText } from './dom.js';
+import { faultPanel } from './drive_faults.js';
+import { ordersPanel } from './drive_orders.js';
+import { tablesPanel } from './drive_tables.js';
+import { MISSING, old, quantity } from './format.js';
+import { age, plant, quality, takeDrive } from './plant.js';
+import { named, t } from './texts.js';
+import { trend } from './trend.js';
+import { SEVERE, trouble } from './trouble.js';
+import { setpointText, stateWord, word } from './words.js';
+
+const BIG = [
+  ['frequency', drive => quantity(drive.status?.output_frequency_hz, 1, 'Hz'), 'status'],
+  ['setpoint', drive => setpointText(drive.setpoint), undefined],
+  ['current', drive => typeof drive.status?.current_a === 'number' ? quantity(drive.status.current_a, 1, 'A')
+    : quantity(drive.status?.current_percent, 0, '%'), 'status'],
+  ['torque', drive => quantity(drive.measurements?.torque_percent, 0, '%'), 'measurements'],
+  ['speed', drive => quantity(drive.measurements?.speed_rpm, 0, t('rpm')), 'measurements'],
+  ['output_power', drive => typeof drive.measurements?.output_power_kw === 'number'
+    ? quantity(drive.measurements.output_power_kw, 2, 'kW') : quantity(drive.measurements?.power_percent, 0, '%'), 'measurements'],
+];
+
+/** Shows the drive `name` in `root`. */
+export function drive(root, name) {
+  let shown = plant.drives.get(name);
+  if (!shown) {
+    root.append(el('h1', { tabindex: -1 }, name), el('p', {}, t('unknown_drive')), el('a', { href: '#/' }, t('overview')));
+    return { update: () => plant.drives.has(name) && dispatchEvent(new HashChangeEvent('hashchange')) };
+  }
+  const state = el('b');
+  const turns = el('span');
+  const place = el('p.hint');
+  const freshness = el('p.freshness');
+  const head = el('header.drive-head', {},
+    el('div', {}, el('h1', { tabindex: -1 }, name), place),
+    el('p.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, turns), freshness);
+  const remark = el('p.remark');
+  const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('small')));
+  const trendPlace = el('section.panel.trend', { 'aria-label': t('trend') });
+  const fault = faultPanel(name);
+  const orders = ordersPanel(name);
+  const tables = tablesPanel(name);
+  root.append(head, remark, fault.element, el('dl.big', {}, ...big),
+    el('div.columns', {}, trendPlace, orders.element), tables.element);
+  const curve = trend(trendPlace, name);
+  update(new Set(['state']));
+  // The events bring a drive when it changes; here it is wanted as it is now.
+  read(path('drives', name)).then(takeDrive, () => {});
+
+  return {
+    update,
+    tick() {
+      tick();
+      curve.tick();
+    },
+    end() {
+      curve.end();
+      orders.end();
+    },
+  };
+
+  function update(names) {
+    if (!names.has('state') && !names.has(`drive ${name}`)) return;
+    shown = plant.drives.get(name) ?? shown;
+    const status = shown.status ?? {};
+    const { rank, text } = trouble(shown);
+    setAttribute(head, 'data-state', rank <= SEVERE ? 'trouble' : status.state);
+    setText(state, stateWord(shown));
+    setText(turns, [status.direction && word(status.direction), status.control && named(t('control'), word(status.control))]
+      .filter(Boolean).map(part => ` · ${part}`).join(''));
+    setText(place, t('line_of', shown));
+    place.title = shown.identity?.model ?? '';
+    const said = shown.fault || status.state === 'fault' ? '' : text;
+    setText(remark, said);
+    remark.hidden = !said;
+    BIG.forEach(([, value, group], index) => {
+      setText(big[index].children[1], value(shown));
+      setAttribute(big[index], 'data-quality', group ? quality(shown[group]) : 'good');
+    });
+    fault.update(shown);
+    orders.update(shown);
+    tables.update(shown);
+    tick();
+  }
+
+  function tick() {
+    const ms = age(shown.status, shown);
+    setText(freshness, quality(shown.status) === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
+    setAttribute(freshness, 'data-quality', quality(shown.status));
+    BIG.forEach(([, , group], index) => {
+      const isOld = group && quality(shown[group]) === 'stale';
+      setText(big[index].children[2], isOld ? old(age(shown[group], shown)) : '');
+    });
+  }
+}

@@ -1,0 +1,77 @@
+// The commands of one drive, each with a question first but the stop, and what became of them.
+
+import { commandId, path, post } from './api.js';
+import { confirmed } from './ask.js';
+import { el, setAttribute, setClass, setText } from './dom.js';
+import { quantity } from './format.js';
+import { carryOut, isDone, onOrder, orderText, ordersOf } from './orders.js';
+import { plant } from './plant.js';
+import { setpointControl } from './setpoint.js';
+import { t } from './texts.js';
+import { faultText } from './trouble.js';
+import { word } from './words.js';
+
+const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
+const EXPIRES_MS = 5_000;
+const SHOWN = 6;
+
+/** The panel of commands of the drive `name`: `element`, `update(drive)`, `end()`. */
+export function ordersPanel(name) {
+  const button = (text, act, more = {}) => el('button', { type: 'button', onclick: act, ...more }, t(text));
+  const setpoint = setpointControl(value => order('setpoint', { setpoint: { frequency_hz: value } }));
+  const forward = button('start_forward', () => start('forward'));
+  const reverse = button('start_reverse', () => start('reverse'));
+  const mode = el('select', { 'aria-label': t('stop_mode') }, ...STOPS.map(kind => el('option', { value: kind }, word(kind))));
+  const stop = button('stop', () => order('stop', { mode: mode.value }), { 'data-order': 'stop' });
+  const reset = button('reset', askReset, { 'data-order': 'reset' });
+  const release = button('release', async () => await confirmed(t('confirm_release', { drive: name }), t('release')) && order('release'));
+  const why = el('p.hint.why');
+  const latest = el('ul.latest');
+  const element = el('section.panel.orders', { 'aria-label': t('orders') },
+    el('h2', {}, t('orders')), setpoint.element,
+    el('div.pair', {}, forward, reverse),
+    el('div.pair', {}, stop, mode),
+    el('div.pair', {}, reset, release), why,
+    el('h3', {}, t('latest_orders')), latest);
+  const forget = onOrder(one => one.to === name && writeLatest());
+  writeLatest();
+  return { element, update, end: forget };
+
+  function update(drive) {
+    const tripped = drive.status?.state === 'fault' || Boolean(drive.fault);
+    const readOnly = drive.control === false;
+    setpoint.update(drive);
+    for (const one of [forward, reverse]) one.disabled = readOnly || Boolean(drive.start_refused);
+    reset.disabled = readOnly || !tripped;
+    release.disabled = readOnly;
+    setText(why, readOnly ? t('only_read_long') : [drive.start_refused && t('start_refused', { why: drive.start_refused }),
+      !tripped && t('reset_not_now')].filter(Boolean).join(' '));
+    setAttribute(stop, 'disabled', readOnly);
+  }
+
+  async function start(direction) {
+    const said = { drive: name, direction: t(`in_direction_${direction}`) };
+    const at = plant.drives.get(name)?.setpoint?.frequency_hz;
+    const question = at === undefined ? t('confirm_start', said) : t('confirm_start_at', { ...said, setpoint: quantity(at, 1, 'Hz') });
+    if (await confirmed(question, t(`start_${direction}`))) order('start', { direction });
+  }
+
+  async function askReset() {
+    const fault = faultText(plant.drives.get(name));
+    if (await confirmed(t('confirm_reset', { drive: name, fault }), t('reset'))) order('reset');
+  }
+
+  function order(action, body = {}) {
+    const expiry = action === 'stop' ? {} : { expires_in_ms: EXPIRES_MS };
+    return carryOut(name, action, () => post(`${path('drives', name, action)}?wait=0`, { id: commandId(), ...expiry, ...body }));
+  }
+
+  function writeLatest() {
+    latest.replaceChildren(...ordersOf(name).slice(0, SHOWN).map(one => {
+      const item = el('li', {}, orderText(one));
+      setClass(item, 'bad', one.outcome !== 'pending' && !isDone(one));
+      return item;
+    }));
+    latest.previousElementSibling.hidden = !latest.children.length;
+  }
+}

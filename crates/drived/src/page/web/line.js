@@ -1,0 +1,118 @@
+// The lines: how much of them is used, what each drive's exchanges take, what went wrong, and the last of them.
+
+import { address, path, read } from './api.js';
+import { el, setAttribute, setText, table } from './dom.js';
+import { clock, duration, MISSING, quantity } from './format.js';
+import { plant } from './plant.js';
+import { named, t } from './texts.js';
+import { word } from './words.js';
+
+const READ_MS = 2_000;
+/** Kinds that a slave's exchanges have, and those that only the line can tell. */
+const ERRORS = ['no_answer', 'damaged', 'late', 'mismatched', 'exception'];
+const LINE_ERRORS = [...ERRORS, 'foreign', 'echo'];
+
+/** Shows all lines in `root`. */
+export function lines(root) {
+  const body = el('tbody');
+  const list = table('', [t('line_name'), t('port'), [t('utilisation'), 'right'], [t('cycle'), 'right'], [t('worst_stop'), 'right'], [t('exchanges'), 'right'], [t('errors'), 'right']], []);
+  list.tBodies[0].replaceWith(body);
+  root.append(el('h1', { tabindex: -1 }, t('lines')), el('section.panel', {}, el('div.wide', {}, list)));
+  const update = () => {
+    const focused = document.activeElement?.textContent;
+    const had = body.contains(document.activeElement);
+    body.replaceChildren(...[...plant.lines.values()].map(line => el(line.link === 'away' ? 'tr.in-trouble' : 'tr', {},
+      el('th', { scope: 'row' }, el('a', { href: `#/line/${encodeURIComponent(line.name)}` }, line.name)),
+      el('td', {}, [line.port, line.protocol, line.link === 'away' && (line.error ?? t('line_away'))].filter(Boolean).join(' · ')),
+      el('td.right', {}, quantity(line.utilisation_percent, 0, '%')),
+      el('td.right', {}, duration(line.cycle_ms)),
+      el('td.right', {}, duration(line.worst_case_stop_ms)),
+      el('td.right', {}, quantity(line.exchanges, 0)),
+      el('td.right', {}, quantity(sum(line.errors), 0)))));
+    if (had) [...body.querySelectorAll('a')].find(link => link.textContent === focused)?.focus({ preventScroll: true });
+  };
+  update();
+  return { update: names => [...names].some(name => name === 'state' || name.startsWith('line ')) && update() };
+}
+
+/** Shows the line `name` in `root`. */
+export function line(root, name) {
+  if (!plant.lines.has(name)) {
+    root.append(el('h1', { tabindex: -1 }, name), el('p', {}, t('unknown_line')), el('a', { href: '#/lines' }, t('lines')));
+    return { update() {} };
+  }
+  const place = el('p.hint');
+  const big = ['utilisation', 'worst_stop', 'cycle', 'exchanges', 'errors'].map(text => el('div', {}, el('dt', {}, t(text)), el('dd.number')));
+  const kinds = el('p.hint');
+  const slaves = el('div.wide');
+  const last = el('div.wide.last');
+  const hold = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => setAttribute(hold, 'aria-pressed', String(!held())) }, t('hold'));
+  const held = () => hold.getAttribute('aria-pressed') === 'true';
+  root.append(
+    el('header.drive-head', {}, el('div', {}, el('h1', { tabindex: -1 }, name), place)),
+    el('dl.big', {}, ...big),
+    el('section.panel', {}, el('h2', {}, t('exchange_times')), slaves, kinds),
+    el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('last_exchanges')),
+      el('span.chips', {}, hold, el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture')))), last));
+  update();
+  readLast();
+  const timer = setInterval(readLast, READ_MS);
+  return { update: names => (names.has('state') || names.has(`line ${name}`)) && update(), end: () => clearInterval(timer) };
+
+  function update() {
+    const now = plant.lines.get(name);
+    if (!now) return;
+    setText(place, [now.port, now.protocol, now.link === 'away' && (now.error ?? t('line_away'))].filter(Boolean).join(' · '));
+    place.classList.toggle('bad', now.link === 'away');
+    const values = [quantity(now.utilisation_percent, 0, '%'), duration(now.worst_case_stop_ms), duration(now.cycle_ms),
+      quantity(now.exchanges, 0), quantity(sum(now.errors), 0)];
+    values.forEach((value, index) => setText(big[index].lastChild, value));
+    setText(kinds, LINE_ERRORS.filter(kind => now.errors?.[kind] !== undefined).map(kind => named(word(kind), quantity(now.errors[kind], 0))).join(' · '));
+    const rows = now.slaves ?? [];
+    const longest = Math.max(1, ...rows.map(row => row.answer_ms?.max ?? 0));
+    slaves.replaceChildren(table('', [[t('slave'), 'right'], t('drive'), t('state'), t('answer_times'), [t('usual'), 'right'], [t('of_hundred'), 'right'],
+      [t('longest'), 'right'], [t('exchanges'), 'right'], ...ERRORS.map(kind => [word(kind), 'right'])], rows.map(row => slaveRow(row, longest))));
+  }
+
+  async function readLast() {
+    if (held() || document.hidden) return;
+    try {
+      const { last: exchanges = [] } = await read(path('lines', name));
+      last.replaceChildren(table('', [t('time'), [t('slave'), 'right'], t('request'), t('answer'), t('result'), [t('took'), 'right']], exchanges.map(one =>
+        el(one.result === 'ok' ? 'tr' : 'tr.in-trouble', {}, el('td', {}, clock(one.time_unix_ms)), el('td.right', {}, one.slave),
+          el('td', {}, el('code', {}, one.request)), el('td', {}, el('code', {}, one.answer || MISSING)), el('td', {}, word(one.result)),
+          el('td.right', {}, quantity(one.took_ms, 1, 'ms'))))));
+    } catch {
+      // The header says that the daemon is away; the next reading shows the rest.
+    }
+  }
+}
+
+function slaveRow(row, longest) {
+  const errors = row.errors ?? {};
+  const times = row.answer_ms;
+  const spread = el('span.meter.spread', { 'aria-hidden': 'true' });
+  for (const [kind, ms] of [['max', times?.max], ['p99', times?.p99], ['p50', times?.p50]]) {
+    if (typeof ms !== 'number') continue;
+    const part = el(`i.fill.${kind}`);
+    part.style.transform = `scaleX(${(ms / longest).toFixed(3)})`;
+    spread.append(part);
+  }
+  const answers = row.off_line ? offLine(row) : row.exchanges ? t('answers') : t('no_answer_yet');
+  return el(row.off_line ? 'tr.in-trouble' : 'tr', {},
+    el('td.right', {}, row.slave),
+    el('th', { scope: 'row' }, el('a', { href: `#/drive/${encodeURIComponent(row.drive)}` }, row.drive ?? MISSING)),
+    el('td', {}, answers), el('td.spread', {}, spread),
+    ...['p50', 'p99', 'max'].map(key => el('td.right', {}, quantity(times?.[key], 1, 'ms'))),
+    el('td.right', {}, quantity(row.exchanges, 0)),
+    ...ERRORS.map(kind => el(errors[kind] ? 'td.right.some' : 'td.right', {}, quantity(errors[kind], 0))));
+}
+
+function offLine(row) {
+  if (row.next_probe_ms !== undefined) return t('next_probe', { time: duration(row.next_probe_ms) });
+  return t('only_probed', { count: row.probes ?? 0 });
+}
+
+function sum(errors) {
+  return errors && ERRORS.reduce((total, kind) => total + (errors[kind] ?? 0), 0);
+}

@@ -1,0 +1,49 @@
+// The dialog for a token, when a right is lacking.
+
+import { post } from './api.js';
+import { el } from './dom.js';
+import { start } from './plant.js';
+import { t } from './texts.js';
+
+let open = false;
+
+/** Gives the session up. */
+export async function logOut() {
+  await post('logout').catch(() => {});
+  start();
+}
+
+
+/** Asks for a token. Whatever lacked the right is not sent again: a motor that starts late by a login is nobody's wish. */
+export function askToken() {
+  if (open) return;
+  open = true;
+  const token = el('input', { type: 'password', autocomplete: 'current-password', required: true });
+  const said = el('p.said', { role: 'alert' });
+  const dialog = el('dialog', { 'aria-label': t('log_in'), onclose: () => {
+    dialog.remove();
+    open = false;
+  } },
+  el('form', { method: 'dialog', onsubmit: send },
+    el('p', {}, t('login_why')),
+    el('label.field', {}, t('token'), token),
+    said,
+    el('div.buttons', {},
+      el('button', { type: 'button', onclick: () => dialog.close() }, t('cancel')),
+      el('button.primary', {}, t('log_in')))));
+  document.body.append(dialog);
+  dialog.showModal();
+  token.focus();
+
+  async function send(event) {
+    event.preventDefault();
+    try {
+      await post('login', { token: token.value });
+      said.textContent = t('login_done');
+      start();
+      setTimeout(() => dialog.close(), 1_500);
+    } catch (problem) {
+      said.textContent = problem.status === 401 || problem.status === 403 ? t('login_wrong') : problem.message;
+    }
+  }
+}

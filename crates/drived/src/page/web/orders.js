@@ -1,0 +1,90 @@
+// Commands on their way: sent once, followed until they are settled, told in words and time.
+
+import { path, read } from './api.js';
+import { el, setClass, setText } from './dom.js';
+import { clock, duration } from './format.js';
+import { askToken } from './login.js';
+import { named, t } from './texts.js';
+import { command, outcome, word } from './words.js';
+
+const KEPT = 20;
+const SHOWN_MS = 12_000;
+const AGAIN_MS = 500;
+
+const orders = [];
+const listeners = new Set();
+
+/** The commands that this page has given to a drive or group, newest first. */
+export function ordersOf(name) {
+  return orders.filter(order => order.to === name);
+}
+
+/** Calls `listener` whenever an order changes; gives the way to stop that. */
+export function onOrder(listener) {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
+}
+
+/** Sends by `send`, and follows the command until its outcome is known. */
+export async function carryOut(to, action, send) {
+  const order = { to, action, at: Date.now(), outcome: 'pending' };
+  orders.unshift(order);
+  orders.length = Math.min(orders.length, KEPT);
+  tell(order);
+  try {
+    take(order, await send());
+    await settle(order);
+  } catch (problem) {
+    fail(order, problem);
+  }
+  tell(order);
+}
+
+/** An order in words: "Start: confirmed at 14:03:22, after 0.4 s". */
+export function orderText(order) {
+  const what = order.command ? command(order) : word(order.action);
+  if (order.outcome === 'pending') return named(what, t('sent_at', { time: clock(order.at) }));
+  if (order.outcome === 'not_sent') return named(what, t('not_sent', { why: order.text }));
+  const how = t('outcome_after', { outcome: outcome(order.outcome), time: clock(order.endedAt), took: duration(order.took_ms ?? order.endedAt - order.at) });
+  const counts = order.drives ? ` (${order.confirmed}/${order.drives.length})` : '';
+  return `${named(what, how)}${counts}${order.text ? `. ${order.text}` : ''}`;
+}
+
+/** Whether an order did what it asked for. */
+export function isDone(order) {
+  return order.outcome === 'confirmed';
+}
+
+async function settle(order) {
+  while (order.outcome === 'pending') {
+    tell(order);
+    await new Promise(over => setTimeout(over, AGAIN_MS));
+    take(order, await read(path('commands', order.id)));
+  }
+  order.endedAt = Date.now();
+}
+
+function take(order, answer) {
+  const { id, outcome: what, text, took_ms: took, command: said, drives, confirmed } = answer;
+  Object.assign(order, { id, outcome: what ?? 'confirmed', text, took_ms: took, command: said, drives, confirmed, endedAt: Date.now() });
+}
+
+function fail(order, problem) {
+  if (problem.lacksRight) askToken();
+  if (problem.document?.outcome) {
+    take(order, { text: problem.message, ...problem.document });
+    return;
+  }
+  const why = problem.status === 0 ? t('not_reached') : problem.message;
+  Object.assign(order, { outcome: problem.status === 0 ? 'unknown' : 'not_sent', text: why, endedAt: Date.now() });
+}
+
+function tell(order) {
+  for (const listener of [...listeners]) listener(order);
+  const place = document.getElementById('outcomes');
+  order.note ??= el('p');
+  if (!order.note.isConnected) place.prepend(order.note);
+  setText(order.note, named(order.to, orderText(order)));
+  setClass(order.note, 'bad', order.outcome !== 'pending' && !isDone(order));
+  if (order.outcome !== 'pending') setTimeout(() => order.note.remove(), SHOWN_MS);
+}

@@ -1,0 +1,134 @@
+// All drives, trouble first, with the lines' health above them.
+
+import { post, path } from './api.js';
+import { confirmed } from './ask.js';
+import { arrange, el, setAttribute, setClass, setText } from './dom.js';
+import { quantity } from './format.js';
+import { carryOut } from './orders.js';
+import { plant } from './plant.js';
+import { COLUMNS, makeRow } from './row.js';
+import { named, t } from './texts.js';
+import { FINE, trouble } from './trouble.js';
+import { stateWord, word } from './words.js';
+
+const MOVING = new Set(['running', 'stopping', 'quick_stop', 'fault_reaction']);
+const FILTERS = {
+  all: () => true,
+  trouble: drive => trouble(drive).rank < FINE,
+  running_drives: drive => MOVING.has(drive.status?.state),
+  standing_drives: drive => !MOVING.has(drive.status?.state),
+};
+
+/** What the user looks for stays when he comes back. */
+const asked = { search: '', filter: 'all', group: '' };
+
+/** Shows the overview in `root`. */
+export function overview(root) {
+  const rows = new Map();
+  const tiles = new Map();
+  const strip = el('section.strip', { 'aria-label': t('lines') });
+  const filters = Object.keys(FILTERS).map(name =>
+    el('button.chip', { type: 'button', 'data-filter': name, onclick: () => ask({ filter: name }) }));
+  const search = el('input', { type: 'search', value: asked.search, 'aria-label': t('search'),
+    placeholder: named(t('search'), t('search_hint')), oninput: () => ask({ search: search.value }) });
+  const group = el('select', { 'aria-label': t('group'), onchange: () => ask({ group: group.value }) });
+  const groupOrders = el('span.group-orders', { hidden: true },
+    el('button', { type: 'button', onclick: () => orderGroup('start') }, t('start_group')),
+    el('button', { type: 'button', onclick: () => orderGroup('stop') }, t('stop_group')));
+  const body = el('div.rows', { role: 'rowgroup' });
+  const nothing = el('p.hint', { hidden: true }, t('nothing_found'));
+
+  root.append(
+    el('h1.unseen', { tabindex: -1 }, t('overview')), strip,
+    el('div.tools', {}, el('div.chips', { role: 'group', 'aria-label': t('state') }, ...filters), search, group, groupOrders),
+    el('div.drives', { role: 'table', 'aria-label': t('overview') },
+      el('div.row.head', { role: 'row' }, ...COLUMNS.map(name => el(`div.${name}`, { role: 'columnheader' }, t(name)))),
+      body),
+    nothing);
+  fillGroups();
+  update(new Set(['state']));
+  return { update, tick: () => rows.forEach(row => row.tick()) };
+
+  function ask(changes) {
+    Object.assign(asked, changes);
+    order();
+  }
+
+  function update(names) {
+    const all = names.has('state');
+    if (all) fillGroups();
+    for (const [name, drive] of plant.drives) {
+      const row = rows.get(name);
+      if (!row) rows.set(name, makeRow(drive));
+      else if (all || names.has(`drive ${name}`)) row.update(drive);
+    }
+    for (const name of rows.keys()) if (!plant.drives.has(name)) rows.delete(name);
+    updateStrip();
+    order();
+  }
+
+  function order() {
+    const drives = [...plant.drives.values()];
+    const members = plant.groups.find(one => one.name === asked.group)?.drives;
+    const inGroup = members ? drives.filter(drive => members.includes(drive.name)) : drives;
+    for (const chip of filters) {
+      const name = chip.dataset.filter;
+      const count = inGroup.filter(FILTERS[name]).length;
+      setText(chip, `${t(name)} ${count}`);
+      setAttribute(chip, 'aria-pressed', String(name === asked.filter));
+      setClass(chip, 'some', name === 'trouble' && count > 0);
+    }
+    const words = asked.search.toLowerCase().split(/\s+/).filter(Boolean);
+    const shown = inGroup.filter(FILTERS[asked.filter]).filter(drive => fits(drive, words));
+    // The order of the configuration among equals: a row moves only when its trouble begins or ends.
+    const ranked = shown.map(drive => [trouble(drive).rank, drive.name]).sort((a, b) => a[0] - b[0]);
+    arrange(body, ranked.map(([, name]) => rows.get(name).element));
+    nothing.hidden = shown.length > 0 || plant.drives.size === 0;
+    groupOrders.hidden = !members;
+  }
+
+  function updateStrip() {
+    for (const [name, line] of plant.lines) {
+      if (!tiles.has(name)) tiles.set(name, makeTile(name));
+      tiles.get(name)(line);
+    }
+    arrange(strip, [...plant.lines.keys()].map(name => tiles.get(name).element));
+  }
+
+  function fillGroups() {
+    group.replaceChildren(el('option', { value: '' }, named(t('group'), t('all'))),
+      ...plant.groups.map(one => el('option', { value: one.name, selected: one.name === asked.group }, one.name)));
+    group.hidden = plant.groups.length === 0;
+  }
+
+  async function orderGroup(action) {
+    const chosen = plant.groups.find(one => one.name === asked.group);
+    if (action === 'start'
+      && !await confirmed(t('confirm_start_group', { count: chosen.drives.length, group: chosen.name }), t('start_group'))) return;
+    carryOut(chosen.name, action, () => post(`${path('groups', chosen.name, action)}?wait=0`));
+  }
+}
+
+/** A line in the strip: a link with its name, its utilisation and how many of its drives answer. */
+function makeTile(name) {
+  const title = el('b', {}, name);
+  const load = el('span.number');
+  const drives = el('span.counted');
+  const meter = el('span.meter', { 'aria-hidden': 'true' }, el('i.fill'));
+  const element = el('a.tile', { href: `#/line/${encodeURIComponent(name)}` }, title, load, meter, drives);
+  const update = line => {
+    const members = [...plant.drives.values()].filter(drive => drive.line === name);
+    const connected = members.filter(drive => drive.link === 'connected').length;
+    setText(load, quantity(line.utilisation_percent, 0, '%'));
+    meter.firstChild.style.transform = `scaleX(${Math.min((line.utilisation_percent ?? 0) / 100, 1).toFixed(3)})`;
+    setText(drives, line.link === 'away' ? t('line_away') : t('line_health', { connected, count: members.length }));
+    setClass(element, 'in-trouble', line.link === 'away' || connected < members.length);
+  };
+  return Object.assign(update, { element });
+}
+
+function fits(drive, words) {
+  const text = [drive.name, drive.line, drive.family, drive.slave, stateWord(drive), trouble(drive).text, drive.fault?.mnemonic,
+    drive.fault?.code, word(drive.status?.control)].join(' ').toLowerCase();
+  return words.every(one => text.includes(one));
+}

@@ -1,0 +1,126 @@
+// What is known of the plant: the state once, then what the events change. The views read it and are told of changes.
+
+import { read } from './api.js';
+import { follow } from './stream.js';
+
+const EVENTS_KEPT = 2_000;
+
+/** What the daemon has said; replaced and patched here alone. */
+export const plant = {
+  daemon: { rights: {} }, drives: new Map(), lines: new Map(), groups: [], events: [],
+  /** `reading`, `live`, `interrupted` (for less than 12 s), `silent`, `away` or `refused`. */
+  connection: 'reading',
+  /** When the daemon was heard last, by its own clock and by ours. */
+  heardUnixMs: 0,
+};
+
+const listeners = new Set();
+const changed = new Set();
+let endStream;
+let due = false;
+
+/** Calls `listener(names)` at most once a frame; `names` holds what has changed: `drive NAME`, `line NAME`, `event`, `state`. */
+export function onChange(listener) {
+  listeners.add(listener);
+  return () => listeners.delete(listener);
+}
+
+/** Reads the state, again and again until there is one, and follows the events from there. */
+export async function start() {
+  endStream?.();
+  endStream = undefined;
+  try {
+    takeState(await read('state'));
+  } catch (problem) {
+    plant.connection = problem.lacksRight ? 'refused' : 'away';
+    tell('state');
+    if (!problem.lacksRight) setTimeout(start, 2_000);
+    return;
+  }
+  endStream = follow(plant.revision, {
+    news: take,
+    reset: start,
+    silence(silent) {
+      if (!silent) return void start();
+      plant.connection = 'silent';
+      tell('state');
+    },
+    interrupted() {
+      if (plant.connection === 'live') plant.connection = 'interrupted';
+      tell('state');
+    },
+  });
+}
+
+/** How old a group of values is now, in milliseconds; `undefined` where there are none. */
+export function age(values, drive) {
+  if (!values || values.quality === 'missing' || typeof values.age_ms !== 'number') return undefined;
+  return values.age_ms + performance.now() - drive.receivedAt;
+}
+
+/** `good`, `stale` or `missing`; nothing is good while the daemon is silent. */
+export function quality(values) {
+  if (!values || values.quality === 'missing') return 'missing';
+  return plant.connection === 'live' || plant.connection === 'interrupted' ? values.quality : 'stale';
+}
+
+/** A fresh `DRIVE` that came another way than by the events. */
+export function takeDrive(drive) {
+  drive.receivedAt = performance.now();
+  plant.drives.set(drive.name, drive);
+  tell(`drive ${drive.name}`);
+}
+
+function takeState(state) {
+  const receivedAt = performance.now();
+  plant.revision = state.revision;
+  plant.daemon = state.daemon;
+  plant.groups = state.groups ?? [];
+  plant.drives = new Map(state.drives.map(drive => [drive.name, Object.assign(drive, { receivedAt })]));
+  plant.lines = new Map(state.lines.map(line => [line.name, line]));
+  plant.heardUnixMs = Date.now();
+  plant.connection = 'live';
+  tell('state');
+}
+
+function take(kind, data) {
+  plant.heardUnixMs = Date.now();
+  if (plant.connection === 'interrupted') {
+    plant.connection = 'live';
+    tell('state');
+  }
+  if (kind === 'drive') takeDrive(data);
+  if (kind === 'line') {
+    plant.lines.set(data.name, data);
+    tell(`line ${data.name}`);
+  }
+  if (kind === 'command') {
+    const known = plant.events.find(event => event.id === data.id);
+    if (known) Object.assign(known, data);
+    else keep({ kind, ...data });
+    tell('event');
+  }
+  if (kind === 'event') {
+    keep({ kind, ...data });
+    tell('event', data);
+  }
+}
+
+function keep(event) {
+  plant.events.unshift(event);
+  if (plant.events.length > EVENTS_KEPT) plant.events.length = EVENTS_KEPT;
+}
+
+function tell(name) {
+  changed.add(name);
+  if (due) return;
+  due = true;
+  // A page in the background has no frames.
+  const next = document.hidden ? callback => setTimeout(callback, 200) : requestAnimationFrame;
+  next(() => {
+    due = false;
+    const names = new Set(changed);
+    changed.clear();
+    for (const listener of [...listeners]) listener(names);
+  });
+}

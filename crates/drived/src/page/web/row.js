@@ -1,0 +1,86 @@
+// One drive as a row of the overview: made once, then only what has changed in it.
+
+import { el, setAttribute, setClass, setText } from './dom.js';
+import { MISSING, old, quantity } from './format.js';
+import { age, quality } from './plant.js';
+import { t } from './texts.js';
+import { CONNECTING, SEVERE, trouble } from './trouble.js';
+import { setpointText, stateWord, word } from './words.js';
+
+const USUAL_HIGH_HZ = 50;
+const ARROWS = { forward: '▶', reverse: '◀' };
+
+/** The heads of the columns, in the order of a row's cells. */
+export const COLUMNS = ['drive', 'state', 'frequency', 'current', 'note', 'control', 'age'];
+
+const template = el('article.row', { role: 'row' },
+  el('div.name', { role: 'rowheader' }, el('a'), el('small')),
+  el('div.state', { role: 'cell' }, el('span.mark', { 'aria-hidden': 'true' }), el('b'), el('span.turns')),
+  el('div.frequency', { role: 'cell' }, el('span.number'), el('small'), bar(true)),
+  el('div.current', { role: 'cell' }, el('span.number'), bar(false)),
+  el('div.note', { role: 'cell' }),
+  el('div.control', { role: 'cell' }),
+  el('div.age', { role: 'cell' }));
+
+function bar(withSetpoint) {
+  return el('span.meter', { 'aria-hidden': 'true' }, el('i.fill'), withSetpoint ? el('i.mark-setpoint') : null);
+}
+
+/** A row with `element`, `update(drive)` and `tick()`, which counts the age on. */
+export function makeRow(drive) {
+  const element = template.cloneNode(true);
+  const [nameCell, stateCell, frequencyCell, currentCell, note, control, ageCell] = element.children;
+  const [link, place] = nameCell.children;
+  const [, state, turns] = stateCell.children;
+  const [frequency, setpoint, frequencyBar] = frequencyCell.children;
+  const [current, currentBar] = currentCell.children;
+  let shown = drive;
+
+  link.href = `#/drive/${encodeURIComponent(drive.name)}`;
+  link.textContent = drive.name;
+
+  function update(drive) {
+    shown = drive;
+    const status = drive.status ?? {};
+    const known = quality(status);
+    const { rank, text } = trouble(drive);
+    setAttribute(element, 'data-state', rank <= SEVERE ? 'trouble' : status.state);
+    setAttribute(element, 'data-trouble', rank <= SEVERE ? 'severe' : rank < CONNECTING && 'minor');
+    setAttribute(element, 'data-quality', known);
+    setText(place, `${drive.line} · ${drive.slave} · ${drive.family}`);
+    setText(state, stateWord(drive));
+    setText(turns, status.direction && status.output_frequency_hz !== 0 ? `${ARROWS[status.direction] ?? ''} ${word(status.direction)}` : '');
+    setText(frequency, quantity(status.output_frequency_hz, 1, 'Hz'));
+    setText(setpoint, drive.setpoint ? t('to_setpoint', { setpoint: setpointText(drive.setpoint) }) : '');
+    const high = drive.limits?.high_hz ?? USUAL_HIGH_HZ;
+    fill(frequencyBar, status.output_frequency_hz, high);
+    placeMark(frequencyBar.lastChild, drive.setpoint?.frequency_hz, high);
+    const share = typeof status.current_percent === 'number';
+    setText(current, typeof status.current_a === 'number' || !share
+      ? quantity(status.current_a, 1, 'A') : quantity(status.current_percent, 0, '%'));
+    setClass(currentBar, 'unknown', !share);
+    fill(currentBar, status.current_percent, 100);
+    setText(note, text);
+    setText(control, status.control ? word(status.control) : MISSING);
+    tick();
+  }
+
+  function tick() {
+    const known = quality(shown.status);
+    const ms = age(shown.status, shown);
+    setText(ageCell, known === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
+  }
+
+  update(drive);
+  return { element, update, tick };
+}
+
+function fill(bar, value, high) {
+  const share = typeof value === 'number' ? Math.min(Math.max(value / high, 0), 1) : 0;
+  bar.firstChild.style.transform = `scaleX(${share.toFixed(3)})`;
+}
+
+function placeMark(mark, value, high) {
+  mark.hidden = typeof value !== 'number';
+  if (!mark.hidden) mark.style.left = `${(Math.min(Math.max(value / high, 0), 1) * 100).toFixed(1)}%`;
+}

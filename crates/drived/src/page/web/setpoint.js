@@ -1,0 +1,82 @@
+// The control of a setpoint, with the drive's limits and forbidden bands drawn into it.
+
+import { el, setAttribute, setText } from './dom.js';
+import { quantity } from './format.js';
+import { t } from './texts.js';
+
+const USUAL_HIGH_HZ = 50;
+const STEP_HZ = 0.1;
+
+/** A control that calls `send(hertz)`: `element`, `update(drive)`. */
+export function setpointControl(send) {
+  const slider = el('input', { type: 'range', step: STEP_HZ, 'aria-label': t('setpoint') });
+  const field = el('input', { type: 'number', step: STEP_HZ, inputmode: 'decimal', 'aria-label': `${t('setpoint')} (Hz)` });
+  const bands = el('div.bands', { 'aria-hidden': 'true' });
+  const said = el('p.hint', { 'aria-live': 'polite' });
+  const give = el('button', {}, t('set'));
+  const element = el('form.setpoint', { onsubmit: submit }, el('label.field', {}, `${t('set_setpoint')} (Hz)`),
+    el('div.track', {}, bands, slider), el('div.pair', {}, field, give), said);
+  let limits = {};
+  let readOnly = false;
+  let touched = false;
+  let drawn = '';
+
+  slider.addEventListener('input', () => choose(slider.value));
+  field.addEventListener('input', () => choose(field.value));
+  return { element, update };
+
+  function update(drive) {
+    limits = { low: drive.limits?.low_hz ?? 0, high: drive.limits?.high_hz ?? USUAL_HIGH_HZ, forbidden: drive.limits?.forbidden_hz ?? [] };
+    readOnly = drive.control === false;
+    for (const input of [slider, field]) {
+      setAttribute(input, 'min', limits.low);
+      setAttribute(input, 'max', limits.high);
+      input.disabled = readOnly;
+    }
+    // Nobody's choice is pulled from under his finger by what the drive reports.
+    if (!touched && drive.setpoint?.frequency_hz !== undefined) slider.value = field.value = String(drive.setpoint.frequency_hz);
+    draw(drive);
+    judge();
+  }
+
+  function draw(drive) {
+    const marks = [drive.status?.output_frequency_hz, drive.setpoint?.frequency_hz];
+    const now = JSON.stringify([limits, marks]);
+    if (now === drawn) return;
+    drawn = now;
+    bands.replaceChildren(
+      ...limits.forbidden.map(([from, to]) => part('i.forbidden', from, to)),
+      ...(typeof marks[0] === 'number' ? [part('i.output', limits.low, marks[0])] : []));
+  }
+
+  function part(name, from, to) {
+    const share = value => (Math.min(Math.max(value, limits.low), limits.high) - limits.low) / (limits.high - limits.low || 1) * 100;
+    const mark = el(name);
+    mark.style.left = `${share(from)}%`;
+    mark.style.width = `${share(to) - share(from)}%`;
+    return mark;
+  }
+
+  function choose(text) {
+    touched = true;
+    slider.value = field.value = text;
+    judge();
+  }
+
+  function judge() {
+    const value = Number(field.value);
+    const band = limits.forbidden.find(([from, to]) => value > from && value < to);
+    const range = ([from, to]) => `${quantity(from, 1)}–${quantity(to, 1, 'Hz')}`;
+    give.disabled = readOnly || field.value === '' || Boolean(band) || value < limits.low || value > limits.high;
+    setText(said, [band ? t('forbidden_now', { value: quantity(value, 1, 'Hz') }) : t('limits_are', { low: quantity(limits.low, 1), high: quantity(limits.high, 1, 'Hz') }),
+      limits.forbidden.length ? t('forbidden_are', { bands: limits.forbidden.map(range).join(', ') }) : ''].filter(Boolean).join('. '));
+    said.classList.toggle('bad', Boolean(band));
+  }
+
+  function submit(event) {
+    event.preventDefault();
+    if (give.disabled) return;
+    touched = false;
+    send(Number(field.value));
+  }
+}

@@ -1,0 +1,289 @@
+// Every text of the page, in English and French, and the choice between them.
+
+const TABLE = {
+  // The frame.
+  skip: ['Skip to the drives', 'Aller aux variateurs'],
+  views: ['Views', 'Vues'],
+  overview: ['Drives', 'Variateurs'],
+  lines: ['Lines', 'Lignes'],
+  events: ['Events', 'Événements'],
+  language: ['Langue : français', 'Language: English'],
+  other_language: ['FR', 'EN'],
+  reading: ['reading…', 'lecture…'],
+  live: ['live', 'en direct'],
+  interrupted: ['reconnecting…', 'reconnexion…'],
+  silent: ['no news', 'plus de nouvelles'],
+  away: ['daemon not reachable', 'service injoignable'],
+  refused: ['log in to see the drives', 'identifiez-vous pour voir les variateurs'],
+  banner_silent: ['No news from the daemon since {time}. Everything below is old.', 'Aucune nouvelle du service depuis {time}. Tout ce qui suit est ancien.'],
+  banner_away: ['The daemon cannot be reached. It is tried again.', 'Le service est injoignable. Nouvel essai en cours.'],
+  old: ['{age} old', 'il y a {age}'],
+  named: ['{name}: {value}', '{name} : {value}'],
+  close: ['Close', 'Fermer'],
+  cancel: ['Cancel', 'Annuler'],
+  all: ['All', 'Tous'],
+  none: ['none', 'aucun'],
+  yes: ['yes', 'oui'],
+  no: ['no', 'non'],
+
+  // Stop all.
+  stop_all: ['STOP ALL', 'ARRÊT GÉNÉRAL'],
+  stop_key: ['Ctrl+Shift+S', 'Ctrl+Maj+S'],
+  stop_note: ['No emergency stop: that one is wired.', 'N’est pas un arrêt d’urgence : celui-ci est câblé.'],
+  stop_account: ['Account of the stop', 'Bilan de l’arrêt'],
+  stop_sending: ['Sending the stop to {count} drives…', 'Envoi de l’arrêt à {count} variateurs…'],
+  stop_sent: ['Stop sent to {count} drives at {time}', 'Arrêt envoyé à {count} variateurs à {time}'],
+  stop_done: ['All {count} drives have confirmed the stop, {time}', 'Les {count} variateurs ont confirmé l’arrêt, {time}'],
+  stop_confirmed: ['confirmed', 'confirmés'],
+  stop_pending: ['pending', 'en attente'],
+  stop_not_reachable: ['not reachable', 'injoignables'],
+  stop_not_confirmed: ['not confirmed', 'non confirmés'],
+  stop_others: ['and {count} more', 'et {count} de plus'],
+  stop_failed: ['STOP NOT SENT: the daemon cannot be reached. Use the emergency stop.', 'ARRÊT NON ENVOYÉ : le service est injoignable. Utilisez l’arrêt d’urgence.'],
+  stop_failed_why: ['STOP NOT SENT: {why}. Use the emergency stop.', 'ARRÊT NON ENVOYÉ : {why}. Utilisez l’arrêt d’urgence.'],
+  stop_tried_again: ['Tried again {count} times, for at most 30 s.', 'Nouvel essai n° {count}, pendant 30 s au plus.'],
+  stop_given_up: ['Given up after 30 s: press again.', 'Abandon après 30 s : appuyez de nouveau.'],
+  stop_lost_sight: ['Sent, but its account cannot be read now: look at the drives.', 'Envoyé, mais son bilan est illisible pour l’instant : regardez les variateurs.'],
+
+  // The overview.
+  search: ['Search', 'Rechercher'],
+  search_hint: ['name, line, fault…', 'nom, ligne, défaut…'],
+  group: ['Group', 'Groupe'],
+  trouble: ['Trouble', 'Anomalies'],
+  running_drives: ['Running', 'En marche'],
+  standing_drives: ['Standing', 'À l’arrêt'],
+  drives_shown: ['{count} drives', '{count} variateurs'],
+  nothing_found: ['No drive fits the search.', 'Aucun variateur ne correspond.'],
+  drive: ['Drive', 'Variateur'],
+  state: ['State', 'État'],
+  frequency: ['Frequency', 'Fréquence'],
+  setpoint: ['Setpoint', 'Consigne'],
+  current: ['Current', 'Courant'],
+  note: ['Fault or remark', 'Défaut ou remarque'],
+  control: ['Control', 'Commande'],
+  age: ['Age', 'Âge'],
+  to_setpoint: ['of {setpoint}', 'sur {setpoint}'],
+  start_group: ['Start group', 'Démarrer le groupe'],
+  stop_group: ['Stop group', 'Arrêter le groupe'],
+  line_health: ['{connected} of {count} drives', '{connected} variateurs sur {count}'],
+  line_away: ['line not connected', 'ligne non raccordée'],
+  only_read: ['only read', 'lecture seule'],
+
+  stop_late: ['STOP NOT CONFIRMED, sent {count} times: use the emergency stop', 'ARRÊT NON CONFIRMÉ, envoyé {count} fois : utilisez l’arrêt d’urgence'],
+  stop_waits: ['stop sent {count} times, waits to be confirmed', 'arrêt envoyé {count} fois, en attente de confirmation'],
+  identity_changed: ['another drive than before answers here', 'un autre variateur qu’auparavant répond ici'],
+  watchdog_broken: ['communication watchdog: {why}', 'surveillance de la communication : {why}'],
+  warning_present: ['an alarm of the drive is present', 'une alarme du variateur est présente'],
+  lost_now: ['does not answer', 'ne répond plus'],
+  values_old: ['values are old', 'valeurs anciennes'],
+  fault_number: ['fault {code}', 'défaut {code}'],
+
+  // One drive.
+  unknown_drive: ['There is no drive of that name.', 'Aucun variateur de ce nom.'],
+  line_of: ['line {line}, slave {slave}, {family}', 'ligne {line}, esclave {slave}, {family}'],
+  torque: ['Torque', 'Couple'],
+  speed: ['Speed', 'Vitesse'],
+  rpm: ['rpm', 'tr/min'],
+  output_power: ['Output power', 'Puissance de sortie'],
+  trend: ['Trend', 'Tendance'],
+  trend_pause: ['Pause', 'Pause'],
+  trend_live: ['Live', 'Direct'],
+  trend_minute: ['1 min', '1 min'],
+  trend_ten: ['10 min', '10 min'],
+  trend_hint: ['Drag to zoom. Gaps: nothing was known.', 'Glisser pour agrandir. Lacunes : rien n’était connu.'],
+  trend_table: ['Values as a table', 'Valeurs en tableau'],
+  trend_missing: ['There is no history of this drive: {why}', 'Pas d’historique de ce variateur : {why}'],
+  time: ['Time', 'Heure'],
+  orders: ['Commands', 'Commandes'],
+  start: ['Start', 'Démarrer'],
+  start_forward: ['Start forward', 'Démarrer en avant'],
+  start_reverse: ['Start reverse', 'Démarrer en arrière'],
+  stop: ['Stop', 'Arrêter'],
+  stop_mode: ['Kind of stop', 'Type d’arrêt'],
+  reset: ['Reset fault', 'Acquitter le défaut'],
+  release: ['Give control back', 'Rendre la commande'],
+  set: ['Set', 'Appliquer'],
+  set_setpoint: ['Set the setpoint', 'Régler la consigne'],
+  limits_are: ['Limits {low} to {high}', 'Limites de {low} à {high}'],
+  forbidden_are: ['Forbidden: {bands}', 'Bandes interdites : {bands}'],
+  forbidden_now: ['{value} is forbidden here.', '{value} est interdit ici.'],
+  only_read_long: ['This drive is only read: its configuration does not say control = true.', 'Ce variateur est seulement lu : sa configuration ne dit pas control = true.'],
+  start_refused: ['A start would be refused now: {why}', 'Un démarrage serait refusé à présent : {why}'],
+  confirm_start: ['{drive}: start {direction}? The motor will turn.', '{drive} : démarrer {direction} ? Le moteur va tourner.'],
+  confirm_start_at: ['{drive}: start {direction} at {setpoint}? The motor will turn.', '{drive} : démarrer {direction} à {setpoint} ? Le moteur va tourner.'],
+  confirm_reset: ['{drive}: reset the fault {fault}? No motor starts by it. See first that its cause is gone.', '{drive} : acquitter le défaut {fault} ? Aucun moteur ne démarre de ce fait. Vérifiez d’abord que sa cause a disparu.'],
+  confirm_release: ['{drive}: give control back to panel or terminals?', '{drive} : rendre la commande au terminal ou au bornier ?'],
+  confirm_start_group: ['Start the {count} drives of the group {group}? The motors will turn.', 'Démarrer les {count} variateurs du groupe {group} ? Les moteurs vont tourner.'],
+  confirm_parameter: ['{drive}: write {value} to {name}?', '{drive} : écrire {value} dans {name} ?'],
+  in_direction_forward: ['forward', 'en avant'],
+  in_direction_reverse: ['reverse', 'en arrière'],
+  sent_at: ['sent at {time}', 'envoyé à {time}'],
+  outcome_after: ['{outcome} at {time}, after {took}', '{outcome} à {time}, après {took}'],
+  not_sent: ['not done: {why}', 'non exécuté : {why}'],
+  not_reached: ['the daemon cannot be reached; whether it took the command is not known', 'le service est injoignable ; on ignore s’il a pris la commande'],
+  latest_orders: ['Latest commands', 'Dernières commandes'],
+  measurements: ['Measurements', 'Mesures'],
+  line_voltage: ['Line voltage', 'Tension réseau'],
+  output_voltage: ['Output voltage', 'Tension de sortie'],
+  dc_bus_voltage: ['DC bus voltage', 'Tension du bus continu'],
+  power: ['Power', 'Puissance'],
+  input_power: ['Input power', 'Puissance d’entrée'],
+  drive_load: ['Drive load', 'Charge du variateur'],
+  motor_load: ['Motor load', 'Charge du moteur'],
+  energy_counts: ['Energy counter', 'Compteur d’énergie'],
+  before_trip_values: ['Values from before the trip', 'Valeurs d’avant le défaut'],
+  motor_thermal: ['Motor thermal state', 'État thermique moteur'],
+  drive_thermal: ['Drive thermal state', 'État thermique variateur'],
+  running_time: ['Motor running time', 'Temps de marche moteur'],
+  powered_time: ['Powered time', 'Temps sous tension'],
+  energy: ['Energy', 'Énergie'],
+  inputs: ['Inputs', 'Entrées'],
+  outputs: ['Outputs', 'Sorties'],
+  identity: ['Identity', 'Identité'],
+  model: ['Model', 'Modèle'],
+  identity_codes: ['Codes', 'Codes'],
+  firmware: ['Firmware', 'Logiciel'],
+  checked: ['Check', 'Contrôle'],
+  watchdog: ['Communication watchdog', 'Surveillance de la communication'],
+  watchdog_time: ['Time', 'Temps'],
+  watchdog_reaction: ['Reaction', 'Réaction'],
+  counters: ['Counters', 'Compteurs'],
+  polls: ['Polls', 'Scrutations'],
+  answered: ['Answered', 'Avec réponse'],
+  missed: ['Missed', 'Manquées'],
+  failures: ['Failures', 'Échecs'],
+  times_lost: ['Times lost', 'Pertes de liaison'],
+  trips: ['Trips', 'Déclenchements'],
+  saves: ['EEPROM saves', 'Sauvegardes EEPROM'],
+  starts_by_itself: ['Starts by itself', 'Redémarre seul'],
+  commanders: ['Commanders', 'Donneurs d’ordres'],
+  anyone: ['anyone with the right', 'quiconque en a le droit'],
+  words: ['Words of the drive', 'Mots du variateur'],
+  register: ['Register', 'Registre'],
+  value: ['Value', 'Valeur'],
+  bits: ['Bits 15 … 0', 'Bits 15 … 0'],
+  parameters: ['Parameters', 'Paramètres'],
+  read_parameters: ['Read the parameters', 'Lire les paramètres'],
+  reading_parameters: ['Reading register by register, behind everything urgent…', 'Lecture registre par registre, après tout ce qui est urgent…'],
+  name: ['Name', 'Nom'],
+  access: ['Access', 'Accès'],
+  factory: ['Factory', 'Usine'],
+  differs: ['changed', 'modifié'],
+
+  // Faults.
+  fault: ['Fault', 'Défaut'],
+  fault_of: ['Tripped: {code} {mnemonic}', 'En défaut : {code} {mnemonic}'],
+  what_to_do: ['What to do', 'Que faire'],
+  by_watchdog: ['Its communication watchdog tripped it.', 'Déclenché par sa surveillance de la communication.'],
+  freeze_frame: ['Freeze-frame', 'Instantané du défaut'],
+  before_trip: ['Before the trip', 'Avant le défaut'],
+  at_trip: ['At the trip', 'Au défaut'],
+  now: ['Now', 'Maintenant'],
+  fault_history: ['Fault history kept by the drive', 'Historique des défauts du variateur'],
+  read_history: ['Read the history', 'Lire l’historique'],
+  history_empty: ['The drive keeps no fault.', 'Le variateur n’a mémorisé aucun défaut.'],
+  reset_not_now: ['Reset: only with a fault.', 'Acquittement : seulement en présence d’un défaut.'],
+
+  // Lines.
+  utilisation: ['Utilisation', 'Charge'],
+  worst_stop: ['Worst-case stop on the wire', 'Arrêt sur le fil, pire cas'],
+  cycle: ['Cycle', 'Cycle'],
+  exchanges: ['Exchanges', 'Échanges'],
+  errors: ['Errors', 'Erreurs'],
+  port: ['Port', 'Port'],
+  exchange_times: ['Exchange times and errors by drive', 'Temps d’échange et erreurs par variateur'],
+  usual: ['usual', 'usuel'],
+  longest: ['longest', 'maximal'],
+  of_hundred: ['99 of 100', '99 sur 100'],
+  next_probe: ['off-line, probed in {time}', 'hors ligne, sondé dans {time}'],
+  line_name: ['Line', 'Ligne'],
+  answer_times: ['Until the answer begins', 'Jusqu’au début de la réponse'],
+  only_probed: ['off-line, only probed ({count} probes)', 'hors ligne, sondé seulement ({count} sondages)'],
+  answers: ['answers', 'répond'],
+  no_answer_yet: ['no answer yet', 'pas encore de réponse'],
+  last_exchanges: ['Last exchanges', 'Derniers échanges'],
+  slave: ['Slave', 'Esclave'],
+  request: ['Request', 'Requête'],
+  answer: ['Answer', 'Réponse'],
+  result: ['Result', 'Résultat'],
+  took: ['Took', 'Durée'],
+  capture: ['Capture for Wireshark', 'Capture pour Wireshark'],
+  hold: ['Hold', 'Figer'],
+  unknown_line: ['There is no line of that name.', 'Aucune ligne de ce nom.'],
+
+  // Events.
+  events_since: ['Since this page was opened, newest first.', 'Depuis l’ouverture de cette page, les plus récents en tête.'],
+  no_events: ['Nothing has happened yet.', 'Rien ne s’est encore passé.'],
+  kind: ['Kind', 'Type'],
+  kind_all: ['Everything', 'Tout'],
+  kind_command: ['Commands', 'Commandes'],
+  kind_alarm: ['Alarms', 'Alarmes'],
+  who: ['Who, from where', 'Qui, d’où'],
+  what: ['What', 'Quoi'],
+  outcome: ['Outcome', 'Issue'],
+  csv: ['Save as CSV', 'Enregistrer en CSV'],
+
+  // Rights.
+  log_out: ['Log out', 'Se déconnecter'],
+  log_in: ['Log in', 'S’identifier'],
+  token: ['Token', 'Jeton'],
+  login_why: ['This needs a right that you do not have here. A token that has it is made by: drived token add NAME --role operate', 'Il faut un droit que vous n’avez pas ici. Un jeton qui le donne se crée par : drived token add NOM --role operate'],
+  login_wrong: ['No token is like that.', 'Ce jeton n’existe pas.'],
+  login_done: ['Logged in. Nothing was sent: press the command again.', 'Identifié. Rien n’a été envoyé : redonnez la commande.'],
+
+  // The demo.
+  demo: ['Demonstration with simulated drives', 'Démonstration avec des variateurs simulés'],
+  demo_trip: ['Trip a drive', 'Provoquer un défaut'],
+  demo_trip_this: ['Trip {drive}', 'Mettre {drive} en défaut'],
+  demo_pull: ['Pull the cable of {line}', 'Débrancher la ligne {line}'],
+  demo_plug: ['Plug the cable of {line} in', 'Rebrancher la ligne {line}'],
+};
+
+const LANGUAGES = ['en', 'fr'];
+const KEPT = 'drived.language';
+let column = LANGUAGES.indexOf(chosen());
+
+/** The language, as in `lang` attributes. */
+export function language() {
+  return LANGUAGES[column];
+}
+
+/** The text of this name, with `{names}` filled in. */
+export function t(name, values = {}) {
+  const text = TABLE[name]?.[column] ?? name;
+  return text.replace(/\{(\w+)\}/g, (whole, key) => values[key] ?? whole);
+}
+
+/** A name with its value, as "Group: all". */
+export function named(name, value) {
+  return t('named', { name, value });
+}
+
+/** Changes to the other language; what is shown must be written again. */
+export function switchLanguage() {
+  column = 1 - column;
+  try {
+    localStorage.setItem(KEPT, language());
+  } catch {
+    // A browser that keeps nothing asks again the next time.
+  }
+}
+
+/** Writes the texts of all elements that name one by `data-text` or `data-label`. */
+export function writeTexts(root = document) {
+  document.documentElement.lang = language();
+  for (const element of root.querySelectorAll('[data-text]')) element.textContent = t(element.dataset.text);
+  for (const element of root.querySelectorAll('[data-label]')) element.setAttribute('aria-label', t(element.dataset.label));
+}
+
+function chosen() {
+  let kept;
+  try {
+    kept = localStorage.getItem(KEPT);
+  } catch {
+    kept = null;
+  }
+  if (LANGUAGES.includes(kept)) return kept;
+  const asked = navigator.languages ?? [navigator.language ?? 'en'];
+  return asked.map(tag => tag.slice(0, 2)).find(tag => LANGUAGES.includes(tag)) ?? 'en';
+}

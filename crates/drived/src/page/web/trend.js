@@ -1,0 +1,182 @@
+// The trend of one drive: ten minutes of the daemon's own history, then what the events bring.
+
+import { path, read } from './api.js';
+import { el, setText, table } from './dom.js';
+import { clock, quantity } from './format.js';
+import { plant, quality } from './plant.js';
+import { language, t } from './texts.js';
+
+const KEPT_S = 600;
+const WINDOWS = { trend_minute: 60, trend_ten: KEPT_S };
+const TABLE_STEP_S = 5;
+const TABLE_ROWS = 24;
+const HEIGHTS = [190, 150];
+
+/** Where the API keeps each column, with unit and digits. */
+const COLUMNS = [
+  { key: 'frequency_hz', text: 'frequency', unit: 'Hz', digits: 1, colour: '--series-1' },
+  { key: 'setpoint_hz', text: 'setpoint', unit: 'Hz', digits: 1, colour: '--series-2', dash: [5, 4] },
+  { key: 'current_a', text: 'current', unit: 'A', digits: 1, colour: '--series-3' },
+  { key: 'torque_percent', text: 'torque', unit: '%', digits: 0, colour: '--series-4' },
+];
+
+/** Shows the trend of the drive `name` in `root`; gives `tick()`, `end()`. */
+export function trend(root, name) {
+  const values = [[], ...COLUMNS.map(() => [])];
+  let plots = [];
+  let seconds = KEPT_S;
+  let held;
+  let ended = false;
+  let stepMs = 500;
+
+  const pause = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => hold(held ? undefined : range()) }, t('trend_pause'));
+  const windows = Object.entries(WINDOWS).map(([text, length]) =>
+    el('button', { type: 'button', 'aria-pressed': String(length === seconds), onclick: event => choose(length, event.target) }, t(text)));
+  const canvas = el('div.plots');
+  const said = el('p.hint', {}, t('trend_hint'));
+  const rows = el('div.wide');
+  const asTable = el('details', { ontoggle: writeTable }, el('summary', {}, t('trend_table')), rows);
+  root.append(el('div.headline', {}, el('h2', {}, t('trend')), el('span.chips', {}, ...windows, pause)), canvas, said, asTable);
+  const dark = matchMedia('(prefers-color-scheme: dark)');
+  dark.addEventListener('change', draw);
+  const resized = new ResizeObserver(() => plots.forEach((plot, index) =>
+    plot.setSize({ width: canvas.clientWidth, height: HEIGHTS[index] })));
+  resized.observe(canvas);
+  begin();
+  const sampling = setInterval(sample, stepMs);
+
+  return {
+    end() {
+      ended = true;
+      clearInterval(sampling);
+      resized.disconnect();
+      dark.removeEventListener('change', draw);
+      plots.forEach(plot => plot.destroy());
+    },
+    tick: () => asTable.open && !held && writeTable(),
+  };
+
+  async function begin() {
+    try {
+      const [history] = await Promise.all([read(path('drives', name, 'history')), loadPlotter()]);
+      if (ended) return;
+      stepMs = history.step_ms ?? stepMs;
+      const since = values[0].length;
+      values[0].unshift(...history.time_unix_ms.map(ms => ms / 1000));
+      COLUMNS.forEach(({ key }, index) => values[index + 1].unshift(...(history[key] ?? history.time_unix_ms.map(() => null))));
+      // What was sampled while the history came is in it already.
+      for (const column of values) column.splice(history.time_unix_ms.length, since);
+      draw();
+    } catch (problem) {
+      setText(said, t('trend_missing', { why: problem.message }));
+    }
+  }
+
+  function sample() {
+    if (!plots.length) return;
+    const drive = plant.drives.get(name);
+    const fresh = quality(drive?.status) === 'good';
+    const torque = quality(drive?.measurements) === 'good' ? drive.measurements.torque_percent : null;
+    const now = [fresh ? drive.status.output_frequency_hz : null, drive?.setpoint?.frequency_hz, fresh ? drive.status.current_a : null, torque];
+    values[0].push(Date.now() / 1000);
+    now.forEach((value, index) => values[index + 1].push(value ?? null));
+    while (values[0][0] < Date.now() / 1000 - KEPT_S) for (const column of values) column.shift();
+    plots.forEach((plot, index) => plot.setData(columnsOf(index), false));
+    follow();
+  }
+
+  function columnsOf(index) {
+    return index === 0 ? [values[0], values[1], values[2]] : [values[0], values[3], values[4]];
+  }
+
+  function follow() {
+    const { min, max } = held ?? range();
+    for (const plot of plots) plot.setScale('x', { min, max });
+  }
+
+  function range() {
+    const max = Date.now() / 1000;
+    return { min: max - seconds, max };
+  }
+
+  function hold(what) {
+    held = what;
+    pause.setAttribute('aria-pressed', String(Boolean(held)));
+    setText(pause, t(held ? 'trend_live' : 'trend_pause'));
+    follow();
+  }
+
+  function choose(length, button) {
+    seconds = length;
+    for (const one of windows) one.setAttribute('aria-pressed', String(one === button));
+    hold(undefined);
+  }
+
+  function draw() {
+    plots.forEach(plot => plot.destroy());
+    const width = canvas.clientWidth;
+    const together = { cursor: { sync: { key: `trend ${name}` }, drag: { x: true, y: false } },
+      hooks: { setSelect: [plot => plot.select.width > 0 && hold({ min: plot.posToVal(plot.select.left, 'x'), max: plot.posToVal(plot.select.left + plot.select.width, 'x') })] } };
+    plots = [
+      new window.uPlot({ width, height: HEIGHTS[0], padding: [null, 52, null, null], ...together, series: [timeSeries(), series(0), series(1)], axes: [timeAxis(), axis('Hz')],
+        scales: { Hz: { range: upTo(10) } } }, columnsOf(0), canvas),
+      new window.uPlot({ width, height: HEIGHTS[1], ...together, series: [timeSeries(), series(2), series(3)], axes: [timeAxis(), axis('A'), axis('%', 1)],
+        scales: { A: { range: upTo(1) }, '%': { range: upTo(100) } } }, columnsOf(1), canvas),
+    ];
+    follow();
+  }
+
+  function writeTable() {
+    if (!asTable.open) return;
+    const picked = [];
+    for (let at = values[0].length - 1; at >= 0 && picked.length < TABLE_ROWS; at -= Math.round(TABLE_STEP_S * 1000 / stepMs)) picked.push(at);
+    rows.replaceChildren(table('', [t('time'), ...COLUMNS.map(({ text }) => [t(text), 'right'])], picked.map(at =>
+      el('tr', {}, el('td', {}, clock(values[0][at] * 1000)), ...COLUMNS.map(({ unit, digits }, index) =>
+        el('td.right', {}, quantity(values[index + 1][at], digits, unit)))))));
+  }
+}
+
+let plotter;
+
+/** Loads the chart's code when the first trend is looked at. */
+function loadPlotter() {
+  plotter ??= new Promise((loaded, failed) => {
+    document.head.append(el('link', { rel: 'stylesheet', href: 'vendor/uplot.css' }),
+      el('script', { src: 'vendor/uplot.js', onload: loaded, onerror: () => failed(new Error('uplot.js')) }));
+  });
+  return plotter;
+}
+
+function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+function font() {
+  return `12px ${getComputedStyle(document.documentElement).fontFamily}`;
+}
+
+function timeSeries() {
+  return { label: t('time'), value: (_, seconds) => (seconds ? clock(seconds * 1000) : '—') };
+}
+
+function series(index) {
+  const { text, unit, digits, colour: name, dash } = COLUMNS[index];
+  return { label: t(text), scale: unit, stroke: colour(name), width: 1.6, dash, spanGaps: false, points: { show: false },
+    value: (_, value) => quantity(value, digits, unit) };
+}
+
+function axis(scale, side = 3) {
+  return { scale, side, size: 52, font: font(), stroke: colour('--ink-soft'), grid: { show: side === 3, stroke: colour('--edge'), width: 1 },
+    ticks: { stroke: colour('--edge') }, values: (_, ticks) => ticks.map(value => quantity(value, Number.isInteger(value) ? 0 : 1, scale)) };
+}
+
+function timeAxis() {
+  const format = new Intl.DateTimeFormat(language(), { hour: '2-digit', minute: '2-digit', second: '2-digit', hourCycle: 'h23' });
+  return { font: font(), stroke: colour('--ink-soft'), grid: { stroke: colour('--edge'), width: 1 }, ticks: { stroke: colour('--edge') }, space: 80,
+    values: (_, ticks) => ticks.map(seconds => format.format(new Date(seconds * 1000))) };
+}
+
+/** From zero to the largest value, at least `least`, so that noise is not shown as a movement. */
+function upTo(least) {
+  return (_, min, max) => [Math.min(0, min ?? 0), Math.max(least, (max ?? 0) * 1.1)];
+}

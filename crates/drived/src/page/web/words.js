@@ -1,0 +1,146 @@
+// The API's words (states, outcomes, kinds of stop, checks …) in plain words of both languages.
+
+import { quantity } from './format.js';
+import { language, t } from './texts.js';
+
+const WORDS = {
+  // States of a drive.
+  not_ready: ['Not ready', 'Non prêt'],
+  disabled: ['Locked', 'Variateur verrouillé'],
+  ready: ['Ready', 'Prêt'],
+  running: ['Running', 'En marche'],
+  stopping: ['Stopping', 'Décélération'],
+  quick_stop: ['Quick stop', 'Arrêt rapide'],
+  fault_reaction: ['Tripping', 'Réaction au défaut'],
+  fault: ['Tripped', 'En défaut'],
+  unknown: ['Unknown state', 'État inconnu'],
+  // Links.
+  connecting: ['Connecting', 'Connexion'],
+  connected: ['Connected', 'Raccordé'],
+  lost: ['Lost', 'Liaison perdue'],
+  missing: ['Not known', 'Inconnu'],
+  // Directions and control.
+  forward: ['forward', 'avant'],
+  reverse: ['reverse', 'arrière'],
+  bus: ['bus', 'bus'],
+  terminals: ['terminals', 'bornier'],
+  panel: ['panel', 'terminal'],
+  local: ['local', 'local'],
+  other_bus: ['other bus', 'autre bus'],
+  // Outcomes of a command.
+  pending: ['pending', 'en attente'],
+  confirmed: ['confirmed', 'confirmé'],
+  not_confirmed: ['NOT confirmed', 'NON confirmé'],
+  outcome_unknown: ['outcome unknown', 'issue inconnue'],
+  refused: ['refused', 'refusé'],
+  expired: ['expired', 'expiré'],
+  superseded: ['superseded by a later command', 'remplacé par un ordre ultérieur'],
+  // Actions.
+  start: ['Start', 'Démarrage'],
+  stop: ['Stop', 'Arrêt'],
+  setpoint: ['Setpoint', 'Consigne'],
+  reset: ['Reset', 'Acquittement'],
+  release: ['Release', 'Restitution de la commande'],
+  parameter: ['Parameter', 'Paramètre'],
+  // Kinds of stop.
+  ramp: ['along the ramp', 'sur rampe'],
+  fast: ['fast', 'rapide'],
+  freewheel: ['freewheel', 'roue libre'],
+  dc_injection: ['DC injection', 'injection de courant continu'],
+  trip: ['trip', 'mise en défaut'],
+  // Checks of identity and watchdog.
+  same: ['as it was', 'inchangée'],
+  unchecked: ['not checked yet', 'pas encore contrôlée'],
+  cannot_say: ['the drive does not tell', 'le variateur ne la donne pas'],
+  changed: ['CHANGED', 'CHANGÉE'],
+  no_contract: ['left as it is found', 'laissée telle quelle'],
+  waits_for_standstill: ['waits for standstill', 'attend l’arrêt du moteur'],
+  verified: ['armed and verified', 'armée et vérifiée'],
+  broken: ['NOT as the contract says', 'NON conforme au contrat'],
+  // Errors on a line.
+  no_answer: ['no answer', 'sans réponse'],
+  damaged: ['damaged', 'altérée'],
+  late: ['late', 'en retard'],
+  mismatched: ['not fitting', 'discordante'],
+  foreign: ['foreign', 'étrangère'],
+  exception: ['exception', 'exception'],
+  echo: ['own echo', 'écho propre'],
+  ok: ['ok', 'ok'],
+  // Access of a parameter.
+  read_only: ['read', 'lecture'],
+  read_write: ['read, write', 'lecture, écriture'],
+  // Kinds of events.
+  tripped: ['Tripped', 'Défaut'],
+  trip_explained: ['Trip explained', 'Défaut expliqué'],
+  fault_cleared: ['Fault cleared', 'Défaut effacé'],
+  state_changed: ['State', 'État'],
+  warning: ['Alarm of the drive', 'Alarme du variateur'],
+  limit: ['Limit', 'Limite'],
+  control_taken: ['Control taken', 'Commande prise'],
+  control_returned: ['Control returned', 'Commande rendue'],
+  run_command_stands: ['Run command stands', 'Ordre de marche présent'],
+  restarts_itself: ['Restarts itself', 'Redémarre seul'],
+  identified: ['Identified', 'Identifié'],
+  identity_changed: ['Identity changed', 'Identité changée'],
+  watchdog_verified: ['Watchdog verified', 'Surveillance vérifiée'],
+  watchdog_broken: ['Watchdog broken', 'Surveillance non conforme'],
+  stop_mode_replaced: ['Stop mode replaced', 'Type d’arrêt remplacé'],
+  stop_took_command: ['Stop took command', 'Arrêt : commande prise'],
+  stop_unconfirmed: ['STOP NOT CONFIRMED', 'ARRÊT NON CONFIRMÉ'],
+  stop_confirmed: ['Stop confirmed', 'Arrêt confirmé'],
+  command: ['Command', 'Commande'],
+  exit: ['Exit', 'Fin du service'],
+};
+
+const COMMANDS = [
+  [/^start (forward|reverse)(?: at (.+))?$/, (direction, at) =>
+    `démarrage ${direction === 'forward' ? 'en avant' : 'en arrière'}${at ? ` à ${number(at)}` : ''}`],
+  [/^setpoint (.+)$/, value => `consigne ${number(value)}`],
+  [/^(?:stop|stop along the ramp|ramp stop)$/, () => 'arrêt sur rampe'],
+  [/^fast stop$/, () => 'arrêt rapide'],
+  [/^freewheel stop$/, () => 'arrêt roue libre'],
+  [/^DC injection stop$/i, () => 'arrêt par injection de courant continu'],
+  [/^fault reset$/, () => 'acquittement du défaut'],
+  [/^release$/, () => 'restitution de la commande'],
+];
+
+/** The plain word for a word of the API; words that are not in the table stand for themselves. */
+export function word(name) {
+  if (name === undefined || name === null) return '';
+  const key = String(name).replaceAll(' ', '_');
+  return WORDS[key]?.[language() === 'fr' ? 1 : 0] ?? String(name).replaceAll('_', ' ');
+}
+
+/** The plain word for an outcome. */
+export function outcome(name) {
+  return word(name === 'unknown' ? 'outcome_unknown' : name);
+}
+
+/** What a command asked for. */
+export function command(given) {
+  const said = given.command ?? given.action ?? '';
+  if (language() !== 'fr') return said;
+  for (const [pattern, french] of COMMANDS) {
+    const found = said.match(pattern);
+    if (found) return french(...found.slice(1));
+  }
+  return said;
+}
+
+/** The state of a drive as its row says it first: a lost drive is lost, whatever it showed last. */
+export function stateWord(drive) {
+  if (drive.link === 'lost') return word('lost');
+  if (drive.link === 'connecting' || !drive.status?.state) return word(drive.link === 'connecting' ? 'connecting' : 'missing');
+  return word(drive.status.state);
+}
+
+/** A setpoint of the API. */
+export function setpointText(setpoint) {
+  if (typeof setpoint?.frequency_hz === 'number') return quantity(setpoint.frequency_hz, 1, 'Hz');
+  if (typeof setpoint?.speed_rpm === 'number') return quantity(setpoint.speed_rpm, 0, t('rpm'));
+  return quantity(undefined);
+}
+
+function number(text) {
+  return text.replace(/(\d)\.(\d)/, '$1,$2').replace(/ ?rpm/, ' tr/min');
+}
