@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        check, demo, families, faults, param, plan, poll, release, reset, scan, setpoint, sim, start, status,
-        stop,
+        audit, check, demo, families, faults, param, plan, poll, release, reset, scan, setpoint, sim, start,
+        status, stop, token,
     },
     failure::Failure,
     output, run,
@@ -21,7 +21,7 @@ Before wiring:      families, plan
 One drive, read:    status, faults, param get, param dump
 One drive, write:   setpoint, start, stop, reset, release, param set, param save
 One line, read:     scan, poll
-The plant's drives: check, plan, run, each with --config FILE
+The plant's drives: check, plan, run, token, audit, each with --config FILE
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
 tcp://HOST:PORT. Speed and format are the drives' factory setting when they are not given; PROTOCOL is rtu, ascii or \
@@ -56,6 +56,10 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Param(param::Command),
     Families(families::Args),
+    #[command(subcommand)]
+    Token(token::Command),
+    #[command(subcommand)]
+    Audit(audit::Command),
 }
 
 impl Command {
@@ -88,6 +92,8 @@ impl Command {
             Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
+            Self::Token(command) => token::run(command),
+            Self::Audit(command) => audit::run(command),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The subcommands, one module each.
 
+pub(crate) mod audit;
 pub(crate) mod check;
 pub(crate) mod demo;
 pub(crate) mod families;
@@ -15,3 +16,4 @@ pub(crate) mod sim;
 pub(crate) mod start;
 pub(crate) mod status;
 pub(crate) mod stop;
+pub(crate) mod token;

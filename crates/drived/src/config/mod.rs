@@ -3,8 +3,8 @@
 //! Read in two steps: the keys one by one ([`raw`], [`values`]), then seen together, against the families and against the
 //! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
 
+mod doors;
 mod groups;
-mod http;
 mod place;
 mod raw;
 mod values;
@@ -19,13 +19,17 @@ use drive_fleet::{
     OnLoss, Periods, WatchdogContract, check_settings, plan,
 };
 
-pub(crate) use self::{groups::Group, place::ConfigError};
+pub(crate) use self::{
+    doors::{DoorsConfig, Http, HttpConfig, SocketConfig, TlsFiles},
+    groups::Group,
+    place::ConfigError,
+};
 use self::{
     place::Source,
     raw::{DriveEntry, File, LineEntry},
     values::Exit,
 };
-use crate::{doors::Http, drive_spec::DriveName, failure::Failure, line_spec};
+use crate::{drive_spec::DriveName, failure::Failure, line_spec};
 
 /// How often snapshots are printed unless the file says otherwise.
 const SNAPSHOTS: Duration = Duration::from_secs(5);
@@ -49,10 +53,10 @@ pub(crate) struct Config {
     pub(crate) snapshots: Duration,
     /// How long the exit may take.
     pub(crate) shutdown: Duration,
+    /// Who may come in, and by which door.
+    pub(crate) doors: DoorsConfig,
     pub(crate) lines: Vec<LinePart>,
     pub(crate) groups: Vec<Group>,
-    /// Where the page and the API are served.
-    pub(crate) http: Http,
 }
 
 /// A line and its drives.
@@ -124,12 +128,14 @@ impl Config {
         let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups::groups(source, &raw.groups, names)?;
+        let (tokens, audit) = (raw.tokens.as_deref(), raw.audit.as_deref());
+        let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
         Ok(Self {
+            doors,
             snapshots: raw.snapshots.map_or(SNAPSHOTS, |time| time.0.0),
             shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
             lines,
             groups,
-            http: raw.http.and_then(|http| http.listen).map_or_else(Http::default, |http| http.0),
         })
     }
 

@@ -1,13 +1,13 @@
 //! The file as it is written: every key, before the keys are seen together.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
+    doors::{HttpEntry, SocketEntry},
     groups::Entries,
-    http::HttpEntry,
     values::{
         BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue,
         Parsed, PercentValue, ReactionValue, TakenPolicy,
@@ -23,6 +23,11 @@ pub(super) struct File {
     pub(super) snapshots: Option<Parsed<Time>>,
     /// How long the exit may take.
     pub(super) shutdown: Option<Parsed<Time>>,
+    pub(super) socket: Option<SocketEntry>,
+    /// The file of the tokens.
+    pub(super) tokens: Option<PathBuf>,
+    /// The file of the audit log.
+    pub(super) audit: Option<PathBuf>,
     /// What holds for every drive that does not say otherwise.
     pub(super) defaults: Option<DriveEntry>,
     #[serde(default)]

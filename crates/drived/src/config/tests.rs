@@ -296,3 +296,35 @@ fn a_group_names_drives_of_the_file_in_its_own_order() {
         assert!(error.contains(reason), "{error}");
     }
 }
+
+#[test]
+fn others_than_this_machine_are_let_in_by_tokens_and_by_encryption_alone() {
+    let rest = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";
+    let read = |head: &str| Config::read(Path::new("drives.toml"), &format!("{head}\n{rest}"));
+    for (head, problem) in [
+        (
+            "[http]\nlisten = \"0.0.0.0:7580\"",
+            "drives.toml:2: listen: 0.0.0.0:7580: others than this machine can reach it",
+        ),
+        ("tokens = \"tokens\"\n[http]\nlisten = \"0.0.0.0:7580\"", "tokens would cross the network in clear"),
+        ("[http]\nlisten = \"[::]:7580\"\nplain = true", "expected tokens = \"FILE\""),
+        ("[http]\nlisten = \"everywhere\"", "expected ADDRESS:PORT"),
+        ("[http]\nwithout_login = \"operate\"", "expected nothing, view or stop"),
+        ("[http]\nallowed_hosts = [\"drives.example:443\"]", "without a port"),
+        ("[http]\nallowed_hosts = [\"https://drives.example\"]", "expected a name"),
+        ("[http]\npassword = \"0000\"", "unknown field"),
+        ("[socket]\nmode = \"999\"", "expected permissions such as 0660"),
+    ] {
+        let error = read(head).unwrap_err().to_string();
+        assert!(error.contains(problem), "{head}: {error}");
+    }
+    for head in [
+        "tokens = \"tokens\"\n[http]\nlisten = \"0.0.0.0:7580\"\nplain = true",
+        "tokens = \"tokens\"\n[http]\nlisten = \"0.0.0.0:7580\"\ntls = { certificate = \"c\", key = \"k\" }",
+        "[http]\nlisten = \"off\"",
+        "[http]\nlisten = \"[::1]:7580\"\nallowed_hosts = [\"drives.example\", \"[fd00::1]\"]\nwithout_login = \"nothing\"",
+        "audit = \"audit\"\n[socket]\npath = \"drived.sock\"\nmode = \"0600\"",
+    ] {
+        read(head).unwrap();
+    }
+}

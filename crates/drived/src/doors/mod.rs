@@ -1,83 +1,311 @@
-//! Who comes in, and by which door.
+//! The doors by which everybody comes in: the control socket and the HTTP server. Both lead through the same checks
+//! ([`gate`]) to the same router; whoever has come through them stands as a [`Caller`] in the request's extensions.
+//!
+//! Neither holds up a line: what is slow, idle or hostile is bounded, and what does not fit is turned away.
 
+pub(crate) mod audit;
+mod connection;
+mod crowd;
+mod failures;
+mod gate;
+mod host;
+mod kept;
+mod patient;
+mod refusal;
 mod rights;
+mod sessions;
+#[cfg(unix)]
+mod socket;
+mod tls;
+pub(crate) mod tokens;
 
-use std::{fmt, net::SocketAddr, str::FromStr};
+use std::{fs, io, net::SocketAddr, path::Path, sync::Arc, time::Duration};
 
-use axum::{Extension, Router};
-use tokio::{net::TcpListener, task::JoinHandle};
+use axum::Router;
+use tokio::{
+    net::{TcpListener, TcpStream},
+    sync::{mpsc, watch},
+    time::{Instant, sleep, timeout},
+};
 
-pub(crate) use self::rights::Rights;
+pub(crate) use self::rights::{Caller, Rights, Role};
+#[cfg(unix)]
+use self::socket::Unbound;
+#[cfg(unix)]
+pub(crate) use self::socket::default_path;
+use self::{
+    audit::{Audit, Kind, Record},
+    connection::DRAINED_WITHIN,
+    crowd::{Crowd, Place},
+    gate::{Door, Gate, Peer},
+    host::Hosts,
+    tls::Tls,
+    tokens::Tokens,
+};
+use crate::{
+    config::{DoorsConfig, HttpConfig, SocketConfig},
+    failure::Failure,
+};
 
-/// Who asks.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Caller {
-    /// The name of his token, `local` on the socket, or `anonymous`.
-    pub(crate) name: String,
-    /// Where he comes from, such as `page 127.0.0.1`.
-    pub(crate) origin: String,
-    pub(crate) rights: Rights,
+/// From one try to open a door or to accept a connection to the next, when the system has no room for it.
+const TRIED_AGAIN: Duration = Duration::from_secs(1);
+
+/// The open doors.
+pub(crate) struct Doors {
+    ended: watch::Sender<bool>,
+    /// Closed when the last connection has gone.
+    gone: mpsc::Receiver<()>,
+    audit: Audit,
 }
 
-/// Where the page and the API are served.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Http {
-    At(SocketAddr),
-    Off,
+/// Doors that only have to be opened: what they need has been found.
+pub(crate) struct Prepared {
+    tokens: Option<Tokens>,
+    audit: Audit,
+    #[cfg(unix)]
+    socket: Option<Entrance>,
+    http: Option<(HttpConfig, Option<Tls>)>,
 }
 
-impl Default for Http {
-    /// 127.0.0.1:7580.
-    fn default() -> Self {
-        Self::At(SocketAddr::from(([127, 0, 0, 1], 7580)))
-    }
+/// What every door and connection has.
+#[derive(Clone)]
+struct Shared {
+    gate: Arc<Gate>,
+    end: watch::Receiver<bool>,
+    /// Held as long as there is somebody to wait for at the end.
+    _here: mpsc::Sender<()>,
 }
-
-impl fmt::Display for Http {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::At(address) => address.fmt(f),
-            Self::Off => f.write_str("off"),
-        }
-    }
-}
-
-impl FromStr for Http {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "off" => Ok(Self::Off),
-            _ => text.parse().map(Self::At).map_err(|_| "expected an address such as 127.0.0.1:7580, or off"),
-        }
-    }
-}
-
-/// An open door.
-pub(crate) struct Doors(Option<JoinHandle<()>>);
 
 impl Doors {
-    /// Serves a router to whoever comes; what cannot be opened is told and left.
-    pub(crate) async fn open(http: Http, rights: Rights, router: Router) -> Self {
-        let Http::At(address) = http else { return Self(None) };
-        let listener = match TcpListener::bind(address).await {
-            Ok(listener) => listener,
-            Err(error) => {
-                tracing::warn!("the page cannot be served at {address}: {error}");
-                return Self(None);
+    /// Finds what the doors of a configuration need. Nobody is let in before they are [opened](Prepared::open).
+    ///
+    /// # Errors
+    ///
+    /// A certificate, the tokens or the audit log cannot be read or written, or the control socket is somebody else's.
+    pub(crate) fn prepare(config: DoorsConfig) -> Result<Prepared, Failure> {
+        let tokens = config.tokens.as_deref().map(Tokens::open).transpose();
+        let tokens = tokens.map_err(|error| Failure::Input(error.to_string()))?;
+        let http = config.http.map(|http| {
+            let tls = http.tls.as_ref().map(Tls::open).transpose().map_err(Failure::Input)?;
+            Ok((http, tls))
+        });
+        let http = http.transpose()?;
+        let audit = config.audit.as_deref().map(Audit::open).transpose().map_err(Failure::Input)?;
+        #[cfg(unix)]
+        let socket = config.socket.as_ref().map(Entrance::of_socket).transpose()?.flatten();
+        Ok(Prepared {
+            tokens,
+            audit: audit.unwrap_or_default(),
+            #[cfg(unix)]
+            socket,
+            http,
+        })
+    }
+}
+
+impl Prepared {
+    /// Opens the doors before a router. An address of the HTTP server that is taken, or not there yet, is tried again and
+    /// again, and told once.
+    pub(crate) fn open(self, router: Router) -> Doors {
+        let (ended, end) = watch::channel(false);
+        let (here, gone) = mpsc::channel(1);
+        let Self { tokens, audit, .. } = self;
+        let (sessions, failures) = Default::default();
+        let gate = Gate { router, tokens, audit: audit.clone(), sessions, failures, end: end.clone() };
+        let shared = Shared { gate: Arc::new(gate), end, _here: here };
+        audit.record(Record::new(Kind::Daemon, &this_program(), "the daemon serves")).whenever();
+        #[cfg(unix)]
+        if let Some(entrance) = self.socket {
+            tokio::spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
+        }
+        if let Some((http, tls)) = self.http {
+            tokio::spawn(until_the_end(shared.clone(), serve_http(http, tls, shared)));
+        }
+        Doors { ended, gone, audit }
+    }
+}
+
+impl Doors {
+    /// Lets nobody in any more, ends the event streams, and waits a little for answers that are under way.
+    pub(crate) async fn close(mut self) {
+        self.audit.record(Record::new(Kind::Daemon, &this_program(), "the daemon ends")).whenever();
+        self.ended.send_replace(true);
+        let _ = timeout(DRAINED_WITHIN, self.gone.recv()).await;
+    }
+}
+
+/// The daemon itself, in the audit log.
+fn this_program() -> Caller {
+    let origin = format!("process {}", std::process::id());
+    Caller { name: "drived".to_owned(), origin, rights: Rights::ALL }
+}
+
+async fn until_the_end(shared: Shared, serve: impl Future<Output = ()>) {
+    let mut end = shared.end;
+    tokio::select! {
+        () = serve => {}
+        _ = end.wait_for(|ended| *ended) => {}
+    }
+}
+
+async fn serve_http(config: HttpConfig, tls: Option<Tls>, shared: Shared) {
+    let listener = listen(config.listen).await;
+    let scheme = if tls.is_some() { "https" } else { "http" };
+    let address = listener.local_addr().unwrap_or(config.listen);
+    tracing::info!("the page is at {scheme}://{address}/");
+    let door = Door {
+        hosts: Hosts::new(Some(address), &config.allowed_hosts),
+        freely: config.freely(false),
+        through_a_proxy: config.freely(true),
+        encrypted: tls.is_some(),
+    };
+    let listener = Listener::Tcp(listener, tls);
+    let entrance =
+        Entrance { name: "the HTTP server", listener, door: Arc::new(door), crowd: Crowd::new(true) };
+    entrance.serve_all(shared).await;
+}
+
+/// Listens on an address as soon as it can be had.
+async fn listen(address: SocketAddr) -> TcpListener {
+    let mut told = false;
+    loop {
+        match TcpListener::bind(address).await {
+            Ok(listener) => return listener,
+            Err(error) if !told => {
+                told = true;
+                tracing::error!("nobody can be served at {address}: {error}: it is tried again and again");
             }
+            Err(_) => {}
+        }
+        sleep(TRIED_AGAIN).await;
+    }
+}
+
+/// A door and who stands in it.
+struct Entrance {
+    name: &'static str,
+    listener: Listener,
+    door: Arc<Door>,
+    crowd: Crowd,
+}
+
+enum Listener {
+    Tcp(TcpListener, Option<Tls>),
+    #[cfg(unix)]
+    Unix(socket::Socket),
+}
+
+enum Stream {
+    Tcp(TcpStream, Option<Tls>),
+    #[cfg(unix)]
+    Unix(tokio::net::UnixStream),
+}
+
+impl Entrance {
+    /// Where nobody has said where the socket is to be, and there is no place for it, the daemon goes on without.
+    #[cfg(unix)]
+    fn of_socket(config: &SocketConfig) -> Result<Option<Self>, Failure> {
+        let path = config.path.clone().unwrap_or_else(default_path);
+        let socket = match socket::Socket::bind(&path, config.mode) {
+            Ok(socket) => socket,
+            Err(error @ Unbound::System { .. }) if config.path.is_none() => {
+                tracing::error!("{error}: name a place by --socket");
+                return Ok(None);
+            }
+            Err(error) => return Err(Failure::Input(error.to_string())),
         };
-        let caller = Caller { name: "anonymous".to_owned(), origin: "page".to_owned(), rights };
-        let router = router.layer(Extension(caller));
-        Self(Some(tokio::spawn(async move {
-            let _ = axum::serve(listener, router).await;
-        })))
+        let hosts = Hosts::new(None, &[]);
+        let door = Door { hosts, freely: Rights::ALL, through_a_proxy: Rights::ALL, encrypted: false };
+        let (listener, crowd) = (Listener::Unix(socket), Crowd::new(false));
+        Ok(Some(Self { name: "the control socket", listener, door: Arc::new(door), crowd }))
     }
 
-    /// Lets nobody in any more.
-    pub(crate) fn close(self) {
-        if let Self(Some(door)) = self {
-            door.abort();
+    /// Accepts connections for ever, and serves each on a task of its own. When the system has no room for one more, such
+    /// as no file descriptor, it is tried again a little later.
+    async fn serve_all(self, shared: Shared) {
+        let (mut failed, mut refused) = (0_u64, 0_u64);
+        loop {
+            let (stream, peer) = match self.listener.accept().await {
+                Ok(accepted) => accepted,
+                Err(error) => {
+                    failed += 1;
+                    if failed.is_power_of_two() {
+                        tracing::warn!("{} cannot accept a connection, {failed} in all: {error}", self.name);
+                    }
+                    sleep(TRIED_AGAIN).await;
+                    continue;
+                }
+            };
+            match self.crowd.enter(peer.address(), Instant::now()) {
+                Some(place) => {
+                    tokio::spawn(serve(shared.clone(), Arc::clone(&self.door), stream, peer, place));
+                }
+                None => {
+                    refused += 1;
+                    if refused.is_power_of_two() {
+                        tracing::warn!("{} is full: {refused} connections were turned away", self.name);
+                    }
+                }
+            }
         }
     }
 }
+
+impl Listener {
+    async fn accept(&self) -> io::Result<(Stream, Peer)> {
+        match self {
+            Self::Tcp(listener, tls) => {
+                let (stream, address) = listener.accept().await?;
+                // An answer is written at once: there is nothing to be gathered.
+                let _ = stream.set_nodelay(true);
+                Ok((Stream::Tcp(stream, tls.clone()), Peer::Address(address.ip().to_canonical())))
+            }
+            #[cfg(unix)]
+            Self::Unix(socket) => {
+                let (stream, _) = socket.listener.accept().await?;
+                let user = stream.peer_cred().ok().map(|user| user.uid());
+                Ok((Stream::Unix(stream), Peer::User(user)))
+            }
+        }
+    }
+}
+
+async fn serve(shared: Shared, door: Arc<Door>, stream: Stream, peer: Peer, place: Place) {
+    let Shared { gate, end, _here } = shared;
+    let answer = |request, asking| {
+        let (gate, door) = (Arc::clone(&gate), Arc::clone(&door));
+        async move { gate.answer(&door, peer, request, asking).await }
+    };
+    match stream {
+        Stream::Tcp(stream, None) => connection::serve(stream, place, end, answer).await,
+        Stream::Tcp(stream, Some(tls)) => {
+            if let Some(stream) = tls.accept(stream).await {
+                connection::serve(stream, place, end, answer).await;
+            }
+        }
+        #[cfg(unix)]
+        Stream::Unix(stream) => connection::serve(stream, place, end, answer).await,
+    }
+}
+
+/// Opens a file that nobody else reads; where there is none it is made. What root makes belongs to whoever has its folder,
+/// so that the daemon's own user can use what was made for him.
+fn private_file(path: &Path, options: &mut fs::OpenOptions) -> io::Result<fs::File> {
+    let is_new = !path.exists();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(options, 0o600);
+    let file = options.create(true).open(path)?;
+    #[cfg(unix)]
+    if is_new
+        && let Some(folder) = path.parent()
+        && let Ok(known) = fs::metadata(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
+    {
+        use std::os::unix::fs::{MetadataExt as _, fchown};
+        // Nobody but root may, and nobody but root has to.
+        let _ = fchown(&file, Some(known.uid()), Some(known.gid()));
+    }
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests;

@@ -11,8 +11,8 @@ use drive_fleet::{Fleet, FleetBuilder};
 use self::report::{Form, Report};
 use crate::{
     api,
-    config::{Config, DrivePart},
-    doors::{Doors, Http, Rights},
+    config::{Config, DrivePart, Http},
+    doors::Doors,
     failure::Failure,
     one_drive::open_line,
     page,
@@ -34,6 +34,9 @@ pub(crate) struct Args {
     /// Where the page and the API are served: an address and a port, or off; by default as the configuration says
     #[arg(long, value_name = "ADDRESS")]
     http: Option<Http>,
+    /// Where the control socket is, for the commands without a line
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
     /// Print JSON objects on a terminal too
     #[arg(long)]
     json: bool,
@@ -41,6 +44,8 @@ pub(crate) struct Args {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
+    // What is wrong with the doors is told before a drive is spoken to.
+    let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
     let mut ending = Ending::listen()?;
     let lines = open_lines(&config).await?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
@@ -48,9 +53,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
-    let rights = Rights { view: true, stop: true, ..Rights::default() };
-    let doors =
-        Doors::open(args.http.unwrap_or(config.http), rights, api::router(plant).merge(page::router())).await;
+    let doors = doors.open(api::router(plant).merge(page::router()));
     let result = tokio::select! {
         () = ending.asked() => Ok(()),
         result = report.ended() => {
@@ -60,7 +63,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             result
         }
     };
-    doors.close();
+    // No motor waits for a reader of the page.
+    let closed = tokio::spawn(doors.close());
     let in_order = tokio::select! {
         // Each drive's event tells what was done.
         _ = fleet.shutdown(config.shutdown) => true,
@@ -72,6 +76,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     if result.is_ok() && in_order {
         report.finish().await;
     }
+    let _ = closed.await;
     for line in lines {
         line.close().await;
     }

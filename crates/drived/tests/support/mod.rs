@@ -7,13 +7,22 @@ use std::{
     io::{BufRead, BufReader, Write},
     path::PathBuf,
     process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio},
+    sync::atomic::{AtomicU32, Ordering},
 };
 
 /// The program with arguments, not yet started.
 pub(crate) fn drived(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drived"));
     command.args(arguments).env_remove("DRIVED_LOG").env("RUST_BACKTRACE", "1");
+    // Its daemon's socket is its own, where the test names none.
+    command.env_remove("RUNTIME_DIRECTORY").env("XDG_RUNTIME_DIR", runtime_folder());
     command
+}
+
+/// A folder that is not there yet, another one each time.
+fn runtime_folder() -> PathBuf {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    path(&format!("runtime-{}", NEXT.fetch_add(1, Ordering::Relaxed)))
 }
 
 /// What a run of the program left behind.
@@ -86,11 +95,15 @@ pub(crate) struct Running {
     child: Child,
     input: Option<ChildStdin>,
     lines: Option<BufReader<ChildStdout>>,
+    runtime: Option<PathBuf>,
 }
 
 impl Running {
     pub(crate) fn start(arguments: &[&str]) -> Self {
-        let mut child = drived(arguments)
+        let mut command = drived(arguments);
+        let runtime = command.get_envs().find(|(name, _)| *name == "XDG_RUNTIME_DIR");
+        let runtime = runtime.and_then(|(_, folder)| folder).map(PathBuf::from);
+        let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -98,7 +111,7 @@ impl Running {
             .expect("the program starts");
         let input = child.stdin.take();
         let lines = Some(BufReader::new(child.stdout.take().expect("stdout is piped")));
-        Self { child, input, lines }
+        Self { child, input, lines, runtime }
     }
 
     /// Says a line on its stdin.
@@ -180,6 +193,9 @@ impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+        if let Some(runtime) = &self.runtime {
+            let _ = std::fs::remove_dir_all(runtime);
+        }
     }
 }
 

@@ -10,6 +10,7 @@ mod unit;
 
 use std::{
     io::{self, IsTerminal},
+    path::PathBuf,
     time::Duration,
 };
 
@@ -20,7 +21,8 @@ use tracing::Level;
 use self::plant::Plant;
 use crate::{
     api,
-    doors::{Doors, Http, Rights},
+    config::{DoorsConfig, Http},
+    doors::Doors,
     failure::Failure,
     output::{self, Table},
     page,
@@ -42,6 +44,9 @@ pub(crate) struct Args {
     /// Where the page and the API are served: an address and a port, or off
     #[arg(long, value_name = "ADDRESS", default_value_t)]
     http: Http,
+    /// A control socket, for the commands without a line
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
 }
 
 impl Args {
@@ -52,17 +57,17 @@ impl Args {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let doors = Doors::prepare(DoorsConfig::of_demo(args.socket).with(Some(args.http), None)?)?;
     let mut ending = Ending::listen()?;
     let plant = Plant::start()?;
     let groups = plant.groups();
-    let rights = Rights { view: true, stop: true, operate: true, engineer: false };
     let faces = crate::plant::Plant::start(plant.fleet.clone(), groups, true);
-    let doors = Doors::open(args.http, rights, api::router(faces).merge(page::router())).await;
+    let doors = doors.open(api::router(faces).merge(page::router()));
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, incoming, until, ending: &mut ending };
     let why = if io::stdout().is_terminal() { screen::run(show).await? } else { plain::run(show).await? };
-    doors.close();
+    doors.close().await;
     farewell(&plant, why)
 }
 

@@ -1,0 +1,365 @@
+//! What every request passes, by whichever door it came: whom it was meant for, who asks, how much he says, and the audit
+//! log; then the router.
+
+use std::{
+    net::IpAddr,
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use axum::{
+    Router,
+    body::{Body, Bytes},
+    http::{
+        HeaderMap, HeaderValue, Method, Request, StatusCode,
+        header::{self, HeaderName},
+    },
+    response::Response,
+};
+use http_body_util::{BodyExt as _, LengthLimitError, Limited};
+use serde::Deserialize;
+use tokio::{
+    sync::watch,
+    time::{Instant, timeout},
+};
+use tower::ServiceExt as _;
+
+use super::{
+    audit::{Audit, Kind, Record},
+    crowd::Asking,
+    failures::Failures,
+    host::{self, Hosts},
+    kept::Kept,
+    refusal::Refusal,
+    rights::{Caller, Rights},
+    sessions::{self, Sessions},
+    tokens::{self, Token, TokenError, Tokens},
+};
+
+/// The most that a request may say.
+const BODY: usize = 64 * 1024;
+/// How long it may take to say it.
+const BODY_WITHIN: Duration = Duration::from_secs(10);
+/// How long an answer may take to begin: the longest wait for a command, and 10 s.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
+
+const API: &str = "/api/";
+const LOGIN: &str = "/api/v1/login";
+const LOGOUT: &str = "/api/v1/logout";
+
+/// What holds for one door.
+#[derive(Debug, Clone)]
+pub(super) struct Door {
+    pub(super) hosts: Hosts,
+    /// What is given to those who bring no token.
+    pub(super) freely: Rights,
+    /// The same, where a proxy stands between.
+    pub(super) through_a_proxy: Rights,
+    pub(super) encrypted: bool,
+}
+
+/// The far end of a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Peer {
+    Address(IpAddr),
+    /// A user of this machine on the socket.
+    User(Option<u32>),
+}
+
+impl Peer {
+    pub(super) const fn address(self) -> Option<IpAddr> {
+        match self {
+            Self::Address(address) => Some(address),
+            Self::User(_) => None,
+        }
+    }
+}
+
+/// The checks, and what lies behind them.
+pub(super) struct Gate {
+    pub(super) router: Router,
+    pub(super) tokens: Option<Tokens>,
+    pub(super) audit: Audit,
+    pub(super) sessions: Mutex<Sessions>,
+    pub(super) failures: Mutex<Failures>,
+    /// True when the server ends.
+    pub(super) end: watch::Receiver<bool>,
+}
+
+impl Gate {
+    /// Answers a request.
+    pub(super) async fn answer<B>(
+        &self,
+        door: &Door,
+        peer: Peer,
+        request: Request<B>,
+        asking: Asking,
+    ) -> Response
+    where
+        B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
+    {
+        let of_api = request.uri().path().starts_with(API);
+        let mut answer = match self.pass(door, peer, request).await {
+            Ok(answer) => answer,
+            Err(refusal) => refusal.into_response(),
+        };
+        let is_stream = |headers: &HeaderMap| {
+            headers
+                .get(header::CONTENT_TYPE)
+                .is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream"))
+        };
+        let streams = is_stream(answer.headers());
+        if streams && !asking.may_stream() {
+            let why = "too many event streams are open: close another page";
+            answer = Refusal::new(StatusCode::TOO_MANY_REQUESTS, why)
+                .after(Duration::from_secs(5))
+                .into_response();
+        }
+        let streams = streams && answer.status().is_success();
+        protect(answer.headers_mut(), of_api);
+        answer.map(|body| {
+            Body::new(match streams {
+                true => Kept::stream(body, asking, self.end.clone()),
+                false => Kept::whole(body, asking),
+            })
+        })
+    }
+
+    async fn pass<B>(&self, door: &Door, peer: Peer, request: Request<B>) -> Result<Response, Refusal>
+    where
+        B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
+    {
+        let (mut parts, body) = request.into_parts();
+        if !door.hosts.allow(&parts.headers) {
+            let why =
+                "this server has no such name: allowed_hosts in the configuration names those that it has";
+            return Err(Refusal::new(StatusCode::MISDIRECTED_REQUEST, why));
+        }
+        if let Some(why) = host::foreign(&parts.method, &parts.headers) {
+            return Err(Refusal::new(StatusCode::FORBIDDEN, why));
+        }
+        let reads = parts.method == Method::GET || parts.method == Method::HEAD;
+        if !reads && !host::is_json(&parts.headers) {
+            let why = "expected JSON, and the header Content-Type: application/json";
+            return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, why));
+        }
+        let path = parts.uri.path().to_owned();
+        let stops = parts.method == Method::POST && is_stop(&path);
+        let logs_in = parts.method == Method::POST && path == LOGIN;
+        let caller = match logs_in {
+            true => freely(door, peer, &parts.headers),
+            false => self.caller(door, peer, &parts.headers, stops)?,
+        };
+        if reads {
+            parts.extensions.insert(caller);
+            return self.route(Request::from_parts(parts, Body::empty())).await;
+        }
+        if caller.rights == Rights::NONE && !logs_in {
+            return Err(Refusal::unauthorized("a token is needed"));
+        }
+        let body = read(body).await?;
+        if logs_in {
+            return self.log_in(door, peer, caller, &body);
+        }
+        if parts.method == Method::POST && path == LOGOUT {
+            return Ok(self.log_out(door, &caller, &parts.headers));
+        }
+        let record = |kind| {
+            let what = parts.uri.path_and_query().map_or(path.as_str(), |path| path.as_str());
+            Record::new(kind, &caller, format!("{} {what}", parts.method))
+        };
+        let came = Record { body: serde_json::from_slice(&body).ok(), ..record(Kind::Command) };
+        let written = self.audit.record(came);
+        if stops {
+            // No disk holds up a stop.
+            written.whenever();
+        } else if let Err(error) = written.done().await {
+            let why = format!("{error}: until it can, only stops are carried out");
+            return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, why));
+        }
+        let answered = record(Kind::Answer);
+        parts.extensions.insert(caller);
+        let answer = self.route(Request::from_parts(parts, Body::from(body))).await;
+        self.audited(answered, answer).await
+    }
+
+    async fn route(&self, request: Request<Body>) -> Result<Response, Refusal> {
+        match timeout(ANSWERED_WITHIN, self.router.clone().oneshot(request)).await {
+            Ok(Ok(answer)) => Ok(answer),
+            Ok(Err(never)) => match never {},
+            Err(_) => Err(Refusal::new(
+                StatusCode::GATEWAY_TIMEOUT,
+                "no answer in time: nobody knows what became of it",
+            )),
+        }
+    }
+
+    /// Writes into the audit log what is answered to a command.
+    async fn audited(&self, record: Record, answer: Result<Response, Refusal>) -> Result<Response, Refusal> {
+        #[derive(Default, Deserialize)]
+        struct Outcome {
+            id: Option<String>,
+            outcome: Option<String>,
+        }
+        let answer = answer.unwrap_or_else(Refusal::into_response);
+        let (parts, body) = answer.into_parts();
+        // Answers to commands are made here and are whole.
+        let body = body.collect().await.map(http_body_util::Collected::to_bytes).unwrap_or_default();
+        let Outcome { id, outcome } = serde_json::from_slice(&body).unwrap_or_default();
+        self.audit.record(Record { id, outcome, status: Some(parts.status.as_u16()), ..record }).whenever();
+        Ok(Response::from_parts(parts, Body::from(body)))
+    }
+
+    /// Who asks. A token that is wrong is never taken for none.
+    fn caller(&self, door: &Door, peer: Peer, headers: &HeaderMap, stops: bool) -> Result<Caller, Refusal> {
+        let without = freely(door, peer, headers);
+        let Some(authorization) = headers.get(header::AUTHORIZATION) else {
+            let session = sessions::cookie(headers)
+                .and_then(|cookie| lock(&self.sessions).token(cookie, Instant::now()).map(str::to_owned));
+            // A session that is over is no wrong token: who had it is anybody again, and the page says so.
+            let token = match (session, &self.tokens) {
+                (Some(hash), Some(tokens)) => tokens.of_hash(&hash).map_err(unreadable)?,
+                _ => None,
+            };
+            return Ok(token.map_or(without.clone(), |token| of_token(&token, without)));
+        };
+        // Whoever has a right token stops his motors, whatever others do at the same address.
+        if !stops {
+            self.wait(peer)?;
+        }
+        let secret = authorization.to_str().ok().and_then(|text| text.split_once(' '));
+        let secret = secret
+            .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
+            .map(|(_, secret)| secret.trim());
+        match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
+            Some(token) => Ok(of_token(&token, without)),
+            None => Err(self.failed(peer, without)),
+        }
+    }
+
+    fn token(&self, secret: &str) -> Result<Option<Token>, Refusal> {
+        self.tokens.as_ref().map_or(Ok(None), |tokens| tokens.find(secret).map_err(unreadable))
+    }
+
+    fn log_in(&self, door: &Door, peer: Peer, caller: Caller, body: &[u8]) -> Result<Response, Refusal> {
+        #[derive(Deserialize)]
+        struct Login {
+            token: String,
+        }
+        self.wait(peer)?;
+        let Login { token: secret } = serde_json::from_slice(body)
+            .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
+        let Some(token) = self.token(secret.trim())? else { return Err(self.failed(peer, caller)) };
+        let session = tokens::new_secret().map_err(unreadable)?;
+        lock(&self.sessions).begin(&session, &token.sha256, Instant::now());
+        let caller = of_token(&token, caller);
+        self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
+        Ok(told(&caller, Some(&session), door.encrypted))
+    }
+
+    fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {
+        if let Some(session) = sessions::cookie(headers) {
+            lock(&self.sessions).end(session);
+        }
+        self.audit.record(Record::new(Kind::Logout, caller, "logout")).whenever();
+        told(caller, None, door.encrypted)
+    }
+
+    /// Whether tokens of this address are looked at.
+    fn wait(&self, peer: Peer) -> Result<(), Refusal> {
+        let Some(address) = peer.address() else { return Ok(()) };
+        match lock(&self.failures).wait(address, Instant::now()) {
+            None => Ok(()),
+            Some(wait) => {
+                let why = "too many wrong tokens from this address";
+                Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, why).after(wait))
+            }
+        }
+    }
+
+    fn failed(&self, peer: Peer, caller: Caller) -> Refusal {
+        if let Some(address) = peer.address() {
+            lock(&self.failures).count(address, Instant::now());
+        }
+        tracing::warn!("a wrong token from {}", caller.origin);
+        self.audit.record(Record::new(Kind::LoginFailed, &caller, "a wrong token")).whenever();
+        Refusal::unauthorized("the token is wrong")
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn unreadable(error: TokenError) -> Refusal {
+    tracing::error!(%error, "no token can be looked at");
+    Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "no token can be looked at: see the log of the daemon")
+}
+
+/// Whoever brings no token.
+fn freely(door: &Door, peer: Peer, headers: &HeaderMap) -> Caller {
+    let browser = headers.contains_key("sec-fetch-site") || headers.contains_key(header::COOKIE);
+    let proxied =
+        ["forwarded", "x-forwarded-for", "x-real-ip"].into_iter().any(|name| headers.contains_key(name));
+    let (name, origin) = match peer {
+        Peer::Address(address) => {
+            ("anonymous", format!("{} {}", if browser { "page" } else { "http" }, address.to_canonical()))
+        }
+        Peer::User(Some(uid)) => ("local", format!("socket uid {uid}")),
+        Peer::User(None) => ("local", "socket".to_owned()),
+    };
+    Caller { name: name.to_owned(), origin, rights: if proxied { door.through_a_proxy } else { door.freely } }
+}
+
+fn of_token(token: &Token, without: Caller) -> Caller {
+    Caller { name: token.name.clone(), rights: token.role.rights(), ..without }
+}
+
+/// Whether a path is that of a stop.
+fn is_stop(path: &str) -> bool {
+    let Some(path) = path.strip_prefix("/api/v1/") else { return false };
+    path == "stop" || (path.starts_with("drives/") || path.starts_with("groups/")) && path.ends_with("/stop")
+}
+
+/// The body of a request, as far as it may go.
+async fn read<B>(body: B) -> Result<Bytes, Refusal>
+where
+    B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
+{
+    match timeout(BODY_WITHIN, Limited::new(body, BODY).collect()).await {
+        Ok(Ok(body)) => Ok(body.to_bytes()),
+        Ok(Err(error)) if error.is::<LengthLimitError>() => {
+            Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, "a request may say 64 KiB"))
+        }
+        Ok(Err(_)) => Err(Refusal::new(StatusCode::BAD_REQUEST, "the request ended before its end")),
+        Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long")),
+    }
+}
+
+/// Who the caller is now, and his cookie.
+fn told(caller: &Caller, session: Option<&str>, encrypted: bool) -> Response {
+    let body = serde_json::json!({ "caller": caller.name, "rights": caller.rights });
+    let mut answer = Response::new(Body::from(body.to_string()));
+    let headers = answer.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
+    if let Ok(cookie) = sessions::set_cookie(session, encrypted).parse() {
+        headers.insert(header::SET_COOKIE, cookie);
+    }
+    answer
+}
+
+/// What a browser is told about every answer.
+fn protect(headers: &mut HeaderMap, of_api: bool) {
+    const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'";
+    for (name, value) in [
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    if of_api {
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    }
+}

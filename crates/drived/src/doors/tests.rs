@@ -1,0 +1,412 @@
+//! The doors before a router that only says who came.
+
+use std::{convert::Infallible, path::PathBuf};
+
+use axum::{
+    Extension, Router,
+    body::{Body, Bytes},
+    http::{HeaderMap, Request, StatusCode, header},
+    response::{IntoResponse as _, Response},
+    routing::{get, post},
+};
+use http_body_util::{BodyExt as _, Full, StreamBody};
+use hyper::body::Frame;
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream, duplex},
+    sync::watch,
+};
+
+use super::{gate::Peer, *};
+use crate::config::DoorsConfig;
+
+/// A folder of one test; removed when dropped.
+pub(crate) struct Folder(PathBuf);
+
+impl Folder {
+    pub(crate) fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("drived-doors-{}-{name}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What stands behind the doors here: it says who came, and streams without end.
+fn router() -> Router {
+    async fn who(Extension(caller): Extension<Caller>) -> String {
+        let Rights { view, stop, operate, engineer } = caller.rights;
+        let rights = [(view, 'v'), (stop, 's'), (operate, 'o'), (engineer, 'e')];
+        let rights: String = rights.into_iter().filter(|(has, _)| *has).map(|(_, letter)| letter).collect();
+        format!("{} {} {rights}", caller.name, caller.origin)
+    }
+    async fn events() -> Response {
+        let ticks = futures_util::stream::unfold((), |()| async {
+            sleep(Duration::from_secs(5)).await;
+            Some((Ok::<_, Infallible>(Frame::data(Bytes::from_static(b"event: tick\n\n"))), ()))
+        });
+        ([(header::CONTENT_TYPE, "text/event-stream")], Body::new(StreamBody::new(Box::pin(ticks))))
+            .into_response()
+    }
+    async fn started() -> Response {
+        (StatusCode::CONFLICT, r#"{"id":"c-1","outcome":"refused"}"#).into_response()
+    }
+    Router::new()
+        .route("/api/v1/state", get(who).post(who))
+        .route("/api/v1/stop", post(who))
+        .route("/api/v1/drives/{name}/start", post(started))
+        .route("/api/v1/events", get(events))
+}
+
+/// A gate, its door, and the tokens and the log behind it.
+struct Rig {
+    gate: Arc<Gate>,
+    door: Door,
+    crowd: Crowd,
+    end: watch::Sender<bool>,
+    folder: Folder,
+}
+
+impl Rig {
+    fn new(name: &str) -> Self {
+        let folder = Folder::new(name);
+        let config = HttpConfig { demo: false, ..DoorsConfig::of_demo(None).http.unwrap() };
+        let door = Door {
+            hosts: Hosts::new(Some(config.listen), &[]),
+            freely: config.freely(false),
+            through_a_proxy: config.freely(true),
+            encrypted: false,
+        };
+        let (end, ended) = watch::channel(false);
+        let (sessions, failures) = Default::default();
+        let tokens = Some(Tokens::open(&folder.file("tokens")).unwrap());
+        let audit = Audit::open(&folder.file("audit")).unwrap();
+        let gate = Arc::new(Gate { router: router(), tokens, audit, sessions, failures, end: ended });
+        Self { gate, door, crowd: Crowd::new(true), end, folder }
+    }
+
+    fn token(&self, name: &str, role: Role) -> String {
+        self.gate.tokens.as_ref().unwrap().add(name, role).unwrap()
+    }
+
+    /// Asks from an address.
+    async fn ask_from(&self, address: [u8; 4], request: &Asked<'_>) -> Answer {
+        let place = self.crowd.enter(Some(address.into()), Instant::now()).unwrap();
+        let mut builder = Request::builder().method(request.method).uri(request.path);
+        let usual = [("host", "localhost:7580"), ("content-type", "application/json")];
+        let kept = usual.iter().filter(|(name, _)| !request.headers.iter().any(|(other, _)| other == name));
+        for (name, value) in kept.chain(request.headers) {
+            builder = builder.header(*name, *value);
+        }
+        let request = builder.body(Full::new(Bytes::copy_from_slice(request.body.as_bytes()))).unwrap();
+        let answer = self.gate.answer(&self.door, Peer::Address(address.into()), request, place.ask()).await;
+        let (parts, body) = answer.into_parts();
+        let body = body.collect().await.unwrap().to_bytes();
+        Answer {
+            status: parts.status,
+            headers: parts.headers,
+            body: String::from_utf8(body.to_vec()).unwrap(),
+        }
+    }
+
+    async fn ask(&self, request: &Asked<'_>) -> Answer {
+        self.ask_from([127, 0, 0, 1], request).await
+    }
+
+    /// A connection to the door.
+    fn connect(&self) -> DuplexStream {
+        let (near, far) = duplex(4_096);
+        let address = std::net::IpAddr::from([127, 0, 0, 1]);
+        let place = self.crowd.enter(Some(address), Instant::now()).unwrap();
+        let (gate, door) = (Arc::clone(&self.gate), self.door.clone());
+        let end = self.end.subscribe();
+        tokio::spawn(async move {
+            let answer = |request, asking| {
+                let (gate, door) = (Arc::clone(&gate), door.clone());
+                async move { gate.answer(&door, Peer::Address(address), request, asking).await }
+            };
+            connection::serve(near, place, end, answer).await;
+        });
+        far
+    }
+
+    /// What the audit log has of it, kind and outcome, once all is written.
+    async fn audited(&self) -> Vec<String> {
+        let last = Record::new(Kind::Daemon, &this_program(), "last");
+        self.gate.audit.record(last).done().await.unwrap();
+        let text = fs::read_to_string(self.folder.file("audit")).unwrap();
+        let told = |line: &str| {
+            let line: serde_json::Value = serde_json::from_str(line).unwrap();
+            let text = |key: &str| line[key].as_str().unwrap_or("-").to_owned();
+            [text("kind"), text("caller"), text("outcome")].join(" ")
+        };
+        text.lines().map(told).filter(|line| !line.starts_with("daemon")).collect()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    method: &'a str,
+    path: &'a str,
+    headers: &'a [(&'a str, &'a str)],
+    body: &'a str,
+}
+
+const STATE: Asked<'_> = Asked { method: "GET", path: "/api/v1/state", headers: &[], body: "" };
+const STOP: Asked<'_> = Asked { method: "POST", path: "/api/v1/stop", headers: &[], body: "" };
+const START: Asked<'_> =
+    Asked { method: "POST", path: "/api/v1/drives/pump%201/start", headers: &[], body: "{}" };
+
+#[derive(Debug)]
+struct Answer {
+    status: StatusCode,
+    headers: HeaderMap,
+    body: String,
+}
+
+impl Answer {
+    #[track_caller]
+    fn assert_refused(&self, status: u16) {
+        assert_eq!(self.status.as_u16(), status, "{self:?}");
+        let problem: serde_json::Value = serde_json::from_str(&self.body).unwrap();
+        assert_eq!(problem["status"], status);
+        assert_eq!(self.headers[header::CONTENT_TYPE], "application/problem+json");
+    }
+}
+
+#[tokio::test]
+async fn on_loopback_to_see_and_to_stop_need_no_login_and_a_proxy_is_no_loopback() {
+    let rig = Rig::new("freely");
+    assert_eq!(rig.ask(&STATE).await.body, "anonymous http 127.0.0.1 vs");
+    assert_eq!(rig.ask(&STOP).await.body, "anonymous http 127.0.0.1 vs");
+    let forwarded = [("x-forwarded-for", "10.0.0.7")];
+    assert_eq!(rig.ask(&Asked { headers: &forwarded, ..STATE }).await.body, "anonymous http 127.0.0.1 ");
+    rig.ask(&Asked { headers: &forwarded, ..STOP }).await.assert_refused(401);
+}
+
+#[tokio::test]
+async fn a_token_has_the_rights_of_its_role_until_it_is_removed() {
+    let rig = Rig::new("roles");
+    for (name, role, rights) in [
+        ("a", Role::View, "v"),
+        ("b", Role::Stop, "vs"),
+        ("c", Role::Operate, "vso"),
+        ("d", Role::Engineer, "vsoe"),
+    ] {
+        let bearer = format!("Bearer {}", rig.token(name, role));
+        let asked = Asked { headers: &[("authorization", &bearer)], ..STATE };
+        assert_eq!(rig.ask(&asked).await.body, format!("{name} http 127.0.0.1 {rights}"));
+        rig.gate.tokens.as_ref().unwrap().remove(name).unwrap();
+        rig.ask(&asked).await.assert_refused(401);
+    }
+}
+
+#[tokio::test]
+async fn a_wrong_token_is_never_taken_for_none_and_ten_a_minute_are_looked_at() {
+    let rig = Rig::new("wrong-token");
+    let right = format!("Bearer {}", rig.token("panel", Role::Operate));
+    for wrong in ["Bearer drv_0", "Bearer ", "Bearer", "Basic YWRtaW46MDAwMA==", "drv_0"] {
+        let asked = Asked { headers: &[("authorization", wrong)], ..STATE };
+        let answer = rig.ask(&asked).await;
+        answer.assert_refused(401);
+        assert_eq!(answer.headers[header::WWW_AUTHENTICATE], "Bearer");
+        rig.ask(&Asked { headers: &[("authorization", wrong)], ..STOP }).await.assert_refused(401);
+    }
+    let asked = Asked { headers: &[("authorization", &right)], ..STATE };
+    let waits = rig.ask(&asked).await;
+    waits.assert_refused(429);
+    assert!(waits.headers.contains_key(header::RETRY_AFTER));
+    // Nobody is kept from a stop by what others do.
+    let stop = rig.ask(&Asked { headers: &[("authorization", &right)], ..STOP }).await;
+    assert_eq!(stop.body, "panel http 127.0.0.1 vso");
+    assert_eq!(rig.ask_from([10, 0, 0, 7], &asked).await.body, "panel http 10.0.0.7 vso");
+    let failures = rig.audited().await;
+    assert_eq!(
+        failures.iter().filter(|line| *line == "login_failed anonymous -").count(),
+        10,
+        "{failures:?}"
+    );
+}
+
+#[tokio::test]
+async fn a_login_gives_a_cookie_that_no_script_reads_and_a_logout_takes_it_back() {
+    let rig = Rig::new("login");
+    let secret = rig.token("panel", Role::Operate);
+    let login = Asked { path: "/api/v1/login", body: &format!("{{\"token\":\"{secret}\"}}"), ..START };
+    let answer = rig.ask(&login).await;
+    assert_eq!(answer.status, StatusCode::OK, "{answer:?}");
+    let set = answer.headers[header::SET_COOKIE].to_str().unwrap();
+    assert!(set.contains("HttpOnly") && set.contains("SameSite=Strict") && !set.contains(&secret), "{set}");
+    let cookie = set.split(';').next().unwrap();
+    let headers = [("cookie", cookie)];
+    let with = |asked| Asked { headers: &headers, ..asked };
+    assert_eq!(rig.ask(&with(STATE)).await.body, "panel page 127.0.0.1 vso");
+    let away = rig.ask(&with(Asked { path: "/api/v1/logout", body: "", ..START })).await;
+    assert!(away.headers[header::SET_COOKIE].to_str().unwrap().contains("Max-Age=0"), "{away:?}");
+    assert_eq!(rig.ask(&with(STATE)).await.body, "anonymous page 127.0.0.1 vs");
+    rig.ask(&Asked { body: "{\"token\":\"drv_0\"}", ..login }).await.assert_refused(401);
+    rig.ask(&Asked { body: "{\"token\"", ..login }).await.assert_refused(400);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(!log.contains(&secret[4..]), "no secret in a log");
+    assert_eq!(rig.audited().await, ["login panel -", "logout panel -", "login_failed anonymous -"]);
+}
+
+#[tokio::test]
+async fn a_wrong_host_or_another_sites_origin_is_refused_before_anything_is_looked_at() {
+    let rig = Rig::new("hosts");
+    for path in ["/", "/api/v1/state", "/api/v1/events", "/metrics", "/nowhere"] {
+        rig.ask(&Asked { headers: &[("host", "evil.example")], path, ..STATE }).await.assert_refused(421);
+    }
+    for foreign in [
+        ("origin", "http://evil.example"),
+        ("origin", "null"),
+        ("origin", "http://localhost:8080"),
+        ("sec-fetch-site", "cross-site"),
+        ("sec-fetch-site", "same-site"),
+    ] {
+        rig.ask(&Asked { headers: &[foreign], ..STOP }).await.assert_refused(403);
+    }
+    for kind in ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"] {
+        rig.ask(&Asked { headers: &[("content-type", kind)], ..STOP }).await.assert_refused(415);
+    }
+    let own = [("origin", "http://localhost:7580"), ("sec-fetch-site", "same-origin")];
+    assert_eq!(rig.ask(&Asked { headers: &own, ..STOP }).await.status, StatusCode::OK);
+    assert_eq!(rig.audited().await.len(), 2, "one command and its answer");
+}
+
+#[tokio::test]
+async fn every_answer_tells_the_browser_to_keep_to_itself_and_no_other_site_is_allowed() {
+    let rig = Rig::new("headers");
+    for asked in
+        [STATE, STOP, Asked { path: "/nowhere", ..STATE }, Asked { headers: &[("host", "x")], ..STATE }]
+    {
+        let answer = rig.ask(&asked).await;
+        for name in [
+            "content-security-policy",
+            "x-content-type-options",
+            "referrer-policy",
+            "cross-origin-resource-policy",
+        ] {
+            assert!(answer.headers.contains_key(name), "{name}: {answer:?}");
+        }
+        assert!(
+            answer.headers.keys().all(|name| !name.as_str().starts_with("access-control-")),
+            "{answer:?}"
+        );
+        assert_eq!(answer.headers.contains_key(header::CACHE_CONTROL), asked.path.starts_with("/api/"));
+    }
+}
+
+#[tokio::test]
+async fn each_command_is_audited_with_what_became_of_it() {
+    let rig = Rig::new("audited");
+    rig.ask(&START).await;
+    assert_eq!(rig.audited().await, ["command anonymous -", "answer anonymous refused"]);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(log.contains("POST /api/v1/drives/pump%201/start") && log.contains(r#""id":"c-1""#), "{log}");
+}
+
+#[tokio::test]
+async fn what_cannot_be_audited_is_not_done_but_a_stop() {
+    let rig = Rig::new("no-audit");
+    rig.ask(&START).await;
+    assert_eq!(rig.audited().await.len(), 2);
+    // A folder in its place: nothing can be written there.
+    fs::remove_file(rig.folder.file("audit")).unwrap();
+    fs::create_dir(rig.folder.file("audit")).unwrap();
+    rig.ask(&START).await.assert_refused(503);
+    assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
+    assert_eq!(rig.ask(&STATE).await.status, StatusCode::OK);
+    fs::remove_dir(rig.folder.file("audit")).unwrap();
+    assert_eq!(rig.ask(&START).await.status, StatusCode::CONFLICT, "the disk is there again");
+}
+
+#[tokio::test]
+async fn a_request_says_64_kib_at_the_most() {
+    let rig = Rig::new("body");
+    let most = " ".repeat(64 * 1024);
+    assert_eq!(rig.ask(&Asked { body: &most, ..START }).await.status, StatusCode::CONFLICT);
+    rig.ask(&Asked { body: &(most.clone() + " "), ..START }).await.assert_refused(413);
+}
+
+const HEAD: &[u8] = b"GET /api/v1/state HTTP/1.1\r\nHost: localhost\r\n";
+
+#[tokio::test(start_paused = true)]
+async fn a_head_that_comes_too_slowly_ends_its_connection() {
+    let rig = Rig::new("slow-head");
+    let mut slow = rig.connect();
+    for byte in HEAD.iter().cycle() {
+        if slow.write_all(&[*byte]).await.is_err() {
+            break;
+        }
+        sleep(Duration::from_secs(1)).await;
+    }
+    let mut rest = Vec::new();
+    slow.read_to_end(&mut rest).await.unwrap();
+    assert!(!rest.starts_with(b"HTTP/1.1 200"), "{rest:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_body_that_comes_too_slowly_is_given_up() {
+    let rig = Rig::new("slow-body");
+    let mut slow = rig.connect();
+    let head = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n";
+    slow.write_all(head.as_bytes()).await.unwrap();
+    let mut answer = Vec::new();
+    slow.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 408"), "{}", String::from_utf8_lossy(&answer));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_idle_connection_ends_and_event_streams_end_with_the_server() {
+    let rig = Rig::new("idle");
+    let mut idle = rig.connect();
+    idle.write_all(HEAD).await.unwrap();
+    idle.write_all(b"\r\n").await.unwrap();
+    let mut answer = Vec::new();
+    idle.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
+
+    let mut stream = rig.connect();
+    stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+    let mut heard = Vec::new();
+    while !heard.windows(4).any(|four| four == b"tick") {
+        stream.read_buf(&mut heard).await.unwrap();
+    }
+    rig.end.send_replace(true);
+    stream.read_to_end(&mut heard).await.unwrap();
+    assert!(heard.ends_with(b"0\r\n\r\n"), "{}", String::from_utf8_lossy(&heard));
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_address_has_eight_event_streams() {
+    let rig = Rig::new("streams");
+    let mut open = Vec::new();
+    for number in 1..=10 {
+        let mut stream = rig.connect();
+        stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+        let mut head = Vec::new();
+        while !head.windows(4).any(|four| four == b"\r\n\r\n") {
+            stream.read_buf(&mut head).await.unwrap();
+        }
+        let status = if number <= 8 { &b"HTTP/1.1 200"[..] } else { b"HTTP/1.1 429" };
+        assert!(head.starts_with(status), "{number}: {}", String::from_utf8_lossy(&head));
+        open.push(stream);
+    }
+    open.clear();
+    // They are gone when the next tick finds nobody.
+    sleep(Duration::from_secs(10)).await;
+    let mut stream = rig.connect();
+    stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+    let mut status = [0; 12];
+    stream.read_exact(&mut status).await.unwrap();
+    assert_eq!(&status, b"HTTP/1.1 200");
+}

@@ -1,0 +1,255 @@
+//! The file of tokens: for each its name, its role and the SHA-256 of it, never the token.
+
+use std::{
+    fmt, fs,
+    io::Write as _,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+    time::SystemTime,
+};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use subtle::ConstantTimeEq as _;
+
+use super::rights::Role;
+
+/// By which a token is known as one of ours, in a file or in a log where it should not be.
+const PREFIX: &str = "drv_";
+const LONGEST_NAME: usize = 64;
+
+/// Makes a token: 256 random bits behind its prefix.
+///
+/// # Errors
+///
+/// The system gives no random numbers.
+pub(crate) fn new_secret() -> Result<String, TokenError> {
+    let mut bits = [0; 32];
+    getrandom::fill(&mut bits).map_err(|error| TokenError::Random(error.to_string()))?;
+    Ok(format!("{PREFIX}{}", hex(&bits)))
+}
+
+/// The SHA-256 of something, in hexadecimal digits.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// One token.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Token {
+    pub(crate) name: String,
+    pub(crate) role: Role,
+    /// In hexadecimal digits.
+    pub(super) sha256: String,
+    /// When it was made, in seconds since 1970.
+    pub(crate) made: u64,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Content {
+    #[serde(default)]
+    tokens: Vec<Token>,
+}
+
+/// What is wrong with the tokens.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum TokenError {
+    #[error("the system gives no random numbers: {0}")]
+    Random(String),
+    #[error("the tokens {file} cannot be {what}: {reason}", file = .file.display())]
+    File { file: PathBuf, what: &'static str, reason: String },
+    #[error("{file} can be read by others than its owner: chmod 600 {file}", file = .0.display())]
+    Open(PathBuf),
+    #[error("{0:?} is no name of a token: expected 1 to 64 letters, digits, - and _")]
+    Name(String),
+    #[error("{0} is the name of those who need no token: choose another")]
+    Reserved(String),
+    #[error("there is a token {0} already: drived token remove {0}")]
+    Taken(String),
+    #[error("there is no token {name:?}: there are {there}", there = .there.join(", "))]
+    Unknown { name: String, there: Vec<String> },
+}
+
+impl TokenError {
+    fn file(file: &Path, what: &'static str, reason: impl fmt::Display) -> Self {
+        Self::File { file: file.to_owned(), what, reason: reason.to_string() }
+    }
+}
+
+/// The tokens of a file, read again when it has changed, so that a removed token ends at once.
+#[derive(Debug)]
+pub(crate) struct Tokens {
+    file: PathBuf,
+    read: Mutex<Option<(Stamp, Vec<Token>)>>,
+}
+
+/// By what a file is known to be the same still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stamp {
+    changed: Option<SystemTime>,
+    length: u64,
+    inode: u64,
+}
+
+impl Tokens {
+    /// The tokens of a file, which need not be there yet.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, is none of tokens, or can be read by others than its owner.
+    pub(crate) fn open(file: &Path) -> Result<Self, TokenError> {
+        let tokens = Self { file: file.to_owned(), read: Mutex::new(None) };
+        tokens.all()?;
+        Ok(tokens)
+    }
+
+    /// All of them.
+    pub(crate) fn all(&self) -> Result<Vec<Token>, TokenError> {
+        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(stamp) = stamp(&self.file)? else {
+            *read = None;
+            return Ok(Vec::new());
+        };
+        if let Some((known, tokens)) = &*read
+            && *known == stamp
+        {
+            return Ok(tokens.clone());
+        }
+        let text =
+            fs::read_to_string(&self.file).map_err(|error| TokenError::file(&self.file, "read", error))?;
+        let content: Content = toml::from_str(&text)
+            .map_err(|error| TokenError::file(&self.file, "understood", error.message().to_owned()))?;
+        *read = Some((stamp, content.tokens.clone()));
+        Ok(content.tokens)
+    }
+
+    /// The token that this secret is, each compared in the same time whether it is right or wrong.
+    pub(crate) fn find(&self, secret: &str) -> Result<Option<Token>, TokenError> {
+        self.of_hash(&sha256(secret.as_bytes()))
+    }
+
+    /// The token with this hash.
+    pub(super) fn of_hash(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
+        let same = |token: &Token| bool::from(token.sha256.as_bytes().ct_eq(wanted.as_bytes()));
+        Ok(self.all()?.into_iter().fold(None, |found, token| if same(&token) { Some(token) } else { found }))
+    }
+
+    /// Adds a token and gives its secret, which nobody can ever read again.
+    pub(crate) fn add(&self, name: &str, role: Role) -> Result<String, TokenError> {
+        let allowed = |character: char| character.is_ascii_alphanumeric() || matches!(character, '-' | '_');
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(allowed) {
+            return Err(TokenError::Name(name.to_owned()));
+        }
+        if ["local", "anonymous"].contains(&name) {
+            return Err(TokenError::Reserved(name.to_owned()));
+        }
+        let mut tokens = self.all()?;
+        if tokens.iter().any(|token| token.name == name) {
+            return Err(TokenError::Taken(name.to_owned()));
+        }
+        let secret = new_secret()?;
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let sha256 = sha256(secret.as_bytes());
+        tokens.push(Token { name: name.to_owned(), role, sha256, made: now.as_secs() });
+        self.write(tokens)?;
+        Ok(secret)
+    }
+
+    /// Removes a token; whoever uses it is refused from now on.
+    pub(crate) fn remove(&self, name: &str) -> Result<(), TokenError> {
+        let mut tokens = self.all()?;
+        let there: Vec<String> = tokens.iter().map(|token| token.name.clone()).collect();
+        tokens.retain(|token| token.name != name);
+        if tokens.len() == there.len() {
+            return Err(TokenError::Unknown { name: name.to_owned(), there });
+        }
+        self.write(tokens)
+    }
+
+    /// Replaces the file in one step, so that nobody reads half of it.
+    fn write(&self, tokens: Vec<Token>) -> Result<(), TokenError> {
+        let failed = |error: &dyn fmt::Display| TokenError::file(&self.file, "written", error);
+        let text = toml::to_string(&Content { tokens }).map_err(|error| failed(&error))?;
+        let mut beside = self.file.clone().into_os_string();
+        beside.push(".new");
+        let beside = PathBuf::from(beside);
+        let write = || {
+            let mut file = super::private_file(&beside, fs::OpenOptions::new().write(true).truncate(true))?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&beside, &self.file)
+        };
+        write().map_err(|error| failed(&error))
+    }
+}
+
+/// Nothing where there is no file.
+fn stamp(file: &Path) -> Result<Option<Stamp>, TokenError> {
+    let known = match fs::metadata(file) {
+        Ok(known) => known,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(TokenError::file(file, "read", error)),
+    };
+    #[cfg(unix)]
+    let inode = {
+        use std::os::unix::fs::MetadataExt as _;
+        if known.mode() & 0o077 != 0 {
+            return Err(TokenError::Open(file.to_owned()));
+        }
+        known.ino()
+    };
+    #[cfg(not(unix))]
+    let inode = 0;
+    Ok(Some(Stamp { changed: known.modified().ok(), length: known.len(), inode }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_is_found_by_its_secret_until_it_is_removed_and_the_secret_is_nowhere() {
+        let folder = crate::doors::tests::Folder::new("tokens");
+        let tokens = Tokens::open(&folder.file("tokens")).unwrap();
+        assert_eq!(tokens.find("drv_0"), Ok(None));
+        let secret = tokens.add("panel-1", Role::Operate).unwrap();
+        assert!(secret.starts_with("drv_") && secret.len() == 68, "256 bits");
+        let found = tokens.find(&secret).unwrap().unwrap();
+        assert_eq!((found.name.as_str(), found.role), ("panel-1", Role::Operate));
+        assert_eq!(tokens.find(&secret[..67]), Ok(None));
+        assert_eq!(tokens.add("panel-1", Role::View), Err(TokenError::Taken("panel-1".to_owned())));
+        let text = fs::read_to_string(folder.file("tokens")).unwrap();
+        assert!(!text.contains(&secret[4..]), "{text}");
+        // Another program removes it.
+        Tokens::open(&folder.file("tokens")).unwrap().remove("panel-1").unwrap();
+        assert_eq!(tokens.find(&secret), Ok(None));
+    }
+
+    #[test]
+    fn a_name_that_nobody_could_tell_apart_is_refused() {
+        let folder = crate::doors::tests::Folder::new("token-names");
+        let tokens = Tokens::open(&folder.file("tokens")).unwrap();
+        for name in ["", "local", "anonymous", "a b", "päuse", "line\nbreak", &"x".repeat(65)] {
+            assert!(tokens.add(name, Role::View).is_err(), "{name:?}");
+        }
+        assert!(matches!(tokens.remove("gone"), Err(TokenError::Unknown { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn tokens_that_others_can_read_are_refused() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = crate::doors::tests::Folder::new("open-tokens");
+        let file = folder.file("tokens");
+        Tokens::open(&file).unwrap().add("panel", Role::View).unwrap();
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
+        assert_eq!(Tokens::open(&file).unwrap_err(), TokenError::Open(file));
+    }
+}
