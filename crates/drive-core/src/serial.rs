@@ -189,6 +189,32 @@ impl fmt::Display for SerialSettings {
     }
 }
 
+/// A text that is no setting of a serial line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SerialSettingsError {
+    /// It is not a speed and a character format.
+    #[error("{0:?} is not a speed in bit/s and a character format, as in 19200 8E1")]
+    Form(String),
+    /// No serial line of this kind has the speed.
+    #[error(transparent)]
+    Baud(#[from] BaudError),
+    /// The character format is none.
+    #[error(transparent)]
+    Format(#[from] CharacterFormatError),
+}
+
+/// Reads speed and character format, such as `19200 8E1`.
+impl FromStr for SerialSettings {
+    type Err = SerialSettingsError;
+
+    fn from_str(text: &str) -> Result<Self, SerialSettingsError> {
+        let form = || SerialSettingsError::Form(text.to_owned());
+        let (baud, format) = text.trim().split_once(' ').ok_or_else(form)?;
+        let baud = baud.parse().map_err(|_| form())?;
+        Ok(Self::new(baud, format.trim_start().parse()?)?)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,6 +235,22 @@ mod tests {
         }
         for text in ["", "8", "9N1", "8X1", "8N3", "8N1x"] {
             assert!(text.parse::<CharacterFormat>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn settings_read_back_as_they_are_written() {
+        for text in ["19200 8E1", "9600 8N2", "300 7O1"] {
+            assert_eq!(text.parse::<SerialSettings>().unwrap().to_string(), text);
+        }
+        for (text, says) in [
+            ("19200", "is not a speed in bit/s and a character format"),
+            ("fast 8E1", "is not a speed in bit/s"),
+            ("19200 9E1", "is not a character format"),
+            ("5 8E1", "5 bit/s is not a serial speed"),
+        ] {
+            let error = text.parse::<SerialSettings>().unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
         }
     }
 

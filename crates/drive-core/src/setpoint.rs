@@ -1,8 +1,8 @@
 //! What is asked of a drive: direction, setpoint, stop mode.
 
-use std::fmt;
+use std::{fmt, str::FromStr};
 
-use crate::units::{Frequency, Speed};
+use crate::units::{Frequency, Speed, UnitError};
 
 /// Direction of rotation, as the drive names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -15,14 +15,10 @@ pub enum Direction {
     Reverse,
 }
 
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Forward => "forward",
-            Self::Reverse => "reverse",
-        })
-    }
-}
+crate::named! { Direction {
+    Forward => "forward",
+    Reverse => "reverse",
+} }
 
 /// The setpoint: how fast, never which way. The direction is part of [`Drive::start`](crate::Drive::start).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -58,6 +54,27 @@ impl fmt::Display for Setpoint {
     }
 }
 
+/// Reads a frequency with at most two decimals, such as `30 Hz` or `30.5Hz`, or a whole speed, such as `900 rpm`. A number
+/// without a unit is none.
+///
+/// ```
+/// use drive_core::{Frequency, Setpoint};
+///
+/// assert_eq!("30.5Hz".parse(), Ok(Setpoint::from(Frequency::from_centihertz(3_050))));
+/// assert!("30".parse::<Setpoint>().is_err());
+/// ```
+impl FromStr for Setpoint {
+    type Err = UnitError;
+
+    fn from_str(text: &str) -> Result<Self, UnitError> {
+        let frequency = text.parse().map(Self::Frequency);
+        let setpoint = frequency.or_else(|_: UnitError| text.parse().map(Self::Speed));
+        setpoint.map_err(|_: UnitError| {
+            UnitError("a frequency with at most two decimals such as 47.5 Hz, or a speed such as 1450 rpm")
+        })
+    }
+}
+
 /// How to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
@@ -78,16 +95,12 @@ impl StopMode {
     pub const ALL: [Self; 4] = [Self::Ramp, Self::Fast, Self::Freewheel, Self::DcInjection];
 }
 
-impl fmt::Display for StopMode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Ramp => "ramp",
-            Self::Fast => "fast",
-            Self::Freewheel => "freewheel",
-            Self::DcInjection => "DC injection",
-        })
-    }
-}
+crate::named! { StopMode {
+    Ramp => "ramp",
+    Fast => "fast",
+    Freewheel => "freewheel",
+    DcInjection => "DC injection",
+} }
 
 /// A command, as errors and logs name it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -147,5 +160,41 @@ impl fmt::Display for Command {
             Self::Persist => f.write_str("save to EEPROM"),
             Self::Configure(what) => f.write_str(what),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setpoint_is_a_number_and_its_unit() {
+        let hertz = |centihertz| Ok(Frequency::from_centihertz(centihertz).into());
+        for (text, setpoint) in [
+            ("30 Hz", hertz(3_000)),
+            ("30.5Hz", hertz(3_050)),
+            ("0.01 hz", hertz(1)),
+            ("900 rpm", Ok(Speed::from_rpm(900).into())),
+            ("1450RPM", Ok(Speed::from_rpm(1_450).into())),
+        ] {
+            assert_eq!(text.parse::<Setpoint>(), setpoint, "{text}");
+        }
+        for text in ["", "30", "fast", "-5 Hz", "1.234 Hz", "1,5 Hz", "99999999999 Hz", "rpm", "14.5 rpm"] {
+            let error = text.parse::<Setpoint>().expect_err(text);
+            assert!(error.to_string().contains("such as 47.5 Hz, or a speed such as 1450 rpm"));
+        }
+    }
+
+    #[test]
+    fn a_stop_mode_and_a_direction_read_back_as_they_are_printed_and_as_programs_write_them() {
+        for mode in StopMode::ALL {
+            assert_eq!(mode.to_string().parse(), Ok(mode));
+        }
+        for text in ["DC injection", "dc_injection", "dc-injection", "DC-Injection"] {
+            assert_eq!(text.parse(), Ok(StopMode::DcInjection));
+        }
+        assert_eq!("Reverse".parse(), Ok(Direction::Reverse));
+        let error = "left".parse::<Direction>().unwrap_err();
+        assert_eq!(error.to_string(), "expected one of forward, reverse");
     }
 }

@@ -50,21 +50,17 @@ impl State {
     }
 }
 
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::NotReady => "not ready",
-            Self::Disabled => "disabled",
-            Self::Ready => "ready",
-            Self::Running => "running",
-            Self::Stopping => "stopping",
-            Self::QuickStop => "quick stop",
-            Self::FaultReaction => "fault reaction",
-            Self::Fault => "fault",
-            Self::Unknown => "unknown",
-        })
-    }
-}
+crate::named! { State {
+    NotReady => "not ready",
+    Disabled => "disabled",
+    Ready => "ready",
+    Running => "running",
+    Stopping => "stopping",
+    QuickStop => "quick stop",
+    FaultReaction => "fault reaction",
+    Fault => "fault",
+    Unknown => "unknown",
+} }
 
 /// Who commands the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -83,17 +79,13 @@ pub enum Control {
     OtherBus,
 }
 
-impl fmt::Display for Control {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Bus => "bus",
-            Self::Terminals => "terminals",
-            Self::Panel => "panel",
-            Self::Local => "local",
-            Self::OtherBus => "other bus",
-        })
-    }
-}
+crate::named! { Control {
+    Bus => "bus",
+    Terminals => "terminals",
+    Panel => "panel",
+    Local => "local",
+    OtherBus => "other bus",
+} }
 
 /// One word as the drive sent it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,6 +1,11 @@
 //! Units as types: integers at the wire's own resolution, so that nothing is rounded on the way.
 
-use std::fmt;
+use std::{fmt, str::FromStr};
+
+/// A text that is no value with its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected {0}")]
+pub struct UnitError(pub(crate) &'static str);
 
 /// Declares a unit that is an integer with a fixed number of decimals.
 macro_rules! decimal_unit {
@@ -27,6 +32,17 @@ macro_rules! decimal_unit {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 write_decimal(f, i64::from(self.0), $decimals)?;
                 f.write_str(concat!(" ", $symbol))
+            }
+        }
+
+        #[doc = concat!("Reads a number with at most ", $decimals, " decimals and its unit, `", $symbol, "`.")]
+        impl FromStr for $name {
+            type Err = UnitError;
+
+            fn from_str(text: &str) -> Result<Self, UnitError> {
+                let counts = without_unit(text, $symbol).and_then(|number| read_decimal(number, $decimals));
+                let value = counts.and_then(|counts| <$inner>::try_from(counts).ok()).map(Self);
+                value.ok_or(UnitError(concat!("a number with at most ", $decimals, " decimals and its unit, ", $symbol)))
             }
         }
 
@@ -148,6 +164,13 @@ pub(crate) fn write_decimal(f: &mut impl fmt::Write, value: i64, decimals: u8) -
     write!(f, "{}.{:0width$}", magnitude / scale, magnitude % scale, width = usize::from(decimals))
 }
 
+/// The number before a unit, whatever the unit's case.
+fn without_unit<'a>(text: &'a str, symbol: &str) -> Option<&'a str> {
+    let text = text.trim();
+    let (number, unit) = text.split_at_checked(text.len().checked_sub(symbol.len())?)?;
+    unit.eq_ignore_ascii_case(symbol).then_some(number.trim_end())
+}
+
 /// Reads a decimal number as an integer of `decimals` places; `None` when it is none or has more places.
 pub(crate) fn read_decimal(text: &str, decimals: u8) -> Option<i64> {
     let (negative, digits) = match text.strip_prefix('-') {
@@ -181,6 +204,26 @@ mod tests {
         assert_eq!(Frequency::from_centihertz(1_234).exact_decihertz(), None);
         assert_eq!(Frequency::from_centihertz(1_230).exact_decihertz(), Some(123));
         assert_eq!(Frequency::from_centihertz(u32::MAX / 10 * 10).exact_decihertz(), None);
+    }
+
+    #[test]
+    fn a_value_reads_back_as_it_is_printed_and_is_nothing_without_its_unit() {
+        for centihertz in [0, 1, 3_050, u32::MAX] {
+            let frequency = Frequency::from_centihertz(centihertz);
+            assert_eq!(frequency.to_string().parse(), Ok(frequency));
+        }
+        assert_eq!("-118.00 %".parse(), Ok(Percent::from_percent(-118)));
+        assert_eq!(" 0.75KW".parse(), Ok(Power::from_decawatts(75)));
+        assert_eq!("900rpm".parse(), Ok(Speed::from_rpm(900)));
+        for text in
+            ["", "30", "Hz", "30.005 Hz", "-5 Hz", "30 rpm", "42949672.96 Hz", "30 H\u{7a}\u{301}", "é"]
+        {
+            assert!(text.parse::<Frequency>().is_err(), "{text}");
+        }
+        assert_eq!(
+            "".parse::<Speed>().unwrap_err().to_string(),
+            "expected a number with at most 0 decimals and its unit, rpm"
+        );
     }
 
     #[test]

@@ -72,6 +72,12 @@ pub enum Link {
     Lost,
 }
 
+drive_core::named! { Link {
+    Connecting => "connecting",
+    Connected => "connected",
+    Lost => "lost",
+} }
+
 /// The verdict on a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
@@ -86,6 +92,12 @@ pub enum Freshness {
     #[cfg_attr(feature = "serde", serde(rename = "missing"))]
     Never,
 }
+
+drive_core::named! { Freshness {
+    Fresh => "good",
+    Stale => "stale",
+    Never => "missing",
+} }
 
 /// What is known of which drive it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -88,7 +88,7 @@ fn a_missing_port_is_named() {
     }
     // A motor that was to be stopped is more than bad input.
     run(&["stop", "--line", PORT, "--drive", "atv312@1"]).assert_refused(1, "STOP NOT CONFIRMED");
-    run(&["setpoint", "30", "--line", PORT, "--drive", "atv312@1"]).assert_refused(2, PORT);
+    run(&["setpoint", "30Hz", "--line", PORT, "--drive", "atv312@1"]).assert_refused(2, PORT);
     // Nobody listens on the discard port of this machine.
     let line = "rtu+tcp://127.0.0.1:9";
     run(&["status", "--line", line, "--drive", "atv312@1"]).assert_refused(2, "127.0.0.1:9");
@@ -100,8 +100,10 @@ fn what_a_family_cannot_do_is_refused_before_the_port_is_opened() {
     ended.assert_refused(2, "takes no speed in rpm");
     let ended = run(&["setpoint", "fast", "--line", PORT, "--drive", "atv312@1"]);
     ended.assert_refused(2, "expected a frequency");
+    let ended = run(&["setpoint", "30", "--line", PORT, "--drive", "atv312@1"]);
+    ended.assert_refused(2, "such as 47.5 Hz, or a speed such as 1450 rpm");
     let ended = run(&["stop", "--mode", "sideways", "--line", PORT, "--drive", "atv312@1"]);
-    ended.assert_refused(2, "possible values: ramp, fast, freewheel, dc-injection");
+    ended.assert_refused(2, "expected one of ramp, fast, freewheel, DC injection");
     let ended = run(&["param", "set", "ETA", "1", "--line", PORT, "--drive", "atv312@1"]);
     ended.assert_refused(2, "ETA (3201): the register can only be read");
     let ended = run(&["param", "get", "NOPE", "--line", PORT, "--drive", "atv312@1"]);

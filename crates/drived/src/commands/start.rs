@@ -1,6 +1,5 @@
 //! `drived start`: starts the motor of one drive.
 
-use clap::ValueEnum;
 use drive_core::Direction;
 
 use crate::{failure::Failure, one_drive::OneDriveArgs, output};
@@ -15,32 +14,17 @@ use crate::{failure::Failure, one_drive::OneDriveArgs, output};
 pub(crate) struct Args {
     #[command(flatten)]
     one: OneDriveArgs,
-    /// Which way
-    #[arg(long, value_enum, default_value_t = Turn::Forward)]
-    direction: Turn,
+    /// Which way: forward or reverse
+    #[arg(long, default_value_t = Direction::Forward)]
+    direction: Direction,
     /// A setting of the drive by which it may start again by itself, such as Atr; may be given several times
     #[arg(long, value_name = "MNEMONIC")]
     accept_self_restart: Vec<String>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Turn {
-    Forward,
-    Reverse,
-}
-
-impl From<Turn> for Direction {
-    fn from(turn: Turn) -> Self {
-        match turn {
-            Turn::Forward => Self::Forward,
-            Turn::Reverse => Self::Reverse,
-        }
-    }
-}
-
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut one = args.one.command(args.accept_self_restart).await?;
-    let direction = Direction::from(args.direction);
+    let direction = args.direction;
     let status = one.start(async |drive| drive.start(direction).await).await?;
     output::say(format_args!("{} started {direction}: the drive shows {status}", one.name))?;
     one.close().await;

@@ -1,6 +1,5 @@
 //! `drived stop`: stops the motor of one drive.
 
-use clap::ValueEnum;
 use drive_core::StopMode;
 
 use crate::{failure::Failure, one_drive::OneDriveArgs, output};
@@ -13,37 +12,15 @@ use crate::{failure::Failure, one_drive::OneDriveArgs, output};
 pub(crate) struct Args {
     #[command(flatten)]
     one: OneDriveArgs,
-    /// How
-    #[arg(long, value_enum, default_value_t = Mode::Ramp)]
-    mode: Mode,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Mode {
-    /// Along the deceleration ramp
-    Ramp,
-    /// Along the drive's short ramp
-    Fast,
-    /// By cutting the output: the motor coasts
-    Freewheel,
-    /// By injecting direct current
-    DcInjection,
-}
-
-impl From<Mode> for StopMode {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::Ramp => Self::Ramp,
-            Mode::Fast => Self::Fast,
-            Mode::Freewheel => Self::Freewheel,
-            Mode::DcInjection => Self::DcInjection,
-        }
-    }
+    /// How: along the deceleration ramp (ramp), along the drive's short ramp (fast), by cutting the output (freewheel), or by
+    /// injecting direct current (dc-injection)
+    #[arg(long, default_value_t = StopMode::Ramp)]
+    mode: StopMode,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut one = args.one.stop()?;
-    let status = one.stop(args.mode.into()).await?;
+    let status = one.stop(args.mode).await?;
     output::say(format_args!("{} stands still: the drive shows {status}", one.name))?;
     one.close().await;
     Ok(())

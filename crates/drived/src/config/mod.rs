@@ -360,7 +360,7 @@ fn settings(
         slow: period(|entry| entry.slow.as_ref().map(|time| time.get_ref().0.0), anyway.slow),
         max_age: period(|entry| entry.max_age.as_ref().map(|time| time.get_ref().0.0), anyway.max_age),
     };
-    let mode = entry.stop_mode.or(defaults.stop_mode).map_or(StopMode::Ramp, |mode| mode.0.0);
+    let mode = entry.stop_mode.or(defaults.stop_mode).map_or(StopMode::Ramp, |mode| mode.0);
     let settings = DriveSettings {
         control: entry.control.or(defaults.control).unwrap_or(false),
         commanders: match entry.commanders.as_ref().or(defaults.commanders.as_ref()) {

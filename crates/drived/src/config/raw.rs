@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use drive_core::StopMode;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -9,8 +10,8 @@ use super::{
     doors::{HttpEntry, SocketEntry},
     groups::Entries,
     values::{
-        BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, Mode, OptionValue,
-        Parsed, PercentValue, ReactionValue, TakenPolicy,
+        BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, OptionValue, Parsed,
+        PercentValue, ReactionValue, TakenPolicy,
     },
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
@@ -68,7 +69,7 @@ pub(super) struct DriveEntry {
     pub(super) watchdog: Option<Spanned<WatchdogEntry>>,
     pub(super) frequency: Option<Spanned<FrequencyEntry>>,
     pub(super) alarms: Option<AlarmEntry>,
-    pub(super) stop_mode: Option<Parsed<Mode>>,
+    pub(super) stop_mode: Option<Parsed<StopMode>>,
     pub(super) on_exit: Option<Parsed<ExitPolicy>>,
     pub(super) on_loss: Option<Parsed<LossPolicy>>,
     pub(super) on_fault: Option<Parsed<FaultPolicy>>,

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use drive_core::{Current, Frequency, Percent, Reaction, StopMode};
+use drive_core::{Current, Frequency, Percent, Reaction};
 use drive_fleet::{Band, OnControlTaken};
 use serde::{Deserialize, Deserializer, de};
 
@@ -48,15 +48,6 @@ macro_rules! words {
             }
         }
     };
-}
-
-words! {
-    /// How to stop.
-    Mode(StopMode):
-    "ramp" => StopMode::Ramp,
-    "fast" => StopMode::Fast,
-    "freewheel" => StopMode::Freewheel,
-    "dc-injection" => StopMode::DcInjection
 }
 
 words! {
