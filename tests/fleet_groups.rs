@@ -6,13 +6,14 @@ use drive_core::{Direction, Frequency, SerialSettings, StopMode};
 use drive_families::Family;
 use drive_fleet::{
     Band, Commanders, DriveSettings, EventKind, FrequencyLimits, GroupFailure, GroupStart, Limit,
-    LimitProblem, OnLoss, Outcome, Refused, Until,
+    LimitProblem, Link, OnLoss, Outcome, Received, Refused, Snapshot, Until,
 };
+use futures_util::StreamExt as _;
 use support::{
     drives,
-    plant::{ADDRESS, MOTOR, Plant, Site, common_settings, controlled},
+    plant::{ADDRESS, MOTOR, PATIENCE, Plant, Site, common_settings, controlled},
 };
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, timeout};
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -211,4 +212,40 @@ async fn two_drives_at_one_address_or_of_one_name_are_refused() {
         panic!("one name, two drives")
     };
     assert_eq!(error.to_string(), "\"motor\": the name is taken");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_at_a_setpoint_is_confirmed_in_force_and_not_only_at_its_reference() {
+    for family in Family::ALL {
+        let plant = Plant::single(family, |_| {});
+        assert_eq!(plant.motor().ready(PATIENCE).await, Ok(()), "{family}");
+        let setpoint = Frequency::from_hertz(30);
+        assert_eq!(
+            plant.motor().start_at(Direction::Forward, setpoint).await,
+            Outcome::Confirmed,
+            "{family}"
+        );
+        let started = plant.machine().observe();
+        assert!(started.running && started.output_frequency < 2_900, "{family}: {started:?}, on its way");
+        let is_there = |snapshot: &Snapshot| snapshot.has_reached_setpoint(Instant::now()) == Some(true);
+        let snapshot = plant.motor().wait_until(is_there).await;
+        assert_eq!(snapshot.setpoint, Some(setpoint.into()), "{family}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_stream_of_events_tells_what_recv_tells_and_ends_with_the_fleet() {
+    let plant = Plant::single(Family::Atv312, |_| {});
+    let read = tokio::spawn(plant.fleet.events().collect::<Vec<Received>>());
+    plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
+    let _ = plant.fleet.shutdown(PATIENCE).await;
+    drop(plant);
+    let read = timeout(PATIENCE, read).await.expect("it ends").expect("no panic");
+    let is = |received: &Received, is_it: fn(&EventKind) -> bool| matches!(received, Received::Event(event) if is_it(&event.kind));
+    assert!(
+        read.iter().any(|received| is(received, |kind| matches!(kind, EventKind::Connected(_)))),
+        "{read:?}"
+    );
+    assert!(is(read.last().expect("events"), |kind| matches!(kind, EventKind::Exit(_))), "{read:?}");
+    assert!(!read.contains(&Received::End));
 }

@@ -2,11 +2,15 @@
 
 use std::{
     fmt,
+    future::poll_fn,
+    pin::Pin,
     sync::{Arc, Mutex, PoisonError},
+    task::{Context, Poll, ready},
     time::Duration,
 };
 
 use drive_bus::Line;
+use futures_core::Stream;
 use futures_util::future::join_all;
 use tokio::{
     sync::broadcast::{self, error::RecvError},
@@ -96,7 +100,7 @@ impl Fleet {
     #[must_use]
     pub fn events(&self) -> Events {
         let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).take();
-        Events(first.or_else(|| self.inner.events.upgrade().map(|events| events.subscribe())))
+        Events::new(first.or_else(|| self.inner.events.upgrade().map(|events| events.subscribe())))
     }
 
     /// The reckoning of a line.
@@ -145,9 +149,14 @@ async fn exit_action(entry: &Entry) -> ExitAction {
     }
 }
 
-/// A reader of the fleet's events.
-#[derive(Debug)]
-pub struct Events(Option<broadcast::Receiver<Event>>);
+/// A reader of the fleet's events: by [`recv`](Self::recv), or as a [`Stream`] that ends with the fleet.
+pub struct Events {
+    /// The wait for the next; `None` when the fleet has ended.
+    next: Option<Next>,
+}
+
+type Next =
+    Pin<Box<dyn Future<Output = (Result<Event, RecvError>, broadcast::Receiver<Event>)> + Send + Sync>>;
 
 /// What a reader of events gets.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -161,16 +170,44 @@ pub enum Received {
 }
 
 impl Events {
+    fn new(receiver: Option<broadcast::Receiver<Event>>) -> Self {
+        Self { next: receiver.map(next) }
+    }
+
     /// The next event, or how many were missed.
     ///
     /// # Cancellation
     /// Safe to drop: nothing is lost.
     pub async fn recv(&mut self) -> Received {
-        let Some(receiver) = &mut self.0 else { return Received::End };
-        match receiver.recv().await {
-            Ok(event) => Received::Event(event),
-            Err(RecvError::Lagged(missed)) => Received::Missed(missed),
-            Err(RecvError::Closed) => Received::End,
-        }
+        poll_fn(|context| Pin::new(&mut *self).poll_next(context)).await.unwrap_or(Received::End)
+    }
+}
+
+fn next(mut receiver: broadcast::Receiver<Event>) -> Next {
+    Box::pin(async move {
+        let received = receiver.recv().await;
+        (received, receiver)
+    })
+}
+
+/// Its items are never [`Received::End`]: the end of the fleet is the end of the stream.
+impl Stream for Events {
+    type Item = Received;
+
+    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Received>> {
+        let Some(waiting) = &mut self.next else { return Poll::Ready(None) };
+        let (received, receiver) = ready!(waiting.as_mut().poll(context));
+        self.next = (received != Err(RecvError::Closed)).then(|| next(receiver));
+        Poll::Ready(match received {
+            Ok(event) => Some(Received::Event(event)),
+            Err(RecvError::Lagged(missed)) => Some(Received::Missed(missed)),
+            Err(RecvError::Closed) => None,
+        })
+    }
+}
+
+impl fmt::Debug for Events {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Events").finish_non_exhaustive()
     }
 }

@@ -154,7 +154,14 @@ impl DriveHandle {
         self.order(Order::Start { direction, setpoint: None, until: Until::InForce }).await
     }
 
-    /// Gives a setpoint, starts the motor, and waits until it has reached it.
+    /// Gives a setpoint and starts the motor. Confirmed when the run command shows in its words: the speed is then on its
+    /// way, and [`run`](Self::run) waits until it is reached.
+    pub async fn start_at(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Outcome {
+        let setpoint = Some(setpoint.into());
+        self.order(Order::Start { direction, setpoint, until: Until::InForce }).await
+    }
+
+    /// Gives a setpoint, starts the motor, and waits until it has reached it; [`start_at`](Self::start_at) does not wait.
     pub async fn run(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Outcome {
         let setpoint = Some(setpoint.into());
         self.order(Order::Start { direction, setpoint, until: Until::AtReference }).await
