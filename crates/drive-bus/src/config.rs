@@ -7,8 +7,6 @@ use std::{collections::BTreeMap, time::Duration};
 use drive_core::serial::SerialSettings;
 
 pub use crate::exchange::echo::Echo;
-#[cfg(feature = "unitelway")]
-use crate::exchange::unitelway;
 use crate::{pdu::MAX_PDU, protocol::Protocol};
 
 /// Where a line goes. Ways whose feature is not compiled in do not exist.
@@ -272,7 +270,7 @@ impl LineConfig {
         #[cfg(feature = "unitelway")]
         if let Protocol::UniTelway(settings) = self.protocol {
             // Its slaves are waited for while others are served.
-            let all = unitelway::longest(self.serial, settings, self.chunk_gap, request, answer);
+            let all = drive_unitelway::longest(self.serial.baud(), settings, self.chunk_gap, request, answer);
             return if disturbed { all } else { all.min(alone) };
         }
         alone + if disturbed { self.protocol.overtime(self.serial, self.chunk_gap) } else { Duration::ZERO }

@@ -56,6 +56,11 @@
 //! # Inside
 //! [`exchange`], [`schedule`] and [`master`] are pure: no clock, no port. One task per line reads, writes and waits.
 
+/// The examples of the README, which compile.
+#[cfg(all(doctest, feature = "serial"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod answer;
 pub mod capture;
 pub mod config;

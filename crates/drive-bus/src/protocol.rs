@@ -15,9 +15,7 @@ pub use crate::exchange::ascii::AsciiSettings;
 use crate::exchange::mbap;
 use crate::exchange::rtu;
 #[cfg(feature = "unitelway")]
-use crate::exchange::unitelway;
-#[cfg(feature = "unitelway")]
-pub use crate::exchange::unitelway::{NetworkHeader, UniTelwaySettings};
+pub use drive_unitelway::{NetworkHeader, UniTelwaySettings};
 
 /// The last address that a slave on a line can have; the rest is reserved (MODBUS over Serial Line V1.02 p. 7).
 const LAST_ON_A_LINE: u8 = 247;
@@ -134,7 +132,7 @@ impl Protocol {
             #[cfg(feature = "ascii")]
             Self::Ascii(_) => ascii::len(pdu),
             #[cfg(feature = "unitelway")]
-            Self::UniTelway(_) => unitelway::request_len(pdu),
+            Self::UniTelway(_) => drive_unitelway::request_len(pdu),
         }
     }
 
@@ -142,7 +140,7 @@ impl Protocol {
     pub(crate) const fn answer_len(&self, pdu: usize) -> usize {
         match self {
             #[cfg(feature = "unitelway")]
-            Self::UniTelway(_) => unitelway::reply_len(pdu),
+            Self::UniTelway(_) => drive_unitelway::reply_len(pdu),
             _ => self.request_len(pdu),
         }
     }

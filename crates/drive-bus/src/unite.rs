@@ -5,13 +5,12 @@ use std::{borrow::Cow, time::Duration};
 
 use bytes::Bytes;
 use drive_core::{Class, Port, PortError, Terms};
+use drive_unitelway::code;
 use tokio_modbus::{ExceptionCode, Request, Response, client::Client};
 
-use crate::{
-    exchange::unitelway::{UNITE, code},
-    protocol::Protocol,
-    slave::Slave,
-};
+pub use drive_unitelway::{Identification, LinkCounters, SpecificCommand, SpecificReport};
+
+use crate::{exchange::unitelway::UNITE, protocol::Protocol, slave::Slave};
 
 /// How long a command may wait until it is sent, where its caller has not said so: as in every family.
 const COMMAND_LIFETIME: Duration = Duration::from_secs(1);
@@ -48,58 +47,6 @@ pub enum UniTeError {
     Port(#[from] PortError),
 }
 
-/// What a slave says of itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Identification {
-    /// 18h: Altivar.
-    pub product: u8,
-    /// 58h: Altivar 58.
-    pub subtype: u8,
-    /// Two decimal digits: 21h is V2.1.
-    pub version: u8,
-    /// The drive's rating, such as `ATV58U18N4`. What is not ASCII is replaced.
-    pub rating: String,
-}
-
-/// The four counters of a slave's link. Each stops at 32 767.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct LinkCounters {
-    /// Messages that it sent and nobody acknowledged.
-    pub sent_not_acknowledged: u16,
-    /// Messages that it sent and the master refused.
-    pub sent_refused: u16,
-    /// Messages that it received and did not acknowledge.
-    pub received_not_acknowledged: u16,
-    /// Messages that it received and refused.
-    pub received_refused: u16,
-}
-
-/// What the specific request writes, in the drive's own counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SpecificCommand {
-    /// `CMD`, the control word.
-    pub cmd: u16,
-    /// `FRH`, the frequency reference.
-    pub frh: u16,
-    /// `ACC`, the acceleration ramp.
-    pub acc: u16,
-    /// `DEC`, the deceleration ramp.
-    pub dec: u16,
-}
-
-/// What the specific request reads back, in the drive's own counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SpecificReport {
-    /// `FRH`, the frequency reference.
-    pub frh: u16,
-    /// `ETA`, the status register.
-    pub eta: u16,
-    /// `FLT`, the fault register.
-    pub flt: u16,
-    /// `LCR`, the motor current.
-    pub lcr: u16,
-}
-
 impl UniTe {
     pub(crate) const fn new(slave: Slave) -> Self {
         Self { slave }
@@ -108,13 +55,7 @@ impl UniTe {
     /// Request 0Fh: who the slave is.
     pub async fn identify(&mut self) -> Result<Identification, UniTeError> {
         let reply = self.ask(code::IDENTIFICATION, &[]).await?;
-        match *reply {
-            [_, product, subtype, version, len, ref text @ ..] if text.len() == usize::from(len) => {
-                let rating = String::from_utf8_lossy(text).into_owned();
-                Ok(Identification { product, subtype, version, rating })
-            }
-            _ => Err(misfit("an identification that is not whole")),
-        }
+        Identification::from_reply(&reply).ok_or_else(|| misfit("an identification that is not whole"))
     }
 
     /// Request 30h: the protocol's version, as the slave codes it; what the bytes mean is not printed.
@@ -131,10 +72,7 @@ impl UniTe {
     /// Request A2h: the counters of the slave's link. They stand in the line's statistics from then on.
     pub async fn link_counters(&mut self) -> Result<LinkCounters, UniTeError> {
         let reply = self.ask(code::READ_COUNTERS, &[]).await?;
-        let [sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused] =
-            words(&reply, 1)?;
-        let counters =
-            LinkCounters { sent_not_acknowledged, sent_refused, received_not_acknowledged, received_refused };
+        let counters = LinkCounters::from_reply(&reply).ok_or_else(|| misfit("not four words"))?;
         self.note_link_counters(counters);
         Ok(counters)
     }
@@ -156,23 +94,14 @@ impl UniTe {
     /// # Errors
     /// Also [`PortError::OutcomeUnknown`] when it was sent and no reply came: read the status before anything else.
     pub async fn command(&mut self, command: SpecificCommand) -> Result<SpecificReport, UniTeError> {
-        let mut body = vec![0, 0];
-        for word in [command.cmd, command.frh, command.acc, command.dec] {
-            body.extend(word.to_le_bytes());
-        }
         let mut commands = self.clone();
         let terms = self.slave.terms;
         if terms.class < Class::Command {
             let lifetime = terms.lifetime.map_or(COMMAND_LIFETIME, |own| own.min(COMMAND_LIFETIME));
             commands.slave.set_terms(Terms { class: Class::Command, lifetime: Some(lifetime), ..terms });
         }
-        let reply = commands.ask(code::SPECIFIC, &body).await?;
-        // Its own code is followed by that of the specific reply and a reserved byte.
-        if reply.get(1) != Some(&0x30) {
-            return Err(misfit("another specific reply"));
-        }
-        let [frh, eta, flt, lcr] = words(&reply, 3)?;
-        Ok(SpecificReport { frh, eta, flt, lcr })
+        let reply = commands.ask(code::SPECIFIC, &command.body()).await?;
+        SpecificReport::from_reply(&reply).ok_or_else(|| misfit("another specific reply"))
     }
 
     fn note_link_counters(&self, counters: LinkCounters) {
@@ -195,12 +124,4 @@ impl UniTe {
 
 fn misfit(why: &str) -> UniTeError {
     UniTeError::Port(PortError::Mismatch(why.to_owned()))
-}
-
-/// The four words of a reply, from this byte on.
-fn words(reply: &[u8], from: usize) -> Result<[u16; 4], UniTeError> {
-    match reply.get(from..) {
-        Some(&[a, b, c, d, e, f, g, h]) => Ok([[a, b], [c, d], [e, f], [g, h]].map(u16::from_le_bytes)),
-        _ => Err(misfit("not four words")),
-    }
 }

@@ -10,11 +10,11 @@ use std::time::Duration;
 use bytes::Bytes;
 use drive_bus::{
     Line, LineConfig, Protocol,
-    exchange::unitelway::{data_frame, poll},
     protocol::UniTelwaySettings,
     unite::{SpecificCommand, SpecificReport, UniTeError},
 };
 use drive_core::{Class, Port, PortError, Terms};
+use drive_unitelway::{data_frame, poll};
 use support::{
     MS,
     unitelway::{ACK, EOT, NAK, READ, WRITE, WRITTEN, serial},

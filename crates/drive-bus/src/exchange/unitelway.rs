@@ -1,264 +1,126 @@
-//! UNI-TELWAY, the master's side: who is polled may speak.
-//!
-//! ```text
-//! data frame : 10 02 address length data BCC      (each 10h of length and data sent twice)
-//! poll       : 10 05 address
-//! yes, no, nothing to say : 06, 15, 04
-//!
-//! master : data            poll                     ACK       poll
-//! slave  :       ACK             data (or EOT: later)              EOT
-//! ```
-//!
-//! One exchange is a request, its acknowledgement, as many polls as the slave needs, the reply and its acknowledgement,
-//! and one more poll. The time that a slave may take for its reply is the line's response timeout, learned as in every
-//! protocol. Inside it [`UniTelwaySettings`] has the link's own times.
-//!
-//! # Which request a reply belongs to
-//! A reply says nothing of it. Slaves do different things with a reply whose acknowledgement they have not heard: they
-//! send it again at the next poll, keep it and answer later requests behind it, refuse any request until it is taken,
-//! or forget it. So a request is sent only to a slave that holds nothing:
-//! - It has answered the last poll of its last exchange by EOT, and every reply that it owed has come.
-//! - Else it is asked first to mirror a number of ours (request FAh). What comes before that number is dropped; behind
-//!   it, nothing older can come, because a slave answers in the order in which it was asked. One that refuses to mirror
-//!   has to have nothing more to say.
-//! - The first write of a stop waits for neither. Where it is not known what the slave holds, no confirmation of it is
-//!   taken: its outcome is unknown, and the line sends it again behind a number that was mirrored.
-//!
-//! # When something is lost, and when a slave is slow
-//! - EOT and silence both mean "not yet" to a poll for a reply: the slave is polled again until its time is over, and
-//!   the line serves others between the polls.
-//! - A request that the slave refuses (NAK) was not carried out. What the slave may hold is taken, the request is sent
-//!   again at once, then after pauses in which others are served, for [`UniTelwaySettings::busy_timeout`].
-//! - A request that the slave does not acknowledge may have been carried out. The exchange fails, a write's outcome is
-//!   unknown, and whether it is sent again is for the line to decide: an edge never is.
-//! - A reply that is damaged is refused and polled for again; nothing is carried out twice by that.
-//!
-//! The line has no broadcast here: the card's manual names none for this protocol.
-//!
-//! # What remains
-//! A slave that can neither mirror nor say EOT is asked as soon as it has been silent once: a reply of its that comes
-//! later than the line's late window and has the shape of a later one is taken for it.
-//!
-//! # Sources
-//! The card's manual (VVDED397054 p. 11–13/35–37) prints the UNI-TE requests and leaves the link to the "UNI-TELWAY
-//! reference manual". The frames here are those of public implementations of the slave's side. **Not confirmed on a
-//! card**: the network header, what a slave with nothing to say answers, all times, and what becomes of a reply whose
-//! acknowledgement the slave has not heard.
+//! UNI-TELWAY: the link of [`drive_unitelway`], and what the Modbus requests of a family become among its own.
 
-mod frame;
-mod known;
-mod network;
-mod receive;
-mod request;
-mod send;
-mod settings;
-mod stage;
-
-use std::{
-    collections::BTreeMap,
-    hash::{BuildHasher, RandomState},
-    mem,
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_core::{Class, serial::SerialSettings};
+use drive_unitelway::{Refusal, Reply, UniTelwaySettings};
 use tokio::time::Instant;
-use tokio_modbus::Request;
+use tokio_modbus::{
+    ExceptionCode, Request, Response,
+    prelude::{ConformityLevel, DeviceIdObject, ReadDeviceIdentificationResponse},
+};
 
-use self::{
-    frame::{MAX_FRAME, Receiver},
-    known::Known,
-    network::MAX_MESSAGE,
-    request::{encode, is_specific},
-    stage::{Current, Next, Stage},
-};
-pub use self::{
-    frame::{data as data_frame, len as frame_len, poll},
-    network::NetworkHeader,
-    request::UNITE,
-    settings::{UniTelwaySettings, longest},
-};
-pub(crate) use self::{
-    request::code,
-    settings::{reply_len, request_len},
-};
-use super::{Exchange, Step, Stray};
-use crate::{answer, shape::Shape};
+use super::{Exchange, Failure, Step, Stray};
+use crate::shape::Shape;
+
+/// The function code under which a UNI-TE request itself travels in a [`Request::Custom`]: the data are its code and its
+/// body without the category, which the line adds; the answer's data are the whole reply. One of the codes that Modbus
+/// leaves to its users (MODBUS Application Protocol V1.1b3, section 5: 100 to 110).
+pub const UNITE: u8 = 100;
 
 /// The machine.
 #[derive(Debug)]
 pub struct UniTelway {
-    settings: UniTelwaySettings,
-    serial: SerialSettings,
-    turnaround: Duration,
-    chunk_gap: Duration,
-    known: BTreeMap<u8, Known>,
-    current: Option<Current>,
-    /// The exchanges that wait for their slaves.
-    aside: BTreeMap<u8, Current>,
-    /// The number that was mirrored last. Where it begins nobody knows, so that none is taken for an earlier run's.
-    marks: u32,
-    receiver: Receiver,
-    last_byte: Option<Instant>,
-    /// How long the slave took for the last answer.
-    took: Option<Duration>,
-    /// What was sent last and has not come back as an echo.
-    sent: Bytes,
-    echoes: bool,
-    strays: Vec<Stray>,
+    link: drive_unitelway::UniTelway,
+    /// The slave of the exchange that is under way.
+    slave: u8,
+    /// What was asked, by slave, in the exchange that is under way and in those that were put aside.
+    asked: BTreeMap<u8, Arc<Request<'static>>>,
 }
 
 impl UniTelway {
     /// A machine for an adapter that makes pauses of at most `chunk_gap` inside a frame.
     #[must_use]
     pub fn new(serial: SerialSettings, settings: UniTelwaySettings, chunk_gap: Duration) -> Self {
-        Self {
-            settings,
-            serial,
-            turnaround: serial.bits(settings.turnaround_bits),
-            chunk_gap: chunk_gap.max(serial.t3_5()),
-            known: BTreeMap::new(),
-            current: None,
-            aside: BTreeMap::new(),
-            marks: RandomState::new().hash_one(()) as u32,
-            receiver: Receiver::default(),
-            last_byte: None,
-            took: None,
-            sent: Bytes::new(),
-            echoes: false,
-            strays: Vec::new(),
-        }
+        let chunk_gap = chunk_gap.max(serial.t3_5());
+        let link = drive_unitelway::UniTelway::new(serial.baud(), settings, chunk_gap);
+        Self { link, slave: 0, asked: BTreeMap::new() }
     }
 
-    /// Whether something that a slave may send now has begun to come.
-    fn is_receiving(&self) -> bool {
-        self.receiver.is_open() && self.current.as_ref().is_some_and(Current::is_listening)
-    }
-
-    fn open(&mut self, slave: u8, request: Arc<Request<'static>>, at_once: bool) -> Bytes {
+    fn open(
+        &mut self,
+        slave: u8,
+        request: Arc<Request<'static>>,
+        start: fn(&mut drive_unitelway::UniTelway, u8, drive_unitelway::Request) -> Bytes,
+    ) -> Bytes {
         // What has no form was refused by `carries`.
-        let unite = encode(&request, self.settings.category).unwrap_or_default();
-        let is_empty = self.known.entry(slave).or_default().is_empty();
-        self.current = Some(Current {
-            slave,
-            frame: frame::data(slave, &self.settings.header.message(&unite)),
-            mark: (!is_empty && !at_once).then(|| self.new_mark(slave)),
-            is_proven: is_empty,
-            stage: Stage::Before(Next::Ask),
-            due: None,
-            patience: Duration::ZERO,
-            reply_by: None,
-            reply: self.serial.characters(reply_len(answer::likely_len(&request))),
-            request,
-            requested: None,
-            waiting_since: None,
-            refusals: 0,
-            damaged: 0,
-            leftovers: 0,
-            unanswered: 0,
-            result: None,
-            misfit: None,
-        });
-        self.took = None;
-        self.begin(Next::Ask)
+        let Ok(unite) = encode(&request) else { return Bytes::new() };
+        self.slave = slave;
+        self.asked.insert(slave, request);
+        start(&mut self.link, slave, unite)
+    }
+
+    fn translated(&mut self, step: drive_unitelway::Step) -> Step {
+        use drive_unitelway::{Failure as F, Step as S};
+
+        match step {
+            S::More => Step::More,
+            S::Send(bytes) => Step::Send(bytes),
+            S::Wait(until) => Step::Wait(Instant::from_std(until)),
+            S::Done(result) => {
+                let asked = self.asked.remove(&self.slave);
+                Step::Done(match result {
+                    Ok(Ok(reply)) => asked
+                        .and_then(|asked| decode(&asked, reply))
+                        .map(Ok)
+                        .ok_or_else(|| Failure::Mismatch("the reply to another request".to_owned())),
+                    // Without a reason: what the exception 03 says.
+                    Ok(Err(Refusal::Negative)) => Ok(Err(ExceptionCode::IllegalDataValue)),
+                    Ok(Err(Refusal::Undeliverable)) => Ok(Err(ExceptionCode::GatewayPathUnavailable)),
+                    Err(F::Timeout) => Err(Failure::Timeout),
+                    Err(F::Damaged(why)) => Err(Failure::Damaged(why)),
+                    Err(F::Mismatch(why)) => Err(Failure::Mismatch(why)),
+                    Err(F::Refused(why)) => Err(Failure::Refused(why)),
+                    Err(F::Doubted(why)) => Err(Failure::Doubted(why)),
+                })
+            }
+        }
     }
 }
 
 impl Exchange for UniTelway {
     fn carries(&self, slave: u8, request: &Request<'_>, class: Class) -> Result<(), String> {
-        if slave == 0 {
-            return Err("UNI-TELWAY has no broadcast here".to_owned());
-        }
-        if is_specific(request) && class < Class::Command {
+        let unite = encode(request)?;
+        if unite.is_specific() && class < Class::Command {
             return Err(format!("request F2h commands the drive, which class {class} may not"));
         }
-        let unite = encode(request, self.settings.category)?;
-        if self.settings.header.message(&unite).len() > MAX_MESSAGE {
-            return Err(format!("a request of {} bytes is longer than a frame", unite.len()));
-        }
-        Ok(())
+        self.link.check(slave, &unite).map_err(|error| error.to_string())
     }
 
     fn is_write(&self, request: &Request<'_>) -> bool {
-        request::is_write(request).unwrap_or_else(|| crate::pdu::is_write(request))
+        encode(request).map_or_else(|_| crate::pdu::is_write(request), |unite| unite.is_write())
     }
 
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, _: &Bytes) -> Bytes {
-        self.open(slave, request, false)
+        self.open(slave, request, drive_unitelway::UniTelway::start)
     }
 
     fn start_at_once(&mut self, slave: u8, request: Arc<Request<'static>>, _: &Bytes) -> Bytes {
-        self.open(slave, request, true)
+        self.open(slave, request, drive_unitelway::UniTelway::start_at_once)
     }
 
     fn handle_sent(&mut self, end: Instant, answer_by: Instant) {
-        let link_timeout = self.settings.link_timeout;
-        let Some(current) = &mut self.current else { return };
-        if current.reply_by.is_none() {
-            current.patience = answer_by.saturating_duration_since(end);
-            current.reply_by = Some(answer_by);
-        }
-        current.due = Some(match current.stage {
-            Stage::Asking => {
-                let reply_by = end + current.patience;
-                current.reply_by = Some(reply_by);
-                current.requested = Some(end);
-                reply_by.min(end + link_timeout + self.serial.characters(1))
-            }
-            Stage::Polling(_) => end + link_timeout + current.reply,
-            // The echo of an acknowledgement must not be taken for one of the next request.
-            Stage::Answering(_) if self.echoes => end + self.chunk_gap,
-            Stage::Answering(_) | Stage::Before(_) => end,
-        });
+        self.link.handle_sent(end.into_std(), answer_by.into_std());
     }
 
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step {
-        self.last_byte = Some(now);
-        self.receiver.push(bytes);
-        let mut step = Step::More;
-        while let Some(heard) = self.receiver.next() {
-            let next = self.hear(now, heard);
-            step = if step == Step::More { next } else { step };
-        }
-        step
+        let step = self.link.handle_bytes(now.into_std(), bytes);
+        self.translated(step)
     }
 
     fn handle_timeout(&mut self, now: Instant) -> Step {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return Step::More;
-        }
-        while self.is_receiving() {
-            let Some(given_up) = self.receiver.give_up() else { break };
-            let step = self.hear(now, given_up);
-            if step != Step::More {
-                return step;
-            }
-            while let Some(heard) = self.receiver.next() {
-                let step = self.hear(now, heard);
-                if step != Step::More {
-                    return step;
-                }
-            }
-        }
-        let over = self.current.as_ref().and_then(|current| current.due).is_some_and(|due| now >= due);
-        if over { self.overdue(now) } else { Step::More }
+        let step = self.link.handle_timeout(now.into_std());
+        self.translated(step)
     }
 
     fn deadline(&self) -> Option<Instant> {
-        let due = self.current.as_ref()?.due?;
-        match self.last_byte {
-            Some(last) if self.is_receiving() => {
-                let limit = due + self.serial.characters(MAX_FRAME) + self.chunk_gap;
-                Some((last + self.chunk_gap).min(limit))
-            }
-            _ => Some(due),
-        }
+        self.link.deadline().map(Instant::from_std)
     }
 
     fn abandon(&mut self) {
-        self.current = None;
+        self.link.abandon();
+        self.asked.remove(&self.slave);
     }
 
     fn frees_the_line(&self) -> bool {
@@ -266,30 +128,33 @@ impl Exchange for UniTelway {
     }
 
     fn resume(&mut self, slave: u8) -> Option<Bytes> {
-        let current = self.aside.remove(&slave)?;
-        let Stage::Before(next) = current.stage else { return None };
-        self.current = Some(current);
-        Some(self.begin(next))
+        self.slave = slave;
+        self.link.resume(slave)
     }
 
     fn forsake(&mut self, slave: u8) {
-        self.aside.remove(&slave);
+        self.link.forsake(slave);
+        self.asked.remove(&slave);
     }
 
     fn reset(&mut self) {
-        self.current = None;
-        self.aside.clear();
-        self.receiver = Receiver::default();
-        self.sent.clear();
-        self.known.clear();
+        self.link.reset();
+        self.asked.clear();
     }
 
     fn took(&self) -> Option<Duration> {
-        self.took
+        self.link.took()
     }
 
     fn take_strays(&mut self) -> Vec<Stray> {
-        mem::take(&mut self.strays)
+        let translated = |stray| match stray {
+            drive_unitelway::Stray::Frame { slave, function } => {
+                Stray::Frame { slave, function, shape: Shape::ANY, is_request: false }
+            }
+            drive_unitelway::Stray::Noise(bytes) => Stray::Noise(bytes),
+            drive_unitelway::Stray::Echo => Stray::Echo,
+        };
+        self.link.take_strays().into_iter().map(translated).collect()
     }
 
     fn confuses_late_answers(&self) -> bool {
@@ -302,6 +167,119 @@ impl Exchange for UniTelway {
     }
 
     fn echoes(&self) -> bool {
-        self.echoes
+        self.link.echoes()
+    }
+}
+
+/// The UNI-TE form of a request.
+///
+/// # Errors
+/// Why it has none.
+fn encode(request: &Request<'_>) -> Result<drive_unitelway::Request, String> {
+    use drive_unitelway::Request as Unite;
+
+    match request {
+        Request::ReadHoldingRegisters(first, quantity) | Request::ReadInputRegisters(first, quantity) => {
+            Unite::read_words(*first, *quantity).map_err(|error| error.to_string())
+        }
+        Request::WriteSingleRegister(address, word) => Ok(Unite::write_word(*address, *word)),
+        Request::WriteMultipleRegisters(first, words) => {
+            Unite::write_words(*first, words).map_err(|error| error.to_string())
+        }
+        Request::Custom(0x08, data) => match &**data {
+            [0, 0, mirrored @ ..] => Ok(Unite::mirror(mirrored)),
+            _ => Err("UNI-TELWAY has the echo 08/00 and no other diagnostics".to_owned()),
+        },
+        Request::ReadDeviceIdentification(_, 0) => Ok(Unite::identification()),
+        Request::Custom(UNITE, data) => match &**data {
+            [code, body @ ..] => Ok(Unite::other(*code, body)),
+            [] => Err("a UNI-TE request has a code".to_owned()),
+        },
+        other => {
+            let function = other.function_code().value();
+            Err(format!("UNI-TELWAY has no request for function {function:02X}h"))
+        }
+    }
+}
+
+/// What the reply, which fits its request, is as the answer to it.
+fn decode(request: &Request<'_>, reply: Reply) -> Option<Response> {
+    Some(match (request, reply) {
+        (Request::ReadHoldingRegisters(..), Reply::Words(words)) => Response::ReadHoldingRegisters(words),
+        (Request::ReadInputRegisters(..), Reply::Words(words)) => Response::ReadInputRegisters(words),
+        (Request::WriteSingleRegister(address, word), Reply::Done) => {
+            Response::WriteSingleRegister(*address, *word)
+        }
+        (Request::WriteMultipleRegisters(first, words), Reply::Done) => {
+            Response::WriteMultipleRegisters(*first, words.len() as u16)
+        }
+        (Request::Custom(0x08, data), Reply::Raw(_)) => Response::Custom(0x08, Bytes::copy_from_slice(data)),
+        (Request::ReadDeviceIdentification(read_code, 0), Reply::Raw(reply)) => {
+            let identification = drive_unitelway::Identification::from_reply(&reply)?;
+            let version = identification.version;
+            let object = |id, value| DeviceIdObject { id, value };
+            let version = Bytes::from(format!("V{}.{}", version >> 4, version & 0x0F));
+            Response::ReadDeviceIdentification(ReadDeviceIdentificationResponse {
+                read_code: *read_code,
+                conformity_level: ConformityLevel::BasicIdentificationStreamOnly,
+                more_follows: false,
+                next_object_id: 0,
+                // The rating stands behind code, product, subtype, version and its length.
+                device_id_objects: vec![object(1, reply.slice(5..)), object(2, version)],
+            })
+        }
+        (Request::Custom(UNITE, _), Reply::Raw(reply)) => Response::Custom(UNITE, reply),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::borrow::Cow;
+
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn what_the_protocol_has_no_form_for_is_refused_before_anything_is_sent() {
+        let settings = UniTelwaySettings::default();
+        let machine = UniTelway::new(SerialSettings::MODBUS_DEFAULT, settings, 20 * MS);
+        let carries = |slave, request: &Request<'_>| machine.carries(slave, request, Class::Command);
+        let unite = |bytes: &'static [u8]| Request::Custom(UNITE, Cow::Borrowed(bytes));
+        assert!(carries(0, &Request::WriteSingleRegister(400, 6)).is_err(), "a broadcast");
+        for request in [
+            Request::ReadHoldingRegisters(0, 64),
+            Request::ReadHoldingRegisters(0, 0),
+            Request::WriteMultipleRegisters(0, Cow::Owned(vec![0; 61])),
+            Request::Custom(0x08, Cow::Borrowed(&[0, 4, 0, 0])),
+            Request::Custom(0x0B, Cow::Borrowed(&[])),
+            unite(&[]),
+            unite(&[0xFA; 252]),
+            Request::ReadCoils(0, 1),
+        ] {
+            assert!(carries(1, &request).is_err(), "{request:?}");
+        }
+        assert_eq!(carries(1, &unite(&[0xFA; 240])), Ok(()));
+        let specific = unite(&[0xF2, 0, 0, 6, 0, 0, 0, 0, 0, 0, 0]);
+        assert!(machine.is_write(&specific));
+        for class in Class::ALL {
+            let carried = machine.carries(1, &specific, class).is_ok();
+            assert_eq!(carried, class >= Class::Command, "{class}");
+        }
+    }
+
+    #[test]
+    fn a_reply_becomes_the_answer_that_modbus_would_have_given() {
+        let words = || Reply::Words(vec![500, 0x1234]);
+        let read = Request::ReadInputRegisters(250, 2);
+        assert_eq!(decode(&read, words()), Some(Response::ReadInputRegisters(vec![500, 0x1234])));
+        let write = Request::WriteSingleRegister(400, 6);
+        assert_eq!(decode(&write, Reply::Done), Some(Response::WriteSingleRegister(400, 6)));
+        let echo = Request::Custom(0x08, Cow::Borrowed(&[0, 0, 0xA5, 0x37]));
+        let raw = Reply::Raw(Bytes::from_static(&[0xFB, 0xA5, 0x37]));
+        let echoed = Response::Custom(0x08, Bytes::from_static(&[0, 0, 0xA5, 0x37]));
+        assert_eq!(decode(&echo, raw), Some(echoed));
+        assert_eq!(decode(&write, words()), None);
     }
 }

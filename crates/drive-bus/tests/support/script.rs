@@ -35,22 +35,6 @@ impl<M: Exchange> Script<M> {
         bytes
     }
 
-    /// Begins the exchange of a stop's first write.
-    pub(crate) fn ask_at_once(&mut self, slave: u8, request: &Request<'static>) -> Bytes {
-        let encoded = pdu::encode(request).expect("it can be encoded");
-        let bytes = self.machine.start_at_once(slave, Arc::new(request.clone()), &encoded);
-        self.machine.handle_sent(self.now, self.now + PATIENCE);
-        bytes
-    }
-
-    /// The exchange that was put aside goes on at this time; what is sent.
-    pub(crate) fn resume(&mut self, slave: u8, at: Instant) -> Bytes {
-        self.now = self.now.max(at);
-        let bytes = self.machine.resume(slave).expect("it was put aside");
-        self.machine.handle_sent(self.now, self.now + PATIENCE);
-        bytes
-    }
-
     /// Bytes come, 5 ms later.
     pub(crate) fn hear(&mut self, bytes: &[u8]) -> Step {
         self.now += 5 * MS;
@@ -77,18 +61,6 @@ impl<M: Exchange> Script<M> {
         self.now = self.now.max(deadline);
         let step = self.machine.handle_timeout(self.now);
         self.written(step)
-    }
-
-    /// A deadline passes, or the exchange that was put aside goes on; steps in which nothing is to be done pass by.
-    pub(crate) fn wait_or_go_on(&mut self, slave: u8) -> Step {
-        for _ in 0..1_000 {
-            match self.wait() {
-                Step::More => {}
-                Step::Wait(until) => return Step::Send(self.resume(slave, until)),
-                step => return step,
-            }
-        }
-        panic!("nothing ever happens");
     }
 
     /// Deadlines pass until something happens.

@@ -2,17 +2,18 @@
 
 use std::time::Duration;
 
-use drive_core::serial::SerialSettings;
-
-use super::{
+use crate::{
     frame,
     network::{NetworkHeader, STANDARD_LEN},
 };
 
+/// Start bit, 8 data bits, odd parity, stop bit: the link has one format.
+const CHARACTER_BITS: u64 = 11;
+
 /// How many replies that are not its request's an exchange takes from a slave.
-pub(super) const LEFTOVERS: u32 = 16;
+pub(crate) const LEFTOVERS: u32 = 16;
 /// Characters of a poll.
-pub(super) const POLL_LEN: usize = 3;
+pub(crate) const POLL_LEN: usize = 3;
 /// The highest category of a request.
 const CATEGORIES: u8 = 7;
 
@@ -53,8 +54,34 @@ impl Default for UniTelwaySettings {
 
 impl UniTelwaySettings {
     /// Whether the category is one.
-    pub(crate) const fn is_category(&self) -> bool {
+    #[must_use]
+    pub const fn is_category(&self) -> bool {
         self.category <= CATEGORIES
+    }
+}
+
+/// The speed of a line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Speed(u32);
+
+impl Speed {
+    /// That of so many bit/s.
+    pub(crate) const fn new(baud: u32) -> Self {
+        Self(if baud == 0 { 1 } else { baud })
+    }
+
+    /// The time that so many bits take, rounded up to the next nanosecond.
+    pub(crate) fn bits(self, bits: u32) -> Duration {
+        self.time(bits.into())
+    }
+
+    /// The time that so many characters take.
+    pub(crate) fn characters(self, characters: usize) -> Duration {
+        self.time(characters as u64 * CHARACTER_BITS)
+    }
+
+    fn time(self, bits: u64) -> Duration {
+        Duration::from_nanos(bits.saturating_mul(1_000_000_000).div_ceil(u64::from(self.0)))
     }
 }
 
@@ -62,26 +89,29 @@ impl UniTelwaySettings {
 /// everything goes wrong that the settings still put up with. Request and replies have so many characters at the most.
 #[must_use]
 pub fn longest(
-    serial: SerialSettings,
+    baud: u32,
     settings: UniTelwaySettings,
     chunk_gap: Duration,
     request: usize,
     reply: usize,
 ) -> Duration {
-    let said = |characters| serial.bits(settings.turnaround_bits) + serial.characters(characters);
+    let speed = Speed::new(baud);
+    let said = |characters| speed.bits(settings.turnaround_bits) + speed.characters(characters);
     // A request; a poll with a reply, and our word to it; the last poll, which may bring one more.
-    let asked = said(request) + settings.link_timeout + serial.characters(1);
-    let polled = said(POLL_LEN) + settings.link_timeout + serial.characters(reply) + chunk_gap + said(1);
+    let asked = said(request) + settings.link_timeout + speed.characters(1);
+    let polled = said(POLL_LEN) + settings.link_timeout + speed.characters(reply) + chunk_gap + said(1);
     asked + polled * 2
 }
 
 /// How many characters the data frame has that carries a Modbus PDU of this length, without doubled bytes.
-pub(crate) const fn request_len(pdu: usize) -> usize {
+#[must_use]
+pub const fn request_len(pdu: usize) -> usize {
     frame::len(pdu + STANDARD_LEN + 4)
 }
 
 /// How many characters come and go from the end of a request to the end of its exchange: two acknowledgements, two polls,
 /// the reply and an EOT.
-pub(crate) const fn reply_len(pdu: usize) -> usize {
+#[must_use]
+pub const fn reply_len(pdu: usize) -> usize {
     3 + 2 * POLL_LEN + frame::len(pdu + STANDARD_LEN)
 }

@@ -1,7 +1,8 @@
 //! The network's part of a message: the header in front of the UNI-TE request or reply.
 
 use bytes::Bytes;
-use tokio_modbus::ExceptionCode;
+
+use crate::request::Refusal;
 
 /// First byte of a message: UNI-TE follows at once.
 const SIMPLIFIED: u8 = 0x00;
@@ -10,9 +11,9 @@ const STANDARD: u8 = 0x20;
 /// First byte of a message that the network could not deliver.
 const UNDELIVERABLE: u8 = 0x22;
 /// The longer header.
-pub(super) const STANDARD_LEN: usize = 6;
+pub(crate) const STANDARD_LEN: usize = 6;
 /// The longest message.
-pub(super) const MAX_MESSAGE: usize = 255;
+pub(crate) const MAX_MESSAGE: usize = 255;
 
 /// What stands in front of each UNI-TE request: whom on the network it is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -41,7 +42,7 @@ impl Default for NetworkHeader {
 
 impl NetworkHeader {
     /// The message that carries this UNI-TE request.
-    pub(super) fn message(self, unite: &[u8]) -> Vec<u8> {
+    pub(crate) fn message(self, unite: &[u8]) -> Vec<u8> {
         match self {
             Self::Simplified => [&[SIMPLIFIED], unite].concat(),
             Self::Standard { network, station, gate, extensions: [first, second] } => {
@@ -52,11 +53,11 @@ impl NetworkHeader {
 }
 
 /// The UNI-TE part of a message, or what the network has to say instead; `None` for an unknown header.
-pub(super) fn unite_of(message: &Bytes) -> Option<Result<Bytes, ExceptionCode>> {
+pub(crate) fn unite_of(message: &Bytes) -> Option<Result<Bytes, Refusal>> {
     match *message.first()? {
         SIMPLIFIED => Some(Ok(message.slice(1..))),
         STANDARD if message.len() >= STANDARD_LEN => Some(Ok(message.slice(STANDARD_LEN..))),
-        UNDELIVERABLE => Some(Err(ExceptionCode::GatewayPathUnavailable)),
+        UNDELIVERABLE => Some(Err(Refusal::Undeliverable)),
         _ => None,
     }
 }
@@ -83,7 +84,7 @@ mod tests {
     #[test]
     fn a_message_that_was_not_delivered_says_so_and_an_unknown_header_says_nothing() {
         let undeliverable = unite_of(&Bytes::from_static(&[0x22, 0x00, 0xFE]));
-        assert_eq!(undeliverable, Some(Err(ExceptionCode::GatewayPathUnavailable)));
+        assert_eq!(undeliverable, Some(Err(Refusal::Undeliverable)));
         let unknown: [&[u8]; 3] = [&[], &[0x20, 0x00, 0xFE, 0x00, 0x00], &[0x30, 0xFB]];
         for message in unknown {
             assert_eq!(unite_of(&Bytes::from_static(message)), None, "{message:02X?}");

@@ -1,19 +1,16 @@
 //! What is heard, and what the exchange does upon it.
 
-use bytes::Bytes;
-use tokio::time::Instant;
+use std::time::Instant;
 
-use super::{
-    UniTelway,
+use bytes::Bytes;
+
+use crate::{
     frame::{self, ACK, EOT, Heard, NAK, poll},
+    link::{Failure, Step, Stray, UniTelway},
     network::unite_of,
-    request::{REFUSED, decode},
+    request::REFUSED,
     settings::{LEFTOVERS, POLL_LEN},
     stage::{Next, Stage, Then, Wanted},
-};
-use crate::{
-    exchange::{Failure, Step, Stray},
-    shape::Shape,
 };
 
 /// Why a reply that fits its request is not taken.
@@ -21,7 +18,7 @@ const DOUBTED: &str = "the confirmation may belong to an earlier request";
 
 impl UniTelway {
     /// Takes what the receiver has made of the bytes.
-    pub(super) fn hear(&mut self, now: Instant, heard: Heard) -> Step {
+    pub(crate) fn hear(&mut self, now: Instant, heard: Heard) -> Step {
         match heard {
             Heard::Signal { byte, alone } => self.signal(now, byte, alone),
             Heard::Poll(address) => {
@@ -96,7 +93,7 @@ impl UniTelway {
             Some(Ok(unite)) => unite.first().copied().unwrap_or_default(),
             _ => message.first().copied().unwrap_or_default(),
         };
-        let stray = Stray::Frame { slave: address, function, shape: Shape::ANY, is_request: false };
+        let stray = Stray::Frame { slave: address, function };
         let current = self.current.as_mut().filter(|current| current.slave == address);
         let Some((current, wanted)) = current.and_then(|current| match current.stage {
             Stage::Polling(wanted) => Some((current, wanted)),
@@ -122,13 +119,13 @@ impl UniTelway {
             },
             (Wanted::Reply, None) => {
                 let answer = match unite {
-                    Some(Ok(unite)) => decode(&current.request, &unite),
-                    Some(Err(exception)) => Ok(Err(exception)),
+                    Some(Ok(unite)) => current.request.check(&unite),
+                    Some(Err(refusal)) => Ok(Err(refusal)),
                     None => Err(format!("the network header {function:02X}h")),
                 };
                 match answer {
                     Ok(answer) => {
-                        let said = self.serial.characters(1 + POLL_LEN + frame::len(message.len()));
+                        let said = self.speed.characters(1 + POLL_LEN + frame::len(message.len()));
                         self.took = current.requested.map(|end| {
                             now.saturating_duration_since(end).saturating_sub(said + self.turnaround)
                         });

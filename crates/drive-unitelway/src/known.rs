@@ -7,7 +7,7 @@ const LISTENED_TO: u32 = 32;
 
 /// One slave, as its polls have shown it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Known {
+pub(crate) struct Known {
     /// It has said that it has nothing to say, since it was asked last.
     empty: bool,
     /// Exchanges in a row that ended without that word.
@@ -15,28 +15,28 @@ pub(super) struct Known {
 }
 
 impl Known {
-    pub(super) const fn is_empty(self) -> bool {
+    pub(crate) const fn is_empty(self) -> bool {
         self.empty
     }
 
     /// It is asked something: a reply will come.
-    pub(super) const fn note_request(&mut self) {
+    pub(crate) const fn note_request(&mut self) {
         self.empty = false;
     }
 
     /// It has said that it has nothing to say. `emptied`: to a poll for nothing, so that it holds nothing either.
-    pub(super) const fn note_nothing_said(&mut self, emptied: bool) {
+    pub(crate) const fn note_nothing_said(&mut self, emptied: bool) {
         self.silences = 0;
         self.empty = emptied;
     }
 
     /// An exchange has ended without that word.
-    pub(super) const fn note_silence(&mut self) {
+    pub(crate) const fn note_silence(&mut self) {
         self.silences = self.silences.saturating_add(1);
     }
 
     /// Whether that word can be expected of it.
-    pub(super) const fn may_say_nothing(self) -> bool {
+    pub(crate) const fn may_say_nothing(self) -> bool {
         self.silences < SILENCES || self.silences.is_multiple_of(LISTENED_TO)
     }
 }

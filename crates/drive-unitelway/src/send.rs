@@ -1,24 +1,22 @@
 //! What is sent next, and how an exchange ends.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use tokio::time::Instant;
 
-use super::{
-    UniTelway,
+use crate::{
     frame::{self, poll},
+    link::{Answer, Failure, Step, Stray, UniTelway},
     request::{MARK, code},
     stage::{Current, Mark, Next, Stage, Then, Wanted},
 };
-use crate::exchange::{Answer, Failure, Step, Stray};
 
 /// The pause before a slave is polled or asked again grows by this part of the time that it has kept us waiting.
 const PAUSE_GROWTH: u32 = 8;
 
 impl UniTelway {
     /// The time of a stage is over.
-    pub(super) fn overdue(&mut self, now: Instant) -> Step {
+    pub(crate) fn overdue(&mut self, now: Instant) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         match current.stage {
             Stage::Before(next) => self.send(next),
@@ -37,7 +35,7 @@ impl UniTelway {
     }
 
     /// A poll has brought nothing: `said`, or silence.
-    pub(super) fn nothing_came(&mut self, now: Instant, wanted: Wanted, said: bool) -> Step {
+    pub(crate) fn nothing_came(&mut self, now: Instant, wanted: Wanted, said: bool) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         match wanted {
             Wanted::Reply => match &current.mark {
@@ -61,7 +59,7 @@ impl UniTelway {
         }
     }
 
-    pub(super) fn go_on(&mut self, now: Instant, then: Then) -> Step {
+    pub(crate) fn go_on(&mut self, now: Instant, then: Then) -> Step {
         let Some(current) = &self.current else { return Step::More };
         match then {
             Then::Ask => self.yield_line(now, Next::Ask),
@@ -78,7 +76,7 @@ impl UniTelway {
     }
 
     /// The mark has come back, or cannot: what comes from now on can only be the request's.
-    pub(super) fn marked(&mut self, now: Instant) -> Step {
+    pub(crate) fn marked(&mut self, now: Instant) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         current.mark = None;
         current.is_proven = true;
@@ -88,7 +86,7 @@ impl UniTelway {
     }
 
     /// Ends as what came has decided.
-    pub(super) fn close(&mut self) -> Step {
+    pub(crate) fn close(&mut self) -> Step {
         match self.current.as_mut().and_then(|current| current.result.take()) {
             Some(result) => self.end(result),
             None => self.fail(),
@@ -96,7 +94,7 @@ impl UniTelway {
     }
 
     /// The silence before this passes, then it is sent.
-    pub(super) fn after_turnaround(&mut self, now: Instant, next: Next) -> Step {
+    pub(crate) fn after_turnaround(&mut self, now: Instant, next: Next) -> Step {
         let Some(current) = &mut self.current else { return Step::More };
         current.stage = Stage::Before(next);
         current.due = Some(now + self.turnaround);
@@ -104,7 +102,7 @@ impl UniTelway {
     }
 
     /// The slave is not ready: the line is free for others until this is sent, the longer the longer it takes.
-    pub(super) fn wait(&mut self, now: Instant, next: Next) -> Step {
+    pub(crate) fn wait(&mut self, now: Instant, next: Next) -> Step {
         let Some(mut current) = self.current.take() else { return Step::More };
         let since = *current.waiting_since.get_or_insert(now);
         let waited = now.saturating_duration_since(since);
@@ -113,7 +111,7 @@ impl UniTelway {
     }
 
     /// The exchange goes on with this after the turnaround, unless a stop is more urgent.
-    pub(super) fn yield_line(&mut self, now: Instant, next: Next) -> Step {
+    pub(crate) fn yield_line(&mut self, now: Instant, next: Next) -> Step {
         let Some(current) = self.current.take() else { return Step::More };
         self.put_aside(now, current, next, self.turnaround)
     }
@@ -125,12 +123,12 @@ impl UniTelway {
         Step::Wait(now + pause)
     }
 
-    pub(super) fn send(&mut self, next: Next) -> Step {
+    pub(crate) fn send(&mut self, next: Next) -> Step {
         Step::Send(self.begin(next))
     }
 
     /// The bytes of a stage, which begins with them. What comes after them is heard anew.
-    pub(super) fn begin(&mut self, next: Next) -> Bytes {
+    pub(crate) fn begin(&mut self, next: Next) -> Bytes {
         let Some(current) = &mut self.current else { return Bytes::new() };
         let (stage, bytes) = match next {
             Next::Ask => {
@@ -152,7 +150,7 @@ impl UniTelway {
     }
 
     /// A number that no earlier one can be taken for.
-    pub(super) fn new_mark(&mut self, slave: u8) -> Mark {
+    pub(crate) fn new_mark(&mut self, slave: u8) -> Mark {
         self.marks = self.marks.wrapping_add(1);
         // Six bits a byte: none of them is a 10h, which would be doubled.
         let number = [18, 12, 6, 0].map(|shift| 0x40 | (self.marks >> shift) as u8 & 0x3F);
@@ -162,12 +160,12 @@ impl UniTelway {
         Mark { frame, reply: [MARK, a, b, c, d], refused: false }
     }
 
-    pub(super) fn fail(&mut self) -> Step {
+    pub(crate) fn fail(&mut self) -> Step {
         let misfit = self.current.as_mut().and_then(|current| current.misfit.take());
         self.end(Err(misfit.map_or(Failure::Timeout, Failure::Mismatch)))
     }
 
-    pub(super) fn end(&mut self, result: Result<Answer, Failure>) -> Step {
+    pub(crate) fn end(&mut self, result: Result<Answer, Failure>) -> Step {
         self.current = None;
         Step::Done(result)
     }

@@ -1,30 +1,24 @@
-//! The exchange machine of UNI-TELWAY: frames byte for byte, and what becomes of everything else. `unitelway_line.rs`
-//! has the line above it.
-
-#![cfg(feature = "unitelway")]
+//! Frames byte for byte, and what becomes of everything else. `unitelway_line.rs` of drive-bus has the line above it.
 
 mod support;
 
-use std::borrow::Cow;
-
 use bytes::Bytes;
-use drive_bus::{
-    exchange::{
-        Exchange, Failure, Step, Stray,
-        unitelway::{UNITE, UniTelway, data_frame, poll},
-    },
-    protocol::{NetworkHeader, UniTelwaySettings},
+use drive_unitelway::{
+    Failure, NetworkHeader, Refusal, Reply, Request, RequestError, Step, Stray, UniTelwaySettings,
+    data_frame, poll,
 };
-use drive_core::Class;
-use support::{
-    MS,
-    script::{PATIENCE, Script},
-    unitelway::{ACK, EOT, NAK, READ, WRITE, WRITTEN, serial},
-};
-use tokio_modbus::{ExceptionCode, Request, Response};
+use support::{MS, PATIENCE, Script};
 
-fn script(settings: UniTelwaySettings) -> Script<UniTelway> {
-    Script::new(UniTelway::new(serial(), settings, 20 * MS))
+const ACK: &[u8] = &[0x06];
+const NAK: &[u8] = &[0x15];
+const EOT: &[u8] = &[0x04];
+
+fn read() -> Request {
+    Request::read_word(400)
+}
+
+fn write() -> Request {
+    Request::write_word(400, 6)
 }
 
 fn simplified(category: u8) -> UniTelwaySettings {
@@ -32,15 +26,12 @@ fn simplified(category: u8) -> UniTelwaySettings {
 }
 
 /// A machine that knows slave 1 to hold nothing.
-fn settled() -> Script<UniTelway> {
-    let mut script = script(UniTelwaySettings::default());
-    let mark = script.ask(1, &READ);
+fn settled() -> Script {
+    let mut script = Script::new(UniTelwaySettings::default());
+    let mark = script.ask(1, &read());
     assert_eq!(give_mark_back(&mut script, &mark), reply(&[0x04, 0x07, 0x90, 0x01]));
     acknowledge(&mut script);
-    assert_eq!(
-        take(&mut script, &reply(&[0x34, 0, 0])),
-        Step::Done(Ok(Ok(Response::ReadHoldingRegisters(vec![0]))))
-    );
+    assert_eq!(take(&mut script, &reply(&[0x34, 0, 0])), Step::Done(Ok(Ok(Reply::Words(vec![0])))));
     script
 }
 
@@ -49,7 +40,7 @@ fn sends(bytes: &[u8]) -> Step {
 }
 
 /// The silence before a transmission passes; what is sent.
-fn send(script: &mut Script<UniTelway>) -> Bytes {
+fn send(script: &mut Script) -> Bytes {
     match script.wait() {
         Step::Send(bytes) => bytes,
         step => panic!("{step:?}"),
@@ -57,20 +48,20 @@ fn send(script: &mut Script<UniTelway>) -> Bytes {
 }
 
 /// The line is free for others until the exchange goes on; what is sent then.
-fn go_on(script: &mut Script<UniTelway>, step: Step) -> Bytes {
+fn go_on(script: &mut Script, step: Step) -> Bytes {
     let Step::Wait(until) = step else { panic!("{step:?}") };
     assert!(until > script.now);
     script.resume(1, until)
 }
 
 /// The slave acknowledges the request and is polled.
-fn acknowledge(script: &mut Script<UniTelway>) {
+fn acknowledge(script: &mut Script) {
     assert_eq!(script.hear(ACK), Step::More);
     assert_eq!(send(script), poll(1));
 }
 
 /// The slave says something that is none of what it was asked for; it is told that we have it, and the exchange goes on.
-fn dropped(script: &mut Script<UniTelway>, said: &[u8]) -> Bytes {
+fn dropped(script: &mut Script, said: &[u8]) -> Bytes {
     assert_eq!(script.hear(said), Step::More);
     assert_eq!(*send(script), *ACK, "{said:02X?}");
     let step = script.wait();
@@ -78,12 +69,12 @@ fn dropped(script: &mut Script<UniTelway>, said: &[u8]) -> Bytes {
 }
 
 /// The slave says its reply, is told that we have it, and has nothing more to say.
-fn take(script: &mut Script<UniTelway>, said: &[u8]) -> Step {
+fn take(script: &mut Script, said: &[u8]) -> Step {
     assert_eq!(script.hear(said), Step::More);
     closed(script)
 }
 
-fn closed(script: &mut Script<UniTelway>) -> Step {
+fn closed(script: &mut Script) -> Step {
     assert_eq!(*send(script), *ACK);
     assert_eq!(script.wait(), Step::More);
     send(script);
@@ -91,7 +82,7 @@ fn closed(script: &mut Script<UniTelway>) -> Step {
 }
 
 /// A slave mirrors the number that it is asked to; what it is asked then.
-fn give_mark_back(script: &mut Script<UniTelway>, mark: &[u8]) -> Bytes {
+fn give_mark_back(script: &mut Script, mark: &[u8]) -> Bytes {
     assert_eq!(script.hear(ACK), Step::More);
     send(script);
     let mirrored = mirrored(mark);
@@ -112,23 +103,24 @@ fn reply(unite: &[u8]) -> Bytes {
     data_frame(1, &[&[0x20, 0, 0xFE, 0, 0, 0], unite].concat())
 }
 
-fn unite(code_and_body: &'static [u8]) -> Request<'static> {
-    Request::Custom(UNITE, Cow::Borrowed(code_and_body))
+fn unite(code_and_body: &[u8]) -> Request {
+    let (code, body) = code_and_body.split_first().expect("it has a code");
+    Request::other(*code, body)
 }
 
 /// Requests and replies as the link's rules make them, the 10h doubled, both checks as they are on the line.
 struct Vector {
     settings: UniTelwaySettings,
     slave: u8,
-    request: Request<'static>,
+    request: Request,
     sent: &'static [u8],
     reply: &'static [u8],
-    answer: Response,
+    answer: Reply,
 }
 
 fn vectors() -> Vec<Vector> {
     let standard = UniTelwaySettings::default();
-    let with = |reply: &'static [u8]| Response::Custom(UNITE, Bytes::from_static(reply));
+    let with = |reply: &'static [u8]| Reply::Raw(Bytes::from_static(reply));
     vec![
         // Mirror of 10h 04h, category 1, simplified header.
         Vector {
@@ -182,13 +174,13 @@ fn vectors() -> Vec<Vector> {
         Vector {
             settings: simplified(7),
             slave: 1,
-            request: Request::ReadHoldingRegisters(250, 4),
+            request: Request::read_words(250, 4).unwrap(),
             sent: &[0x10, 0x02, 0x01, 0x09, 0x00, 0x36, 0x07, 0x68, 0x07, 0xFA, 0x00, 0x04, 0x00, 0xC6],
             reply: &[
                 0x10, 0x02, 0x01, 0x0B, 0x00, 0x66, 0x07, 0xF4, 0x01, 0x00, 0x00, 0x10, 0x10, 0x00, 0x1E,
                 0x00, 0xBE,
             ],
-            answer: Response::ReadHoldingRegisters(vec![500, 0, 16, 30]),
+            answer: Reply::Words(vec![500, 0, 16, 30]),
         },
     ]
 }
@@ -196,7 +188,7 @@ fn vectors() -> Vec<Vector> {
 #[test]
 fn the_test_vectors_go_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
     for Vector { settings, slave, request, sent, reply, answer } in vectors() {
-        let mut script = script(settings);
+        let mut script = Script::new(settings);
         for round in 0..3 {
             let opening = script.ask(slave, &request);
             let asked = if round == 0 {
@@ -226,7 +218,7 @@ fn the_test_vectors_go_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
 #[test]
 fn a_damaged_vector_is_refused_and_polled_for_again_and_never_taken_for_another_answer() {
     let reply = reply(&[0x66, 0x07, 0xF4, 0x01, 0x10, 0x00]);
-    let read = Request::ReadHoldingRegisters(250, 2);
+    let read = Request::read_words(250, 2).unwrap();
     for at in 0..reply.len() {
         for bit in 0..8 {
             let mut damaged = reply.to_vec();
@@ -241,7 +233,7 @@ fn a_damaged_vector_is_refused_and_polled_for_again_and_never_taken_for_another_
             }
             // Refused, or no beginning of a frame was left, or that of another slave's.
             assert_eq!(go_on(&mut script, step), poll(1), "after {damaged:02X?}");
-            let answer = Response::ReadHoldingRegisters(vec![500, 16]);
+            let answer = Reply::Words(vec![500, 16]);
             assert_eq!(take(&mut script, &reply), Step::Done(Ok(Ok(answer))));
         }
     }
@@ -251,19 +243,19 @@ fn a_damaged_vector_is_refused_and_polled_for_again_and_never_taken_for_another_
 fn a_slave_that_has_nothing_to_say_yet_or_says_nothing_is_polled_again_until_its_time_is_over() {
     for says in [EOT, &[]] {
         let mut script = settled();
-        script.ask(1, &WRITE);
+        script.ask(1, &write());
         let asked = script.now;
         acknowledge(&mut script);
-        let not_yet = |script: &mut Script<UniTelway>| {
+        let not_yet = |script: &mut Script| {
             if says.is_empty() { script.wait() } else { script.hear(says) }
         };
         for _ in 0..2 {
             let step = not_yet(&mut script);
             assert_eq!(go_on(&mut script, step), poll(1));
         }
-        assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+        assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(Reply::Done))));
 
-        let mark = script.ask(1, &WRITE);
+        let mark = script.ask(1, &write());
         if says.is_empty() {
             // What it said last may have been the answer to an earlier poll.
             give_mark_back(&mut script, &mark);
@@ -283,7 +275,7 @@ fn a_slave_that_has_nothing_to_say_yet_or_says_nothing_is_polled_again_until_its
 #[test]
 fn the_polls_of_a_slave_that_needs_long_become_rarer() {
     let mut script = settled();
-    script.ask(1, &WRITE);
+    script.ask(1, &write());
     acknowledge(&mut script);
     let mut polls = 0;
     while let step @ Step::Wait(_) = script.hear(EOT) {
@@ -296,7 +288,7 @@ fn the_polls_of_a_slave_that_needs_long_become_rarer() {
 #[test]
 fn a_slave_is_known_to_hold_nothing_only_once_it_has_said_so_behind_its_last_reply() {
     let mut script = settled();
-    script.ask(1, &WRITE);
+    script.ask(1, &write());
     acknowledge(&mut script);
     script.hear(&reply(&[0xFE]));
     assert_eq!(*send(&mut script), *ACK);
@@ -305,25 +297,25 @@ fn a_slave_is_known_to_hold_nothing_only_once_it_has_said_so_behind_its_last_rep
     // It has not heard our acknowledgement, and then nothing is heard of it.
     let again = dropped(&mut script, &reply(&[0xFE]));
     assert_eq!(again, poll(1));
-    assert_eq!(script.wait(), Step::Done(Ok(Ok(WRITTEN))));
+    assert_eq!(script.wait(), Step::Done(Ok(Ok(Reply::Done))));
 
-    let mark = script.ask(1, &WRITE);
+    let mark = script.ask(1, &write());
     assert!(mark.windows(2).any(|bytes| bytes == [0xFA, 0x07]), "{mark:02X?}");
     assert_eq!(script.hear(ACK), Step::More);
     send(&mut script);
     script.strays();
     assert_eq!(dropped(&mut script, &reply(&[0xFE])), poll(1));
-    assert!(matches!(script.strays()[..], [Stray::Frame { slave: 1, function: 0xFE, .. }]));
+    assert!(matches!(script.strays()[..], [Stray::Frame { slave: 1, function: 0xFE }]));
     let request = dropped(&mut script, &mirrored(&mark));
     assert_eq!(request, reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
 }
 
 #[test]
 fn two_marks_are_never_the_same() {
-    let mut script = script(UniTelwaySettings::default());
-    let first = script.ask(1, &READ);
+    let mut script = Script::new(UniTelwaySettings::default());
+    let first = script.ask(1, &read());
     script.machine.abandon();
-    let second = script.ask(1, &READ);
+    let second = script.ask(1, &read());
     assert_ne!(first, second);
     script.hear(ACK);
     send(&mut script);
@@ -332,8 +324,8 @@ fn two_marks_are_never_the_same() {
 
 #[test]
 fn a_slave_that_cannot_mirror_has_to_have_nothing_more_to_say() {
-    let mut script = script(UniTelwaySettings::default());
-    script.ask(1, &READ);
+    let mut script = Script::new(UniTelwaySettings::default());
+    script.ask(1, &read());
     script.hear(ACK);
     send(&mut script);
     let step = script.hear(EOT);
@@ -347,34 +339,34 @@ fn a_slave_that_cannot_mirror_has_to_have_nothing_more_to_say() {
 
 #[test]
 fn the_first_write_of_a_stop_is_sent_at_once_and_its_confirmation_is_taken_only_where_it_proves_something() {
-    let mut script = script(UniTelwaySettings::default());
-    assert_eq!(script.ask_at_once(1, &WRITE), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
+    let mut script = Script::new(UniTelwaySettings::default());
+    assert_eq!(script.ask_at_once(1, &write()), reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
     acknowledge(&mut script);
     assert!(matches!(take(&mut script, &reply(&[0xFE])), Step::Done(Err(Failure::Doubted(_)))));
-    let mark = script.ask(1, &WRITE);
+    let mark = script.ask(1, &write());
     give_mark_back(&mut script, &mark);
     acknowledge(&mut script);
-    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
-    script.ask_at_once(1, &WRITE);
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(Reply::Done))));
+    script.ask_at_once(1, &write());
     acknowledge(&mut script);
-    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(Reply::Done))));
 }
 
 #[test]
 fn a_refused_request_is_sent_again_once_what_the_slave_holds_is_taken() {
     let mut script = settled();
-    let request = script.ask(1, &WRITE);
+    let request = script.ask(1, &write());
     assert_eq!(script.hear(NAK), Step::More);
     assert_eq!(send(&mut script), poll(1));
     assert_eq!(dropped(&mut script, &reply(&[0x34, 1, 2])), request);
     acknowledge(&mut script);
-    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(WRITTEN))));
+    assert_eq!(take(&mut script, &reply(&[0xFE])), Step::Done(Ok(Ok(Reply::Done))));
 }
 
 #[test]
 fn a_slave_that_goes_on_refusing_is_asked_after_pauses_and_given_up_as_busy() {
     let mut script = settled();
-    let request = script.ask(1, &WRITE);
+    let request = script.ask(1, &write());
     let (asked, mut refused) = (script.now, 0);
     let step = loop {
         refused += 1;
@@ -396,7 +388,7 @@ fn a_slave_that_goes_on_refusing_is_asked_after_pauses_and_given_up_as_busy() {
 #[test]
 fn a_refusal_among_noise_is_none_because_the_request_may_have_been_taken() {
     let mut script = settled();
-    script.ask(1, &WRITE);
+    script.ask(1, &write());
     assert_eq!(script.hear(&[0xAA, 0x15]), Step::More);
     assert_eq!(script.wait_for_step(), Step::Done(Err(Failure::Timeout)));
 }
@@ -404,7 +396,7 @@ fn a_refusal_among_noise_is_none_because_the_request_may_have_been_taken() {
 #[test]
 fn a_request_that_is_not_acknowledged_is_not_sent_again() {
     let mut script = settled();
-    script.ask(1, &WRITE);
+    script.ask(1, &write());
     let asked = script.now;
     assert_eq!(script.wait(), Step::Done(Err(Failure::Timeout)));
     assert!(script.now - asked < 110 * MS, "the link's own timeout, not that of the reply");
@@ -413,7 +405,7 @@ fn a_request_that_is_not_acknowledged_is_not_sent_again() {
 #[test]
 fn a_reply_that_stays_damaged_is_given_up_and_one_that_breaks_off_is_damaged() {
     let mut script = settled();
-    script.ask(1, &READ);
+    script.ask(1, &read());
     acknowledge(&mut script);
     let good = reply(&[0x34, 1, 2]);
     assert_eq!(script.hear(&good[..7]), Step::More);
@@ -428,7 +420,7 @@ fn a_reply_that_stays_damaged_is_given_up_and_one_that_breaks_off_is_damaged() {
 #[test]
 fn a_reply_to_another_request_is_taken_from_the_slave_and_is_no_answer() {
     let mut script = settled();
-    script.ask(1, &READ);
+    script.ask(1, &read());
     acknowledge(&mut script);
     for unfit in [&[0xFE][..], &[0x34, 1], &[0x66, 7, 1, 2], &[]] {
         assert_eq!(dropped(&mut script, &reply(unfit)), poll(1), "{unfit:02X?}");
@@ -447,23 +439,23 @@ fn a_reply_to_another_request_is_taken_from_the_slave_and_is_no_answer() {
 }
 
 #[test]
-fn a_negative_reply_is_an_exception_and_so_is_what_the_network_cannot_deliver() {
+fn a_negative_reply_is_a_refusal_and_so_is_what_the_network_cannot_deliver() {
     let mut script = settled();
-    for (answer, exception) in [
-        (reply(&[0xFD]), ExceptionCode::IllegalDataValue),
-        (reply(&[0xFD, 0x06]), ExceptionCode::IllegalDataValue),
-        (data_frame(1, &[0x22, 0, 0xFE, 0, 0, 0]), ExceptionCode::GatewayPathUnavailable),
+    for (answer, refusal) in [
+        (reply(&[0xFD]), Refusal::Negative),
+        (reply(&[0xFD, 0x06]), Refusal::Negative),
+        (data_frame(1, &[0x22, 0, 0xFE, 0, 0, 0]), Refusal::Undeliverable),
     ] {
-        script.ask(1, &WRITE);
+        script.ask(1, &write());
         acknowledge(&mut script);
-        assert_eq!(take(&mut script, &answer), Step::Done(Ok(Err(exception))));
+        assert_eq!(take(&mut script, &answer), Step::Done(Ok(Err(refusal))));
     }
 }
 
 #[test]
 fn an_adapter_that_echoes_is_recognised_in_every_step() {
-    let mut script = script(UniTelwaySettings::default());
-    let mark = script.ask(1, &READ);
+    let mut script = Script::new(UniTelwaySettings::default());
+    let mark = script.ask(1, &read());
     assert_eq!(script.hear(&mark), Step::More);
     assert!(script.machine.echoes());
     script.hear(ACK);
@@ -482,27 +474,19 @@ fn an_adapter_that_echoes_is_recognised_in_every_step() {
         // The next poll waits for the echo of this acknowledgement, or that would be taken for something.
         assert_eq!(script.hear(ACK), Step::More);
         assert_eq!(send(&mut script), poll(1));
-        let answer = Step::Done(Ok(Ok(Response::ReadHoldingRegisters(vec![6]))));
+        let answer = Step::Done(Ok(Ok(Reply::Words(vec![6]))));
         assert_eq!(script.hear(&[&poll(1)[..], EOT].concat()), answer);
-        request = script.ask(1, &READ);
+        request = script.ask(1, &read());
         assert_eq!(request, reply(&[0x04, 0x07, 0x90, 0x01]));
     }
     assert_eq!(script.strays().iter().filter(|stray| **stray == Stray::Echo).count(), 3 + 2 * 4);
 }
 
 #[test]
-fn what_the_protocol_has_no_form_for_is_refused_before_anything_is_sent() {
-    let machine = UniTelway::new(serial(), UniTelwaySettings::default(), 20 * MS);
-    let carries = |slave, request: &Request<'_>| machine.carries(slave, request, Class::Command);
-    assert!(carries(0, &WRITE).is_err(), "a broadcast");
-    assert!(carries(1, &Request::ReadHoldingRegisters(0, 64)).is_err());
-    assert!(carries(1, &Request::Custom(0x08, Cow::Borrowed(&[0, 4, 0, 0]))).is_err());
-    assert!(carries(1, &Request::Custom(UNITE, Cow::Owned(vec![0xFA; 252]))).is_err(), "too long");
-    assert_eq!(carries(1, &Request::Custom(UNITE, Cow::Owned(vec![0xFA; 240]))), Ok(()));
-    let specific = unite(&[0xF2, 0, 0, 6, 0, 0, 0, 0, 0, 0, 0]);
-    assert!(machine.is_write(&specific));
-    for class in Class::ALL {
-        let carried = machine.carries(1, &specific, class).is_ok();
-        assert_eq!(carried, class >= Class::Command, "{class}");
-    }
+fn what_has_no_form_is_refused_before_anything_is_sent() {
+    let machine = Script::new(UniTelwaySettings::default()).machine;
+    assert_eq!(machine.check(0, &write()), Err(RequestError::Broadcast));
+    assert_eq!(machine.check(1, &Request::mirror(&[0; 251])), Err(RequestError::TooLong(253)));
+    assert_eq!(machine.check(1, &Request::mirror(&[0; 239])), Ok(()));
+    assert!(unite(&[0xF2, 0, 0, 6, 0, 0, 0, 0, 0, 0, 0]).is_write());
 }

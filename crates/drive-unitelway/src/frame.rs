@@ -8,14 +8,14 @@ const DLE: u8 = 0x10;
 const STX: u8 = 0x02;
 const ENQ: u8 = 0x05;
 /// "I have it."
-pub(super) const ACK: u8 = 0x06;
+pub(crate) const ACK: u8 = 0x06;
 /// "Once more."
-pub(super) const NAK: u8 = 0x15;
+pub(crate) const NAK: u8 = 0x15;
 /// "I have nothing to say."
-pub(super) const EOT: u8 = 0x04;
+pub(crate) const EOT: u8 = 0x04;
 
 /// The longest frame: 255 bytes, each doubled, with all that surrounds them.
-pub(super) const MAX_FRAME: usize = 5 + 2 * 255 + 1;
+pub(crate) const MAX_FRAME: usize = 5 + 2 * 255 + 1;
 
 /// How many characters a data frame has, without doubled bytes.
 #[must_use]
@@ -49,7 +49,7 @@ pub fn poll(address: u8) -> Bytes {
 
 /// What was heard.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Heard {
+pub(crate) enum Heard {
     /// One of the three single characters. `alone`: nothing else came since something was last sent.
     Signal { byte: u8, alone: bool },
     /// Somebody polls a slave.
@@ -72,7 +72,7 @@ enum Found {
 
 /// The receiver. It finds the next good frame behind whatever came before it.
 #[derive(Debug, Default)]
-pub(super) struct Receiver {
+pub(crate) struct Receiver {
     /// What has come and is not yet part of anything. It never holds more than one frame can have.
     received: BytesMut,
     /// How many bytes have come since something was sent.
@@ -81,12 +81,12 @@ pub(super) struct Receiver {
 
 impl Receiver {
     /// Takes what came in.
-    pub(super) fn push(&mut self, bytes: &[u8]) {
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.received.extend_from_slice(bytes);
     }
 
     /// The next thing that was heard, if it is whole.
-    pub(super) fn next(&mut self) -> Option<Heard> {
+    pub(crate) fn next(&mut self) -> Option<Heard> {
         let mut noise = 0;
         loop {
             match look(&self.received) {
@@ -106,7 +106,7 @@ impl Receiver {
     }
 
     /// What has begun goes on no more: it is dropped, and what stands behind its beginning is looked at anew.
-    pub(super) fn give_up(&mut self) -> Option<Heard> {
+    pub(crate) fn give_up(&mut self) -> Option<Heard> {
         if self.received.is_empty() {
             return None;
         }
@@ -117,18 +117,18 @@ impl Receiver {
     }
 
     /// Whether something has begun.
-    pub(super) fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         !self.received.is_empty()
     }
 
     /// Something is sent now: what comes from now on may be its answer. The bytes of what had begun are no part of it.
-    pub(super) fn begin(&mut self) -> usize {
+    pub(crate) fn begin(&mut self) -> usize {
         self.since = 0;
         mem::take(&mut self.received).len()
     }
 
     /// What was heard last was our own and does not count.
-    pub(super) fn discount(&mut self) {
+    pub(crate) fn discount(&mut self) {
         self.since = 0;
     }
 
