@@ -55,7 +55,10 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         step: TIME_OVER,
         reactions: &[Reaction::Ignore, Reaction::Trip],
         settable: false,
+        wears: false,
     }),
+    // BUS, bit E of 0021h.
+    communication_fault: Some(0xE),
     persist: Some("ENTER, a write to 0900h"),
     broadcast_stops: &[StopMode::Ramp],
     turnaround: turnaround(2_400),

@@ -72,7 +72,10 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         step: Duration::from_secs(1),
         reactions: &[Reaction::Ignore, Reaction::Freewheel, Reaction::Ramp, Reaction::DcInjection],
         settable: true,
+        wears: true,
     }),
+    // Err5.
+    communication_fault: Some(24),
     identification: Some("function 43/14; FB05, FB72"),
     release: true,
     broadcast_stops: &[StopMode::Ramp, StopMode::Freewheel, StopMode::DcInjection],

@@ -36,6 +36,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     stop_modes: &StopMode::ALL,
     speed_setpoint: true,
     fault_reset: "CMD bit 7, rising edge",
+    // SLF.
+    communication_fault: Some(5),
     identification: Some("nominal current INV (W555)"),
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,

@@ -112,6 +112,11 @@ impl<P: Port> Drive for Atv312<P> {
         self.set_watchdog(timeout, reaction).await
     }
 
+    /// As it was found; one that was switched off by the NTO bit of `CMI` is so again, and `SLL` stays what it was.
+    async fn restore_watchdog(&mut self, found: Watchdog) -> Result<Watchdog> {
+        self.put_back_watchdog(found).await
+    }
+
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {
         self.registers.at(Class::Background).read_row(row).await
     }

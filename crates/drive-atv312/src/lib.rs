@@ -40,6 +40,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     frequency_step: "0.1 Hz (with CMI bit 9: 600/32767 Hz)",
     fault_reset: "CMD bit 7, rising edge",
     watchdog: Some(parameters::WATCHDOG),
+    // SLF.
+    communication_fault: Some(5),
     identification: Some("function 43/14, and NCV, VCAL, INV, UdP, TSP"),
     release: true,
     persist: Some("CMI bit 1"),

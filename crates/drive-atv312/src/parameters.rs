@@ -33,6 +33,8 @@ pub(crate) const WATCHDOG: WatchdogCapability = WatchdogCapability {
     step: STEP,
     reactions: &[Reaction::Ignore, Reaction::Freewheel, Reaction::Ramp, Reaction::Fast],
     settable: true,
+    // ttO and SLL change in RAM until CMI bit 1 saves them (BBV51701 p. 20, 22).
+    wears: false,
 };
 
 impl<P: Port> Atv312<P> {
@@ -168,6 +170,20 @@ impl<P: Port> Atv312<P> {
         }
         let status = self.fast_status(Class::Background).await?;
         Err(self.not_confirmed(Command::ArmWatchdog, status, None))
+    }
+
+    /// Puts the watchdog back to what it was found. One that the NTO bit had switched off is switched off by it again, so that
+    /// `SLL` goes on protecting after the next power-up.
+    pub(crate) async fn put_back_watchdog(&mut self, found: Watchdog) -> Result<Watchdog> {
+        let timeout = found.timeout.unwrap_or(WATCHDOG.max);
+        let reaction = found.reaction.unwrap_or(Reaction::Ignore);
+        let set = self.set_watchdog(timeout, reaction).await?;
+        if set == found || found.timeout.is_some() {
+            return Ok(set);
+        }
+        let unwatched = (self.held_cmi().await? | ExtendedControl::NO_TIMEOUT).bits();
+        self.registers.at(Class::Background).write(CMI, unwatched).await?;
+        self.read_watchdog().await
     }
 
     fn time_out_counts(&self, timeout: Duration) -> Result<u16> {

@@ -27,7 +27,14 @@ pub const ASCII_MESSAGE_WATCH: Duration = Duration::from_secs(1);
 
 /// The watch as a capability: it can be neither set nor switched off.
 const fn watchdog(time: Duration) -> WatchdogCapability {
-    WatchdogCapability { min: time, max: time, step: Duration::from_secs(1), reactions: &[], settable: false }
+    WatchdogCapability {
+        min: time,
+        max: time,
+        step: Duration::from_secs(1),
+        reactions: &[],
+        settable: false,
+        wears: false,
+    }
 }
 
 /// What an Altivar 58 with the card VW3-A58303 can do.

@@ -52,6 +52,10 @@ pub struct Capabilities {
     pub fault_reset: &'static str,
     /// Its communication watchdog, where it has one that the bus can read or set.
     pub watchdog: Option<WatchdogCapability>,
+    /// The code by which it says that it tripped because its communication watchdog ran out: that of
+    /// [`Status::fault_code`](crate::Status::fault_code) and of [`Fault::code`](crate::Fault::code). `None` where its manual
+    /// names none.
+    pub communication_fault: Option<u16>,
     /// How it says what it is, where it does.
     pub identification: Option<&'static str>,
     /// Whether control can be given back to the panel or the terminals over the bus.
@@ -109,6 +113,7 @@ impl Capabilities {
             frequency_step: "0.1 Hz",
             fault_reset: "as its manual says",
             watchdog: None,
+            communication_fault: None,
             identification: None,
             release: false,
             persist: None,
@@ -171,6 +176,8 @@ pub struct WatchdogCapability {
     pub reactions: &'static [Reaction],
     /// Whether the bus can set it, or only read it.
     pub settable: bool,
+    /// Whether each write of its setting goes to an EEPROM, which wears.
+    pub wears: bool,
 }
 
 impl WatchdogCapability {

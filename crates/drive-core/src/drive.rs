@@ -205,6 +205,25 @@ pub trait Drive: Send {
         Err(Error::Unsupported { what: "watchdog", reason: "the manual gives no register for it" })
     }
 
+    /// Puts the drive's communication watchdog back to what [`watchdog`](Self::watchdog) found before it was armed, and reads
+    /// it back. A time that was found switched off is not restored, because nothing told it.
+    ///
+    /// # Errors
+    /// As [`arm_watchdog`](Self::arm_watchdog).
+    async fn restore_watchdog(&mut self, found: Watchdog) -> Result<Watchdog> {
+        match (found.timeout, found.reaction) {
+            (Some(timeout), Some(reaction)) => self.arm_watchdog(timeout, reaction).await,
+            (Some(_), None) => Err(Error::Unsupported {
+                what: "restoring the watchdog",
+                reason: "its reaction was not told",
+            }),
+            (None, _) => {
+                let least = self.watchdog_capability().map_or(Duration::ZERO, |watchdog| watchdog.min);
+                self.arm_watchdog(least, Reaction::Ignore).await
+            }
+        }
+    }
+
     /// Reads the register of a row.
     ///
     /// # Errors

@@ -393,7 +393,8 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore
     let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
     drive.accept_self_restart(&accepted);
     let now = Instant::now();
-    let supervisor = Supervisor::new(now, settings.clone(), drive.watchdog_capability());
+    let (watchdog, communication_fault) = (drive.watchdog_capability(), capabilities.communication_fault);
+    let supervisor = Supervisor::new(now, settings.clone(), watchdog, communication_fault);
     let name = supervisor.name();
     let (messages, message_box) = mpsc::channel(MAILBOX);
     // Unbounded, because a stop must never be refused for want of room: each entry is a caller that waits.

@@ -90,6 +90,17 @@ pub enum EventKind {
     },
     /// Its communication watchdog is not as the contract says.
     WatchdogBroken(String),
+    /// **Alarm**: its motor turns, and its communication watchdog is not as the contract says. It is set up at standstill.
+    WatchdogNotInForce(String),
+    /// At the shut-down its communication watchdog was put back to what was found.
+    WatchdogRestored(Watchdog),
+    /// At the shut-down its communication watchdog stays armed: it acts as soon as nobody speaks to the drive.
+    WatchdogStays {
+        /// After how long.
+        timeout: Duration,
+        /// Why it was not put back.
+        why: &'static str,
+    },
     /// A command ended.
     Command {
         /// Which.
@@ -146,6 +157,9 @@ impl EventKind {
             Self::IdentityChanged { .. } => "identity changed",
             Self::WatchdogVerified { .. } => "watchdog verified",
             Self::WatchdogBroken(_) => "watchdog broken",
+            Self::WatchdogNotInForce(_) => "watchdog not in force",
+            Self::WatchdogRestored(_) => "watchdog put back",
+            Self::WatchdogStays { .. } => "watchdog stays armed",
             Self::Command { .. } => "command",
             Self::StopModeReplaced { .. } => "stop mode replaced",
             Self::StopTookCommand(_) => "stop took command",
@@ -158,12 +172,20 @@ impl EventKind {
     /// Whether somebody should look at it now.
     #[must_use]
     pub const fn is_alarm(&self) -> bool {
+        match self {
+            Self::Exit(action) => action.is_alarm(),
+            other => other.is_always_alarm(),
+        }
+    }
+
+    const fn is_always_alarm(&self) -> bool {
         matches!(
             self,
             Self::Lost { .. }
                 | Self::Tripped(_)
                 | Self::IdentityChanged { .. }
                 | Self::WatchdogBroken(_)
+                | Self::WatchdogNotInForce(_)
                 | Self::StopUnconfirmed { .. }
                 | Self::RunCommandStands(_)
                 | Self::RestartsItself { accepted: false, .. }
@@ -198,7 +220,16 @@ impl fmt::Display for EventKind {
                     None => write!(f, ": off, {how}"),
                 }
             }
-            Self::WatchdogBroken(why) => write!(f, ": {why}"),
+            Self::WatchdogBroken(why) | Self::WatchdogNotInForce(why) => write!(f, ": {why}"),
+            Self::WatchdogRestored(watchdog) => match watchdog.timeout {
+                Some(timeout) => {
+                    write!(f, " to {timeout:?}, as it was found: it acts when nobody speaks to it")
+                }
+                None => f.write_str(": off, as it was found"),
+            },
+            Self::WatchdogStays { timeout, why } => {
+                write!(f, ", it acts {timeout:?} after the last message: {why}")
+            }
             Self::Command { command, commander, outcome } => {
                 write!(f, ": {command} by {commander}: {outcome}")
             }
@@ -225,8 +256,12 @@ impl fmt::Display for EventKind {
 }
 
 fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
-    if let Some(silence) = trip.watchdog_after {
-        write!(f, " by its communication watchdog after {silence:?} without a message")?;
+    match trip.watchdog_after {
+        Some(silence) if trip.by_watchdog => {
+            write!(f, " by its communication watchdog after {silence:?} without a message")?;
+        }
+        _ if trip.by_watchdog => f.write_str(" by its communication watchdog")?,
+        _ => {}
     }
     match trip.faults.as_deref().and_then(|faults| faults.present.first()) {
         Some(fault) => write!(f, ": {fault}"),
@@ -291,23 +326,38 @@ impl fmt::Display for Limit {
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "action", rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum ExitAction {
-    /// It was left as it was, because its policy says so or because this fleet had not started it.
+    /// It was left as it was: it stands, or its policy says so, or nothing may be written to it.
     Left,
+    /// **Alarm**: its motor turns, or turned when it was last seen. This fleet had not started it, and left it.
+    LeftTurning,
     /// It was stopped, with this outcome.
     Stopped(Outcome),
     /// Control was given back, with this outcome.
     Released(Outcome),
-    /// The time for shutting down was over first.
+    /// **Alarm**: the time for shutting down was over first. Its motor may turn.
     TimeOver,
+}
+
+impl ExitAction {
+    /// Whether somebody should look at the drive now.
+    #[must_use]
+    pub const fn is_alarm(&self) -> bool {
+        match self {
+            Self::Left => false,
+            Self::LeftTurning | Self::TimeOver => true,
+            Self::Stopped(outcome) | Self::Released(outcome) => !outcome.is_confirmed(),
+        }
+    }
 }
 
 impl fmt::Display for ExitAction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Left => f.write_str("left as it is"),
+            Self::LeftTurning => f.write_str("left turning, it was not started here"),
             Self::Stopped(outcome) => write!(f, "stop {outcome}"),
             Self::Released(outcome) => write!(f, "release {outcome}"),
-            Self::TimeOver => f.write_str("time over before it was done"),
+            Self::TimeOver => f.write_str("given up, its stop is not confirmed"),
         }
     }
 }

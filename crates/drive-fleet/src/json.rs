@@ -96,7 +96,7 @@ impl<'a> From<&'a Trip> for TripObject<'a> {
     fn from(trip: &'a Trip) -> Self {
         Self {
             fault: trip.fault(),
-            by_watchdog: trip.watchdog_after.is_some(),
+            by_watchdog: trip.by_watchdog,
             time_unix_ms: trip.at,
             before: trip.before.as_ref().map(|before| &*before.value),
             at_trip: &trip.status.value,

@@ -69,8 +69,8 @@ pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
 pub use plan::{Demand, Feed, LineBudget, LinePlan, PlanProblem, Reckoning, plan, reckon};
 pub use settings::{
-    Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnFault, OnLoss, Periods, Times,
-    WatchdogContract,
+    Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
+    OnLoss, Periods, Times, WatchdogContract,
 };
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,

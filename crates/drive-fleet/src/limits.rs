@@ -147,6 +147,16 @@ impl FrequencyLimits {
         if let Some(band) = self.forbidden.iter().find(|band| band.low >= band.high) {
             return Err(format!("the forbidden band {} to {} is empty", band.low, band.high));
         }
+        if let Some(high) = self.high {
+            let low = self.low.unwrap_or(Frequency::ZERO);
+            let edges =
+                self.forbidden.iter().map(|band| band.high).filter(|edge| (low..=high).contains(edge));
+            let is_forbidden =
+                |asked: Frequency| self.forbidden.iter().any(|band| band.low < asked && asked < band.high);
+            if edges.chain([low]).all(is_forbidden) {
+                return Err(format!("the forbidden bands leave nothing of {low} to {high}"));
+            }
+        }
         if self.change_per_second == Some(Frequency::ZERO) {
             return Err("a change of 0.00 Hz per second forbids every setpoint".to_owned());
         }

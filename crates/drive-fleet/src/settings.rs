@@ -38,6 +38,12 @@ pub struct DriveSettings {
     /// What happens to it when the fleet shuts down.
     #[cfg_attr(feature = "serde", serde(default))]
     pub on_exit: OnExit,
+    /// What happens at the shut-down to a motor that turns and that the fleet has not started.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub on_exit_adopted: OnExitAdopted,
+    /// What happens at the shut-down to the watchdog that the fleet has armed.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub on_exit_watchdog: OnExitWatchdog,
     /// What happens to it when it is lost.
     #[cfg_attr(feature = "serde", serde(default))]
     pub on_loss: OnLoss,
@@ -70,6 +76,8 @@ impl DriveSettings {
             alarms: Alarms::default(),
             watchdog: None,
             on_exit: OnExit::default(),
+            on_exit_adopted: OnExitAdopted::default(),
+            on_exit_watchdog: OnExitWatchdog::default(),
             on_loss: OnLoss::default(),
             on_fault: OnFault::default(),
             on_control_taken: OnControlTaken::default(),
@@ -262,6 +270,37 @@ impl Default for OnExit {
     fn default() -> Self {
         Self::Stop(StopMode::Ramp)
     }
+}
+
+/// What happens at the shut-down to a motor that turns and that the fleet has not started, where [`OnExit`] is not to leave it
+/// or to release it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub enum OnExitAdopted {
+    /// It is left turning, and that is an alarm.
+    #[default]
+    Report,
+    /// It is stopped as well.
+    Stop(StopMode),
+    /// It is left turning.
+    Leave,
+}
+
+/// What happens at the shut-down to the watchdog of a drive that stands. One that stays armed trips the drive as soon as
+/// nobody speaks to it any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub enum OnExitWatchdog {
+    /// It is put back to what was found, unless that writes to an EEPROM
+    /// ([`WatchdogCapability::wears`](drive_core::WatchdogCapability::wears)).
+    #[default]
+    RestoreInRam,
+    /// It is put back to what was found, also through an EEPROM.
+    Restore,
+    /// It stays armed.
+    Leave,
 }
 
 /// What happens to a drive that was lost. While it is lost nothing reaches it; this is for its return.

@@ -181,7 +181,10 @@ pub struct Trip {
     pub status: Timed<Status>,
     /// What the drive said about its faults, as soon as that has been read.
     pub faults: Option<Arc<Faults>>,
-    /// For how long the drive had not been heard, when it must have tripped by its communication watchdog.
+    /// Whether it tripped by its communication watchdog: its own code says so, or, where its family has no code for that, it
+    /// had not been heard for longer than the watchdog's time.
+    pub by_watchdog: bool,
+    /// For how long the drive had not been heard then; `None` where it was already tripped when it was first seen.
     pub watchdog_after: Option<Duration>,
 }
 

@@ -263,6 +263,7 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         Job::Release => Reply::Ordered(drive.release().await),
         Job::Persist => Reply::Saved(drive.persist().await),
         Job::ArmWatchdog(timeout, reaction) => Reply::Watchdog(drive.arm_watchdog(timeout, reaction).await),
+        Job::RestoreWatchdog(found) => Reply::Watchdog(drive.restore_watchdog(found).await),
         Job::KeepAlive => Reply::KeptAlive(drive.keep_alive().await),
         Job::Status { anew } => {
             if anew {

@@ -18,6 +18,7 @@ pub(crate) const CAPABILITIES: Capabilities = Capabilities {
         step: Duration::from_millis(100),
         reactions: &[Reaction::Ignore, Reaction::Ramp, Reaction::Freewheel],
         settable: true,
+        wears: false,
     }),
     identification: Some("function 43/14"),
     release: true,

@@ -101,8 +101,7 @@ impl Command {
 /// Carries out a subcommand.
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
     let runtime = tokio::runtime::Runtime::new().map_err(|error| {
-        // No input and no output helps it.
-        Failure::Drive(format!("the system gives no threads or timers: {error}"))
+        Failure::Input(format!("the system gives no threads, timers or file descriptors: {error}"))
     })?;
     runtime.block_on(command.run())
 }

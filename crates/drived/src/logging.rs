@@ -14,7 +14,9 @@ use std::{
 };
 
 use tracing::Level;
-use tracing_subscriber::{EnvFilter, filter::LevelFilter};
+use tracing_subscriber::{EnvFilter, filter::LevelFilter, fmt::time::FormatTime};
+
+use crate::failure::Failure;
 
 const VARIABLE: &str = "DRIVED_LOG";
 /// Lines that wait for the writer.
@@ -22,12 +24,16 @@ const WAITING: usize = 1_024;
 /// How long the reader of stderr has for the last lines.
 const LAST_WORDS: Duration = Duration::from_millis(500);
 
-/// Starts the log at a level, or at what the environment says instead. `None`: no log, because the screen is a table.
-pub(crate) fn start(level: Option<Level>) -> Option<Log> {
-    let filter = EnvFilter::builder()
-        .with_default_directive(LevelFilter::from_level(level?).into())
-        .with_env_var(VARIABLE)
-        .from_env_lossy();
+/// Starts the log at a level, or at what the environment says instead. `Ok(None)`: no log, because the screen is a table.
+///
+/// # Errors
+/// What the environment says is no level.
+pub(crate) fn start(level: Option<Level>) -> Result<Option<Log>, Failure> {
+    let said = std::env::var(VARIABLE).unwrap_or_default();
+    check(&said)?;
+    let Some(level) = level else { return Ok(None) };
+    let filter =
+        EnvFilter::builder().with_default_directive(LevelFilter::from_level(level).into()).parse_lossy(said);
     let log = Log::to(io::stderr());
     let lines = log.lines.clone();
     tracing_subscriber::fmt()
@@ -35,10 +41,35 @@ pub(crate) fn start(level: Option<Level>) -> Option<Log> {
         .with_writer(move || lines.clone())
         .with_ansi(io::stderr().is_terminal())
         .with_target(false)
+        .with_timer(LocalTime)
         // It would be told on stderr, by a panic where nobody reads that.
         .log_internal_errors(false)
         .init();
-    Some(log)
+    Ok(Some(log))
+}
+
+/// Checks what the environment says: `LEVEL` or `PART=LEVEL`, several with commas.
+fn check(said: &str) -> Result<(), Failure> {
+    let directives = said.split(',').map(str::trim).filter(|directive| !directive.is_empty());
+    for directive in directives {
+        let level = directive.split_once('=').map_or(directive, |(_, level)| level);
+        if level.trim().parse::<LevelFilter>().is_err() {
+            return Err(Failure::Input(format!(
+                "{VARIABLE}: {directive:?} is no level: expected off, error, warn, info, debug or trace, or a part of the \
+                 program with one, such as drive_bus=debug"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Local time with its offset, as a person beside the plant has it on the wrist.
+struct LocalTime;
+
+impl FormatTime for LocalTime {
+    fn format_time(&self, writer: &mut tracing_subscriber::fmt::format::Writer<'_>) -> std::fmt::Result {
+        write!(writer, "{}", chrono::Local::now().format("%Y-%m-%d %H:%M:%S%.3f%:z"))
+    }
 }
 
 enum Message {

@@ -32,7 +32,10 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return cli::refuse(&error),
     };
-    let log = logging::start(cli.command.log_level());
+    let log = match logging::start(cli.command.log_level()) {
+        Ok(log) => log,
+        Err(failure) => return cli::end(Err(failure)),
+    };
     let result = cli::run(cli.command);
     if let Some(log) = log {
         log.finish();

@@ -65,7 +65,6 @@ fn a_configuration_is_checked_without_a_port() {
         "{out}"
     );
     assert!(out.contains("at the exit       stopped if it was started here (ramp stop)"), "{out}");
-    run(&["run", "--config", file.path()]).assert_refused(2, "/dev/nowhere");
 }
 
 #[test]

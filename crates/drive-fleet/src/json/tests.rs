@@ -118,6 +118,7 @@ fn a_fault_is_told_as_long_as_the_drive_shows_it_with_the_statuses_around_it() {
         before: Some(status(State::Running)),
         status: status(State::Fault),
         faults: Some(Arc::new(faults)),
+        by_watchdog: false,
         watchdog_after: None,
     };
     let trips = Arc::new(VecDeque::from([trip]));
@@ -272,7 +273,8 @@ fn settings_read_back_as_they_were_told_and_what_is_not_said_is_usual() {
         "times": {"lifetime_ms": 1_000, "effect_ms": 5_000, "reference_ms": 60_000, "standstill_ms": 60_000, "stop_alarm_ms": 2_000},
         "limits": {"low_hz": 10.0, "high_hz": 50.0, "forbidden_hz": [[30.0, 32.0]]},
         "alarms": {"current_a": 3.5}, "watchdog": {"time_ms": 10_000, "reaction": "ramp"},
-        "on_exit": {"release": "fast"}, "on_loss": {"stop": "ramp"}, "on_fault": "reset_watchdog_trip",
+        "on_exit": {"release": "fast"}, "on_exit_adopted": "report",
+        "on_exit_watchdog": "restore_in_ram", "on_loss": {"stop": "ramp"}, "on_fault": "reset_watchdog_trip",
         "on_control_taken": "withdraw", "accept_self_restart": []
     });
     is(&settings, told.clone());

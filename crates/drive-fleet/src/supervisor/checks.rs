@@ -37,6 +37,12 @@ pub(crate) struct Checks {
     watchdog_at: Option<Instant>,
     /// The watchdog was verified at some time since the program started, so it acts while the drive is lost.
     armed: bool,
+    /// As it was read first, before anything was written to it.
+    found: Option<Watchdog>,
+    /// It was written here.
+    written: bool,
+    /// That it is not as it should be while the motor turns has been told.
+    told: bool,
     heard: Option<Instant>,
     feed_again: Option<Instant>,
     restarts: Option<Arc<[SelfRestart]>>,
@@ -61,6 +67,9 @@ impl Checks {
             watchdog,
             watchdog_at: None,
             armed: false,
+            found: None,
+            written: false,
+            told: false,
             heard: None,
             feed_again: None,
             restarts: None,
@@ -129,6 +138,38 @@ impl Checks {
         }
     }
 
+    /// Why a motor that turns does so without the watchdog that it should have, if that has not been told yet.
+    pub(crate) fn not_in_force(&mut self, turns: bool) -> Option<String> {
+        let (WatchdogCheck::WaitsForStandstill(watchdog), Some(contract)) = (&self.watchdog, self.contract)
+        else {
+            self.told = false;
+            return None;
+        };
+        let is_told = std::mem::replace(&mut self.told, turns);
+        (turns && !is_told)
+            .then(|| format!("{}; it is set up at the next standstill", describe(*watchdog, contract)))
+    }
+
+    /// The watchdog as it was found, if something else was written to it and it is still the drive to which that was written.
+    pub(crate) fn to_restore(&self) -> Option<Watchdog> {
+        let known = matches!(self.identity, IdentityCheck::Same(_) | IdentityCheck::CannotSay);
+        let verified = matches!(self.watchdog, WatchdogCheck::Verified(_));
+        self.found.filter(|_| self.written && known && verified)
+    }
+
+    /// The time of the watchdog that the drive has now, as far as it is known.
+    pub(crate) fn set_to(&self) -> Option<Duration> {
+        match &self.watchdog {
+            WatchdogCheck::Verified(watchdog) | WatchdogCheck::WaitsForStandstill(watchdog) => {
+                watchdog.timeout
+            }
+            WatchdogCheck::NoContract { found: Some(watchdog) } => watchdog.timeout,
+            WatchdogCheck::NoContract { found: None }
+            | WatchdogCheck::Unchecked
+            | WatchdogCheck::Broken(_) => self.armed_for(),
+        }
+    }
+
     /// The check that is due. The watchdog is written at standstill, and only to the drive that the settings are for.
     pub(crate) fn job(&self, now: Instant, control: bool, stands: bool) -> Option<Job> {
         let restarts = || self.restarts_at.filter(|at| *at <= now).map(|_| Job::SelfRestarts);
@@ -138,7 +179,10 @@ impl Checks {
             let due = self.watchdog_at.is_none_or(|at| at <= now);
             self.arm().filter(|_| waits && known && due && control && stands)
         };
-        self.identity_job(now).or_else(|| self.watchdog_job(now)).or_else(arms).or_else(restarts)
+        // Of a motor that turns it is wanted first whether its drive would stop it by itself.
+        let first = self.watchdog_job(now).filter(|_| !stands && self.contract.is_some());
+        let identity = first.or_else(|| self.identity_job(now));
+        identity.or_else(|| self.watchdog_job(now)).or_else(arms).or_else(restarts)
     }
 
     /// The question which drive it is, if it is due.
@@ -173,6 +217,7 @@ impl Checks {
         match &self.remembered {
             Some(remembered) if *remembered != found => {
                 let remembered = Arc::clone(remembered);
+                (self.found, self.written) = (None, false);
                 self.identity =
                     IdentityCheck::Changed { remembered: Arc::clone(&remembered), found: Arc::clone(&found) };
                 Some(EventKind::IdentityChanged { remembered, found })
@@ -223,9 +268,13 @@ impl Checks {
             self.adopt_watchdog(now, result);
             return None;
         };
+        if let (false, Ok(watchdog)) = (written, &result) {
+            self.found.get_or_insert(*watchdog);
+        }
         match result {
             Ok(watchdog) if self.keeps(watchdog, contract) => {
                 self.armed = true;
+                self.written |= written;
                 self.watchdog = WatchdogCheck::Verified(watchdog);
                 Some(EventKind::WatchdogVerified { watchdog, written })
             }

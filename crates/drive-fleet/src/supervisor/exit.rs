@@ -1,14 +1,18 @@
-//! The exit: each drive's policy acts (rule 8).
+//! The exit: each drive's policy acts (rule 8), and what was armed for this fleet is not left to trip a drive that stands.
 
-use drive_core::StopMode;
+use drive_core::{Error, Result, StopMode, Watchdog};
 use tokio::time::Instant;
 
-use super::{Asker, Supervisor, orders::Queued};
+use super::{Asker, Job, Supervisor, orders::Queued};
 use crate::{
     event::{EventKind, ExitAction},
     outcome::{Order, Outcome},
-    settings::OnExit,
+    settings::{OnExit, OnExitAdopted, OnExitWatchdog},
+    snapshot::Link,
 };
+
+/// How often the watchdog is tried to be put back.
+const ATTEMPTS: u8 = 3;
 
 /// How far the exit is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,6 +28,14 @@ pub(super) enum Exit {
     Release,
     /// Control is being given back.
     Releasing,
+    /// The watchdog is being put back to what was found.
+    Restoring {
+        found: Watchdog,
+        /// How often it may still be tried.
+        attempts: u8,
+        /// What was done to the motor before.
+        action: ExitAction,
+    },
     /// Done.
     Done(ExitAction),
 }
@@ -38,27 +50,40 @@ impl Supervisor {
         let started = self.started_here || self.is_starting();
         // Rule 1 ends with its confirmation, whatever the policy.
         let stopping = self.stopping.is_some();
-        let policy = self.settings.on_exit;
-        match policy {
-            _ if !self.settings.control => self.exit_done(ExitAction::Left),
-            OnExit::Stop(mode) | OnExit::Release(mode) if started || stopping => {
-                self.exit = Exit::Stopping { release: matches!(policy, OnExit::Release(_)) };
-                self.stop_by_policy(now, Asker::Exit, mode);
+        let turns = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        let (policy, adopted) = (self.settings.on_exit, self.settings.on_exit_adopted);
+        let release = matches!(policy, OnExit::Release(_));
+        match (policy, adopted) {
+            _ if !self.settings.control => self.exit_ends(ExitAction::Left),
+            (OnExit::Stop(mode) | OnExit::Release(mode), _) if started || stopping => {
+                self.exit_by_stop(now, mode, release);
             }
-            OnExit::Leave if stopping => {
-                self.exit = Exit::Stopping { release: false };
-                self.stop_by_policy(now, Asker::Exit, StopMode::Ramp);
+            (OnExit::Leave, _) if stopping => self.exit_by_stop(now, StopMode::Ramp, false),
+            (OnExit::Leave, _) => self.exit_ends(ExitAction::Left),
+            (OnExit::Stop(_) | OnExit::Release(_), OnExitAdopted::Stop(mode)) if turns => {
+                self.exit_by_stop(now, mode, release);
             }
-            OnExit::Release(_) if self.stands() => self.exit = Exit::Release,
-            OnExit::Stop(_) | OnExit::Release(_) | OnExit::Leave => self.exit_done(ExitAction::Left),
+            (OnExit::Stop(_), OnExitAdopted::Report) if turns => self.exit_ends(ExitAction::LeftTurning),
+            (OnExit::Release(_), _) if self.stands() => self.exit = Exit::Release,
+            (OnExit::Stop(_) | OnExit::Release(_), _) => self.exit_ends(ExitAction::Left),
         }
         true
     }
 
+    fn exit_by_stop(&mut self, now: Instant, mode: StopMode, release: bool) {
+        self.exit = Exit::Stopping { release };
+        self.stop_by_policy(now, Asker::Exit, mode);
+    }
+
     /// The time for shutting down is over.
     pub(crate) fn handle_exit_time_over(&mut self) {
-        if !matches!(self.exit, Exit::Done(_)) {
-            self.exit_done(ExitAction::TimeOver);
+        match std::mem::replace(&mut self.exit, Exit::No) {
+            Exit::Done(action) => self.exit = Exit::Done(action),
+            Exit::Restoring { action, .. } => {
+                self.watchdog_stays("the time for shutting down was over");
+                self.exit_done(action);
+            }
+            _ => self.exit_done(ExitAction::TimeOver),
         }
     }
 
@@ -70,9 +95,9 @@ impl Supervisor {
     pub(super) fn exit_concluded(&mut self, outcome: &Outcome) {
         match self.exit {
             Exit::Stopping { release: true } if outcome.is_confirmed() => self.exit = Exit::Release,
-            Exit::Stopping { .. } => self.exit_done(ExitAction::Stopped(outcome.clone())),
-            Exit::Releasing => self.exit_done(ExitAction::Released(outcome.clone())),
-            Exit::No | Exit::Release | Exit::Done(_) => {}
+            Exit::Stopping { .. } => self.exit_ends(ExitAction::Stopped(outcome.clone())),
+            Exit::Releasing => self.exit_ends(ExitAction::Released(outcome.clone())),
+            Exit::No | Exit::Release | Exit::Restoring { .. } | Exit::Done(_) => {}
         }
     }
 
@@ -80,6 +105,60 @@ impl Supervisor {
         if self.exit == Exit::Release {
             self.exit = Exit::Releasing;
             self.enqueue(Queued { asker: Asker::Exit, order: Order::Release, issued: now });
+        }
+    }
+
+    /// The motor was dealt with. What is left is the watchdog of a drive that stands.
+    fn exit_ends(&mut self, action: ExitAction) {
+        let policy = self.settings.on_exit_watchdog;
+        let why = match self.checks.to_restore() {
+            _ if !self.settings.control => return self.exit_done(action),
+            _ if self.link != Link::Connected => "the drive does not answer",
+            _ if !self.stands() => "the motor turns",
+            None => "it was not written by this program",
+            Some(_) if policy == OnExitWatchdog::Leave => "its policy says so",
+            Some(_) if policy == OnExitWatchdog::RestoreInRam && self.watchdog_wears => {
+                "to put it back writes to the drive's EEPROM, on_exit_watchdog = \"restore\" does it all the same"
+            }
+            Some(found) => {
+                self.exit = Exit::Restoring { found, attempts: ATTEMPTS, action };
+                return;
+            }
+        };
+        self.watchdog_stays(why);
+        self.exit_done(action);
+    }
+
+    pub(super) fn restore_job(&self) -> Option<Job> {
+        match self.exit {
+            Exit::Restoring { found, .. } => Some(Job::RestoreWatchdog(found)),
+            _ => None,
+        }
+    }
+
+    pub(super) fn handle_restored(&mut self, result: Result<Watchdog>) {
+        let Exit::Restoring { found, attempts, action } = &mut self.exit else { return };
+        *attempts = attempts.saturating_sub(1);
+        let why = match result {
+            Ok(watchdog) if watchdog.timeout == found.timeout => {
+                let action = action.clone();
+                self.emit(EventKind::WatchdogRestored(watchdog));
+                return self.exit_done(action);
+            }
+            Err(Error::Port { .. }) if *attempts > 0 => return,
+            Ok(_) => "it was put back and reads back otherwise",
+            Err(Error::Port { .. }) => "the drive does not answer",
+            Err(_) => "the drive refuses to have it put back",
+        };
+        let action = action.clone();
+        self.watchdog_stays(why);
+        self.exit_done(action);
+    }
+
+    /// Tells that the drive trips by its watchdog once nobody speaks to it any more.
+    fn watchdog_stays(&mut self, why: &'static str) {
+        if let Some(timeout) = self.checks.set_to() {
+            self.emit(EventKind::WatchdogStays { timeout, why });
         }
     }
 

@@ -50,6 +50,7 @@ pub(crate) enum Job {
     Release,
     Persist,
     ArmWatchdog(Duration, Reaction),
+    RestoreWatchdog(Watchdog),
     KeepAlive,
     Status {
         /// Whether what was read once is to be forgotten first.

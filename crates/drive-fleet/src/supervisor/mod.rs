@@ -86,6 +86,10 @@ pub(crate) enum Output {
 pub(crate) struct Supervisor {
     name: Arc<str>,
     settings: DriveSettings,
+    /// The code by which the drive says that its watchdog has tripped it.
+    communication_fault: Option<u16>,
+    /// Whether setting its watchdog wears its EEPROM.
+    watchdog_wears: bool,
     link: Link,
     status: Option<Timed<Status>>,
     measurements: Option<Timed<Measurements>>,
@@ -121,8 +125,15 @@ pub(crate) struct Supervisor {
 }
 
 impl Supervisor {
-    pub(crate) fn new(now: Instant, settings: DriveSettings, watchdog: Option<WatchdogCapability>) -> Self {
+    pub(crate) fn new(
+        now: Instant,
+        settings: DriveSettings,
+        watchdog: Option<WatchdogCapability>,
+        communication_fault: Option<u16>,
+    ) -> Self {
         Self {
+            communication_fault,
+            watchdog_wears: watchdog.is_some_and(|watchdog| watchdog.wears),
             name: Arc::from(settings.name.as_str()),
             link: Link::Connecting,
             status: None,
@@ -184,7 +195,7 @@ impl Supervisor {
         if let Some(job) = self.stop_job(now) {
             return Some((job, None));
         }
-        if let Some(job) = self.withdraw_job(now) {
+        if let Some(job) = self.withdraw_job(now).or_else(|| self.restore_job()) {
             return Some((job, None));
         }
         let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
@@ -296,11 +307,14 @@ impl Supervisor {
         match reply {
             Reply::Status(result) => self.handle_status(now, result),
             Reply::Measurements(result) => self.handle_measurements(now, result),
-            Reply::Faults(result) => self.handle_faults(result),
+            Reply::Faults(result) => self.handle_faults(now, result),
             Reply::Identity(result) => {
                 if let Some(event) = self.checks.handle_identity(now, result) {
                     self.emit(event);
                 }
+            }
+            Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {
+                self.handle_restored(result);
             }
             Reply::Watchdog(result) => {
                 let armed = matches!(job, Some(Job::ArmWatchdog(..)));
@@ -308,6 +322,7 @@ impl Supervisor {
                 if let Some(event) = self.checks.handle_watchdog(now, armed, control, result) {
                     self.emit(event);
                 }
+                self.tell_watchdog();
             }
             Reply::SelfRestarts(result) => {
                 if let Some(event) = self.checks.handle_restarts(now, result) {

@@ -67,10 +67,18 @@ impl Supervisor {
         self.compare(now, before.as_ref().map(|before| &*before.value), &status.value);
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
-            let watchdog_after = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
+            let unheard = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
+            let by_watchdog = match (self.communication_fault, status.value.fault_code) {
+                (Some(code), Some(shown)) => code == shown,
+                // Its explanation will tell.
+                (Some(_), None) => false,
+                (None, _) => unheard.is_some(),
+            };
+            let watchdog_after = unheard.filter(|_| by_watchdog || status.value.fault_code.is_none());
+            let status = status.clone();
             self.record_trip(
                 now,
-                Trip { at: now, before, status: status.clone(), faults: None, watchdog_after },
+                Trip { at: now, before, status, faults: None, by_watchdog, watchdog_after },
             );
         }
         if status.value.is_standstill() && !self.is_starting() {
@@ -90,6 +98,7 @@ impl Supervisor {
         {
             self.stop_by_policy(now, Asker::Policy("on loss"), mode);
         }
+        self.tell_watchdog();
         self.judge_stop(now);
         self.judge_order(now);
         if self.is_busy() {
@@ -130,6 +139,14 @@ impl Supervisor {
         }
     }
 
+    /// A motor that turns without the watchdog of its contract is an alarm.
+    pub(super) fn tell_watchdog(&mut self) {
+        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        if let Some(why) = self.checks.not_in_force(moving && self.link == Link::Connected) {
+            self.emit(EventKind::WatchdogNotInForce(why));
+        }
+    }
+
     fn record_trip(&mut self, now: Instant, trip: Trip) {
         self.counters.trips += 1;
         if self.started_here
@@ -139,19 +156,25 @@ impl Supervisor {
         }
         self.explanations = EXPLANATIONS;
         self.emit(EventKind::Tripped(Box::new(trip.clone())));
-        let by_watchdog = trip.watchdog_after.is_some();
+        let by_watchdog = trip.by_watchdog;
         let trips: &mut VecDeque<Trip> = Arc::make_mut(&mut self.trips);
         if trips.len() == TRIPS {
             trips.pop_front();
         }
         trips.push_back(trip);
         self.end_order_by_trip();
-        if by_watchdog && self.settings.control && self.settings.on_fault == OnFault::ResetWatchdogTrip {
+        if by_watchdog {
+            self.reset_watchdog_trip(now);
+        }
+    }
+
+    fn reset_watchdog_trip(&mut self, now: Instant) {
+        if self.settings.control && self.settings.on_fault == OnFault::ResetWatchdogTrip {
             self.enqueue_reset(now);
         }
     }
 
-    pub(super) fn handle_faults(&mut self, result: Result<Faults>) {
+    pub(super) fn handle_faults(&mut self, now: Instant, result: Result<Faults>) {
         let Ok(faults) = result else {
             self.explanations = self.explanations.saturating_sub(1);
             return;
@@ -159,9 +182,17 @@ impl Supervisor {
         self.explanations = 0;
         let trips = Arc::make_mut(&mut self.trips);
         let Some(trip) = trips.back_mut() else { return };
+        let code = self.communication_fault.filter(|_| trip.status.value.fault_code.is_none());
+        let by_watchdog = code.is_some_and(|code| faults.present.iter().any(|fault| fault.code == code));
         trip.faults = Some(Arc::new(faults));
+        trip.by_watchdog |= by_watchdog;
+        trip.watchdog_after = trip.watchdog_after.filter(|_| trip.by_watchdog);
         let explained = trip.clone();
+        let present = self.status.as_ref().is_some_and(|status| status.value.is_fault());
         self.emit(EventKind::TripExplained(Box::new(explained)));
+        if by_watchdog && present {
+            self.reset_watchdog_trip(now);
+        }
     }
 
     pub(super) fn handle_measurements(&mut self, now: Instant, result: Result<Measurements>) {

@@ -40,14 +40,21 @@ impl Drop for Pty {
     }
 }
 
+/// Whether a link led to a pty that is gone: a simulator that was killed made it. One that leads to something may be anybody's,
+/// also a simulator's that serves.
+fn is_left_behind(link: &Path) -> bool {
+    fs::read_link(link).is_ok_and(|target| target.starts_with("/dev") && !target.exists())
+}
+
 /// Opens a pty in raw mode and links to it: our side, and what keeps it.
 pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Kept, Pty)> {
     let (ours, kept) = SerialStream::pair()?;
     let device = kept.name().ok_or_else(|| io::Error::other("the pty has no name"))?;
     match fs::symlink_metadata(&link) {
-        Ok(found) if found.is_symlink() => fs::remove_file(&link)?,
+        Ok(found) if found.is_symlink() && is_left_behind(&link) => fs::remove_file(&link)?,
         Ok(_) => {
-            let text = format!("{} is there already and is no symbolic link", link.display());
+            let text =
+                format!("{} is there already and is no link that a simulator left behind", link.display());
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, text));
         }
         Err(_) => {}

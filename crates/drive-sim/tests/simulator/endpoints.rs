@@ -73,9 +73,9 @@ mod pty {
     }
 
     #[tokio::test]
-    async fn an_old_link_is_replaced() {
+    async fn a_link_that_a_killed_simulator_left_behind_is_replaced() {
         let link = link("old");
-        std::os::unix::fs::symlink("/nowhere", &link).unwrap();
+        std::os::unix::fs::symlink("/dev/pts/gone", &link).unwrap();
         let serving = line().serve_pty(&link).unwrap();
         assert_eq!(fs::read_link(&link).unwrap(), PathBuf::from(serving.device().unwrap()));
     }

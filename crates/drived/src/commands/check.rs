@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use drive_fleet::{
-    Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnFault, OnLoss, Periods,
+    Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted,
+    OnExitWatchdog, OnFault, OnLoss, Periods,
 };
 
 use crate::{
@@ -93,6 +94,18 @@ fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
     line("setpoints", limits(&settings.limits));
     line("watchdog", Some(watchdog.unwrap_or_else(|| "left as it is".to_owned())));
     line("at the exit", Some(at_exit(settings.on_exit)));
+    line("turning then", turning_at_exit(settings.on_exit, settings.on_exit_adopted));
+    let wears = drive.name.family.capabilities().watchdog.is_some_and(|watchdog| watchdog.wears);
+    let restores = match settings.on_exit_watchdog {
+        OnExitWatchdog::RestoreInRam => !wears,
+        OnExitWatchdog::Restore => true,
+        OnExitWatchdog::Leave => false,
+    };
+    let afterwards = match restores {
+        true => "put back at standstill to what was found",
+        false => "stays armed: it trips the drive when nobody speaks to it",
+    };
+    line("its watchdog then", settings.watchdog.map(|_| afterwards.to_owned()));
     line("when lost", Some(when_lost(settings.on_loss)));
     let tripped = match settings.on_fault {
         OnFault::Report => "reported",
@@ -144,6 +157,20 @@ fn at_exit(policy: OnExit) -> String {
             format!("stopped if it was started here ({mode} stop), control back to panel or terminals")
         }
         OnExit::Leave => "left as it is".to_owned(),
+    }
+}
+
+/// What happens at the exit to a motor that turns and was not started here.
+fn turning_at_exit(policy: OnExit, adopted: OnExitAdopted) -> Option<String> {
+    match (policy, adopted) {
+        (OnExit::Leave, _) => None,
+        (_, OnExitAdopted::Stop(mode)) => {
+            Some(format!("a motor that was not started here is stopped too ({mode} stop)"))
+        }
+        (OnExit::Stop(_), OnExitAdopted::Report) => {
+            Some("a motor that was not started here is left, and is an alarm".to_owned())
+        }
+        _ => Some("a motor that was not started here is left".to_owned()),
     }
 }
 

@@ -11,7 +11,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     one: OneDriveArgs,
     /// A frequency such as 47.5Hz, or a speed such as 1450rpm for the families that take one
-    #[arg(value_name = "SETPOINT")]
+    #[arg(value_name = "SETPOINT", allow_hyphen_values = true)]
     setpoint: Setpoint,
 }
 

@@ -3,6 +3,7 @@
 //! Read in two steps: the keys one by one ([`raw`], [`values`]), then seen together, against the families and against the
 //! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
 
+mod checks;
 mod doors;
 mod groups;
 mod place;
@@ -11,12 +12,12 @@ mod values;
 
 use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
-use drive_bus::{Endpoint, LineConfig, Protocol};
+use drive_bus::{LineConfig, Protocol};
 use drive_core::{StopMode, WatchdogCapability};
 use drive_families::{OptionEntry, Options};
 use drive_fleet::{
-    Alarms, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnControlTaken, OnExit, OnFault,
-    OnLoss, Periods, WatchdogContract, check_settings, plan,
+    Alarms, Commanders, Demand, DriveSettings, FrequencyLimits, LineBudget, OnControlTaken, OnExit,
+    OnExitAdopted, OnExitWatchdog, OnFault, OnLoss, Periods, WatchdogContract, check_settings, plan,
 };
 
 pub(crate) use self::{
@@ -27,7 +28,7 @@ pub(crate) use self::{
 use self::{
     place::Source,
     raw::{DriveEntry, File, LineEntry},
-    values::Exit,
+    values::{Adopted, Exit},
 };
 use crate::{drive_spec::DriveName, failure::Failure, line_spec};
 
@@ -99,11 +100,9 @@ impl LinePart {
 impl Config {
     /// Reads a file.
     pub(crate) fn load(file: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(file);
-        let source = Source { file, text: text.as_deref().unwrap_or_default() };
-        match &text {
-            Ok(text) => Self::read(file, text),
-            Err(error) => Err(source.error_of_file(format_args!("cannot be read: {error}"))),
+        match checks::read_file(file) {
+            Ok(text) => Self::read(file, &text),
+            Err(why) => Err(Source { file, text: "" }.error_of_file(format_args!("cannot be read: {why}"))),
         }
     }
 
@@ -124,7 +123,7 @@ impl Config {
         for (name, entry) in &raw.lines {
             lines.push(line_part(source, name.get_ref(), name.span(), entry, &members)?);
         }
-        check_ports(source, &raw, &lines)?;
+        checks::ports(source, &raw, &lines)?;
         let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups::groups(source, &raw.groups, names)?;
@@ -132,8 +131,8 @@ impl Config {
         let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
         Ok(Self {
             doors,
-            snapshots: raw.snapshots.map_or(SNAPSHOTS, |time| time.0.0),
-            shutdown: raw.shutdown.map_or(SHUTDOWN, |time| time.0.0),
+            snapshots: checks::snapshots(source, raw.snapshots.as_ref())?.unwrap_or(SNAPSHOTS),
+            shutdown: raw.shutdown.as_ref().map_or(SHUTDOWN, |time| time.get_ref().0.0),
             lines,
             groups,
         })
@@ -275,29 +274,6 @@ fn response_timeout(source: Source<'_>, entry: &LineEntry) -> Result<Duration, C
     Err(source.error(said.span(), problem))
 }
 
-/// Two lines over one port would talk into each other. Where a port has several names, links to it are followed. A
-/// gateway for Modbus TCP keeps its connections apart.
-fn check_ports(source: Source<'_>, raw: &File, lines: &[LinePart]) -> Result<(), ConfigError> {
-    let mut ports: BTreeMap<String, &str> = BTreeMap::new();
-    for line in lines {
-        let port = match &line.config.endpoint {
-            Endpoint::Serial(path) => {
-                path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string()
-            }
-            Endpoint::Tcp(address) if line.config.protocol.is_paced() => format!("rtu+tcp://{address}"),
-            _ => continue,
-        };
-        if let Some(other) = ports.insert(port, &line.name) {
-            let entry = raw.lines.iter().find(|(name, _)| *name.get_ref() == line.name);
-            let span = entry.map(|(_, entry)| entry.port.span()).unwrap_or_default();
-            let problem =
-                format_args!("it is the port of line {other:?} too: expected all its drives on one line");
-            return Err(source.error(span, problem));
-        }
-    }
-    Ok(())
-}
-
 /// By how much the periods that the file does not name are longer than usual: as little as leaves a fifth of the line for
 /// commands. Periods that the file names stay as they are.
 fn fitting_stretch(budget: LineBudget, group: &[Member]) -> u32 {
@@ -360,10 +336,10 @@ fn settings(
         slow: period(|entry| entry.slow.as_ref().map(|time| time.get_ref().0.0), anyway.slow),
         max_age: period(|entry| entry.max_age.as_ref().map(|time| time.get_ref().0.0), anyway.max_age),
     };
-    let mode = entry.stop_mode.or(defaults.stop_mode).map_or(StopMode::Ramp, |mode| mode.0);
+    let mode = said(entry, defaults, |entry| &entry.stop_mode).map_or(StopMode::Ramp, |mode| mode.0);
     let settings = DriveSettings {
         control: entry.control.or(defaults.control).unwrap_or(false),
-        commanders: match entry.commanders.as_ref().or(defaults.commanders.as_ref()) {
+        commanders: match said(entry, defaults, |entry| &entry.commanders) {
             Some(names) => Commanders::Only(names.clone()),
             None => Commanders::Anyone,
         },
@@ -371,27 +347,29 @@ fn settings(
         limits: limits(entry, defaults),
         alarms: alarms(entry, defaults),
         watchdog: watchdog(entry, defaults, capability),
-        on_exit: match entry.on_exit.or(defaults.on_exit).map_or(Exit::Stop, |policy| policy.0.0) {
+        on_exit: match said(entry, defaults, |entry| &entry.on_exit).map_or(Exit::Stop, |policy| policy.0.0) {
             Exit::Stop => OnExit::Stop(mode),
             Exit::Release => OnExit::Release(mode),
             Exit::Leave => OnExit::Leave,
         },
-        on_loss: match entry.on_loss.or(defaults.on_loss).is_some_and(|policy| policy.0.0) {
+        on_exit_adopted: match said(entry, defaults, |entry| &entry.on_exit_adopted) {
+            Some(policy) if policy.0.0 == Adopted::Stop => OnExitAdopted::Stop(mode),
+            Some(policy) if policy.0.0 == Adopted::Leave => OnExitAdopted::Leave,
+            _ => OnExitAdopted::Report,
+        },
+        on_exit_watchdog: said(entry, defaults, |entry| &entry.on_exit_watchdog)
+            .map_or(OnExitWatchdog::default(), |policy| policy.0.0),
+        on_loss: match said(entry, defaults, |entry| &entry.on_loss).is_some_and(|policy| policy.0.0) {
             true => OnLoss::Stop(mode),
             false => OnLoss::Report,
         },
-        on_fault: match entry.on_fault.or(defaults.on_fault).is_some_and(|policy| policy.0.0) {
+        on_fault: match said(entry, defaults, |entry| &entry.on_fault).is_some_and(|policy| policy.0.0) {
             true => OnFault::ResetWatchdogTrip,
             false => OnFault::Report,
         },
-        on_control_taken: entry
-            .on_control_taken
-            .or(defaults.on_control_taken)
+        on_control_taken: said(entry, defaults, |entry| &entry.on_control_taken)
             .map_or(OnControlTaken::default(), |policy| policy.0.0),
-        accept_self_restart: entry
-            .accept_self_restart
-            .as_ref()
-            .or(defaults.accept_self_restart.as_ref())
+        accept_self_restart: said(entry, defaults, |entry| &entry.accept_self_restart)
             .cloned()
             .unwrap_or_default(),
         ..DriveSettings::watched(name)
@@ -401,7 +379,17 @@ fn settings(
         let place = place.or_else(|| entry.drive.as_ref().map(toml::Spanned::span)).unwrap_or_default();
         source.error(place, format_args!("{}: {problem}", settings.name.escape_debug()))
     })?;
+    checks::drive(source, entry, defaults, &settings, capabilities)?;
     Ok(settings)
+}
+
+/// What the entry of a drive says, else the defaults.
+fn said<'a, T>(
+    entry: &'a DriveEntry,
+    defaults: &'a DriveEntry,
+    of: impl Fn(&'a DriveEntry) -> &'a Option<toml::Spanned<T>>,
+) -> Option<&'a T> {
+    of(entry).as_ref().or(of(defaults).as_ref()).map(toml::Spanned::get_ref)
 }
 
 /// The options of one drive: what its entry says, else the defaults of its family.

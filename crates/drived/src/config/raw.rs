@@ -10,8 +10,8 @@ use super::{
     doors::{HttpEntry, SocketEntry},
     groups::Entries,
     values::{
-        BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy, OptionValue, Parsed,
-        PercentValue, ReactionValue, TakenPolicy,
+        AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy,
+        OptionValue, Parsed, PercentValue, ReactionValue, TakenPolicy, WatchdogPolicy,
     },
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
@@ -21,9 +21,9 @@ use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
     /// How often a snapshot of every drive is printed; 0: never.
-    pub(super) snapshots: Option<Parsed<Time>>,
+    pub(super) snapshots: Option<Spanned<Parsed<Time>>>,
     /// How long the exit may take.
-    pub(super) shutdown: Option<Parsed<Time>>,
+    pub(super) shutdown: Option<Spanned<Parsed<Time>>>,
     pub(super) socket: Option<SocketEntry>,
     /// The file of the tokens.
     pub(super) tokens: Option<PathBuf>,
@@ -61,7 +61,7 @@ pub(super) struct DriveEntry {
     pub(super) drive: Option<Spanned<Parsed<DriveSpec>>>,
     pub(super) name: Option<Spanned<String>>,
     pub(super) control: Option<bool>,
-    pub(super) commanders: Option<Vec<String>>,
+    pub(super) commanders: Option<Spanned<Vec<String>>>,
     pub(super) running: Option<Spanned<Parsed<Time>>>,
     pub(super) rest: Option<Spanned<Parsed<Time>>>,
     pub(super) slow: Option<Spanned<Parsed<Time>>>,
@@ -69,12 +69,14 @@ pub(super) struct DriveEntry {
     pub(super) watchdog: Option<Spanned<WatchdogEntry>>,
     pub(super) frequency: Option<Spanned<FrequencyEntry>>,
     pub(super) alarms: Option<AlarmEntry>,
-    pub(super) stop_mode: Option<Parsed<StopMode>>,
-    pub(super) on_exit: Option<Parsed<ExitPolicy>>,
-    pub(super) on_loss: Option<Parsed<LossPolicy>>,
-    pub(super) on_fault: Option<Parsed<FaultPolicy>>,
-    pub(super) on_control_taken: Option<Parsed<TakenPolicy>>,
-    pub(super) accept_self_restart: Option<Vec<String>>,
+    pub(super) stop_mode: Option<Spanned<Parsed<StopMode>>>,
+    pub(super) on_exit: Option<Spanned<Parsed<ExitPolicy>>>,
+    pub(super) on_exit_adopted: Option<Spanned<Parsed<AdoptedPolicy>>>,
+    pub(super) on_exit_watchdog: Option<Spanned<Parsed<WatchdogPolicy>>>,
+    pub(super) on_loss: Option<Spanned<Parsed<LossPolicy>>>,
+    pub(super) on_fault: Option<Spanned<Parsed<FaultPolicy>>>,
+    pub(super) on_control_taken: Option<Spanned<Parsed<TakenPolicy>>>,
+    pub(super) accept_self_restart: Option<Spanned<Vec<String>>>,
     /// As `--option` has them.
     #[serde(default)]
     pub(super) options: BTreeMap<Spanned<String>, Spanned<OptionValue>>,

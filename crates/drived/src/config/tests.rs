@@ -224,9 +224,9 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
 #[test]
 fn a_port_under_two_names_is_one_port() {
     let link = std::env::temp_dir().join(format!("drived-port-{}", std::process::id()));
-    std::os::unix::fs::symlink("/dev/null", &link).unwrap();
+    std::os::unix::fs::symlink("/dev/tty", &link).unwrap();
     let text = format!(
-        "[lines.a]\nport = \"/dev/null\"\n[lines.b]\nport = {:?}\n\
+        "[lines.a]\nport = \"/dev/tty\"\n[lines.b]\nport = {:?}\n\
          [[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n[[drives]]\nline = \"b\"\ndrive = \"atv312@2\"\n",
         link
     );

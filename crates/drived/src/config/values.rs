@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use drive_core::{Current, Frequency, Percent, Reaction};
-use drive_fleet::{Band, OnControlTaken};
+use drive_fleet::{Band, OnControlTaken, OnExitWatchdog};
 use serde::{Deserialize, Deserializer, de};
 
 /// A value that is written as a text and read by its own rules, whose error says what was expected.
@@ -74,6 +74,30 @@ words! {
     "stop" => Exit::Stop,
     "release" => Exit::Release,
     "leave" => Exit::Leave
+}
+
+/// What happens at the exit to a motor that turns and that was not started here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Adopted {
+    Report,
+    Stop,
+    Leave,
+}
+
+words! {
+    /// What happens at the exit to a motor that was not started here.
+    AdoptedPolicy(Adopted):
+    "report" => Adopted::Report,
+    "stop" => Adopted::Stop,
+    "leave" => Adopted::Leave
+}
+
+words! {
+    /// What happens at the exit to the watchdog of a drive that stands.
+    WatchdogPolicy(OnExitWatchdog):
+    "restore-in-ram" => OnExitWatchdog::RestoreInRam,
+    "restore" => OnExitWatchdog::Restore,
+    "leave" => OnExitWatchdog::Leave
 }
 
 words! {

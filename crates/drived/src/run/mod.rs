@@ -1,5 +1,7 @@
 //! `drived run`: the fleet as a daemon.
 
+mod descriptors;
+mod exit;
 mod json;
 mod report;
 
@@ -11,11 +13,10 @@ use drive_fleet::{Fleet, FleetBuilder};
 use self::report::{Form, Report};
 use crate::{
     api,
-    config::{Config, DrivePart, Http},
+    config::{Config, DrivePart, Http, LinePart},
     doors::Doors,
     failure::Failure,
-    one_drive::open_line,
-    page,
+    one_drive, page,
     plant::Plant,
     signals::Ending,
 };
@@ -24,8 +25,8 @@ use crate::{
 ///
 /// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal, where the log tells
 /// the events, stdout has one line for each drive whose state has changed instead. Ctrl-C and SIGTERM end it: each drive's
-/// policy acts, and what was done is told. A second Ctrl-C ends it at once. A stdout that nobody reads any more ends nothing:
-/// the drives are watched on.
+/// policy acts, and what was done is told. A second Ctrl-C ends it at once. Exit code 1 when a motor may turn that no policy
+/// leaves turning. A stdout that nobody reads any more ends nothing: the drives are watched on.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The configuration, in TOML
@@ -44,17 +45,18 @@ pub(crate) struct Args {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
+    descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
     let mut ending = Ending::listen()?;
-    let lines = open_lines(&config).await?;
+    let lines = start_lines(&config)?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let doors = doors.open(api::router(plant).merge(page::router()));
-    let result = tokio::select! {
+    let read = tokio::select! {
         () = ending.asked() => Ok(()),
         result = report.ended() => {
             // Without this program the drives' watchdogs would stop their motors.
@@ -65,30 +67,22 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     };
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
-    let in_order = tokio::select! {
-        // Each drive's event tells what was done.
-        _ = fleet.shutdown(config.shutdown) => true,
-        () = ending.asked() => {
-            tracing::warn!("asked to end a second time: drives are left as they are");
-            false
-        }
-    };
-    if result.is_ok() && in_order {
+    let ended = exit::end(&fleet, config.shutdown, &mut ending).await;
+    if read.is_ok() {
         report.finish().await;
     }
     let _ = closed.await;
     for line in lines {
-        line.close().await;
+        one_drive::close(&line).await;
     }
-    result
+    ended.and(read)
 }
 
-async fn open_lines(config: &Config) -> Result<Vec<Line>, Failure> {
-    let mut lines = Vec::with_capacity(config.lines.len());
-    for part in &config.lines {
-        lines.push(open_line(part.config.clone()).await?);
-    }
-    Ok(lines)
+/// Starts every line. One whose port cannot be opened is tried again; its drives are lost meanwhile, and the others run.
+fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
+    let start = |part: &LinePart| Line::start(part.config.clone());
+    let lines = config.lines.iter().map(start).collect::<Result<_, _>>();
+    lines.map_err(|error| Failure::Input(error.to_string()))
 }
 
 fn build(config: &Config, lines: &[Line]) -> FleetBuilder {

@@ -173,6 +173,13 @@ impl Paper {
                 let watchdog = self.watchdog;
                 Reply::Watchdog(self.result(watchdog))
             }
+            Job::RestoreWatchdog(found) => {
+                if reached {
+                    self.watchdog = found;
+                }
+                let watchdog = self.watchdog;
+                Reply::Watchdog(self.result(watchdog))
+            }
             Job::KeepAlive => Reply::KeptAlive(self.result(())),
             Job::Status { .. } => Reply::Status(self.status()),
             Job::Identify => {
@@ -209,7 +216,7 @@ struct Rig {
 impl Rig {
     fn new(settings: DriveSettings) -> Self {
         let now = Instant::now();
-        let machine = Supervisor::new(now, settings, CAPABILITIES.watchdog);
+        let machine = Supervisor::new(now, settings, CAPABILITIES.watchdog, CAPABILITIES.communication_fault);
         Self { machine, drive: Paper::new(), now, outputs: Vec::new(), next_call: 0 }
     }
 

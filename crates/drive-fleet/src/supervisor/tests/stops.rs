@@ -161,7 +161,7 @@ fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
 fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
     for (started, policy, expected) in [
         (true, OnExit::Stop(StopMode::Ramp), ExitAction::Stopped(Outcome::Confirmed)),
-        (false, OnExit::Stop(StopMode::Ramp), ExitAction::Left),
+        (false, OnExit::Stop(StopMode::Ramp), ExitAction::LeftTurning),
         (true, OnExit::Leave, ExitAction::Left),
         (true, OnExit::Release(StopMode::Ramp), ExitAction::Released(Outcome::Confirmed)),
         (false, OnExit::Release(StopMode::Ramp), ExitAction::Left),
@@ -179,7 +179,7 @@ fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
         rig.machine.handle_dropped();
         rig.pass(5_000 * MS);
         assert_eq!(rig.machine.exit_action(), Some(&expected), "{started} {policy:?}");
-        if expected == ExitAction::Left {
+        if matches!(expected, ExitAction::Left | ExitAction::LeftTurning) {
             assert_eq!(rig.drive.writes(), []);
         }
     }
@@ -212,7 +212,10 @@ fn a_stop_under_way_keeps_its_mode_whatever_policy_or_group_stops_the_drive_besi
         assert!(rig.machine.exit_action().is_some() && rig.drive.status.is_standstill(), "{policy:?}");
         let stops = rig.drive.writes();
         assert!(
-            stops.iter().all(|job| matches!(job, Job::Stop(StopMode::Freewheel) | Job::Release)),
+            stops.iter().all(|job| matches!(
+                job,
+                Job::Stop(StopMode::Freewheel) | Job::Release | Job::RestoreWatchdog(_)
+            )),
             "{stops:?}"
         );
     }

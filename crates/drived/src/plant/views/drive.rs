@@ -197,7 +197,7 @@ impl TripView {
             mnemonic: entry.map(|entry| entry.mnemonic),
             meaning: entry.map(|entry| entry.meaning),
             remedy: entry.map(|entry| entry.remedy),
-            by_watchdog: trip.watchdog_after.is_some(),
+            by_watchdog: trip.by_watchdog,
             time_unix_ms: unix(trip.at),
             before: trip.before.as_ref().map(|before| StatusView::past(before, now)),
             at_trip: StatusView::past(&trip.status, now),
