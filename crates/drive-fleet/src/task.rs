@@ -224,11 +224,7 @@ impl Desk {
             match output {
                 Output::Event(kind) => {
                     let drive = self.supervisor.name();
-                    if kind.is_alarm() {
-                        tracing::warn!(%drive, "{kind}");
-                    } else {
-                        tracing::info!(%drive, "{kind}");
-                    }
+                    tracing::debug!(%drive, "{kind}");
                     // Without a reader there is nobody to tell.
                     let _ = self.events.send(Event { drive, at: Instant::now(), kind });
                 }

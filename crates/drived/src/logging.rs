@@ -1,9 +1,14 @@
 //! The log: to stderr, as much as `DRIVED_LOG` says (`debug`, `drive_bus=trace,warn`).
 //!
+//! A line is `2026-11-21 14:03:21.350+01:00 WARN  north: pump 3 lost at 30 Hz: no answer for 3.2 s`: the time on the wrist
+//! of whoever stands beside the plant, the level, what happened. What a device or a caller sent stands in it with its
+//! control characters escaped.
+//!
 //! Writing may block for as long as a terminal is held or a pipe is full, and may fail for ever. The tasks that feed the
 //! drives' watchdogs write to the log, so they only hand their lines to a thread: what it cannot take is lost and counted.
 
 use std::{
+    fmt::{self, Write as _},
     io::{self, IsTerminal as _, Write},
     sync::{
         Arc,
@@ -13,8 +18,13 @@ use std::{
     time::Duration,
 };
 
-use tracing::Level;
-use tracing_subscriber::{EnvFilter, filter::LevelFilter, fmt::time::FormatTime};
+use tracing::{Event, Level, Subscriber, field::Field};
+use tracing_subscriber::{
+    EnvFilter,
+    filter::LevelFilter,
+    fmt::{FmtContext, FormatEvent, FormatFields, format},
+    registry::LookupSpan,
+};
 
 use crate::failure::Failure;
 
@@ -40,10 +50,9 @@ pub(crate) fn start(level: Option<Level>) -> Result<Option<Log>, Failure> {
         .with_env_filter(filter)
         .with_writer(move || lines.clone())
         .with_ansi(io::stderr().is_terminal())
-        .with_target(false)
-        .with_timer(LocalTime)
         // It would be told on stderr, by a panic where nobody reads that.
         .log_internal_errors(false)
+        .event_format(Form)
         .init();
     Ok(Some(log))
 }
@@ -63,13 +72,70 @@ fn check(said: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Local time with its offset, as a person beside the plant has it on the wrist.
-struct LocalTime;
+/// How a line of the log looks.
+struct Form;
 
-impl FormatTime for LocalTime {
-    fn format_time(&self, writer: &mut tracing_subscriber::fmt::format::Writer<'_>) -> std::fmt::Result {
-        write!(writer, "{}", chrono::Local::now().format("%Y-%m-%d %H:%M:%S%.3f%:z"))
+impl<S, N> FormatEvent<S, N> for Form
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        _: &FmtContext<'_, S, N>,
+        mut writer: format::Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        let mut text = Text::default();
+        event.record(&mut text);
+        let level = *event.metadata().level();
+        let (on, off) = if writer.has_ansi_escapes() { colour(level) } else { ("", "") };
+        let time = chrono::Local::now().format("%Y-%m-%d %H:%M:%S%.3f%:z");
+        writeln!(writer, "{time} {on}{level:<5}{off} {}{}", text.message, text.fields)
     }
+}
+
+/// What switches the colour of a level on and off.
+const fn colour(level: Level) -> (&'static str, &'static str) {
+    match level {
+        Level::ERROR => ("\u{1b}[1;31m", "\u{1b}[0m"),
+        Level::WARN => ("\u{1b}[33m", "\u{1b}[0m"),
+        Level::INFO => ("\u{1b}[32m", "\u{1b}[0m"),
+        _ => ("\u{1b}[2m", "\u{1b}[0m"),
+    }
+}
+
+/// What an event says, its control characters escaped.
+#[derive(Default)]
+struct Text {
+    message: String,
+    fields: String,
+}
+
+impl tracing::field::Visit for Text {
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        let said = escaped(&format!("{value:?}"));
+        if field.name() == "message" {
+            self.message = said;
+        } else {
+            // A string takes it.
+            let _ = write!(self.fields, " {}={said}", field.name());
+        }
+    }
+}
+
+/// A text that neither ends a line nor commands a terminal, nor turns its letters round.
+pub(crate) fn escaped(text: &str) -> String {
+    let turns = |character| matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() || turns(character) || matches!(character, '\u{2028}' | '\u{2029}') {
+            escaped.extend(character.escape_default());
+        } else {
+            escaped.push(character);
+        }
+    }
+    escaped
 }
 
 enum Message {
@@ -181,6 +247,26 @@ mod tests {
         let whole: String = told.iter().collect();
         assert!(whole.contains(" lines of the log are lost"), "{whole}");
         assert!(whole.contains("0\n") && !whole.contains(&format!("{}\n", written - 1)), "{whole}");
+    }
+
+    #[test]
+    fn what_a_device_sent_commands_no_terminal_and_ends_no_line() {
+        assert_eq!(escaped("ATV312\u{1b}[2J\n\u{9b}31m"), "ATV312\\u{1b}[2J\\n\\u{9b}31m");
+        assert_eq!(escaped("Pumpe Süd → 30 Hz"), "Pumpe Süd → 30 Hz");
+        assert_eq!(escaped("a\u{202e}b"), "a\\u{202e}b");
+    }
+
+    #[test]
+    fn an_unknown_level_is_refused_and_a_part_with_its_level_is_not() {
+        for (said, is_right) in [
+            ("", true),
+            ("debug", true),
+            ("drive_bus=trace,warn", true),
+            ("loud", false),
+            ("drive_bus=loud", false),
+        ] {
+            assert_eq!(check(said).is_ok(), is_right, "{said}");
+        }
     }
 
     #[test]

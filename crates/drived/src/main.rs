@@ -12,6 +12,7 @@ mod drive_options;
 mod drive_spec;
 mod duration;
 mod failure;
+mod journal;
 mod json;
 mod line_spec;
 mod logging;

@@ -183,7 +183,7 @@ impl<C> Master<C> {
     }
 
     fn go_offline(&mut self, now: Instant, slave: u8) {
-        tracing::warn!(slave, "slave off-line");
+        tracing::debug!(slave, "slave off-line");
         self.offline.insert(slave);
         let at = self.station(slave).probe_at().unwrap_or(now);
         let retry_in = self.probe_in(now, at);

@@ -20,7 +20,7 @@ pub(super) enum Link {
 impl<C> Master<C> {
     /// The port is open.
     pub fn handle_up(&mut self, now: Instant) {
-        tracing::info!(endpoint = ?self.config.endpoint, "line up");
+        tracing::debug!(endpoint = ?self.config.endpoint, "line up");
         self.link = Link::Up;
         self.exchange.reset();
         self.quiet_from = now;
@@ -31,7 +31,7 @@ impl<C> Master<C> {
 
     /// The port is lost. What waits goes on waiting.
     pub fn handle_lost(&mut self, now: Instant, reason: &str) {
-        tracing::warn!(endpoint = ?self.config.endpoint, reason, "line lost");
+        tracing::debug!(endpoint = ?self.config.endpoint, reason, "line lost");
         self.link = Link::Opening;
         self.stats.lost += 1;
         self.exchange.reset();
@@ -42,7 +42,7 @@ impl<C> Master<C> {
     /// The port cannot be opened. What waits without a lifetime ends; what has one expires.
     pub fn handle_down(&mut self, reason: &str) {
         if let Link::Opening = mem::replace(&mut self.link, Link::Down(reason.to_owned())) {
-            tracing::warn!(endpoint = ?self.config.endpoint, reason, "line down");
+            tracing::debug!(endpoint = ?self.config.endpoint, reason, "line down");
         }
         for entry in self.schedule.withdraw_all(|entry| entry.terms.lifetime.is_none()) {
             self.drop_unsent(entry, PortError::LineDown(reason.to_owned()));

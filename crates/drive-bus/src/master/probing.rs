@@ -133,7 +133,7 @@ impl<C> Master<C> {
         for neighbour in self.probing.is_back(slave, &self.offline) {
             self.station(neighbour).hope(now);
         }
-        tracing::info!(slave, "slave answers again");
+        tracing::debug!(slave, "slave answers again");
     }
 
     /// How long the answer to what is asked next may take to begin, and what kind of question that makes it.

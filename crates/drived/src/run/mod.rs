@@ -16,7 +16,7 @@ use crate::{
     config::{Config, DrivePart, Http, LinePart},
     doors::Doors,
     failure::Failure,
-    one_drive, page,
+    journal, one_drive, page,
     plant::Plant,
     signals::Ending,
 };
@@ -54,6 +54,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
+    let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let doors = doors.open(api::router(plant).merge(page::router()));
     let read = tokio::select! {
@@ -68,6 +69,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, config.shutdown, &mut ending).await;
+    // It ends with the fleet, and what it says last is not lost.
+    let _ = journal.await;
     if read.is_ok() {
         report.finish().await;
     }

@@ -100,7 +100,11 @@ pub(crate) struct Running {
 
 impl Running {
     pub(crate) fn start(arguments: &[&str]) -> Self {
-        let mut command = drived(arguments);
+        Self::of(&mut drived(arguments))
+    }
+
+    /// The same with an environment of its own.
+    pub(crate) fn of(command: &mut Command) -> Self {
         let runtime = command.get_envs().find(|(name, _)| *name == "XDG_RUNTIME_DIR");
         let runtime = runtime.and_then(|(_, folder)| folder).map(PathBuf::from);
         let mut child = command
@@ -127,13 +131,24 @@ impl Running {
 
     /// Waits for a line of its log that contains this.
     pub(crate) fn wait_for_log(&mut self, text: &str) {
+        self.log_until(text);
+    }
+
+    /// Its log up to the end of the first line that contains this.
+    pub(crate) fn log_until(&mut self, text: &str) -> String {
         let log = self.child.stderr.as_mut().expect("stderr is read");
-        let (mut line, mut byte) = (Vec::new(), [0]);
-        while !String::from_utf8_lossy(&line).contains(text) {
-            std::io::Read::read_exact(log, &mut byte).expect("the program ended without saying it");
-            line.extend(byte.iter().filter(|byte| **byte != b'\n'));
+        let (mut all, mut line, mut byte) = (String::new(), Vec::new(), [0]);
+        loop {
+            let read = std::io::Read::read_exact(log, &mut byte);
+            assert!(read.is_ok(), "the program ended without saying {text:?}: {all}");
+            line.push(byte[0]);
             if byte == *b"\n" {
+                let whole = String::from_utf8_lossy(&line).into_owned();
                 line.clear();
+                all += &whole;
+                if whole.contains(text) {
+                    return all;
+                }
             }
         }
     }
