@@ -42,6 +42,7 @@ files![
     "drive_tables.js",
     "events.js",
     "fault_texts.js",
+    "faults_fr.js",
     "format.js",
     "icon.svg",
     "line.js",

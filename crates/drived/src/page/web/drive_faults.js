@@ -32,10 +32,10 @@ export function faultPanel(name) {
   }
 
   function content(drive, fault) {
-    const remedy = faultRemedy(drive.family, fault);
+    const remedy = faultRemedy(fault);
     const said = el('div', {},
       el('h2', {}, t('fault_of', { code: fault.code ?? '', mnemonic: fault.mnemonic ?? '' })),
-      el('p.meaning', {}, faultMeaning(drive.family, fault)),
+      el('p.meaning', {}, faultMeaning(fault)),
       ...(remedy ? [el('p', {}, el('b', {}, `${t('what_to_do')}: `), remedy)] : []),
       ...(fault.by_watchdog ? [el('p', {}, t('by_watchdog'))] : []),
       history(drive));
@@ -59,8 +59,8 @@ export async function readHistory(place, drive) {
   try {
     const { history = [] } = await read(path('drives', drive.name, 'faults'));
     place.replaceChildren(history.length ? el('ol.history', {}, ...history.map(fault => {
-      const remedy = faultRemedy(drive.family, fault);
-      return el('li', {}, el('b', {}, `${fault.code ?? ''} ${fault.mnemonic ?? ''} `), faultMeaning(drive.family, fault),
+      const remedy = faultRemedy(fault);
+      return el('li', {}, el('b', {}, `${fault.code ?? ''} ${fault.mnemonic ?? ''} `), faultMeaning(fault),
         remedy ? el('small', {}, ` – ${remedy}`) : null);
     })) : el('p', {}, t('history_empty')));
   } catch (problem) {

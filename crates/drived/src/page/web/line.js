@@ -48,12 +48,12 @@ export function line(root, name) {
   const last = el('div.wide.last');
   const hold = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => setAttribute(hold, 'aria-pressed', String(!held())) }, t('hold'));
   const held = () => hold.getAttribute('aria-pressed') === 'true';
+  const lately = el('section.panel', { hidden: true }, el('div.headline', {}, el('h2', {}, t('last_exchanges')),
+    el('span.chips', {}, hold, el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture')))), last);
   root.append(
     el('header.drive-head', {}, el('div', {}, el('h1', { tabindex: -1 }, name), place)),
     el('dl.big', {}, ...big),
-    el('section.panel', {}, el('h2', {}, t('exchange_times')), slaves, kinds),
-    el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('last_exchanges')),
-      el('span.chips', {}, hold, el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture')))), last));
+    el('section.panel', {}, el('h2', {}, t('exchange_times')), slaves, kinds), lately);
   update();
   readLast();
   const timer = setInterval(readLast, READ_MS);
@@ -77,7 +77,9 @@ export function line(root, name) {
   async function readLast() {
     if (held() || document.hidden) return;
     try {
-      const { last: exchanges = [] } = await read(path('lines', name));
+      const { last: exchanges } = await read(path('lines', name));
+      lately.hidden = !exchanges;
+      if (!exchanges) return;
       last.replaceChildren(table('', [t('time'), [t('slave'), 'right'], t('request'), t('answer'), t('result'), [t('took'), 'right']], exchanges.map(one =>
         el(one.result === 'ok' ? 'tr' : 'tr.in-trouble', {}, el('td', {}, clock(one.time_unix_ms)), el('td.right', {}, one.slave),
           el('td', {}, el('code', {}, one.request)), el('td', {}, el('code', {}, one.answer || MISSING)), el('td', {}, word(one.result)),

@@ -11,6 +11,9 @@ import { named, t } from './texts.js';
 import { FINE, trouble } from './trouble.js';
 import { stateWord, word } from './words.js';
 
+/** Rows that are shown at once, and how many more each frame: the worst are read while the rest is made. */
+const ROWS_AT_ONCE = 24;
+
 const MOVING = new Set(['running', 'stopping', 'quick_stop', 'fault_reaction']);
 const FILTERS = {
   all: () => true,
@@ -25,6 +28,7 @@ const asked = { search: '', filter: 'all', group: '' };
 /** Shows the overview in `root`. */
 export function overview(root) {
   const rows = new Map();
+  let room = ROWS_AT_ONCE;
   const tiles = new Map();
   const strip = el('section.strip', { 'aria-label': t('lines') });
   const filters = Object.keys(FILTERS).map(name =>
@@ -57,12 +61,11 @@ export function overview(root) {
   function update(names) {
     const all = names.has('state');
     if (all) fillGroups();
-    for (const [name, drive] of plant.drives) {
-      const row = rows.get(name);
-      if (!row) rows.set(name, makeRow(drive));
+    for (const [name, row] of rows) {
+      const drive = plant.drives.get(name);
+      if (!drive) rows.delete(name);
       else if (all || names.has(`drive ${name}`)) row.update(drive);
     }
-    for (const name of rows.keys()) if (!plant.drives.has(name)) rows.delete(name);
     updateStrip();
     order();
   }
@@ -82,9 +85,20 @@ export function overview(root) {
     const shown = inGroup.filter(FILTERS[asked.filter]).filter(drive => fits(drive, words));
     // The order of the configuration among equals: a row moves only when its trouble begins or ends.
     const ranked = shown.map(drive => [trouble(drive).rank, drive.name]).sort((a, b) => a[0] - b[0]);
-    arrange(body, ranked.map(([, name]) => rows.get(name).element));
+    arrange(body, ranked.slice(0, room).map(([, name]) => rowOf(name).element));
+    if (room < ranked.length) setTimeout(more);
     nothing.hidden = shown.length > 0 || plant.drives.size === 0;
     groupOrders.hidden = !members;
+  }
+
+  function more() {
+    room += ROWS_AT_ONCE;
+    if (root.contains(body)) requestAnimationFrame(order);
+  }
+
+  function rowOf(name) {
+    if (!rows.has(name)) rows.set(name, makeRow(plant.drives.get(name)));
+    return rows.get(name);
   }
 
   function updateStrip() {

@@ -16,7 +16,7 @@ export const COLUMNS = ['drive', 'state', 'frequency', 'current', 'note', 'contr
 const template = el('article.row', { role: 'row' },
   el('div.name', { role: 'rowheader' }, el('a'), el('small')),
   el('div.state', { role: 'cell' }, el('span.mark', { 'aria-hidden': 'true' }), el('b'), el('span.turns')),
-  el('div.frequency', { role: 'cell' }, el('span.number'), el('small'), bar(true)),
+  el('div.frequency', { role: 'cell' }, el('span.number'), ' ', el('small'), bar(true)),
   el('div.current', { role: 'cell' }, el('span.number'), bar(false)),
   el('div.note', { role: 'cell' }),
   el('div.control', { role: 'cell' }),

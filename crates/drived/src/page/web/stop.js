@@ -108,7 +108,7 @@ function counts() {
   if (!account.drives) return null;
   const shown = [['confirmed', account.confirmed], ['pending', account.pending], ['not_reachable', account.notReachable], ['not_confirmed', account.bad]];
   return el('dl.counts', {}, ...shown.filter(([name, count]) => name !== 'not_confirmed' || count).flatMap(([name, count]) => [
-    el(`dd.${name}`, { 'data-count': name }, String(count)), el('dt', {}, t(`stop_${name}`))]));
+    el(count ? `dd.${name}` : 'dd', { 'data-count': name }, String(count)), el('dt', {}, t(`stop_${name}`))]));
 }
 
 /** Who is not accounted for yet, by name, while they are few enough to be read. */

@@ -40,7 +40,7 @@ const WORDS = {
   stop: ['Stop', 'Arrêt'],
   setpoint: ['Setpoint', 'Consigne'],
   reset: ['Reset', 'Acquittement'],
-  release: ['Release', 'Restitution de la commande'],
+  release: ['Give control back', 'Rendre la main'],
   parameter: ['Parameter', 'Paramètre'],
   // Kinds of stop.
   ramp: ['along the ramp', 'sur rampe'],
@@ -101,7 +101,7 @@ const COMMANDS = [
   [/^freewheel stop$/, () => 'arrêt roue libre'],
   [/^DC injection stop$/i, () => 'arrêt par injection de courant continu'],
   [/^fault reset$/, () => 'acquittement du défaut'],
-  [/^release$/, () => 'restitution de la commande'],
+  [/^release$/, () => 'rendre la main'],
 ];
 
 /** The plain word for a word of the API; words that are not in the table stand for themselves. */
