@@ -196,6 +196,7 @@ export const FAULTS_FR = {
   // 3G3EV.
   'look for a short circuit or an earth fault at the output and a blocked motor; lengthen the acceleration time n20': 'rechercher un court-circuit ou un défaut de terre en sortie et un moteur bloqué ; allonger le temps d’accélération n20',
   'overvoltage': 'surtension',
+  'undervoltage': 'sous-tension',
   'lengthen the deceleration time; check the supply voltage and what the load gives back': 'allonger le temps de décélération ; vérifier la tension d’alimentation et l’énergie renvoyée par la charge',
   'lower the load; check the V/f curve and the size of the drive': 'réduire la charge ; vérifier la courbe U/f et le calibre du variateur',
   'overheating of the drive': 'surchauffe du variateur',
