@@ -169,12 +169,18 @@ impl Group {
     /// The report comes when every drive stands or its time is over; a drive that does not answer is named after the time
     /// that its line's plan gives. Stops that are not confirmed go on being repeated.
     pub async fn stop(&self, mode: StopMode) -> StopReport {
-        self.stop_each(mode, false).await
+        self.stop_each(mode, false, &|_, _| ()).await
+    }
+
+    /// The same, and tells the outcome of each drive as soon as it is known. Every stop is on its way to its drive when
+    /// this has been polled for the first time.
+    pub async fn stop_telling(&self, mode: StopMode, told: impl Fn(&str, &Outcome)) -> StopReport {
+        self.stop_each(mode, false, &told).await
     }
 
     /// Stops every drive of the group; `anyhow`: a stop in another mode that is under way does as well, and no broadcast
     /// comes over it.
-    async fn stop_each(&self, mode: StopMode, anyhow: bool) -> StopReport {
+    async fn stop_each(&self, mode: StopMode, anyhow: bool, told: &impl Fn(&str, &Outcome)) -> StopReport {
         let mut report = StopReport::default();
         let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
             self.members.iter().cloned().partition(|member| member.entry.settings.control);
@@ -183,7 +189,7 @@ impl Group {
         for (number, line) in self.fleet.line_entries().iter().enumerate() {
             let members = members.iter().filter(|member| member.entry.line == number);
             let write = self.common_write(number, mode).filter(|_| !anyhow);
-            stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow));
+            stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow, told));
         }
         for (broadcast, outcomes) in join_all(stops).await {
             report.broadcasts.extend(broadcast);
@@ -280,7 +286,7 @@ impl Group {
                 if failed.load(Ordering::Relaxed) {
                     return None;
                 }
-                let outcome = member.order_on(Some(leave), order).await;
+                let outcome = member.order_on(Some(leave), None, order).await;
                 failed.fetch_or(!outcome.is_confirmed(), Ordering::Relaxed);
                 Some((Arc::clone(member.name()), outcome))
             };
@@ -308,7 +314,7 @@ impl Group {
         }
         // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
         // perhaps by its freewheel, is not slowed down by this.
-        let stopped = Box::pin(self.stop_each(StopMode::Ramp, true)).await;
+        let stopped = Box::pin(self.stop_each(StopMode::Ramp, true, &|_, _| ())).await;
         Err(GroupFailure::Failed { outcomes, stopped })
     }
 }
@@ -320,6 +326,7 @@ async fn stop_line(
     members: Vec<DriveHandle>,
     mode: StopMode,
     anyhow: bool,
+    told: &impl Fn(&str, &Outcome),
 ) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
     let broadcast = async {
         match write {
@@ -330,7 +337,8 @@ async fn stop_line(
     let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
     let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
     let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
-    let stops: Vec<_> = members.into_iter().map(|member| stop_one(member, mode, anyhow, patience)).collect();
+    let stops: Vec<_> =
+        members.into_iter().map(|member| stop_one(member, mode, anyhow, patience, told)).collect();
     // Both at once: the broadcast is first on the line, and no start of before can come behind it.
     join(broadcast, join_all(stops)).await
 }
@@ -340,8 +348,10 @@ async fn stop_one(
     mode: StopMode,
     anyhow: bool,
     patience: Duration,
+    told: &impl Fn(&str, &Outcome),
 ) -> (Arc<str>, Outcome) {
     let outcome = member.stop_within(mode, anyhow, Some(patience)).await;
+    told(member.name(), &outcome);
     (Arc::clone(member.name()), outcome)
 }
 

@@ -5,7 +5,7 @@ use std::{fmt, pin::pin, sync::Arc, time::Duration};
 use drive_core::{BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode};
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    time::sleep,
+    time::{Instant, sleep},
 };
 
 use crate::{
@@ -219,14 +219,24 @@ impl DriveHandle {
 
     /// Gives an order and waits for its outcome.
     pub async fn order(&self, order: Order) -> Outcome {
-        self.order_on(None, order).await
+        self.order_on(None, None, order).await
+    }
+
+    /// Gives an order that is not sent after `expires`, whatever lifetime the settings give, and waits for its outcome.
+    pub async fn order_until(&self, order: Order, expires: Instant) -> Outcome {
+        self.order_on(None, Some(expires), order).await
     }
 
     /// Gives an order, and no more if a stop has come since its leave.
-    pub(crate) async fn order_on(&self, leave: Option<Leave>, order: Order) -> Outcome {
+    pub(crate) async fn order_on(
+        &self,
+        leave: Option<Leave>,
+        expires: Option<Instant>,
+        order: Order,
+    ) -> Outcome {
         let (reply, outcome) = oneshot::channel();
         let name = Arc::clone(&self.commander);
-        match self.post(Message::Order { order, leave, name, reply }) {
+        match self.post(Message::Order { order, leave, expires, name, reply }) {
             Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
             Err(refused) => Outcome::Refused(refused),
         }

@@ -24,7 +24,14 @@ use crate::{
 #[derive(Debug)]
 pub(crate) enum Message {
     /// An order.
-    Order { order: Order, leave: Option<Leave>, name: Arc<str>, reply: oneshot::Sender<Outcome> },
+    Order {
+        order: Order,
+        leave: Option<Leave>,
+        /// When it may not be sent any more; `None`: as the settings say.
+        expires: Option<Instant>,
+        name: Arc<str>,
+        reply: oneshot::Sender<Outcome>,
+    },
     /// The question whether a start would be sent now.
     Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
 }
@@ -178,9 +185,9 @@ impl Desk {
     fn handle_message(&mut self, message: Message) -> bool {
         let now = Instant::now();
         match message {
-            Message::Order { order, leave, name, reply } => {
+            Message::Order { order, leave, expires, name, reply } => {
                 let asker = self.caller(name, reply);
-                self.supervisor.handle_order(now, asker, order, leave)
+                self.supervisor.handle_order(now, asker, order, leave, expires)
             }
             Message::Ask { name, setpoint, reply } => {
                 let _ = reply.send(self.supervisor.leave(now, &name, setpoint));

@@ -3,7 +3,7 @@
 use drive_core::{Error, Result, StopMode, Watchdog};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor, orders::Queued};
+use super::{Asker, Job, Supervisor};
 use crate::{
     event::{EventKind, ExitAction},
     outcome::{Order, Outcome},
@@ -104,7 +104,7 @@ impl Supervisor {
     pub(super) fn advance_exit(&mut self, now: Instant) {
         if self.exit == Exit::Release {
             self.exit = Exit::Releasing;
-            self.enqueue(Queued { asker: Asker::Exit, order: Order::Release, issued: now });
+            self.enqueue(now, Asker::Exit, Order::Release, None);
         }
     }
 

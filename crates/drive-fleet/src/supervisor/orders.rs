@@ -13,7 +13,8 @@ use crate::outcome::{Order, Outcome, Refused, Unconfirmed};
 pub(super) struct Queued {
     pub(super) asker: Asker,
     pub(super) order: Order,
-    pub(super) issued: Instant,
+    /// When it may not be sent any more.
+    pub(super) expires: Instant,
 }
 
 /// The order that is being carried out.
@@ -64,14 +65,15 @@ impl Active {
 }
 
 impl Supervisor {
-    /// Somebody commands the drive, on a leave that was given before or on none. Gives whether the job in flight has to
-    /// be dropped for it.
+    /// Somebody commands the drive, on a leave that was given before or on none, until it expires or for the lifetime of
+    /// the settings. Gives whether the job in flight has to be dropped for it.
     pub(crate) fn handle_order(
         &mut self,
         now: Instant,
         asker: Asker,
         order: Order,
         leave: Option<Leave>,
+        expires: Option<Instant>,
     ) -> bool {
         self.changed = true;
         if let Some(refused) = self.refuse_at_once(&asker, &order, leave) {
@@ -81,7 +83,7 @@ impl Supervisor {
         if matches!(order, Order::Setpoint { .. }) {
             self.supersede_setpoints();
         }
-        self.enqueue(Queued { asker, order, issued: now });
+        self.enqueue(now, asker, order, expires);
         // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
@@ -106,12 +108,13 @@ impl Supervisor {
         }
     }
 
-    pub(super) fn enqueue(&mut self, queued: Queued) {
-        self.queue.push_back(queued);
+    pub(super) fn enqueue(&mut self, now: Instant, asker: Asker, order: Order, expires: Option<Instant>) {
+        let expires = expires.unwrap_or(now + self.settings.times.lifetime);
+        self.queue.push_back(Queued { asker, order, expires });
     }
 
     pub(super) fn enqueue_reset(&mut self, now: Instant) {
-        self.enqueue(Queued { asker: Asker::Policy("on fault"), order: Order::ResetFaults, issued: now });
+        self.enqueue(now, Asker::Policy("on fault"), Order::ResetFaults, None);
     }
 
     /// Whether a start is being carried out.
@@ -138,11 +141,11 @@ impl Supervisor {
                 self.conclude(active.asker, active.order.command(), outcome);
             }
             if self.active.is_none() {
-                let Queued { asker, order, issued } = self.queue.pop_front()?;
+                let Queued { asker, order, expires } = self.queue.pop_front()?;
                 self.active = Some(Active {
                     asker,
                     order,
-                    expires: issued + self.settings.times.lifetime,
+                    expires,
                     setpoint_given: false,
                     armed: false,
                     blocked: None,

@@ -1,38 +1,42 @@
-//! The HTTP API v1 over the plant.
+//! The HTTP API v1 over the plant: a table of routes, from which both the router and its description are made.
 
-use axum::{
-    Extension, Json, Router,
-    extract::{Path, State},
-    http::StatusCode,
-    response::{IntoResponse, Response},
-    routing::get,
-};
-
-use crate::{doors::Caller, plant::Plant};
-
-/// Everything under `/api/v1`.
-pub(crate) fn router(plant: Plant) -> Router {
-    Router::new()
-        .route("/api/v1/state", get(state))
-        .route("/api/v1/drives", get(drives))
-        .route("/api/v1/drives/{name}", get(drive))
-        .with_state(plant)
-}
-
-async fn state(State(plant): State<Plant>, Extension(caller): Extension<Caller>) -> Response {
-    Json(plant.state(&caller)).into_response()
-}
-
-async fn drives(State(plant): State<Plant>) -> Response {
-    Json(plant.drives()).into_response()
-}
-
-async fn drive(State(plant): State<Plant>, Path(name): Path<String>) -> Response {
-    match plant.drive(&name) {
-        Some(drive) => Json(drive).into_response(),
-        None => StatusCode::NOT_FOUND.into_response(),
-    }
-}
-
+mod ask;
+mod command;
+mod document;
+mod health;
+mod problem;
+mod read;
+mod routes;
+mod stream;
 #[cfg(test)]
 mod tests;
+
+use axum::{
+    Router,
+    body::Bytes,
+    extract::DefaultBodyLimit,
+    http::header::{CACHE_CONTROL, CONTENT_TYPE},
+    routing::{any, get},
+};
+
+use self::{problem::Problem, routes::routes};
+use crate::plant::Plant;
+
+/// The largest body that is read.
+const LARGEST_BODY: usize = 64 << 10;
+
+/// Everything under `/api/v1`, `/healthz` and `/readyz`. Who asks is a [`Caller`](crate::doors::Caller) in the extensions
+/// of each request.
+pub(crate) fn router(plant: Plant) -> Router {
+    let routes = routes();
+    let document = Bytes::from(document::of(&routes).to_string());
+    let headers = [(CONTENT_TYPE, "application/json"), (CACHE_CONTROL, "no-store")];
+    let router = Router::new().route(document::PATH, get(move || async move { (headers, document) }));
+    routes
+        .into_iter()
+        .fold(router, |router, route| router.route(route.path, route.handler))
+        .route("/api/{*rest}", any(|| async { Problem::not_found("there is nothing at this address") }))
+        .method_not_allowed_fallback(async || Problem::method_not_allowed())
+        .layer(DefaultBodyLimit::max(LARGEST_BODY))
+        .with_state(plant)
+}

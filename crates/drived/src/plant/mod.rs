@@ -1,15 +1,26 @@
 //! What every face shares: the fleet, the groups, and what is told of them. No HTTP is in it.
 
+pub(crate) mod commands;
+pub(crate) mod history;
+mod progress;
+pub(crate) mod revisions;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod views;
+mod watching;
 
 use std::sync::Arc;
 
 use drive_fleet::{DriveHandle, Fleet};
-use tokio::time::Instant;
+use tokio::{sync::Mutex, time::Instant};
 
 use self::views::{DaemonView, DriveView, LineView, StateView};
+use self::{
+    commands::Log,
+    history::{History, HistoryView},
+    progress::Progress,
+    revisions::Revisions,
+};
 use crate::{config::Group, doors::Caller, json::unix};
 
 /// The plant as its faces see it. Cheap to clone.
@@ -21,11 +32,30 @@ struct Inner {
     groups: Vec<Group>,
     started_unix_ms: u64,
     demo: bool,
+    commands: Log,
+    /// One group starts at a time.
+    group_starts: Mutex<()>,
+    revisions: Revisions,
+    history: History,
+    progress: Progress,
 }
 
 impl Plant {
     pub(crate) fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
-        Self(Arc::new(Inner { fleet, groups, started_unix_ms: unix(Instant::now()), demo }))
+        let inner = Arc::new(Inner {
+            fleet,
+            groups,
+            started_unix_ms: unix(Instant::now()),
+            demo,
+            commands: Log::default(),
+            group_starts: Mutex::default(),
+            revisions: Revisions::new(),
+            history: History::default(),
+            progress: Progress::default(),
+        });
+        watching::start(&inner);
+        history::start(&inner);
+        Self(inner)
     }
 
     pub(crate) fn fleet(&self) -> Fleet {
@@ -35,7 +65,7 @@ impl Plant {
     pub(crate) fn state(&self, caller: &Caller) -> StateView {
         let now = Instant::now();
         StateView {
-            revision: 0,
+            revision: self.0.revisions.last(),
             time_unix_ms: unix(now),
             daemon: DaemonView {
                 version: env!("CARGO_PKG_VERSION"),
@@ -50,23 +80,33 @@ impl Plant {
         }
     }
 
+    /// The stream of what happens.
+    pub(crate) fn revisions(&self) -> &Revisions {
+        &self.0.revisions
+    }
+
     pub(crate) fn lines(&self) -> Vec<LineView> {
-        let view = |name: &Arc<str>, line| {
-            let plan = self.0.fleet.plan(name)?;
-            Some(LineView::of(name, line, plan, &self.0.fleet.drives_on(name)))
-        };
-        self.0.fleet.lines().iter().filter_map(|(name, line)| view(name, line)).collect()
+        self.0.lines()
+    }
+
+    /// The lines on which no drive has been asked for longer than its periods allow.
+    pub(crate) fn standing_lines(&self) -> Vec<String> {
+        self.0.progress.standing(&self.0.fleet)
     }
 
     /// The drives, line by line.
     pub(crate) fn drives(&self) -> Vec<DriveView> {
-        let now = Instant::now();
-        self.members().map(|(line, drive)| DriveView::of(&line, &drive, now)).collect()
+        self.members().map(|(line, drive)| DriveView::of(&line, &drive)).collect()
     }
 
     pub(crate) fn drive(&self, name: &str) -> Option<DriveView> {
         let (line, drive) = self.members().find(|(_, drive)| **drive.name() == *name)?;
-        Some(DriveView::of(&line, &drive, Instant::now()))
+        Some(DriveView::of(&line, &drive))
+    }
+
+    /// The last ten minutes of a drive.
+    pub(crate) fn history(&self, name: &str) -> Option<HistoryView> {
+        self.0.fleet.drive(name).map(|_| self.0.history.of(name))
     }
 
     fn members(&self) -> impl Iterator<Item = (Arc<str>, DriveHandle)> {
@@ -74,5 +114,15 @@ impl Plant {
         fleet.lines().into_iter().flat_map(move |(name, _)| {
             fleet.drives_on(&name).into_iter().map(move |drive| (Arc::clone(&name), drive))
         })
+    }
+}
+
+impl Inner {
+    fn lines(&self) -> Vec<LineView> {
+        let view = |name: &Arc<str>, line| {
+            let plan = self.fleet.plan(name)?;
+            Some(LineView::of(name, line, plan, &self.fleet.drives_on(name)))
+        };
+        self.fleet.lines().iter().filter_map(|(name, line)| view(name, line)).collect()
     }
 }

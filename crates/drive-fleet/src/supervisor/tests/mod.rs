@@ -272,7 +272,7 @@ impl Rig {
 
     fn order(&mut self, order: Order) -> CallId {
         let asker = self.asker();
-        self.machine.handle_order(self.now, asker, order, None);
+        self.machine.handle_order(self.now, asker, order, None, None);
         CallId(self.next_call)
     }
 

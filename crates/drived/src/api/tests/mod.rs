@@ -1,6 +1,9 @@
 //! The API over a simulated plant in virtual time, asked as a client asks it.
 
+mod commanding;
+mod described;
 mod reading;
+mod streaming;
 
 use axum::{
     Extension, Router,
@@ -31,6 +34,16 @@ async fn send(router: Router, request: Request<Body>) -> (StatusCode, Value) {
     let status = response.status();
     let body = response.into_body().collect().await.unwrap().to_bytes();
     (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
+}
+
+/// A request with a body, as JSON.
+fn post(path: &str, body: &Value) -> Request<Body> {
+    let request = Request::post(path).header("content-type", "application/json");
+    request.body(Body::from(body.to_string())).unwrap()
+}
+
+async fn command(plant: &Plant, path: &str, body: &Value) -> (StatusCode, Value) {
+    send(api(plant, "operator", ALL), post(path, body)).await
 }
 
 async fn get(plant: &Plant, path: &str) -> (StatusCode, Value) {

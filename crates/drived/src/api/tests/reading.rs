@@ -50,5 +50,5 @@ async fn a_tripped_drive_says_what_the_fault_means_and_what_to_do() {
     // BBV51701, fault codes of LFT: 9 = overcurrent OCF.
     assert_eq!((&drive["fault"]["code"], &drive["fault"]["mnemonic"]), (&9.into(), &"OCF".into()), "{drive}");
     assert!(drive["fault"]["remedy"].is_string() && drive["start_refused"].is_string(), "{drive}");
-    assert_eq!(drive["fault"]["at_trip"]["quality"], "stale", "the freeze-frame is no live value");
+    assert!(drive["fault"]["at_trip"]["age_ms"].is_u64(), "the freeze-frame says how old it is: {drive}");
 }

@@ -2,22 +2,22 @@
 //!
 //! A key whose value is not known, or that a family does not have, is left out: nothing is 0 because it is missing.
 
+mod command;
 mod drive;
 mod line;
-mod status;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 pub(crate) use self::{
-    drive::DriveView,
+    command::{CommandView, SeveralView},
+    drive::{DriveView, Gist, Shown},
     line::LineView,
-    status::{MeasurementsView, Quality, StatusView},
 };
 use crate::{config::Group, doors::Rights};
 
 /// Everything at one moment.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub(crate) struct StateView {
     /// The last revision that is in it: events after this one complete it.
     pub(crate) revision: u64,
@@ -40,9 +40,4 @@ pub(crate) struct DaemonView {
     pub(crate) rights: Rights,
     /// Who the asker is: the name of his token, `local` on the socket, or `anonymous`.
     pub(crate) caller: String,
-}
-
-/// A word of the library as the API writes it: `not ready` is `not_ready`.
-fn word(word: impl std::fmt::Display) -> String {
-    word.to_string().to_lowercase().replace(' ', "_")
 }

@@ -1,0 +1,215 @@
+//! The table of routes: what the router serves and what the document describes, in one place, so that they are the same.
+
+use axum::{
+    handler::Handler,
+    http::Method,
+    routing::{MethodFilter, MethodRouter, on},
+};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+
+use super::{
+    command::{self, NewSetpoint, Plain, Release, Reset, Start, Stop},
+    health, read, stream,
+};
+use crate::plant::{
+    Plant,
+    history::HistoryView,
+    views::{CommandView, DriveView, LineView, StateView},
+};
+
+/// How the schema of a type is made.
+pub(super) type Describe = fn(&mut SchemaGenerator) -> Schema;
+
+/// One method at one address.
+pub(super) struct Route {
+    pub(super) path: &'static str,
+    pub(super) method: Method,
+    pub(super) handler: MethodRouter<Plant>,
+    /// What it is for.
+    pub(super) about: &'static str,
+    /// What may stand behind a question mark.
+    pub(super) query: Vec<Parameter>,
+    pub(super) body: Option<Describe>,
+    pub(super) answers: Vec<Answer>,
+    /// The statuses of its problem documents.
+    pub(super) problems: Vec<u16>,
+}
+
+/// What may be said in the address.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parameter {
+    pub(super) name: &'static str,
+    pub(super) about: &'static str,
+    pub(super) kind: &'static str,
+}
+
+/// What is answered when nothing is wrong.
+pub(super) struct Answer {
+    pub(super) status: u16,
+    pub(super) about: &'static str,
+    pub(super) content: &'static str,
+    pub(super) describe: Option<Describe>,
+}
+
+const JSON: &str = "application/json";
+const WAIT: Parameter = Parameter {
+    name: "wait",
+    about: "how long the outcome is waited for: 0 to 30s, 2s unless it is said",
+    kind: "string",
+};
+const SINCE: Parameter =
+    Parameter { name: "since", about: "the revision that the reader has", kind: "integer" };
+
+impl Route {
+    fn new<H, T>(method: Method, path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let filter = MethodFilter::try_from(method.clone()).unwrap_or(MethodFilter::GET);
+        let handler = on(filter, handler);
+        let (query, answers) = (Vec::new(), Vec::new());
+        Self { path, method, handler, about, query, body: None, answers, problems: vec![400, 401, 403] }
+    }
+
+    fn get<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let route = Self::new(Method::GET, path, handler, about);
+        if path.contains('{') { route.or_problem(404) } else { route }
+    }
+
+    /// A command: its body in JSON, and an answer for each outcome.
+    fn command<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let mut route = Self::new(Method::POST, path, handler, about)
+            .answers::<CommandView>(200, "it is confirmed")
+            .answers::<CommandView>(202, "it is not settled yet; Location says where it will be told");
+        route.query.push(WAIT);
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([404, 409, 410, 413, 415, 422, 504]);
+        route
+    }
+
+    fn answers<A: JsonSchema>(self, status: u16, about: &'static str) -> Self {
+        self.answer(Answer {
+            status,
+            about,
+            content: JSON,
+            describe: Some(SchemaGenerator::subschema_for::<A>),
+        })
+    }
+
+    fn answer(mut self, answer: Answer) -> Self {
+        self.answers.push(answer);
+        self
+    }
+
+    fn or_problem(mut self, status: u16) -> Self {
+        self.problems.push(status);
+        self
+    }
+
+    fn with_query(mut self, parameter: Parameter) -> Self {
+        self.query.push(parameter);
+        self
+    }
+}
+
+/// All of them.
+pub(super) fn routes() -> Vec<Route> {
+    let mut routes = reads();
+    routes.extend(commands());
+    routes
+}
+
+fn reads() -> Vec<Route> {
+    let events = Answer {
+        status: 200,
+        about: "server-sent events: `drive`, `line`, `command`, `event`, `tick`, and `reset` when the state must be read anew",
+        content: "text/event-stream",
+        describe: None,
+    };
+    vec![
+        Route::get("/api/v1/state", read::state, "Everything at one moment")
+            .answers::<StateView>(200, "the state"),
+        Route::get("/api/v1/drives", read::drives, "All drives").answers::<Vec<DriveView>>(200, "the drives"),
+        Route::get("/api/v1/drives/{name}", read::drive, "One drive").answers::<DriveView>(200, "the drive"),
+        Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
+            .answers::<HistoryView>(200, "the history"),
+        Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
+        Route::get("/api/v1/lines/{name}", read::line, "One line").answers::<LineView>(200, "the line"),
+        Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
+            .with_query(WAIT)
+            .answers::<CommandView>(200, "the command, whatever its outcome"),
+        Route::get("/api/v1/events", stream::events, "What happens, as it happens")
+            .with_query(SINCE)
+            .answer(events),
+        Route::get("/healthz", health::lives, "Whether the program lives")
+            .answers::<health::Health>(200, "it does"),
+        Route::get("/readyz", health::ready, "Whether every line makes progress")
+            .answers::<health::Health>(200, "they do")
+            .or_problem(503),
+    ]
+}
+
+fn commands() -> Vec<Route> {
+    vec![
+        Route::command::<_, _, Start>(
+            "/api/v1/drives/{name}/start",
+            command::to_drive::<Start>,
+            "Starts a motor",
+        ),
+        Route::command::<_, _, Stop>(
+            "/api/v1/drives/{name}/stop",
+            command::to_drive::<Stop>,
+            "Stops a motor",
+        ),
+        Route::command::<_, _, NewSetpoint>(
+            "/api/v1/drives/{name}/setpoint",
+            command::to_drive::<NewSetpoint>,
+            "Changes the setpoint of a drive",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/reset",
+            command::to_drive::<Reset>,
+            "Resets the present fault of a drive",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/release",
+            command::to_drive::<Release>,
+            "Gives control of a drive back to its panel or terminals",
+        ),
+        Route::command::<_, _, Start>(
+            "/api/v1/groups/{name}/start",
+            command::to_group::<Start>,
+            "Starts every drive of a group, or none",
+        ),
+        Route::command::<_, _, Stop>(
+            "/api/v1/groups/{name}/stop",
+            command::to_group::<Stop>,
+            "Stops every drive of a group",
+        ),
+        Route::command::<_, _, NewSetpoint>(
+            "/api/v1/groups/{name}/setpoint",
+            command::to_group::<NewSetpoint>,
+            "Changes the setpoint of every drive of a group",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/groups/{name}/reset",
+            command::to_group::<Reset>,
+            "Resets the present faults of a group",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/groups/{name}/release",
+            command::to_group::<Release>,
+            "Gives control of a group back to panels or terminals",
+        ),
+        Route::command::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
+    ]
+}

@@ -1,0 +1,121 @@
+//! The description of the API, held against the answers.
+
+use axum::http::Method;
+use serde_json::json;
+
+use super::*;
+
+/// Validates against a schema of the document.
+fn validate(document: &Value, schema: &Value, answer: &Value, what: &str) {
+    let mut schema = schema.clone();
+    schema["components"] = document["components"].clone();
+    let validator = jsonschema::draft202012::options().build(&schema).unwrap();
+    let errors: Vec<String> = validator
+        .iter_errors(answer)
+        .map(|error| format!("{} at {}", error, error.instance_path()))
+        .collect();
+    assert!(errors.is_empty(), "{what}: {errors:?} in {answer}");
+}
+
+/// Sends a request and holds the answer against what the document says of its status.
+async fn held(plant: &Plant, document: &Value, path: &str, request: Request<Body>) -> u16 {
+    let method = request.method().as_str().to_lowercase();
+    let what = format!("{method} {}", request.uri());
+    let response = api(plant, "operator", ALL).oneshot(request).await.unwrap();
+    let status = response.status().as_u16();
+    let kind = response.headers()["content-type"].to_str().unwrap().to_owned();
+    let described = &document["paths"][path][&method]["responses"][status.to_string()]["content"][&kind];
+    assert!(described.is_object(), "{what}: {status} {kind} is not described");
+    if kind != "text/event-stream" {
+        let body = response.into_body().collect().await.unwrap().to_bytes();
+        let answer: Value = serde_json::from_slice(&body).unwrap();
+        validate(document, &described["schema"], &answer, &what);
+    }
+    status
+}
+
+#[tokio::test(start_paused = true)]
+async fn every_answer_and_every_refusal_is_as_the_document_says() {
+    let test = TestPlant::of(2).await;
+    let plant = &test.plant;
+    let (status, document) = get(plant, "/api/v1/openapi.json").await;
+    assert_eq!((status, &document["openapi"]), (StatusCode::OK, &"3.1.0".into()));
+    assert!(document["paths"].as_object().unwrap().len() >= 20);
+    let known = json!({"id": "known", "setpoint": {"frequency_hz": 30.0}});
+    let _ = command(plant, "/api/v1/drives/pump%201/start", &known).await;
+    tokio::time::sleep(std::time::Duration::from_secs(12)).await;
+    for round in 0..3 {
+        for (path, methods) in document["paths"].as_object().unwrap() {
+            for method in methods.as_object().unwrap().keys() {
+                let name = if path.contains("/drives/") {
+                    "pump%201"
+                } else if path.contains("/lines/") {
+                    "north"
+                } else {
+                    "pumps"
+                };
+                let asked = path.replace("{name}", name).replace("{id}", "known");
+                let method = Method::from_bytes(method.to_uppercase().as_bytes()).unwrap();
+                let is_read = method == Method::GET;
+                let request = |path: &str, kind: &str, body: Value| {
+                    let body = if is_read { Body::empty() } else { Body::from(body.to_string()) };
+                    let request = Request::builder().method(method.clone()).uri(path);
+                    request.header("content-type", kind).body(body).unwrap()
+                };
+                let (json, body) = ("application/json", json!({"setpoint": {"frequency_hz": 20.0}}));
+                let body =
+                    if path.ends_with("start") || path.ends_with("setpoint") { body } else { json!({}) };
+                let good = held(plant, &document, path, request(&asked, json, body.clone())).await;
+                assert!(round > 0 || !is_read || good == 200, "{asked}: {good}");
+                let nowhere = path.replace("{name}", "nobody").replace("{id}", "none");
+                if nowhere != *path {
+                    let missing = held(plant, &document, path, request(&nowhere, json, body.clone())).await;
+                    assert_eq!(missing, 404, "{nowhere}");
+                }
+                if !is_read {
+                    assert_eq!(held(plant, &document, path, request(&asked, "text/plain", body)).await, 415);
+                    let odd = request(&asked, json, json!({"id": 7}));
+                    assert_eq!(held(plant, &document, path, odd).await, 422, "{asked}");
+                    let waits = request(&format!("{asked}?wait=1h"), json, json!({}));
+                    assert_eq!(held(plant, &document, path, waits).await, 400, "{asked}");
+                }
+            }
+        }
+        // Then with a drive that has tripped, then with a cut cable: what is stale or refused has its shape, too.
+        match round {
+            0 => test.machines[0].trip(9),
+            _ => test.line.cut(),
+        }
+        tokio::time::sleep(std::time::Duration::from_secs(12)).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_the_document_says_of_a_body_is_what_is_taken() {
+    let test = TestPlant::of(1).await;
+    let (_, document) = get(&test.plant, "/api/v1/openapi.json").await;
+    let body = &document["paths"]["/api/v1/drives/{name}/start"]["post"]["requestBody"];
+    let schema = &body["content"]["application/json"]["schema"];
+    for taken in [
+        json!({}),
+        json!({"id": "a", "expires_in_ms": 500, "direction": "reverse", "until": "at_reference"}),
+        json!({"setpoint": {"frequency_hz": 30.05}}),
+        json!({"setpoint": {"speed_rpm": 900}}),
+    ] {
+        validate(&document, schema, &taken, "a body that is taken");
+    }
+    let mut schema = schema.clone();
+    schema["components"] = document["components"].clone();
+    let validator = jsonschema::draft202012::options().build(&schema).unwrap();
+    for refused in [
+        json!({"direction": "up"}),
+        json!({"setpoint": {"frequency_hz": "30"}}),
+        json!({"setpoint": 30}),
+        json!({"expires_in_ms": 20_000}),
+        json!({"speed": 1}),
+    ] {
+        assert!(!validator.is_valid(&refused), "{refused}");
+        let (status, _) = command(&test.plant, "/api/v1/drives/pump%201/start", &refused).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{refused}");
+    }
+}

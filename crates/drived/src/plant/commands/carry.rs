@@ -1,0 +1,325 @@
+//! Carrying out: what is asked of the fleet, and how the answer is told.
+
+use std::{
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError},
+    task::{Context, Waker},
+    time::Duration,
+};
+
+use drive_core::StopMode;
+use drive_fleet::{DriveHandle, Group, GroupFailure, GroupStart, Link, Order, Outcome};
+use futures_util::future::join_all;
+use tokio::{
+    sync::Notify,
+    time::{Instant, sleep, timeout_at},
+};
+
+use super::{
+    Action, OutcomeWord, Request, Target,
+    log::Command,
+    outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, told},
+    settle::settled,
+};
+use crate::{
+    doors::Caller,
+    json::{milliseconds, unix},
+    plant::{
+        Plant,
+        revisions::Subject,
+        views::{CommandView, SeveralView, Shown},
+    },
+};
+
+/// Outcomes of several drives that come within this time are told together.
+const TOGETHER: Duration = Duration::from_millis(50);
+/// For how long an outcome that is not known may still be settled: as long as the command is remembered.
+const SETTLES_FOR: Duration = Duration::from_secs(600);
+
+/// A command and the drives that are meant.
+#[derive(Clone)]
+pub(super) struct Work(Arc<Inner>);
+
+struct Inner {
+    plant: Plant,
+    request: Request,
+    members: Vec<DriveHandle>,
+    /// What is told of each member, in their order.
+    parts: Mutex<Vec<CommandView>>,
+    /// One of them has changed.
+    changed: Notify,
+    /// What holds for all of them.
+    head: CommandView,
+}
+
+impl Work {
+    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, drives: Vec<String>) -> Self {
+        let fleet = plant.fleet();
+        let commanded = |name: &String| Some(fleet.drive(name)?.commanded_by(&caller.name));
+        let members: Vec<DriveHandle> = drives.iter().filter_map(commanded).collect();
+        let head = CommandView {
+            id: request.id.clone().unwrap_or_else(new_id),
+            drive: None,
+            group: None,
+            action: request.action.name(),
+            command: request.action.text(),
+            caller: caller.name.clone(),
+            origin: caller.origin.clone(),
+            outcome: OutcomeWord::Pending,
+            reason: None,
+            text: None,
+            time_unix_ms: unix(request.arrived),
+            took_ms: None,
+            status: None,
+            several: None,
+        };
+        let part = |member: &DriveHandle| {
+            let part = CommandView { drive: Some(member.name().to_string()), ..head.clone() };
+            match (request.action, member.settings().control) {
+                // A stop of several goes to those that may be commanded, and the others are accounted for at once.
+                (Action::Stop(_), false) if request.target != Target::Drive(member.name().to_string()) => {
+                    part.ended(&Outcome::Refused(drive_fleet::Refused::ReadOnly), member, request.arrived)
+                }
+                _ => part,
+            }
+        };
+        let parts = Mutex::new(members.iter().map(part).collect());
+        let head = match &request.target {
+            Target::Group(name) => CommandView { group: Some(name.clone()), ..head },
+            Target::Drive(_) | Target::All => head,
+        };
+        let request = request.clone();
+        Self(Arc::new(Inner { plant, request, members, parts, changed: Notify::new(), head }))
+    }
+
+    /// The command as it is to be told now.
+    pub(super) fn view(&self) -> CommandView {
+        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let (Target::Drive(_), Some(part)) = (&self.0.request.target, parts.first()) {
+            return part.clone();
+        }
+        let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason)));
+        let silent = |part: &CommandView| {
+            let member = self.0.members.iter().find(|member| part.drive.as_deref() == Some(member.name()));
+            member.is_some_and(|member| member.snapshot().link != Link::Connected)
+        };
+        CommandView {
+            outcome,
+            took_ms: parts.iter().filter_map(|part| part.took_ms).max(),
+            several: Some(SeveralView::of(parts, silent)),
+            ..self.0.head.clone()
+        }
+    }
+
+    /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
+    /// returns.
+    pub(super) fn begin(self, command: Command) {
+        let mut carried: Pin<Box<dyn Future<Output = ()> + Send>> =
+            Box::pin(self.clone().carried(Arc::clone(&command)));
+        // Whoever is woken polls it again, so that nothing is lost by a waker that wakes nobody.
+        let mut context = Context::from_waker(Waker::noop());
+        if carried.as_mut().poll(&mut context).is_pending() {
+            self.tell(&command);
+            tokio::spawn(carried);
+        }
+    }
+
+    async fn carried(self, command: Command) {
+        tokio::select! {
+            () = self.work() => {}
+            () = self.tell_changes(&command) => {}
+        }
+        self.tell(&command);
+        if self.is_open() {
+            tokio::select! {
+                () = self.settle() => {}
+                () = self.tell_changes(&command) => {}
+                () = sleep(SETTLES_FOR) => {}
+            }
+            self.tell(&command);
+        }
+    }
+
+    fn tell(&self, command: &Command) {
+        let view = Arc::new(self.view());
+        self.0.plant.0.revisions.push(Subject::Command, &*view);
+        command.send_replace(view);
+    }
+
+    /// Tells what has changed, for as long as it is polled.
+    async fn tell_changes(&self, command: &Command) {
+        loop {
+            self.0.changed.notified().await;
+            sleep(TOGETHER).await;
+            self.tell(command);
+        }
+    }
+
+    async fn work(&self) {
+        let Inner { plant, request, members, .. } = &*self.0;
+        let expires = request.arrived + request.lifetime;
+        match (request.action, &request.target, &**members) {
+            (Action::Stop(mode), Target::Drive(_), [member]) => self.end(0, &member.stop(mode).await),
+            (Action::Stop(mode), ..) => {
+                let told = |name: &str, outcome: &Outcome| self.end_of(name, outcome);
+                let _ = self.group().stop_telling(mode, told).await;
+            }
+            (Action::Start { .. }, Target::Group(_) | Target::All, _) => {
+                let Ok(_turn) = timeout_at(expires, plant.0.group_starts.lock()).await else {
+                    let text = "another start of a group was under way";
+                    return self.end_all(OutcomeWord::Expired, GROUP_BUSY, text);
+                };
+                self.start_group().await;
+            }
+            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
+                for (name, outcome) in self.group().set_setpoint(setpoint).await {
+                    self.end_of(&name, &outcome);
+                }
+            }
+            (action, ..) => {
+                let Some(order) = order(action) else { return };
+                let orders = members.iter().enumerate().map(|(number, member)| async move {
+                    self.end(number, &member.order_until(order, expires).await);
+                });
+                join_all(orders).await;
+            }
+        }
+    }
+
+    async fn start_group(&self) {
+        let Action::Start { direction, setpoint, until } = self.0.request.action else { return };
+        let start = GroupStart { direction, setpoint, spacing: Duration::ZERO, until };
+        match self.group().start(start).await {
+            Ok(()) => {
+                for number in 0..self.0.members.len() {
+                    self.end(number, &Outcome::Confirmed);
+                }
+            }
+            Err(GroupFailure::NotReady(reasons)) => {
+                for (name, refused) in reasons {
+                    self.end_of(&name, &Outcome::Refused(refused));
+                }
+                let text = "nobody of the group was started: another of its drives was not ready";
+                self.end_all(OutcomeWord::Refused, GROUP_NOT_READY, text);
+            }
+            Err(GroupFailure::Failed { outcomes, .. }) => {
+                for (name, outcome) in outcomes {
+                    self.end_of(&name, &outcome);
+                }
+                let text = "the group was stopped again, because not all of its drives started";
+                self.end_all(OutcomeWord::Superseded, GROUP_FAILED, text);
+            }
+        }
+    }
+
+    fn group(&self) -> Group {
+        let names = self.0.members.iter().map(|member| &**member.name());
+        let fleet = self.0.plant.fleet();
+        // The names are those of members, so that the group has them all.
+        let group = fleet.group(names).unwrap_or_else(|_| fleet.all());
+        group.commanded_by(&self.0.head.caller)
+    }
+
+    /// Waits until what is not known is.
+    async fn settle(&self) {
+        let open = self.0.members.iter().enumerate().filter(|(number, _)| self.is_open_at(*number));
+        let each = open.map(|(number, member)| async move {
+            let ended = Instant::now();
+            if let Some(outcome) = settled(self.0.request.action, member, ended).await {
+                self.end_as(number, outcome, None, None);
+            }
+        });
+        join_all(each).await;
+    }
+
+    fn is_open(&self) -> bool {
+        (0..self.0.members.len()).any(|number| self.is_open_at(number))
+    }
+
+    /// Whether it may still turn out what became of a part.
+    fn is_open_at(&self, number: usize) -> bool {
+        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        let outcome = parts.get(number).map(|part| part.outcome);
+        let is_stop = matches!(self.0.request.action, Action::Stop(_));
+        outcome == Some(OutcomeWord::Unknown) || is_stop && outcome == Some(OutcomeWord::NotConfirmed)
+    }
+
+    fn end_of(&self, name: &str, outcome: &Outcome) {
+        if let Some(number) = self.0.members.iter().position(|member| **member.name() == *name) {
+            self.end(number, outcome);
+        }
+    }
+
+    fn end(&self, number: usize, outcome: &Outcome) {
+        let (word, reason, text) = told(outcome);
+        self.end_as(number, word, reason, text);
+    }
+
+    /// Ends what has no outcome of its own.
+    fn end_all(&self, word: OutcomeWord, reason: &'static str, text: &str) {
+        for number in 0..self.0.members.len() {
+            let outcome = {
+                let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+                parts.get(number).map(|part| part.outcome)
+            };
+            if outcome == Some(OutcomeWord::Pending) {
+                self.end_as(number, word, Some(reason), Some(text.to_owned()));
+            }
+        }
+    }
+
+    fn end_as(&self, number: usize, word: OutcomeWord, reason: Option<&'static str>, text: Option<String>) {
+        let Some(member) = self.0.members.get(number) else { return };
+        let mut parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(part) = parts.get_mut(number) {
+            *part = part.clone().ended_as(word, reason, text, member, self.0.request.arrived);
+        }
+        drop(parts);
+        self.0.changed.notify_one();
+    }
+}
+
+impl CommandView {
+    fn ended(self, outcome: &Outcome, member: &DriveHandle, arrived: Instant) -> Self {
+        let (word, reason, text) = told(outcome);
+        self.ended_as(word, reason, text, member, arrived)
+    }
+
+    /// The same, ended, with what the drive shows now.
+    fn ended_as(
+        self,
+        outcome: OutcomeWord,
+        reason: Option<&'static str>,
+        text: Option<String>,
+        member: &DriveHandle,
+        arrived: Instant,
+    ) -> Self {
+        let now = Instant::now();
+        let status = Some(Shown(member.snapshot()));
+        let took_ms = Some(milliseconds(now.saturating_duration_since(arrived)));
+        Self { outcome, reason, text, status, took_ms, ..self }
+    }
+}
+
+/// What a drive is asked for an action; `None` for a stop, which is no order.
+fn order(action: Action) -> Option<Order> {
+    Some(match action {
+        Action::Start { direction, setpoint, until } => Order::Start { direction, setpoint, until },
+        Action::Setpoint { setpoint, until } => Order::Setpoint { setpoint, until },
+        Action::Reset => Order::ResetFaults,
+        Action::Release => Order::Release,
+        Action::Stop(StopMode::Ramp | StopMode::Fast | StopMode::Freewheel | StopMode::DcInjection) => {
+            return None;
+        }
+    })
+}
+
+/// An id that nobody guesses.
+fn new_id() -> String {
+    let mut bytes = [0; 8];
+    // Without randomness the time must do; an id is no secret.
+    if getrandom::fill(&mut bytes).is_err() {
+        bytes = unix(Instant::now()).to_be_bytes();
+    }
+    format!("c-{:016x}", u64::from_be_bytes(bytes))
+}

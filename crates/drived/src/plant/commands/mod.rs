@@ -1,0 +1,156 @@
+//! Commands: each has an id, an expiry that counts from its arrival, and an outcome that is told under its id.
+//!
+//! A command goes on when whoever asked for it has gone. A stop never expires, and is carried out each time it arrives.
+
+mod carry;
+mod log;
+mod outcome;
+mod settle;
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::{Direction, Setpoint, StopMode};
+use drive_fleet::Until;
+use tokio::time::{Instant, timeout};
+
+pub(super) use self::log::Log;
+pub(crate) use self::outcome::OutcomeWord;
+use self::{carry::Work, log::Found};
+use super::{Plant, views::CommandView};
+use crate::doors::Caller;
+
+/// How long a command may wait until it is sent, unless it says so itself, and at the longest.
+pub(crate) const LIFETIME: Duration = Duration::from_secs(1);
+pub(crate) const LONGEST_LIFETIME: Duration = Duration::from_secs(10);
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Request {
+    /// The caller's name of it; `None`: it gets one of ours.
+    pub(crate) id: Option<String>,
+    pub(crate) target: Target,
+    pub(crate) action: Action,
+    pub(crate) lifetime: Duration,
+    /// When it arrived.
+    pub(crate) arrived: Instant,
+}
+
+/// Who is meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Target {
+    Drive(String),
+    Group(String),
+    All,
+}
+
+/// What is to be done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Action {
+    Start { direction: Direction, setpoint: Option<Setpoint>, until: Until },
+    Stop(StopMode),
+    Setpoint { setpoint: Setpoint, until: Until },
+    Reset,
+    Release,
+}
+
+/// Why a command is not taken at all.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Rejected {
+    #[error("{caller} has no right to {right}")]
+    NoRight { caller: String, right: &'static str },
+    #[error("there is no drive {0:?}")]
+    NoDrive(String),
+    #[error("there is no group {0:?}")]
+    NoGroup(String),
+    #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
+    IdReused(String),
+}
+
+impl Action {
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::Start { .. } => "start",
+            Self::Stop(_) => "stop",
+            Self::Setpoint { .. } => "setpoint",
+            Self::Reset => "reset",
+            Self::Release => "release",
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Start { direction, setpoint: Some(setpoint), .. } => {
+                format!("start {direction} at {setpoint}")
+            }
+            Self::Start { direction, setpoint: None, .. } => format!("start {direction}"),
+            Self::Stop(mode) => format!("{mode} stop"),
+            Self::Setpoint { setpoint, .. } => format!("setpoint {setpoint}"),
+            Self::Reset => "fault reset".to_owned(),
+            Self::Release => "release".to_owned(),
+        }
+    }
+}
+
+impl Plant {
+    /// Carries out a command and waits for its outcome for as long as `wait`; then it is told as it is.
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    ///
+    /// # Cancellation
+    /// The command goes on.
+    pub(crate) async fn command(
+        &self,
+        caller: &Caller,
+        request: Request,
+        wait: Duration,
+    ) -> Result<Arc<CommandView>, Rejected> {
+        let told = self.begin(caller, request)?;
+        Ok(settled(told, wait).await)
+    }
+
+    /// The command of an id, after its outcome is known or `wait` is over.
+    pub(crate) async fn command_of(&self, id: &str, wait: Duration) -> Option<Arc<CommandView>> {
+        let told = self.0.commands.of(id)?.subscribe();
+        Some(settled(told, wait).await)
+    }
+
+    fn begin(&self, caller: &Caller, request: Request) -> Result<log::Told, Rejected> {
+        let (has_right, right) = match request.action {
+            Action::Stop(_) => (caller.rights.stop, "stop"),
+            _ => (caller.rights.operate, "operate"),
+        };
+        if !has_right {
+            return Err(Rejected::NoRight { caller: caller.name.clone(), right });
+        }
+        let drives = self.named(&request.target)?;
+        let work = Work::new(self.clone(), caller, &request, drives);
+        match self.0.commands.find_or_add(caller, request, work.view())? {
+            Found::Again(told) => Ok(told.subscribe()),
+            Found::New(command) => {
+                let told = command.subscribe();
+                work.begin(command);
+                Ok(told)
+            }
+        }
+    }
+
+    /// The names of the drives that are meant.
+    fn named(&self, target: &Target) -> Result<Vec<String>, Rejected> {
+        match target {
+            Target::Drive(name) if self.fleet().drive(name).is_none() => Err(Rejected::NoDrive(name.clone())),
+            Target::Drive(name) => Ok(vec![name.clone()]),
+            Target::Group(name) => {
+                let group = self.0.groups.iter().find(|group| group.name == *name);
+                group.map(|group| group.drives.clone()).ok_or_else(|| Rejected::NoGroup(name.clone()))
+            }
+            Target::All => Ok(self.fleet().drives().iter().map(|drive| drive.name().to_string()).collect()),
+        }
+    }
+}
+
+async fn settled(mut told: log::Told, wait: Duration) -> Arc<CommandView> {
+    // What is not known in time is told as it is.
+    let _ = timeout(wait, told.wait_for(|view| view.outcome != OutcomeWord::Pending)).await;
+    Arc::clone(&told.borrow())
+}

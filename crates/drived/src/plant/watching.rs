@@ -1,0 +1,110 @@
+//! What turns the fleet into revisions: its events, and every change of a drive or a line.
+
+use std::{
+    sync::{Arc, Weak},
+    time::Duration,
+};
+
+use drive_fleet::{DriveHandle, Events, Received};
+use schemars::JsonSchema;
+use serde::Serialize;
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+
+use super::{
+    Inner,
+    revisions::Subject,
+    views::{DriveView, Gist, LineView},
+};
+use crate::json::unix;
+
+/// Between two revisions of one drive at the least: what its task tells in between is told together.
+const TOGETHER: Duration = Duration::from_millis(100);
+/// A drive of which nothing changes is told anew after this time, so that a reader who counts its ages on stays right.
+const ANEW: Duration = Duration::from_secs(5);
+/// Between two looks at the lines.
+const LINES: Duration = Duration::from_secs(1);
+/// Between two signs of life.
+const TICK: Duration = Duration::from_secs(5);
+
+/// A sign of life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub(crate) struct TickView {
+    pub(crate) revision: u64,
+    pub(crate) time_unix_ms: u64,
+}
+
+/// Watches all of a plant, for as long as anybody holds it.
+pub(super) fn start(plant: &Arc<Inner>) {
+    tokio::spawn(events(Arc::downgrade(plant), plant.fleet.events()));
+    tokio::spawn(lines(Arc::downgrade(plant)));
+    for (name, _) in plant.fleet.lines() {
+        for drive in plant.fleet.drives_on(&name) {
+            tokio::spawn(changes(Arc::downgrade(plant), Arc::clone(&name), drive));
+        }
+    }
+}
+
+async fn events(plant: Weak<Inner>, mut events: Events) {
+    loop {
+        let received = events.recv().await;
+        let Some(plant) = plant.upgrade() else { return };
+        match received {
+            Received::Event(event) => plant.revisions.push(Subject::Event, &event),
+            Received::Missed(_) => {}
+            Received::End => return,
+        }
+    }
+}
+
+/// Tells a drive whenever it has changed, and its values when they have become old: nobody else says so then.
+async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
+    let mut watch = drive.watch();
+    let mut told: Option<(Gist, Instant)> = None;
+    loop {
+        let now = Instant::now();
+        let snapshot = Arc::clone(&watch.borrow_and_update());
+        let known = Gist::of(&snapshot, now);
+        let is_new = told.as_ref().is_none_or(|(last, at)| {
+            *last != known || now.saturating_duration_since(*at) >= ANEW && known.is_live()
+        });
+        if is_new {
+            let Some(plant) = plant.upgrade() else { return };
+            plant.revisions.push(Subject::Drive, &DriveView::of(&line, &drive));
+            told = Some((known, now));
+        }
+        sleep_until(now + TOGETHER).await;
+        // The status is stale a moment after its age has been reached.
+        let stale_at = snapshot.status.as_ref().map(|status| status.at + snapshot.max_age);
+        let next = stale_at.filter(|at| *at >= now).map_or(ANEW, |at| at.saturating_duration_since(now));
+        let patience = next + Duration::from_millis(1);
+        // In vain is no harm: the drive is looked at again.
+        if let Ok(Err(_)) = timeout(patience, watch.changed()).await {
+            return;
+        }
+    }
+}
+
+/// Tells the lines where somebody reads along, and the signs of life.
+async fn lines(plant: Weak<Inner>) {
+    let mut looks = interval(LINES);
+    looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut told: Vec<LineView> = Vec::new();
+    let mut tick_at = Instant::now() + TICK;
+    loop {
+        looks.tick().await;
+        let Some(plant) = plant.upgrade() else { return };
+        plant.progress.look(&plant.fleet);
+        if plant.revisions.readers() > 0 {
+            let lines = plant.lines();
+            for line in lines.iter().filter(|line| !told.contains(line)) {
+                plant.revisions.push(Subject::Line, line);
+            }
+            told = lines;
+        }
+        if Instant::now() >= tick_at {
+            tick_at += TICK;
+            let revision = plant.revisions.last() + 1;
+            plant.revisions.push(Subject::Tick, &TickView { revision, time_unix_ms: unix(Instant::now()) });
+        }
+    }
+}
