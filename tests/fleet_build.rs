@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress};
+use drive_core::{Direction, Error, Frequency, SerialSettings, SlaveAddress, StopMode};
 use drive_families::Family;
 use drive_fleet::{DriveSettings, Fleet, FleetError};
 use drive_sim::{SimLine, Wiring};
@@ -99,5 +99,21 @@ async fn a_line_that_was_told_nothing_keeps_the_pause_of_its_families_and_a_long
         assert_eq!(simulated.violations(), []);
         let expected = SlaveSettings { turnaround: needed.max(said), ..told };
         assert_eq!(line.config().slaves.get(&5), Some(&expected));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_of_another_address_than_its_port_says_so_and_neither_slave_hears_of_it() {
+    for family in Family::ALL {
+        let (simulated, line) = site(family, common_settings());
+        let [one, two] = [1, 2].map(|at| SlaveAddress::try_from(at).expect("an address"));
+        let mut drive = family.open(line.slave(1), two);
+        let expected = Error::OtherSlave { slave: two, made_for: one };
+        assert_eq!(drive.status().await, Err(expected.clone()), "{family}");
+        assert_eq!(drive.start(Direction::Forward).await, Err(expected.clone()), "{family}");
+        assert_eq!(drive.stop(StopMode::Freewheel).await, Err(expected), "{family}");
+        for address in [1, 2] {
+            assert_eq!(simulated.slave(address).expect("it is there").all_requests(), 0, "{family}");
+        }
     }
 }

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Class, Direction, Drive, Faults, Lifetimes, Measurements, Port, Reaction,
-    Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Faults, Measurements, Port, Reaction, Result, Row, Setpoint,
+    Status, StopMode, Stopped, Watchdog, Written,
 };
 
 use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
@@ -15,17 +15,7 @@ const LOOP_BACK: u16 = 0xA537;
 
 #[async_trait]
 impl<P: Port> Drive for Drive3g3ev<P> {
-    fn slave(&self) -> SlaveAddress {
-        self.registers.slave()
-    }
-
-    fn capabilities(&self) -> &'static Capabilities {
-        &CAPABILITIES
-    }
-
-    fn lifetimes_mut(&mut self) -> &mut Lifetimes {
-        &mut self.registers.lifetimes
-    }
+    drive_core::told_by!(registers);
 
     fn forget(&mut self) {
         self.settings = Settings::default();

@@ -4,25 +4,15 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Class, Direction, Drive, Error, Faults, Identity, Lifetimes, Measurements,
-    Port, Reaction, Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Measurements, Port, Reaction, Result,
+    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
 };
 
-use crate::{Atv21, CAPABILITIES, CommandWord, registers};
+use crate::{Atv21, CommandWord, registers};
 
 #[async_trait]
 impl<P: Port> Drive for Atv21<P> {
-    fn slave(&self) -> SlaveAddress {
-        self.registers.slave()
-    }
-
-    fn capabilities(&self) -> &'static Capabilities {
-        &CAPABILITIES
-    }
-
-    fn lifetimes_mut(&mut self) -> &mut Lifetimes {
-        &mut self.registers.lifetimes
-    }
+    drive_core::told_by!(registers);
 
     fn forget(&mut self) {
         self.forget_blocks();

@@ -4,15 +4,14 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Class, Direction, Drive, Fault, Faults, Identity, Lifetimes, Measurements,
-    Percent, Port, RawWord, Result, Row, Setpoint, SlaveAddress, Speed, Status, StopMode, Stopped, Voltage,
-    Written,
+    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Measurements, Percent, Port, RawWord,
+    Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
     drivecom::{self, StatusWords},
     registers::{Register, access::Readable},
 };
 
 use crate::{
-    Atv28, CAPABILITIES, FAULTS, WARNINGS, command,
+    Atv28, FAULTS, WARNINGS, command,
     reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK},
     registers::{DP1, DP2, DP3, DP4, ETA, INV, IOLR, OPR, OTR, RFRD, RTH},
     setpoint::Limits,
@@ -21,17 +20,7 @@ use crate::{
 
 #[async_trait]
 impl<P: Port> Drive for Atv28<P> {
-    fn slave(&self) -> SlaveAddress {
-        self.registers.slave()
-    }
-
-    fn capabilities(&self) -> &'static Capabilities {
-        &CAPABILITIES
-    }
-
-    fn lifetimes_mut(&mut self) -> &mut Lifetimes {
-        &mut self.registers.lifetimes
-    }
+    drive_core::told_by!(registers);
 
     fn forget(&mut self) {
         self.limits = Limits::default();

@@ -4,13 +4,12 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Class, Direction, Drive, Faults, Identity, Lifetimes, Measurements, Port,
-    Reaction, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog, Written,
-    drivecom,
+    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Measurements, Port, Reaction, Result, Row,
+    SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
 };
 
 use crate::{
-    Atv312, CAPABILITIES, command,
+    Atv312, command,
     registers::{ATR, ETA},
     settings::Known,
     words::ControlWord,
@@ -18,17 +17,7 @@ use crate::{
 
 #[async_trait]
 impl<P: Port> Drive for Atv312<P> {
-    fn slave(&self) -> SlaveAddress {
-        self.registers.slave()
-    }
-
-    fn capabilities(&self) -> &'static Capabilities {
-        &CAPABILITIES
-    }
-
-    fn lifetimes_mut(&mut self) -> &mut Lifetimes {
-        &mut self.registers.lifetimes
-    }
+    drive_core::told_by!(registers);
 
     fn forget(&mut self) {
         self.known = Known::default();

@@ -2,16 +2,15 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Class, Direction, Drive, Error, Fault, Faults, Identity, Lifetimes,
-    Measurements, Port, Result, Row, Setpoint, SlaveAddress, Status, StopMode, Stopped, Watchdog,
-    WatchdogCapability, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Measurements, Port, Result, Row,
+    Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     drivecom::{self, ChartState, Drivecom},
     registers::refuse_commands,
 };
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{
-    Atv58, CAPABILITIES,
+    Atv58,
     reading::Words,
     registers::{CMD, W401, W402, W463},
     watchdog,
@@ -19,17 +18,7 @@ use crate::{
 
 #[async_trait]
 impl<P: Port> Drive for Atv58<P> {
-    fn slave(&self) -> SlaveAddress {
-        self.registers.slave()
-    }
-
-    fn capabilities(&self) -> &'static Capabilities {
-        &CAPABILITIES
-    }
-
-    fn lifetimes_mut(&mut self) -> &mut Lifetimes {
-        &mut self.registers.lifetimes
-    }
+    drive_core::told_by!(registers);
 
     fn forget(&mut self) {
         self.limits = None;

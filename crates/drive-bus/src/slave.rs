@@ -3,7 +3,7 @@
 use std::{fmt, io, sync::Arc};
 
 use async_trait::async_trait;
-use drive_core::{Port, PortError, Terms};
+use drive_core::{Port, PortError, SlaveAddress, Terms};
 use tokio::time::Instant;
 use tokio_modbus::{
     Request, Response,
@@ -105,6 +105,10 @@ impl Port for Slave {
 
     fn answered_at(&self) -> Option<Instant> {
         self.answered_at
+    }
+
+    fn made_for(&self) -> Option<SlaveAddress> {
+        SlaveAddress::try_from(self.address).ok()
     }
 
     fn is_ascii(&self) -> bool {

@@ -72,6 +72,8 @@ pub struct Registers<P> {
     slave: SlaveAddress,
     capabilities: &'static Capabilities,
     meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
+    /// The other slave to which the port leads.
+    elsewhere: Option<SlaveAddress>,
     /// When the oldest answer since [`begin_snapshot`](Self::begin_snapshot) ended on the line.
     oldest: Option<Instant>,
     /// How long calls may wait.
@@ -79,7 +81,8 @@ pub struct Registers<P> {
 }
 
 impl<P: Port> Registers<P> {
-    /// The registers of `slave`. `meaning` says what an exception means on this family.
+    /// The registers of `slave`, which is the one that the port was made for where it was made for one: else every call ends
+    /// with [`Error::OtherSlave`]. `meaning` says what an exception means on this family.
     #[must_use]
     pub fn new(
         mut port: P,
@@ -87,8 +90,11 @@ impl<P: Port> Registers<P> {
         capabilities: &'static Capabilities,
         meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
     ) -> Self {
-        port.set_slave(Slave(slave.number()));
-        Self { port, slave, capabilities, meaning, oldest: None, lifetimes: Lifetimes::default() }
+        let elsewhere = port.made_for().filter(|made_for| *made_for != slave);
+        if elsewhere.is_none() {
+            port.set_slave(Slave(slave.number()));
+        }
+        Self { port, slave, capabilities, meaning, elsewhere, oldest: None, lifetimes: Lifetimes::default() }
     }
 
     /// The slave.
@@ -132,6 +138,33 @@ impl<P: Port> Registers<P> {
     pub fn into_port(self) -> P {
         self.port
     }
+}
+
+/// The methods of [`Drive`](crate::Drive) that need nothing but the [`Registers`] of a family, in the field of this name:
+/// `slave`, `capabilities` and `lifetimes_mut`.
+///
+/// ```ignore
+/// #[async_trait]
+/// impl<P: Port> Drive for Fan1<P> {
+///     drive_core::told_by!(registers);
+///     // and the methods that are the family's own
+/// }
+/// ```
+#[macro_export]
+macro_rules! told_by {
+    ($registers:ident) => {
+        fn slave(&self) -> $crate::SlaveAddress {
+            self.$registers.slave()
+        }
+
+        fn capabilities(&self) -> &'static $crate::Capabilities {
+            self.$registers.capabilities()
+        }
+
+        fn lifetimes_mut(&mut self) -> &mut $crate::Lifetimes {
+            &mut self.$registers.lifetimes
+        }
+    };
 }
 
 /// Calls to one slave under the same terms.
@@ -371,6 +404,9 @@ impl<P: Port> Calls<'_, P> {
     }
 
     async fn once(&mut self, terms: Terms, request: Request<'_>, exchange: Exchange) -> Result<Response> {
+        if let Some(made_for) = self.registers.elsewhere {
+            return Err(Error::OtherSlave { slave: self.registers.slave, made_for });
+        }
         self.registers.port.set_terms(terms);
         let outcome = self.registers.port.call(request).await;
         if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.answered_at()) {

@@ -343,6 +343,14 @@ pub enum Error {
         /// Why it cannot be.
         reason: &'static str,
     },
+    /// The drive was made for one slave and its port leads to another. Nothing was sent.
+    #[error("slave {slave}: its port leads to slave {made_for}")]
+    OtherSlave {
+        /// The slave that the drive was made for.
+        slave: SlaveAddress,
+        /// The slave that its port was made for.
+        made_for: SlaveAddress,
+    },
     /// More words than one request of this family may carry. Nothing was sent.
     #[error("slave {slave}: {words} words in one request, the family takes {limit}")]
     TooManyWords {
@@ -481,7 +489,8 @@ impl Error {
             Self::Exception { .. } => ErrorKind::Exception,
             Self::Answer { .. } => ErrorKind::Answer,
             Self::Unsupported { .. } => ErrorKind::Unsupported,
-            Self::TooManyWords { .. }
+            Self::OtherSlave { .. }
+            | Self::TooManyWords { .. }
             | Self::ValueNotAllowed { .. }
             | Self::AccessForbidden { .. }
             | Self::Setpoint { .. }

@@ -5,6 +5,8 @@ use std::{fmt, io, time::Duration};
 use tokio::time::Instant;
 use tokio_modbus::client::Client;
 
+use crate::error::SlaveAddress;
+
 /// How urgent a call is. A line serves a higher class first, always.
 ///
 /// The order of the variants is the order of urgency: `Class::Stop > Class::Background`.
@@ -117,6 +119,12 @@ pub trait Port: Client {
     /// Sets the terms of the calls that follow.
     fn set_terms(&mut self, terms: Terms) {
         let _ = terms;
+    }
+
+    /// The slave that it was made for; `None` on a port that goes to whichever it is told. A drive that is made for another
+    /// slave talks to nobody: its calls end with [`Error::OtherSlave`](crate::Error::OtherSlave).
+    fn made_for(&self) -> Option<SlaveAddress> {
+        None
     }
 
     /// When the exchange that brought the last answer ended on the line; `None` where the port does not keep it. A value is
