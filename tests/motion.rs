@@ -5,11 +5,14 @@ use std::time::Duration;
 
 use drive_core::{Direction, Drive, ErrorKind, Frequency, SlaveAddress, StopMode};
 use drive_families::Family;
-use drive_testing::bench;
+use drive_testing::{
+    bench,
+    rig::{ADDRESS, Rig},
+};
 use support::{
+    contracts::contract,
     drives,
     interrupted::{Event, Interrupted},
-    rig::{ADDRESS, Rig},
 };
 use tokio_modbus::Request;
 
@@ -34,7 +37,7 @@ const FAILURES: [fn() -> Event; 2] = [|| Event::Expiry, || Event::Busy];
 
 /// A rig whose motor stands ready to run at 25 Hz, and another driver of its drive on a port where something may happen.
 async fn ready(family: Family) -> (Rig, Box<dyn Drive>, Interrupted) {
-    let mut rig = Rig::new(family);
+    let mut rig = contract(family).rig();
     rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes 25 Hz");
     let port = Interrupted::new(rig.line.slave(ADDRESS));
     let drive = another(family, port.clone());

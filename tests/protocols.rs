@@ -11,7 +11,8 @@ use drive_bus::{
 use drive_core::{Class, Direction, Frequency, PortError, SerialSettings, SlaveAddress, StopMode, Terms};
 use drive_families::Family;
 use drive_sim::{ALWAYS, Delivery, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58};
-use support::rig::{ADDRESS, Rig};
+use drive_testing::rig::ADDRESS;
+use support::contracts::contract;
 use tokio_modbus::{Request, Response, client::Client};
 
 /// W252, ACC: a word that keeps what is written to it.
@@ -112,7 +113,7 @@ async fn a_mute_uni_telway_slave_does_not_keep_the_others_waiting() {
 
 #[tokio::test(start_paused = true)]
 async fn the_specific_request_climbs_the_chart_and_reports_in_the_same_exchange() {
-    let mut rig = Rig::speaking(Family::Atv58, unitelway(), Family::Atv58.capabilities().factory);
+    let mut rig = contract(Family::Atv58).rig_speaking(unitelway(), Family::Atv58.capabilities().factory);
     let mut unite = rig.line.slave(ADDRESS).unite();
     let identity = unite.identify().await.expect("it says who it is");
     assert_eq!((identity.product, identity.subtype, &*identity.rating), (0x18, 0x58, "ATV58U18N4"));
@@ -196,7 +197,7 @@ async fn under_every_fault_nothing_wrong_is_taken_for_right_in_either_protocol()
 
 #[tokio::test(start_paused = true)]
 async fn the_last_character_that_the_card_is_told_is_followed_until_it_forgets_it() {
-    let mut rig = Rig::speaking(Family::Atv58, ascii(), Family::Atv58.capabilities().factory);
+    let mut rig = contract(Family::Atv58).rig_speaking(ascii(), Family::Atv58.capabilities().factory);
     let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
     let mut card = drive_atv58::Atv58::new(rig.line.slave(ADDRESS), slave);
     card.change_ascii_delimiter(b'!').await.expect("the card has 08/03");

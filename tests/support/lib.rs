@@ -2,9 +2,9 @@
 
 pub mod cable;
 pub mod configurations;
+pub mod contracts;
 pub mod drives;
 pub mod interrupted;
 pub mod peers;
 pub mod plant;
-pub mod rig;
 pub mod scene;

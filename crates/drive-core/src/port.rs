@@ -2,8 +2,9 @@
 
 use std::{fmt, io, time::Duration};
 
+use async_trait::async_trait;
 use tokio::time::Instant;
-use tokio_modbus::client::Client;
+use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
 
 use crate::error::SlaveAddress;
 
@@ -136,6 +137,42 @@ pub trait Port: Client {
     /// Whether its line speaks Modbus ASCII, in which some drives watch their line more closely.
     fn is_ascii(&self) -> bool {
         false
+    }
+}
+
+/// A port of any kind, for what takes one of a single type.
+#[async_trait]
+impl Client for Box<dyn Port> {
+    async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        (**self).call(request).await
+    }
+
+    async fn disconnect(&mut self) -> io::Result<()> {
+        (**self).disconnect().await
+    }
+}
+
+impl SlaveContext for Box<dyn Port> {
+    fn set_slave(&mut self, slave: Slave) {
+        (**self).set_slave(slave);
+    }
+}
+
+impl Port for Box<dyn Port> {
+    fn set_terms(&mut self, terms: Terms) {
+        (**self).set_terms(terms);
+    }
+
+    fn made_for(&self) -> Option<SlaveAddress> {
+        (**self).made_for()
+    }
+
+    fn answered_at(&self) -> Option<Instant> {
+        (**self).answered_at()
+    }
+
+    fn is_ascii(&self) -> bool {
+        (**self).is_ascii()
     }
 }
 

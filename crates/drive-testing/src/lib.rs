@@ -1,10 +1,11 @@
-//! What the tests of the drive families share.
+//! What the tests of the drive families share, those of this house and those of others.
 //!
 //! - [`frames`]: the frames that a manual prints, as bytes on a wire: what a driver sends on a real line and how it reads
 //!   the answer, and what a simulated drive answers.
 //! - [`words`]: a drive that is nothing but words, behind a plain port: what is asked of it, and what becomes of writes.
 //! - [`babble`]: a drive that answers any word to anything.
-//! - [`bench`](mod@bench): one simulated drive on a line in virtual time.
+//! - [`bench`](mod@bench), [`rig`]: one simulated drive on a line in virtual time.
+//! - [`Contract`]: what every family promises of itself, for a family from anywhere to run on itself.
 //!
 //! This crate is for tests: its functions panic when what they check is not so.
 
@@ -12,5 +13,9 @@
 
 pub mod babble;
 pub mod bench;
+pub mod contract;
 pub mod frames;
+pub mod rig;
 pub mod words;
+
+pub use contract::Contract;

@@ -1,14 +1,11 @@
-//! One simulated drive of any family on a simulated line, in virtual time, and the drive that talks to it.
+//! A drive, the simulated machine that it talks to, and the line between, in virtual time.
 
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, Protocol, SlaveSettings};
 use drive_core::{Drive, Frequency, SerialSettings, SlaveAddress, Status};
-use drive_families::Family;
-use drive_sim::{Observation, SimLine, SimSlave, Wiring};
+use drive_sim::{Model, Observation, SimLine, SimSlave, Wiring};
 use tokio::time::{Instant, sleep, timeout_at};
-
-use crate::drives;
 
 /// Where the drive is.
 pub const ADDRESS: u8 = 5;
@@ -29,35 +26,31 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// A drive of `family`, set up for control by the bus, with its factory line settings.
-    ///
-    /// # Panics
-    /// Only when the rig itself is wrong.
-    #[must_use]
-    pub fn new(family: Family) -> Self {
-        Self::speaking(family, Protocol::Rtu, family.capabilities().factory)
-    }
-
-    /// The same on a line that speaks this protocol with these characters.
+    /// A machine on a line that speaks this protocol with these characters, and the drive that `open` makes for it. The line
+    /// keeps the pause that the family needs after each answer.
     ///
     /// # Panics
     /// Only when the rig itself is wrong, or the protocol does not have these characters.
     #[must_use]
-    pub fn speaking(family: Family, protocol: Protocol, settings: SerialSettings) -> Self {
+    pub fn new(
+        protocol: Protocol,
+        settings: SerialSettings,
+        machine: Box<dyn Model>,
+        open: impl FnOnce(drive_bus::Slave, SlaveAddress) -> Box<dyn Drive>,
+    ) -> Self {
         protocol.check(settings).expect("the protocol has these characters");
-        let capabilities = family.capabilities();
         let spoken = match protocol {
             Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
             Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
             _ => drive_sim::Protocol::Rtu,
         };
         let simulated = SimLine::new(Wiring { protocol: spoken, ..Wiring::rtu(settings) });
-        let machine = simulated.add_boxed(ADDRESS, drives::machine(family)).expect("the address is free");
-        let turnaround = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
-        let config = LineConfig { protocol, ..LineConfig::stream(settings) }.slave(ADDRESS, turnaround);
-        let line = Line::over(simulated.in_memory(), config);
+        let machine = simulated.add_boxed(ADDRESS, machine).expect("the address is free");
+        let line = Line::over(simulated.in_memory(), LineConfig { protocol, ..LineConfig::stream(settings) });
         let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
-        let drive = drives::drive(family, line.slave(ADDRESS), slave);
+        let drive = open(line.slave(ADDRESS), slave);
+        let turnaround = drive.capabilities().turnaround;
+        line.configure_slave(ADDRESS, SlaveSettings { turnaround, ..SlaveSettings::default() });
         Self { drive, machine, simulated, line }
     }
 
