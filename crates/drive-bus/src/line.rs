@@ -116,6 +116,15 @@ impl Line {
         self.handle.shared.master().stats(Instant::now())
     }
 
+    /// How often the line's task has come round, to see from outside that it lives: asking makes it come round once more,
+    /// whether its port is there or not, so that a number that stays the same for seconds is that of a task that hangs.
+    #[must_use]
+    pub fn rounds(&self) -> u64 {
+        let rounds = self.handle.shared.rounds();
+        self.handle.shared.wake.notify_one();
+        rounds
+    }
+
     /// The longest time from the call of a Stop to its first bit on the line, whatever is asked on it: see
     /// [`LineConfig::worst_case_stop`], with the longest PDUs there are.
     #[must_use]

@@ -1,6 +1,9 @@
 //! What the handles of a line and its task share.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicU64, Ordering},
+};
 
 use tokio::{
     sync::{Notify, oneshot, watch},
@@ -43,13 +46,20 @@ impl Drop for Handle {
 pub(crate) struct Shared {
     master: Mutex<Master<Caller>>,
     tap: Mutex<Option<Tap>>,
+    /// How often the task has come round.
+    rounds: AtomicU64,
     /// Tells the task that the master has something new to do.
     pub(crate) wake: Notify,
 }
 
 impl Shared {
     pub(crate) fn new(master: Master<Caller>) -> Self {
-        Self { master: Mutex::new(master), tap: Mutex::new(None), wake: Notify::new() }
+        Self {
+            master: Mutex::new(master),
+            tap: Mutex::new(None),
+            rounds: AtomicU64::new(0),
+            wake: Notify::new(),
+        }
     }
 
     /// The master, locked for the moment of one decision; never across an await.
@@ -61,6 +71,16 @@ impl Shared {
     /// The capture, if there is one.
     pub(crate) fn tap(&self) -> MutexGuard<'_, Option<Tap>> {
         self.tap.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The task has come round once more.
+    pub(crate) fn count_round(&self) {
+        self.rounds.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// How often the task has come round.
+    pub(crate) fn rounds(&self) -> u64 {
+        self.rounds.load(Ordering::Relaxed)
     }
 
     fn close(&self) {

@@ -95,6 +95,7 @@ impl Task {
 
     pub(crate) async fn run(mut self) {
         while let Some(deadline) = self.decide().await {
+            self.shared.count_round();
             match self.next_event(deadline).await {
                 Event::Received(Ok(0)) => self.lose("the port was closed by its far end"),
                 Event::Received(Ok(len)) => self.take(len),

@@ -55,6 +55,8 @@ pub(crate) struct Doors {
     ended: watch::Sender<bool>,
     /// Closed when the last connection has gone.
     gone: mpsc::Receiver<()>,
+    /// Whether every door listens.
+    listening: watch::Receiver<bool>,
     audit: Audit,
 }
 
@@ -109,6 +111,7 @@ impl Prepared {
     pub(crate) fn open(self, router: Router) -> Doors {
         let (ended, end) = watch::channel(false);
         let (here, gone) = mpsc::channel(1);
+        let (listens, listening) = watch::channel(self.http.is_none());
         let Self { tokens, audit, .. } = self;
         let (sessions, failures) = Default::default();
         let gate = Gate { router, tokens, audit: audit.clone(), sessions, failures, end: end.clone() };
@@ -119,13 +122,18 @@ impl Prepared {
             tokio::spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
         }
         if let Some((http, tls)) = self.http {
-            tokio::spawn(until_the_end(shared.clone(), serve_http(http, tls, shared)));
+            tokio::spawn(until_the_end(shared.clone(), serve_http(http, tls, listens, shared)));
         }
-        Doors { ended, gone, audit }
+        Doors { ended, gone, listening, audit }
     }
 }
 
 impl Doors {
+    /// Becomes true when every door listens.
+    pub(crate) fn listening(&self) -> watch::Receiver<bool> {
+        self.listening.clone()
+    }
+
     /// Lets nobody in any more, ends the event streams, and waits a little for answers that are under way.
     pub(crate) async fn close(mut self) {
         self.audit.record(Record::new(Kind::Daemon, &this_program(), "the daemon ends")).whenever();
@@ -148,8 +156,9 @@ async fn until_the_end(shared: Shared, serve: impl Future<Output = ()>) {
     }
 }
 
-async fn serve_http(config: HttpConfig, tls: Option<Tls>, shared: Shared) {
+async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender<bool>, shared: Shared) {
     let listener = listen(config.listen).await;
+    listens.send_replace(true);
     let scheme = if tls.is_some() { "https" } else { "http" };
     let address = listener.local_addr().unwrap_or(config.listen);
     tracing::info!("the page is at {scheme}://{address}/");

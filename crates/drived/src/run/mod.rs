@@ -3,6 +3,7 @@
 mod descriptors;
 mod exit;
 mod json;
+mod notify;
 mod report;
 
 use std::{io::IsTerminal as _, path::PathBuf};
@@ -10,7 +11,10 @@ use std::{io::IsTerminal as _, path::PathBuf};
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
 
-use self::report::{Form, Report};
+use self::{
+    notify::Notify,
+    report::{Form, Report},
+};
 use crate::{
     api,
     config::{Config, DrivePart, Http, LinePart},
@@ -49,6 +53,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
     let mut ending = Ending::listen()?;
+    let notify = Notify::start();
     let lines = start_lines(&config)?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
@@ -57,6 +62,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let doors = doors.open(api::router(plant).merge(page::router()));
+    let watching = notify.watch(fleet.clone(), doors.listening());
     let read = tokio::select! {
         () = ending.asked() => Ok(()),
         result = report.ended() => {
@@ -66,9 +72,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             result
         }
     };
+    drop(watching);
+    let stopping = notify.stopping(fleet.clone());
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, config.shutdown, &mut ending).await;
+    drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;
     if read.is_ok() {
