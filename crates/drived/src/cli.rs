@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, check, demo, families, faults, param, plan, poll, release, reset, scan, setpoint, sim, start,
-        status, stop, token,
+        audit, check, demo, families, faults, param, plan, poll, release, reload, reset, scan, setpoint, sim,
+        start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -18,8 +18,9 @@ use crate::{
 const NOTES: &str = "\
 To try it:          demo; or sim in one terminal and poll, status, start in another
 Before wiring:      families, plan
-One drive, read:    status, faults, param get, param dump
-One drive, write:   setpoint, start, stop, reset, release, param set, param save
+A drive, read:      status, faults, param get, param dump
+A drive, write:     setpoint, start, stop, reset, release, param set, param save
+The running daemon: all these without --line and with the names of its drives; watch, reload
 One line, read:     scan, poll
 The plant's drives: check, plan, run, token, audit, each with --config FILE
 
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Param(param::Command),
     Families(families::Args),
+    Watch(watch::Args),
+    Reload(reload::Args),
     #[command(subcommand)]
     Token(token::Command),
     #[command(subcommand)]
@@ -92,6 +95,8 @@ impl Command {
             Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
+            Self::Watch(args) => watch::run(args).await,
+            Self::Reload(args) => reload::run(args).await,
             Self::Token(command) => token::run(command),
             Self::Audit(command) => audit::run(command),
         }

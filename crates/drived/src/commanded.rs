@@ -14,7 +14,7 @@ use tokio::time::{Instant, interval_at, timeout};
 use crate::{drive_spec::DriveName, failure::Failure, one_drive, output, signals::Ending};
 
 /// What whoever waits for a stop has to know.
-const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
+pub(crate) const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
 
 /// How long a drive may take to answer for the first time, over a line that is disturbed or comes and goes.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(5);

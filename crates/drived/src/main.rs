@@ -4,6 +4,7 @@
 
 mod api;
 mod cli;
+mod client;
 mod commanded;
 mod commands;
 mod config;

@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::{Endpoint, Line, LineConfig, OpenError};
 use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError};
 use drive_families::Options;
 use drive_fleet::Order;
 use tokio::time::timeout;
 
 use crate::{
+    client::{self, Daemon, DaemonArgs, Target, Told},
     commanded::Commanded,
     drive_options::{self, OptionArgs},
     drive_spec::{DriveName, DriveSpec},
@@ -28,31 +29,61 @@ pub(crate) const NEVER_QUIET: &str = "the line is never quiet, something else is
 /// How long a port has to let itself be closed.
 const CLOSED_WITHIN: Duration = Duration::from_secs(1);
 
-/// `--line` and `--drive` of the subcommands that act on one drive.
+/// Which drive a subcommand acts on: one on a line, by `--line` and `--drive`, or what the running daemon knows by name.
 #[derive(Debug, clap::Args)]
 pub(crate) struct OneDriveArgs {
     // The text has brackets that a doc comment would take for links.
-    #[arg(long, value_name = "LINE", help = line_spec::HELP)]
-    line: LineSpec,
+    #[arg(long, value_name = "LINE", requires = "drive", conflicts_with_all = ["socket", "token_file", "json"], help = line_spec::HELP)]
+    line: Option<LineSpec>,
     /// The drive, such as atv312@1
-    #[arg(long, value_name = "FAMILY@ADDRESS")]
-    drive: DriveSpec,
+    #[arg(long, value_name = "FAMILY@ADDRESS", requires = "line")]
+    drive: Option<DriveSpec>,
     #[command(flatten)]
     options: OptionArgs,
+    #[command(flatten)]
+    pub(crate) daemon: DaemonArgs,
 }
 
 impl OneDriveArgs {
-    /// The name of the one drive.
+    /// Whether it is a drive on a line; without, it is one of the running daemon.
+    pub(crate) const fn is_on_line(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// The name of the one drive on a line.
     pub(crate) fn name(&self) -> Result<DriveName, Failure> {
-        self.drive.single().ok_or_else(|| {
+        let drive = self.drive.as_ref().ok_or_else(unnamed)?;
+        drive.single().ok_or_else(|| {
             Failure::Input("--drive names several drives: this acts on one, such as atv312@1".to_owned())
         })
+    }
+
+    /// Commands a drive or a group of the running daemon.
+    pub(crate) async fn tell(&self, name: Option<&str>, told: &Told) -> Result<(), Failure> {
+        let name = name.ok_or_else(unnamed)?;
+        let mut daemon = self.daemon.connect().await?;
+        let target = Target::find(&daemon.state().await?, name)?;
+        client::order(&self.daemon, &mut daemon, &target, told).await
+    }
+
+    /// The path of something of one drive of the running daemon.
+    pub(crate) async fn path(
+        &self,
+        daemon: &mut Daemon,
+        name: Option<&str>,
+        parts: &[&str],
+    ) -> Result<String, Failure> {
+        let name = name.ok_or_else(unnamed)?;
+        match Target::find(&daemon.state().await?, name)? {
+            Target::Drive(drive) => Ok(client::path_of(&[&["drives", drive.as_str()], parts].concat())),
+            _ => Err(Failure::Input(format!("{name} is a group: name one drive"))),
+        }
     }
 
     /// Opens the line, for reading and for parameters. Nothing is sent by it.
     pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
         let (name, options, config) = self.parts()?;
-        let line = open_line(config.clone()).await?;
+        let line = open_line_of(Some(name), config.clone()).await?;
         let mut drive = open_drive(&line, name, &options);
         wait_at_most(&mut *drive);
         Ok(OneDrive { name, drive, config, line })
@@ -61,7 +92,7 @@ impl OneDriveArgs {
     /// Opens the line, for a command: see [`Commanded::over`].
     pub(crate) async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
-        let line = open_line(config.clone()).await?;
+        let line = open_line_of(Some(name), config.clone()).await?;
         Commanded::over(name, line, config, &options, accepted)
     }
 
@@ -84,10 +115,18 @@ impl OneDriveArgs {
         Commanded::over(name, line, config, &options, Vec::new())
     }
 
+    /// Whose the port is, where a stop could not be sent because somebody else has it.
+    pub(crate) async fn whose(&self) -> Option<String> {
+        let (name, _, config) = self.parts().ok()?;
+        let Endpoint::Serial(path) = &config.endpoint else { return None };
+        client::explain(path, Some(name)).await
+    }
+
     fn parts(&self) -> Result<(DriveName, Options, LineConfig), Failure> {
         let name = self.name()?;
         let options = self.options.of(&[name])?;
-        let config = self.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+        let line = self.line.as_ref().ok_or_else(unnamed)?;
+        let config = line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
         // No other drive waits behind a mute one here, so each request is really sent.
         Ok((name, options, LineConfig { offline_after: 0, ..config }))
     }
@@ -130,7 +169,27 @@ pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> Stri
 
 /// Opens a line; a port that is missing or in use is the caller's input.
 pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
-    Line::open(config).await.map_err(|error| Failure::Input(error.to_string()))
+    open_line_of(None, config).await
+}
+
+/// The same, for a drive that is to be spoken to.
+async fn open_line_of(drive: Option<DriveName>, config: LineConfig) -> Result<Line, Failure> {
+    match Line::open(config).await {
+        Ok(line) => Ok(line),
+        Err(OpenError::InUse { path }) => {
+            let told = client::explain(&path, drive).await;
+            Err(Failure::Input(told.unwrap_or_else(|| OpenError::InUse { path }.to_string())))
+        }
+        Err(error) => Err(Failure::Input(error.to_string())),
+    }
+}
+
+/// Nobody has said which drive.
+pub(crate) fn unnamed() -> Failure {
+    Failure::Input(
+        "say which drive: by its name in the running daemon (drived status lists them), or by --line and --drive"
+            .to_owned(),
+    )
 }
 
 /// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.

@@ -155,7 +155,8 @@ fn the_simulator_does_not_replace_a_file() {
     let path = support::path("a-file");
     std::fs::write(&path, "mine").expect("the file can be written");
     let text = path.to_str().expect("the path is text");
-    run(&["sim", "--pty", text, "--drive", "atv312@1"]).assert_refused(2, "is no symbolic link");
+    run(&["sim", "--pty", text, "--drive", "atv312@1"])
+        .assert_refused(2, "is no link that a simulator left behind");
     assert_eq!(std::fs::read_to_string(&path).expect("the file is still there"), "mine");
     std::fs::remove_file(path).expect("the file can be removed");
 }

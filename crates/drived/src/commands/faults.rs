@@ -2,16 +2,26 @@
 
 use drive_core::Fault;
 
-use crate::{failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{client, failure::Failure, one_drive::OneDriveArgs, output};
 
 /// Read the present faults of one drive, its alarms and its fault history
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
+    /// A drive of the running daemon
+    #[arg(value_name = "NAME", conflicts_with = "line")]
+    name: Option<String>,
     #[command(flatten)]
     one: OneDriveArgs,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    if !args.one.is_on_line() {
+        let name = args.name.as_deref();
+        let mut daemon = args.one.daemon.connect().await?;
+        let path = args.one.path(&mut daemon, name, &["faults"]).await?;
+        let faults = daemon.get(&path).await?.done()?;
+        return args.one.daemon.say(&faults, |faults| client::faults(name.unwrap_or_default(), faults));
+    }
     let mut one = args.one.open().await?;
     let faults = one.drive.faults().await.map_err(|error| one.failure(&error))?;
     if faults.present.is_empty() {

@@ -1,17 +1,26 @@
 //! `drived release`: gives control of one drive back.
 
 use drive_fleet::Order;
+use serde_json::json;
 
-use crate::{failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
 
 /// Give control of one drive back to its panel or its terminals, such as after a stop that took it; the motor must stand
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
+    /// A drive or a group of the running daemon
+    #[arg(value_name = "NAME", conflicts_with = "line")]
+    name: Option<String>,
     #[command(flatten)]
     one: OneDriveArgs,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    const DONE: &str = "has given control back";
+    if !args.one.is_on_line() {
+        let told = Told { action: "release", body: json!({}), done: DONE.to_owned() };
+        return args.one.tell(args.name.as_deref(), &told).await;
+    }
     let name = args.one.name()?;
     let capabilities = name.family.capabilities();
     if !capabilities.release {
@@ -20,5 +29,5 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             capabilities.name
         )));
     }
-    args.one.order(Order::Release, "has given control back").await
+    args.one.order(Order::Release, DONE).await
 }

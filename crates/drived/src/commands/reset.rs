@@ -1,16 +1,25 @@
 //! `drived reset`: resets the present fault of one drive.
 
 use drive_fleet::Order;
+use serde_json::json;
 
-use crate::{failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
 
-/// Reset the present fault of one drive, once; the motor does not start by it
+/// Reset the present fault of a drive, or of all of a group, once; the motor does not start by it
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
+    /// A drive or a group of the running daemon
+    #[arg(value_name = "NAME", conflicts_with = "line")]
+    name: Option<String>,
     #[command(flatten)]
     one: OneDriveArgs,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    args.one.order(Order::ResetFaults, "has no fault").await
+    const DONE: &str = "has no fault";
+    if !args.one.is_on_line() {
+        let told = Told { action: "reset", body: json!({}), done: DONE.to_owned() };
+        return args.one.tell(args.name.as_deref(), &told).await;
+    }
+    args.one.order(Order::ResetFaults, DONE).await
 }

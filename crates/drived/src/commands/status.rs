@@ -3,14 +3,20 @@
 use drive_core::{Measurements, Status};
 
 use crate::{
+    client::{self, Target},
     failure::Failure,
     one_drive::OneDriveArgs,
     output::{self, Table},
 };
 
-/// Read the state of one drive; nothing is written
+/// Show the drives of the running daemon, a group or one of them, or read one drive on a line; nothing is written
+///
+/// A value that is old is in brackets, with its age. Exit code 1 when a drive that was asked for does not answer.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
+    /// A drive or a group of the running daemon; without it, all
+    #[arg(value_name = "NAME", conflicts_with = "line")]
+    name: Option<String>,
     #[command(flatten)]
     one: OneDriveArgs,
     /// Also read the slow values: voltages, torque, thermal states, hours, inputs and outputs
@@ -19,6 +25,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    if !args.one.is_on_line() {
+        return through_daemon(&args).await;
+    }
     let mut one = args.one.open().await?;
     let status = one.drive.status().await.map_err(|error| one.failure(&error))?;
     let restarts = one.drive.self_restarts().await;
@@ -41,6 +50,18 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     output::say_table(table)?;
     one.close().await;
     Ok(())
+}
+
+async fn through_daemon(args: &Args) -> Result<(), Failure> {
+    let mut daemon = args.one.daemon.connect().await?;
+    let state = daemon.state().await?;
+    let target = args.name.as_deref().map_or(Ok(Target::All), |name| Target::find(&state, name))?;
+    let mut drives = state["drives"].as_array().into_iter().flatten();
+    let one = drives.find(|drive| matches!(&target, Target::Drive(name) if drive["name"] == **name));
+    match one {
+        Some(drive) => args.one.daemon.say(drive, |drive| client::whole(drive, args.all)),
+        None => args.one.daemon.say(&state, |state| client::overview(state, &target)),
+    }
 }
 
 /// The values that the drive gave, each with its label.

@@ -32,7 +32,7 @@ pub(crate) use self::rights::{Caller, Rights, Role};
 #[cfg(unix)]
 use self::socket::Unbound;
 #[cfg(unix)]
-pub(crate) use self::socket::default_path;
+pub(crate) use self::socket::usual_places;
 use self::{
     audit::{Audit, Kind, Record},
     connection::DRAINED_WITHIN,
@@ -46,6 +46,12 @@ use crate::{
     config::{DoorsConfig, HttpConfig, SocketConfig},
     failure::Failure,
 };
+
+/// A system without such sockets.
+#[cfg(not(unix))]
+pub(crate) fn usual_places() -> Vec<std::path::PathBuf> {
+    Vec::new()
+}
 
 /// From one try to open a door or to accept a connection to the next, when the system has no room for it.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
@@ -214,7 +220,7 @@ impl Entrance {
     /// Where nobody has said where the socket is to be, and there is no place for it, the daemon goes on without.
     #[cfg(unix)]
     fn of_socket(config: &SocketConfig) -> Result<Option<Self>, Failure> {
-        let path = config.path.clone().unwrap_or_else(default_path);
+        let path = config.path.clone().or_else(|| usual_places().into_iter().next()).unwrap_or_default();
         let socket = match socket::Socket::bind(&path, config.mode) {
             Ok(socket) => socket,
             Err(error @ Unbound::System { .. }) if config.path.is_none() => {

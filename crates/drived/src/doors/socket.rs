@@ -14,15 +14,14 @@ use tokio::net::UnixListener;
 /// The name of the socket in a folder for such things.
 const NAME: &str = "drived.sock";
 
-/// Where the socket is when nobody says it.
-pub(crate) fn default_path() -> PathBuf {
+/// Where the socket is when nobody says it: the first of these for a daemon, the first that answers for its clients.
+pub(crate) fn usual_places() -> Vec<PathBuf> {
     let of = |variable| env::var_os(variable).filter(|folder| !folder.is_empty());
     // systemd gives several folders with colons between.
     let runtime = of("RUNTIME_DIRECTORY").and_then(|all| env::split_paths(&all).next());
-    runtime
-        .or_else(|| of("XDG_RUNTIME_DIR").map(PathBuf::from))
-        .unwrap_or_else(|| PathBuf::from("/run/drived"))
-        .join(NAME)
+    let session = of("XDG_RUNTIME_DIR").map(PathBuf::from);
+    let system = Some(PathBuf::from("/run/drived"));
+    [runtime, session, system].into_iter().flatten().map(|folder| folder.join(NAME)).collect()
 }
 
 /// Why the socket cannot be bound.

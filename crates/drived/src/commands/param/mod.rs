@@ -1,12 +1,15 @@
 //! `drived param`: the registers of a family, and their content in one drive.
 
+mod remote;
+
 use drive_core::{
     ErrorKind, Row,
     registers::{Factory, Range, Storage},
 };
-use drive_families::Family;
+use drive_families::{Family, UnknownFamily};
 
 use crate::{
+    client::{DaemonArgs, Target},
     drive_spec::DriveName,
     failure::Failure,
     one_drive::{OneDrive, OneDriveArgs, told},
@@ -19,28 +22,29 @@ use crate::{
 pub(crate) enum Command {
     /// List every register of a family: access, where it is kept, range, factory setting, source
     List {
-        /// The family, such as atv312
-        #[arg(value_name = "FAMILY")]
-        family: Family,
+        /// The family, such as atv312, or a drive of the running daemon
+        #[arg(value_name = "FAMILY|NAME")]
+        of: String,
+        #[command(flatten)]
+        daemon: DaemonArgs,
     },
     /// Read registers
     Get {
         #[command(flatten)]
         one: OneDriveArgs,
-        /// Mnemonics or addresses, such as ACC, 9001 or 2329h
-        #[arg(value_name = "REGISTER", required = true)]
-        registers: Vec<String>,
+        /// The drive of the running daemon, which --line and --drive stand for otherwise; and mnemonics or addresses, such as
+        /// ACC, 9001 or 2329h
+        #[arg(value_name = "NAME] [REGISTER", required = true)]
+        words: Vec<String>,
     },
     /// Write one register and read it back
     Set {
         #[command(flatten)]
         one: OneDriveArgs,
-        /// Mnemonic or address
-        #[arg(value_name = "REGISTER")]
-        register: String,
-        /// A number in the register's unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
-        #[arg(value_name = "VALUE", allow_hyphen_values = true)]
-        value: String,
+        /// The drive of the running daemon, which --line and --drive stand for otherwise; the mnemonic or the address of the
+        /// register; and a number in its unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
+        #[arg(value_name = "NAME] [REGISTER] [VALUE", required = true, num_args = 2..=3, allow_negative_numbers = true)]
+        words: Vec<String>,
         /// Then save the drive's parameters to its EEPROM, all of them, as `drived param save` does, also when the value was
         /// there already
         #[arg(long)]
@@ -51,11 +55,17 @@ pub(crate) enum Command {
     /// What was changed since the last save outlives the next power-off then, whoever changed it. An EEPROM wears out by
     /// writes: save when you have changed something, not by a timer.
     Save {
+        /// A drive of the running daemon
+        #[arg(value_name = "NAME", conflicts_with = "line")]
+        name: Option<String>,
         #[command(flatten)]
         one: OneDriveArgs,
     },
     /// Read every register that can be read
     Dump {
+        /// A drive of the running daemon
+        #[arg(value_name = "NAME", conflicts_with = "line")]
+        name: Option<String>,
         #[command(flatten)]
         one: OneDriveArgs,
     },
@@ -63,12 +73,40 @@ pub(crate) enum Command {
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::List { family } => output::say_table(list(family)),
-        Command::Get { one, registers } => get(&one, &registers).await,
-        Command::Set { one, register, value, save } => set(&one, &register, &value, save).await,
-        Command::Save { one } => save_all(&one).await,
-        Command::Dump { one } => dump(&one).await,
+        Command::List { of, daemon } => output::say_table(list(family(&of, &daemon).await?)),
+        Command::Get { one, words } if one.is_on_line() => get(&one, &words).await,
+        Command::Get { one, words } => remote::get(&one, &words).await,
+        Command::Set { one, words, save } => match (one.is_on_line(), &*words) {
+            (true, [register, value]) => set(&one, register, value, save).await,
+            (false, [name, register, value]) => remote::set(&one, name, register, value, save).await,
+            (true, _) => {
+                Err(Failure::Input("expected REGISTER and VALUE beside --line and --drive".to_owned()))
+            }
+            (false, _) => Err(Failure::Input(
+                "expected NAME, REGISTER and VALUE, or --line and --drive instead of the name".to_owned(),
+            )),
+        },
+        Command::Save { one, .. } if one.is_on_line() => save_all(&one).await,
+        Command::Save { one, name } => remote::save(&one, name.as_deref()).await,
+        Command::Dump { one, .. } if one.is_on_line() => dump(&one).await,
+        Command::Dump { one, name } => remote::dump(&one, name.as_deref()).await,
     }
+}
+
+/// A family by its name, or that of a drive of the running daemon.
+async fn family(of: &str, daemon: &DaemonArgs) -> Result<Family, Failure> {
+    let unknown = match of.parse() {
+        Ok(family) => return Ok(family),
+        Err(error) => Failure::Input(UnknownFamily::to_string(&error)),
+    };
+    // Where no daemon runs, it was meant for a family.
+    let Ok(mut daemon) = daemon.connect().await else { return Err(unknown) };
+    let state = daemon.state().await?;
+    Target::find(&state, of)?;
+    let mut drives = state["drives"].as_array().into_iter().flatten();
+    let family =
+        drives.find(|drive| drive["name"] == of).and_then(|drive| drive["family"].as_str()?.parse().ok());
+    family.ok_or(unknown)
 }
 
 fn list(family: Family) -> Table {

@@ -1,0 +1,187 @@
+//! A connection to the daemon, and its answers.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use axum::{
+    body::Bytes,
+    http::{Request, Response, StatusCode, header},
+};
+use http_body_util::{BodyExt as _, Full};
+use hyper::{
+    body::Incoming,
+    client::conn::http1::{self, SendRequest},
+};
+use hyper_util::rt::TokioIo;
+use serde_json::Value;
+use tokio::time::timeout;
+
+use crate::failure::Failure;
+
+/// How long the daemon may take to begin an answer: it waits itself for what it is asked to.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
+
+/// A connection to the daemon.
+pub(crate) struct Daemon {
+    sender: SendRequest<Full<Bytes>>,
+    token: Option<String>,
+    socket: PathBuf,
+    pid: Option<i32>,
+}
+
+/// What the daemon answered.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Answer {
+    pub(crate) status: StatusCode,
+    pub(crate) body: Value,
+}
+
+impl Answer {
+    /// The body, if that is what was asked for.
+    pub(crate) fn done(self) -> Result<Value, Failure> {
+        if self.status.is_success() { Ok(self.body) } else { Err(self.failure()) }
+    }
+
+    /// Why it is not what was asked for.
+    pub(crate) fn failure(&self) -> Failure {
+        let detail = self.body["detail"].as_str().or_else(|| self.body["text"].as_str());
+        let text = match detail.or_else(|| self.body["title"].as_str()) {
+            Some(text) => text.to_owned(),
+            None => format!("the daemon answers {}", self.status),
+        };
+        match self.status {
+            StatusCode::BAD_REQUEST
+            | StatusCode::UNAUTHORIZED
+            | StatusCode::FORBIDDEN
+            | StatusCode::NOT_FOUND
+            | StatusCode::PAYLOAD_TOO_LARGE
+            | StatusCode::UNPROCESSABLE_ENTITY
+            | StatusCode::NOT_IMPLEMENTED => Failure::Input(text),
+            _ => Failure::Drive(text),
+        }
+    }
+}
+
+impl Daemon {
+    /// Connects to the daemon of a socket, or of the first that answers where they usually are.
+    pub(crate) async fn connect(socket: Option<&Path>, token_file: Option<&Path>) -> Result<Self, Failure> {
+        let token = token_file.map(|file| {
+            let token = std::fs::read_to_string(file);
+            let token = token.map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
+            Ok(token.trim().to_owned())
+        });
+        let token = token.transpose()?;
+        let places = socket.map_or_else(crate::doors::usual_places, |socket| vec![socket.to_owned()]);
+        let mut why = None;
+        for place in places {
+            match open(&place).await {
+                Ok((sender, pid)) => return Ok(Self { sender, token, socket: place, pid }),
+                // The one that was expected first says why.
+                Err(error) => why = why.or(Some((place, error))),
+            }
+        }
+        let (place, error) = why.unwrap_or_else(|| (PathBuf::new(), io::ErrorKind::NotFound.into()));
+        let what_to_do =
+            "start one by drived run --config FILE, or go to a drive directly by --line and --drive";
+        Err(Failure::Input(match error.kind() {
+            io::ErrorKind::PermissionDenied => {
+                format!(
+                    "{}: you may not use the control socket of the daemon: become root, or one of its group",
+                    place.display()
+                )
+            }
+            io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
+                format!("no daemon serves {}: {what_to_do}", place.display())
+            }
+            _ => format!("no daemon can be reached at {}: {error}: {what_to_do}", place.display()),
+        }))
+    }
+
+    /// Whose it is, as the system knows.
+    pub(crate) const fn pid(&self) -> Option<i32> {
+        self.pid
+    }
+
+    /// Reads something.
+    pub(crate) async fn get(&mut self, path: &str) -> Result<Answer, Failure> {
+        self.ask("GET", path, None).await
+    }
+
+    /// The state of the whole plant.
+    pub(crate) async fn state(&mut self) -> Result<Value, Failure> {
+        self.get("/api/v1/state").await?.done()
+    }
+
+    /// Asks for something to be done.
+    pub(crate) async fn post(&mut self, path: &str, body: &Value) -> Result<Answer, Failure> {
+        self.ask("POST", path, Some(body)).await
+    }
+
+    /// Asks for something to be written.
+    pub(crate) async fn put(&mut self, path: &str, body: &Value) -> Result<Answer, Failure> {
+        self.ask("PUT", path, Some(body)).await
+    }
+
+    async fn ask(&mut self, method: &str, path: &str, body: Option<&Value>) -> Result<Answer, Failure> {
+        let (parts, body) = self.send(method, path, body).await?.into_parts();
+        let body = body.collect().await.map_err(|error| self.lost(&error))?.to_bytes();
+        let body = serde_json::from_slice(&body)
+            .unwrap_or_else(|_| Value::String(String::from_utf8_lossy(&body).into_owned()));
+        Ok(Answer { status: parts.status, body })
+    }
+
+    /// Sends a request, and gives the answer as it begins.
+    pub(crate) async fn send(
+        &mut self,
+        method: &str,
+        path: &str,
+        body: Option<&Value>,
+    ) -> Result<Response<Incoming>, Failure> {
+        let mut request = Request::builder().method(method).uri(path).header(header::HOST, "localhost");
+        if body.is_some() {
+            request = request.header(header::CONTENT_TYPE, "application/json");
+        }
+        if let Some(token) = &self.token {
+            request = request.header(header::AUTHORIZATION, format!("Bearer {token}"));
+        }
+        let body = body.map(Value::to_string).unwrap_or_default();
+        let request = request.body(Full::new(Bytes::from(body)));
+        let request = request.map_err(|error| Failure::Input(error.to_string()))?;
+        // The connection may have been idle for as long as the daemon allows.
+        if self.sender.ready().await.is_err() {
+            let opened = open(&self.socket).await;
+            (self.sender, self.pid) = opened.map_err(|error| self.lost(&error))?;
+        }
+        match timeout(ANSWERED_WITHIN, self.sender.send_request(request)).await {
+            Ok(answer) => answer.map_err(|error| self.lost(&error)),
+            Err(_) => Err(Failure::Drive(format!(
+                "the daemon at {} gave no answer in time: nobody knows what became of it",
+                self.socket.display()
+            ))),
+        }
+    }
+
+    fn lost(&self, error: &dyn std::fmt::Display) -> Failure {
+        Failure::Drive(format!(
+            "the daemon at {} has gone: {error}: read the state before you ask again",
+            self.socket.display()
+        ))
+    }
+}
+
+#[cfg(unix)]
+async fn open(socket: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
+    let stream = tokio::net::UnixStream::connect(socket).await?;
+    let pid = stream.peer_cred().ok().and_then(|daemon| daemon.pid());
+    let (sender, connection) = http1::handshake(TokioIo::new(stream)).await.map_err(io::Error::other)?;
+    tokio::spawn(connection);
+    Ok((sender, pid))
+}
+
+#[cfg(not(unix))]
+async fn open(_: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
+    Err(io::Error::from(io::ErrorKind::NotFound))
+}

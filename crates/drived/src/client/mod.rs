@@ -1,0 +1,54 @@
+//! The subcommands that go to the running daemon, over its control socket.
+
+mod connection;
+mod holder;
+mod names;
+mod order;
+mod show;
+mod watch;
+
+use std::path::PathBuf;
+
+pub(crate) use self::{
+    connection::{Answer, Daemon},
+    holder::explain,
+    names::{Target, path_of},
+    order::{Told, order},
+    show::{faults, overview, registers, whole},
+    watch::watch,
+};
+use crate::{failure::Failure, output};
+
+/// How a subcommand finds the daemon, and how it answers.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(crate) struct DaemonArgs {
+    /// The control socket of the daemon, if not where it usually is
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// A file with the token by which the daemon knows whose commands they are; without it, its socket's permissions do
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
+    /// Print one JSON object, as the HTTP API has it
+    #[arg(long)]
+    json: bool,
+}
+
+impl DaemonArgs {
+    /// Connects to the daemon.
+    pub(crate) async fn connect(&self) -> Result<Daemon, Failure> {
+        Daemon::connect(self.socket.as_deref(), self.token_file.as_deref()).await
+    }
+
+    /// Prints an answer: the object for a program, else what a person reads.
+    pub(crate) fn say(
+        &self,
+        body: &serde_json::Value,
+        text: impl FnOnce(&serde_json::Value) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        if self.json { output::say_as_it_is(body) } else { text(body) }
+    }
+
+    pub(crate) const fn is_json(&self) -> bool {
+        self.json
+    }
+}

@@ -1,0 +1,153 @@
+//! The names of a plant's drives and groups, as a person writes them.
+
+use serde_json::Value;
+
+use crate::failure::Failure;
+
+/// How many near names are told to somebody who has missed one.
+const NEAREST: usize = 3;
+
+/// What a name means.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Target {
+    Drive(String),
+    Group(String),
+    /// Every drive.
+    All,
+}
+
+impl Target {
+    /// What a name means in a plant whose state this is; a drive comes before a group of its name.
+    pub(crate) fn find(state: &Value, name: &str) -> Result<Self, Failure> {
+        let named = |kind: &str| {
+            let all = state[kind].as_array().into_iter().flatten();
+            all.filter_map(|one| one["name"].as_str()).map(str::to_owned).collect::<Vec<_>>()
+        };
+        let (drives, groups) = (named("drives"), named("groups"));
+        if drives.iter().any(|drive| drive == name) {
+            return Ok(Self::Drive(name.to_owned()));
+        }
+        if groups.iter().any(|group| group == name) {
+            return Ok(Self::Group(name.to_owned()));
+        }
+        let near = nearest(name, drives.into_iter().chain(groups).collect());
+        let near = if near.is_empty() { "the daemon has none".to_owned() } else { near.join(", ") };
+        Err(Failure::Input(format!("there is no drive and no group {name:?}: the nearest are {near}")))
+    }
+
+    /// Where its commands go.
+    pub(crate) fn path(&self, action: &str) -> String {
+        match self {
+            Self::Drive(name) => path_of(&["drives", name, action]),
+            Self::Group(name) => path_of(&["groups", name, action]),
+            Self::All => path_of(&[action]),
+        }
+    }
+
+    /// Whether a drive of the state belongs to it.
+    pub(crate) fn has(&self, state: &Value, drive: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::Drive(name) => name == drive,
+            Self::Group(name) => {
+                let groups = state["groups"].as_array().into_iter().flatten();
+                let group = groups.into_iter().find(|group| group["name"] == **name);
+                let members = group.and_then(|group| group["drives"].as_array()).into_iter().flatten();
+                members.into_iter().any(|member| member == drive)
+            }
+        }
+    }
+}
+
+/// A path of the API; each part may be any text.
+pub(crate) fn path_of(parts: &[&str]) -> String {
+    let mut path = "/api/v1".to_owned();
+    for part in parts {
+        path.push('/');
+        for byte in part.bytes() {
+            match byte {
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => {
+                    path.push(char::from(byte));
+                }
+                _ => path.push_str(&format!("%{byte:02X}")),
+            }
+        }
+    }
+    path
+}
+
+/// The names that are fewest changes away from this one.
+fn nearest(wanted: &str, names: Vec<String>) -> Vec<String> {
+    let wanted = wanted.to_lowercase();
+    let mut near: Vec<(usize, String)> =
+        names.into_iter().map(|name| (distance(&wanted, &name.to_lowercase()), name)).collect();
+    near.sort();
+    near.into_iter().take(NEAREST).map(|(_, name)| name).collect()
+}
+
+/// How many characters have to be changed, added or taken out to make one text of another.
+fn distance(one: &str, other: &str) -> usize {
+    let other: Vec<char> = other.chars().collect();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (index, character) in one.chars().enumerate() {
+        let mut diagonal = index;
+        let mut left = index + 1;
+        for (column, against) in other.iter().enumerate() {
+            let above = row.get(column + 1).copied().unwrap_or_default();
+            let best = (diagonal + usize::from(character != *against)).min(above + 1).min(left + 1);
+            if let Some(first) = row.get_mut(column) {
+                *first = left;
+            }
+            (diagonal, left) = (above, best);
+        }
+        if let Some(last) = row.last_mut() {
+            *last = left;
+        }
+    }
+    row.last().copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_not_there_is_answered_with_the_nearest() {
+        let state = json!({
+            "drives": [{"name": "pump 1"}, {"name": "pump 2"}, {"name": "fan 1"}, {"name": "stirrer"}],
+            "groups": [{"name": "fans", "drives": ["fan 1"]}],
+        });
+        assert_eq!(Target::find(&state, "pump 1"), Ok(Target::Drive("pump 1".to_owned())));
+        let fans = Target::find(&state, "fans").unwrap();
+        assert!(fans.has(&state, "fan 1") && !fans.has(&state, "pump 1"));
+        let error = Target::find(&state, "Pmp 1").unwrap_err();
+        let told = "there is no drive and no group \"Pmp 1\": the nearest are pump 1, pump 2, fan 1";
+        assert_eq!(error, Failure::Input(told.to_owned()));
+    }
+
+    #[test]
+    fn distances_count_changes() {
+        for (one, other, changes) in [
+            ("", "", 0),
+            ("pump", "pump", 0),
+            ("", "abc", 3),
+            ("pump 1", "pump 2", 1),
+            ("kitten", "sitting", 3),
+        ] {
+            assert_eq!(distance(one, other), changes, "{one} {other}");
+            assert_eq!(distance(other, one), changes, "{other} {one}");
+        }
+    }
+
+    #[test]
+    fn any_name_stands_in_a_path() {
+        assert_eq!(Target::Drive("pump 1".to_owned()).path("stop"), "/api/v1/drives/pump%201/stop");
+        assert_eq!(
+            Target::Group("Lüfter/?#".to_owned()).path("start"),
+            "/api/v1/groups/L%C3%BCfter%2F%3F%23/start"
+        );
+        assert_eq!(Target::All.path("stop"), "/api/v1/stop");
+    }
+}
