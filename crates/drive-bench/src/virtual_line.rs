@@ -39,7 +39,7 @@ struct VirtualLine {
 impl VirtualLine {
     fn new(dead: &[u8]) -> Self {
         let now = Instant::now();
-        let mut master = Master::new(LineConfig::stream(SETTINGS));
+        let mut master = Master::new(Instant::now(), LineConfig::stream(SETTINGS));
         master.handle_up(now);
         let (dead, lost) = (dead.to_vec(), dead.to_vec());
         let (waiting, counted) = (BTreeSet::new(), Counted::default());

@@ -83,7 +83,7 @@ fn schedule(criterion: &mut Criterion) {
 
 fn master(criterion: &mut Criterion) {
     let config = LineConfig { unpaced: true, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
-    let mut master: Master<()> = Master::new(config);
+    let mut master: Master<()> = Master::new(Instant::now(), config);
     let now = Instant::now();
     master.handle_up(now);
     let bytes = answer_to(&Request::ReadHoldingRegisters(3201, 8));

@@ -74,7 +74,7 @@ impl Line {
 
     fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>) -> Self {
         let (finished, when_finished) = watch::channel(false);
-        let shared = Arc::new(Shared::new(Master::new(config.clone())));
+        let shared = Arc::new(Shared::new(Master::new(Instant::now(), config.clone())));
         let task = Task::new(&config, Arc::clone(&shared), connector, stream);
         tokio::spawn(async move {
             task.run().await;

@@ -1,9 +1,11 @@
 //! The schedule of a line: which request is sent next. Pure: time is an argument.
 //!
-//! - A **higher class** goes first. A Stop is never overtaken, and while one waits, even for its slave's pause, nothing
-//!   else starts, except in front of one that has to [wait long](Readiness::holds_line).
-//! - **Inside a class** the earliest deadline goes first, fair among slaves: the second request of one slave waits until
-//!   every other slave has had its first.
+//! Classes by rank, and inside a class a round-robin of slaves with deadlines inside each round:
+//! - A **higher class** goes first. A Stop is never overtaken, and while one [holds the line](Readiness::holds_line), even
+//!   for its slave's pause, nothing else starts.
+//! - **Inside a class** requests go in rounds. Each slave has one request in a round, so that the second of one waits until
+//!   every other slave has had its first, whatever their deadlines are; one that has not asked for a while begins in the
+//!   present round and has saved nothing up. Inside a round the earliest deadline goes first.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
 //!   ten times as fast and goes first among what has aged: behind a stream of commands its drive would trip.
 //! - **Background** gets every twentieth turn when it would otherwise get none.
@@ -52,7 +54,7 @@ pub struct Entry<T> {
     pub arrived: Instant,
     /// What is to be done.
     pub work: T,
-    /// Its place inside its class: turn of its slave, then deadline, then order of arrival.
+    /// Its place inside its class: the round, then the deadline, then the order of arrival.
     rank: (u64, Instant, Ticket),
 }
 
@@ -98,10 +100,10 @@ pub struct Schedule<T> {
     rules: Rules,
     queued: Vec<Entry<T>>,
     next_ticket: u64,
-    /// The turn that each slave's last request got, by class.
-    turns: BTreeMap<(Class, u8), u64>,
-    /// The turn that each class is in.
-    turn: BTreeMap<Class, u64>,
+    /// The round that each slave's last request got, by class.
+    last_rounds: BTreeMap<(Class, u8), u64>,
+    /// The round that each class is in.
+    round: BTreeMap<Class, u64>,
     since_aged: u32,
     since_background: u32,
     /// Of each queued entry, while choosing.
@@ -116,8 +118,8 @@ impl<T> Schedule<T> {
             rules,
             queued: Vec::new(),
             next_ticket: 0,
-            turns: BTreeMap::new(),
-            turn: BTreeMap::new(),
+            last_rounds: BTreeMap::new(),
+            round: BTreeMap::new(),
             since_aged: 0,
             since_background: 0,
             readiness: Vec::new(),
@@ -187,18 +189,18 @@ impl<T> Schedule<T> {
     }
 
     fn rank(&mut self, now: Instant, slave: u8, terms: Terms, ticket: Ticket) -> (u64, Instant, Ticket) {
-        let current = self.turn.get(&terms.class).copied().unwrap_or_default();
-        let turn = match self.turns.get(&(terms.class, slave)) {
+        let current = self.round.get(&terms.class).copied().unwrap_or_default();
+        let round = match self.last_rounds.get(&(terms.class, slave)) {
             Some(last) => current.max(last + 1),
             None => current,
         };
-        self.turns.insert((terms.class, slave), turn);
+        self.last_rounds.insert((terms.class, slave), round);
         let deadline = terms.lifetime.unwrap_or(match terms.class {
             Class::Stop => Duration::ZERO,
             Class::Command | Class::KeepAlive | Class::Status => Duration::from_secs(1),
             Class::Background => Duration::from_secs(10),
         });
-        (turn, now.checked_add(deadline).unwrap_or(now), ticket)
+        (round, now.checked_add(deadline).unwrap_or(now), ticket)
     }
 
     /// Puts back what [`choose`](Self::choose) gave and was not sent after all, at its old place.
@@ -243,8 +245,8 @@ impl<T> Schedule<T> {
             Some(Best::Now(index)) => {
                 self.count_turn(now, index);
                 let entry = self.queued.swap_remove(index);
-                let turn = self.turn.entry(entry.terms.class).or_default();
-                *turn = (*turn).max(entry.rank.0);
+                let round = self.round.entry(entry.terms.class).or_default();
+                *round = (*round).max(entry.rank.0);
                 Choice::Send(entry)
             }
             Some(Best::At(at)) => Choice::Wait(at),

@@ -65,8 +65,10 @@ fn replay(
     feed: impl Fn(&mut Master<usize>, Instant, &[u8]),
 ) -> Vec<Result<Vec<u16>, String>> {
     let begin = Instant::now();
-    let mut master =
-        Master::new(LineConfig { retries: 0, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) });
+    let mut master = Master::new(
+        Instant::now(),
+        LineConfig { retries: 0, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) },
+    );
     master.handle_up(begin);
     let mut now = begin;
     let mut outcomes = Vec::new();

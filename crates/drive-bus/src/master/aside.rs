@@ -3,36 +3,15 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use drive_core::Class;
 use tokio::time::Instant;
 
-use super::{Flight, Job, Master, Purpose};
-use crate::{exchange::Failure, schedule::Entry};
-
-/// How long what may not overtake an exchange that was put aside waits until it is looked at again.
-const LOOK: Duration = Duration::from_millis(1);
+use super::{Flight, Master, Purpose};
+use crate::exchange::Failure;
 
 /// An exchange that waits.
 pub(super) struct Aside<C> {
     pub(super) flight: Flight<C>,
-    at: Instant,
-}
-
-impl<C> Aside<C> {
-    /// Whether this request is sent all the same: the write of a stop, whose slave is asked for nothing less.
-    fn gives_way_to(&self, entry: &Entry<Job<C>>) -> bool {
-        let call = match &self.flight.purpose {
-            Purpose::Call(call) => call.as_ref(),
-            Purpose::Probe | Purpose::Settle => None,
-        };
-        let stops = |entry: &Entry<Job<C>>| entry.terms.class == Class::Stop;
-        stops(entry) && entry.work.is_write && !call.is_some_and(stops)
-    }
-
-    /// Until when this request to the same slave waits for it.
-    pub(super) fn holds(&self, now: Instant, entry: &Entry<Job<C>>) -> Option<Instant> {
-        (!self.gives_way_to(entry)).then(|| self.at.max(now + LOOK))
-    }
+    pub(super) at: Instant,
 }
 
 impl<C> Master<C> {

@@ -12,7 +12,8 @@ impl<C> Master<C> {
         let heard_else = self.stats.foreign + self.stats.noise_bytes > 0
             || self.stations.values().any(|station| station.stats.has_heard_else());
         let shown = self.stations.values().filter_map(|station| station.timeout.short()).max();
-        let on_line = self.stations.iter().filter(|(slave, _)| **slave != 0 && !self.offline.contains(slave));
+        let on_line =
+            self.stations.iter().filter(|(slave, _)| **slave != 0 && !self.offline.contains(**slave));
         let timeouts = on_line.map(|(_, station)| match shown {
             Some(short) if !station.timeout.is_learned() => short.min(station.timeout.current()),
             _ => station.timeout.current(),

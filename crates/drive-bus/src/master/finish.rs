@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
 
-use super::{Flight, Job, Master, OFFLINE_STOP_REST, Purpose, Question, link::Link};
+use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
     answer, config,
     exchange::{Answer, Failure},
@@ -46,8 +46,8 @@ impl<C> Master<C> {
                     self.outcomes.push_back((entry.work.caller, outcome));
                 }
                 Err(failure) => {
-                    if entry.terms.class == Class::Stop && self.station(slave).stop_failed() {
-                        self.offline_stop_at = Some(now + took * OFFLINE_STOP_REST);
+                    if entry.terms.class == Class::Stop {
+                        self.offline.stop_failed(now, slave, took);
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
@@ -66,7 +66,7 @@ impl<C> Master<C> {
                     self.offline.len(),
                 );
             }
-            Purpose::Settle => {
+            Purpose::EchoRead => {
                 tracing::debug!(slave, echoes = self.exchange.echoes(), "adapter asked for its echo");
             }
         }
@@ -114,7 +114,8 @@ impl<C> Master<C> {
     }
 
     fn note_alive(&mut self, now: Instant, slave: u8) {
-        if self.station(slave).answered(now) {
+        self.station(slave).answered(now);
+        if self.offline.remove(slave) {
             self.welcome(now, slave);
         }
     }
@@ -146,7 +147,7 @@ impl<C> Master<C> {
             // Nothing of it can still come. One that does nothing but refuse is as good as away.
             Failure::Refused(_) => {
                 station.stats.outcomes.busy += 1;
-                if station.missed(now, &self.config, false) {
+                if self.missed(now, flight.slave, false) {
                     self.go_offline(now, flight.slave);
                 }
                 return;
@@ -155,7 +156,7 @@ impl<C> Master<C> {
             Failure::Timeout => station.stats.outcomes.timeouts += 1,
         }
         let goes_offline = *failure == Failure::Timeout
-            && station.missed(now, &self.config, flight.question == Question::Short);
+            && self.missed(now, flight.slave, flight.question == Question::Short);
         self.fear_late_answer(now, flight);
         if goes_offline {
             self.go_offline(now, flight.slave);
@@ -173,7 +174,7 @@ impl<C> Master<C> {
         // A slave that may take longer than the window to answer in time may take longer still to be late.
         let window = self.config.late_window.max(timeout * 3 / 2);
         let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
-        let lost = !matches!(self.link, Link::Up);
+        let lost = !matches!(self.port, PortState::Open);
         let from = if flight.stalled { now } else { sent };
         let doubt = &mut self.station(flight.slave).doubt;
         doubt.owe(now, flight.shape, from + window, lost);
@@ -182,10 +183,22 @@ impl<C> Master<C> {
         }
     }
 
+    /// A slave did not answer a question, `short` or not. True: it goes off-line with this.
+    fn missed(&mut self, now: Instant, slave: u8, short: bool) -> bool {
+        let backoff = self.config.probe_backoff;
+        let Some(station) = self.stations.get_mut(&slave) else { return false };
+        let is_lost = station.missed(&self.config, short);
+        if self.offline.missed_again(now, slave, backoff) || !is_lost {
+            return false;
+        }
+        station.stats.went_offline += 1;
+        self.offline.insert(now, slave, backoff.0);
+        true
+    }
+
     fn go_offline(&mut self, now: Instant, slave: u8) {
         tracing::debug!(slave, "slave off-line");
-        self.offline.insert(slave);
-        let at = self.station(slave).probe_at().unwrap_or(now);
+        let at = self.probe_at(slave).unwrap_or(now);
         let retry_in = self.probe_in(now, at);
         let waiting =
             self.schedule.withdraw_all(|entry| entry.slave == slave && entry.terms.class != Class::Stop);
@@ -198,7 +211,7 @@ impl<C> Master<C> {
     pub(super) fn fail(
         &mut self,
         now: Instant,
-        mut entry: Entry<Job<C>>,
+        mut entry: Entry<Asked<C>>,
         failure: Failure,
         waited: Duration,
     ) {
@@ -227,8 +240,8 @@ impl<C> Master<C> {
         }
     }
 
-    fn may_retry(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
-        let offline = self.stations.get(&entry.slave).is_some_and(|station| station.probe_at().is_some());
+    fn may_retry(&self, now: Instant, entry: &Entry<Asked<C>>) -> bool {
+        let offline = self.offline.contains(entry.slave);
         let edge = entry.work.is_write && entry.terms.effect == Effect::Edge;
         // A command sent again behind a stop would undo it.
         let stopped = entry.work.is_write
@@ -286,7 +299,7 @@ impl<C> Master<C> {
     }
 
     /// A request leaves the queue. What was sent before, and waited to be sent again, ends as that attempt did.
-    pub(super) fn drop_unsent(&mut self, entry: Entry<Job<C>>, error: PortError) {
+    pub(super) fn drop_unsent(&mut self, entry: Entry<Asked<C>>, error: PortError) {
         let outcomes = &mut self.station(entry.slave).stats.outcomes;
         match error {
             PortError::Expired => outcomes.expired += 1,

@@ -6,13 +6,15 @@ mod aside;
 mod bound;
 mod doubt;
 mod finish;
-mod link;
+mod offline;
+mod port;
 mod probing;
 mod send;
 mod station;
+mod waits;
 
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     sync::Arc,
     time::Duration,
 };
@@ -33,7 +35,8 @@ use crate::{
 };
 
 use aside::Aside;
-use link::Link;
+use offline::Offline;
+use port::PortState;
 use probing::{Probing, Question};
 use station::Station;
 
@@ -43,19 +46,15 @@ pub type Outcome = Result<Answer, PortError>;
 /// How long a request waits before it may take an aged turn.
 const AGING: Duration = Duration::from_secs(1);
 
-/// For each stop of a slave that is off-line, so many times as long on the line no other: they are repeated for as long as
-/// it is, and together they take a fifth. If all went ahead of everything, three dead drives would take the whole line from the living.
-const OFFLINE_STOP_REST: u32 = 4;
-
 /// The machine of one line. `C` is whoever waits for an answer.
 pub struct Master<C> {
     config: LineConfig,
     exchange: Box<dyn Exchange>,
-    schedule: Schedule<Job<C>>,
+    schedule: Schedule<Asked<C>>,
     /// Boxed, because a node of the map has room for eleven.
     stations: BTreeMap<u8, Box<Station>>,
     /// Those that do not answer: they are probed.
-    offline: BTreeSet<u8>,
+    offline: Offline,
     flight: Option<Flight<C>>,
     /// Exchanges whose slaves are not ready yet.
     aside: BTreeMap<u8, Aside<C>>,
@@ -65,7 +64,7 @@ pub struct Master<C> {
     /// What the port was given and has not confirmed yet.
     sending: Option<Sending>,
     outcomes: VecDeque<(C, Outcome)>,
-    link: Link,
+    port: PortState,
     far_end_paces: bool,
     closing: bool,
     /// End of the last activity on the line: computed for what we sent, observed for what we received.
@@ -80,8 +79,6 @@ pub struct Master<C> {
     probing: Probing,
     /// The lengths of the longest PDUs asked and likely answered so far.
     longest: (usize, usize),
-    /// No stop of a slave that is off-line before this.
-    offline_stop_at: Option<Instant>,
     /// When the schedule wants to be asked again.
     choose_at: Option<Instant>,
     opened_at: Option<Instant>,
@@ -89,7 +86,7 @@ pub struct Master<C> {
 }
 
 /// What is asked, and by whom.
-struct Job<C> {
+struct Asked<C> {
     request: Arc<Request<'static>>,
     pdu: Bytes,
     shape: Shape,
@@ -97,7 +94,7 @@ struct Job<C> {
     caller: C,
     attempts: u32,
     /// The adapter was asked for its echo on behalf of this request.
-    settled: bool,
+    echo_was_read: bool,
     /// The slave refuses to read more along.
     asked_longer: bool,
     /// What became of the last attempt.
@@ -143,39 +140,38 @@ struct Sent {
 
 enum Purpose<C> {
     /// Somebody's call; `None` once he has dropped it.
-    Call(Option<Entry<Job<C>>>),
+    Call(Option<Entry<Asked<C>>>),
     /// Whether an off-line slave is back.
     Probe,
     /// Whether the adapter echoes.
-    Settle,
+    EchoRead,
 }
 
 impl<C> Master<C> {
-    /// A line whose port is not open yet.
+    /// A line whose port is not open yet at `now`.
     #[must_use]
-    pub fn new(config: LineConfig) -> Self {
+    pub fn new(now: Instant, config: LineConfig) -> Self {
         let mut master = Self {
             exchange: exchange::of(&config),
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
-            offline: BTreeSet::new(),
+            offline: Offline::default(),
             flight: None,
             aside: BTreeMap::new(),
             resumed: false,
             to_send: None,
             sending: None,
             outcomes: VecDeque::new(),
-            link: Link::Opening,
+            port: PortState::Opening,
             far_end_paces: true,
             closing: false,
-            quiet_from: Instant::now(),
+            quiet_from: now,
             heard: None,
             called_at: None,
-            exchange_end: Instant::now(),
+            exchange_end: now,
             last_slave: None,
             probing: Probing::default(),
             longest: (0, 0),
-            offline_stop_at: None,
             choose_at: None,
             opened_at: None,
             stats: Stats::default(),
@@ -223,20 +219,20 @@ impl<C> Master<C> {
             self.clear_the_way(now, slave);
         }
         let shape = self.exchange.shape(&pdu);
-        let job = Job {
+        let asked = Asked {
             request,
             pdu,
             shape,
             is_write,
             caller,
             attempts: 0,
-            settled: false,
+            echo_was_read: false,
             asked_longer: false,
             last: None,
         };
         let (ticket, replaced) = self
             .schedule
-            .push(now, slave, terms, job)
+            .push(now, slave, terms, asked)
             .map_err(|_| PortError::QueueFull(self.schedule.len()))?;
         for old in replaced {
             self.drop_unsent(old, PortError::Superseded);
@@ -268,14 +264,13 @@ impl<C> Master<C> {
             )));
         }
         self.exchange.carries(slave, request, terms.class).map_err(PortError::NotCarried)?;
-        if let Link::Down(reason) = &self.link {
+        if let PortState::Down(reason) = &self.port {
             return Err(PortError::LineDown(reason.clone()));
         }
         let is_write = self.exchange.is_write(request);
-        let station = self.station(slave);
-        station.ask(now, request, is_write);
+        self.station(slave).ask(now, request, is_write);
         if terms.class != Class::Stop
-            && let Some(at) = station.probe_at()
+            && let Some(at) = self.probe_at(slave)
         {
             return Err(PortError::Offline { retry_in: self.probe_in(now, at) });
         }
@@ -291,7 +286,7 @@ impl<C> Master<C> {
             self.drop_unsent(entry, PortError::Superseded);
         }
         // A repetition that waits for its share of the line is worth no probe.
-        if self.station(slave).was_stopped_in_vain() && self.offline_stop_at.is_some_and(|at| at > now) {
+        if self.offline.stop_at(slave).is_some_and(|at| at > now) {
             return;
         }
         let Some(flight) = self.flight.take_if(|flight| matches!(flight.purpose, Purpose::Probe)) else {
@@ -300,7 +295,7 @@ impl<C> Master<C> {
         self.exchange.abandon();
         self.to_send = None;
         self.fear_late_answer(now, &flight);
-        self.station(flight.slave).probe_again(now);
+        self.offline.probe_again(now, flight.slave);
         self.quiet_from = self.quiet_from.max(now);
         self.exchange_end = self.quiet_from;
     }
@@ -434,7 +429,8 @@ impl<C> Master<C> {
         };
         let late = confuses && station.doubt.heard(now, shape, is_request);
         if late {
-            station.heard_late(now);
+            station.heard_late();
+            self.offline.hope(now, slave);
         }
         match asked {
             _ if late => station.stats.late += 1,
@@ -476,6 +472,7 @@ impl<C> Master<C> {
             .map(|(slave, station)| {
                 let mut stats = station.stats.clone();
                 stats.response_timeout = station.timeout.current();
+                stats.offline = self.offline.contains(*slave);
                 (*slave, stats)
             })
             .collect();

@@ -5,13 +5,13 @@
 //! that. Questions in vain take from 2 to 10 % of the line, the more the more slaves are lost; on an idle line they are
 //! free. Where one comes back its neighbours are asked next: power comes back by the cabinet.
 
-use std::{collections::BTreeSet, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{AGING, Master, Purpose};
+use super::{AGING, Master, Purpose, offline::Offline};
 
 /// What short questions in vain may take of a line that is needed, in thousandths: when as few or as many are lost.
 const FEW: (usize, u32) = (3, 14);
@@ -61,9 +61,8 @@ impl Probing {
     }
 
     /// A slave is back: the next that are lost on both sides of it are asked first.
-    fn is_back(&mut self, slave: u8, lost: &BTreeSet<u8>) -> impl Iterator<Item = u8> + use<> {
-        let neighbours =
-            [lost.range(..slave).next_back(), lost.range(slave..).next()].map(Option::<&u8>::copied);
+    fn is_back(&mut self, slave: u8, lost: &Offline) -> impl Iterator<Item = u8> + use<> {
+        let neighbours = lost.neighbours(slave);
         for neighbour in neighbours.into_iter().flatten() {
             self.first.retain(|first| *first != neighbour);
             self.first.insert(0, neighbour);
@@ -106,18 +105,30 @@ impl<C> Master<C> {
 
     /// Whom to probe and when, if the line were his.
     fn soonest(&self, now: Instant, idle: bool) -> Option<(u8, Instant)> {
-        let at = |slave: &u8| self.stations.get(slave)?.wanted_probe_at(idle, &self.config);
-        let asks = |slave: &&u8| self.offline.contains(slave) && !self.aside.contains_key(slave);
-        let first = self.probing.first.iter().filter(asks);
-        let first = first.filter_map(|slave| Some((*slave, at(slave)?))).find(|(_, at)| *at <= now);
-        let all = || {
-            self.offline
-                .iter()
-                .filter(asks)
-                .filter_map(|slave| Some((*slave, at(slave)?)))
-                .min_by_key(|(_, at)| *at)
+        let wanted = |slave: u8| {
+            let free = !self.aside.contains_key(&slave);
+            let at = self.wanted_probe_at(slave, idle).filter(|_| free)?;
+            Some((slave, at))
         };
-        first.or_else(all)
+        let first = self.probing.first.iter().filter_map(|slave| wanted(*slave)).find(|(_, at)| *at <= now);
+        first.or_else(|| self.offline.slaves().filter_map(wanted).min_by_key(|(_, at)| *at))
+    }
+
+    /// When a slave that is off-line is asked next.
+    pub(super) fn probe_at(&self, slave: u8) -> Option<Instant> {
+        let at = self.offline.probe_at(slave)?;
+        self.stations.get(&slave)?.doubt.over().max(Some(at))
+    }
+
+    /// The same, as long as somebody cares. On an `idle` line no probe waits longer than the first.
+    fn wanted_probe_at(&self, slave: u8, idle: bool) -> Option<Instant> {
+        let at = if idle {
+            self.offline.idle_probe_at(slave, self.config.probe_backoff.0)?
+        } else {
+            self.offline.probe_at(slave)?
+        };
+        let station = self.stations.get(&slave)?;
+        station.doubt.over().max(Some(at)).filter(|at| station.is_wanted(*at))
     }
 
     /// How long it takes until the slave that is off-line and due at `at` is probed, as far as is known.
@@ -129,9 +140,8 @@ impl<C> Master<C> {
 
     /// A slave that was off-line answers.
     pub(super) fn welcome(&mut self, now: Instant, slave: u8) {
-        self.offline.remove(&slave);
         for neighbour in self.probing.is_back(slave, &self.offline) {
-            self.station(neighbour).hope(now);
+            self.offline.hope(now, neighbour);
         }
         tracing::debug!(slave, "slave answers again");
     }
@@ -214,12 +224,15 @@ mod tests {
     #[test]
     fn the_neighbours_of_what_is_back_are_asked_first_the_upper_before_the_lower() {
         let mut probing = Probing::default();
-        let lost = BTreeSet::from([3, 4, 9, 12]);
+        let now = Instant::now();
+        let mut lost = Offline::default();
+        for slave in [3, 4, 9, 12] {
+            lost.insert(now, slave, MS);
+        }
         assert_eq!(probing.is_back(5, &lost).collect::<Vec<_>>(), [4, 9]);
         assert_eq!(probing.first, [9, 4]);
         assert_eq!(probing.is_back(13, &lost).collect::<Vec<_>>(), [12]);
         assert_eq!(probing.first, [12, 9, 4]);
-        let now = Instant::now();
         probing.begin(now, 9, false, MS);
         assert_eq!(probing.first, [12, 4]);
     }

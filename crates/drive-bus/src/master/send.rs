@@ -8,10 +8,10 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use super::{
-    Flight, Job, Master, Purpose, Sending, Sent,
-    link::Link,
+    Asked, Flight, Master, Purpose, Sending, Sent,
+    port::PortState,
     probing,
-    station::{shape_of, wants_settling},
+    waits::{Waits, shape_of, wants_echo_read},
 };
 use crate::{
     answer, pdu,
@@ -35,7 +35,7 @@ impl<C> Master<C> {
 
     fn next_exchange(&mut self, now: Instant) -> Option<Bytes> {
         self.choose_at = None;
-        if self.flight.is_some() || !matches!(self.link, Link::Up) {
+        if self.flight.is_some() || !matches!(self.port, PortState::Open) {
             return None;
         }
         let aside = self.next_aside();
@@ -43,9 +43,10 @@ impl<C> Master<C> {
             return None;
         }
         let free_at = self.free_at();
-        let waits_long = |entry: &Entry<Job<C>>| self.waits_long(now, entry);
-        let stop_at =
-            self.schedule.first_stop(|entry| !waits_long(entry)).map(|since| self.stop_free_at(since));
+        let Self { exchange, stations, aside: waiting, offline, .. } = &*self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline };
+        let stop_since = self.schedule.first_stop(|entry| waits.until(now, entry).is_none());
+        let stop_at = stop_since.map(|since| self.stop_free_at(since));
         let probe = self.next_probe(now).filter(|_| stop_at.is_none() && !self.closing);
         let soonest = stop_at.unwrap_or(free_at);
         if now < soonest {
@@ -77,8 +78,9 @@ impl<C> Master<C> {
         None
     }
 
-    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Job<C>> {
-        let Self { schedule, stations, aside, config, last_slave, exchange, offline_stop_at, .. } = self;
+    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Asked<C>> {
+        let Self { schedule, stations, aside, config, last_slave, exchange, offline, .. } = self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline };
         schedule.choose(now, |entry| {
             let stop = entry.terms.class == Class::Stop;
             let mut at = stop_at.filter(|_| stop).unwrap_or(free_at);
@@ -90,29 +92,15 @@ impl<C> Master<C> {
                 at = stations.values().filter_map(|station| station.ready_at).fold(at, Instant::max);
             }
             let request = &entry.work.request;
-            let mut takes = config.response_timeout;
-            let mut long = None;
-            if let Some(station) = stations.get(&entry.slave) {
-                at = at.max(station.ready_at.unwrap_or(at));
-                long = station.held_until(now, exchange.as_ref(), entry, *offline_stop_at);
-                let aside = aside.get(&entry.slave).and_then(|aside| aside.holds(now, entry));
-                long = long.max(aside);
-                at = at.max(long.unwrap_or(at));
-                takes = station.timeout.typical();
-            }
+            let station = stations.get(&entry.slave);
+            at = station.and_then(|station| station.ready_at).map_or(at, |ready_at| at.max(ready_at));
+            let mut takes = station.map_or(config.response_timeout, |station| station.timeout.typical());
+            let waits = waits.until(now, entry);
+            at = waits.map_or(at, |until| at.max(until));
             let pdus = (entry.work.pdu.len(), answer::likely_len(request));
             takes += config.characters(config.request_len(pdus.0) + config.answer_len(pdus.1));
-            Readiness { at, takes, holds_line: stop && long.is_none() }
+            Readiness { at, takes, holds_line: stop && waits.is_none() }
         })
-    }
-
-    /// Whether a Stop has to wait for longer than its slave's pause, so that the line is free for others meanwhile.
-    fn waits_long(&self, now: Instant, entry: &Entry<Job<C>>) -> bool {
-        let aside = self.aside.get(&entry.slave);
-        aside.is_some_and(|aside| aside.holds(now, entry).is_some())
-            || self.stations.get(&entry.slave).is_some_and(|station| {
-                station.held_until(now, self.exchange.as_ref(), entry, self.offline_stop_at).is_some()
-            })
     }
 
     /// When the silence before any request is over.
@@ -141,12 +129,12 @@ impl<C> Master<C> {
         }
     }
 
-    fn begin(&mut self, now: Instant, mut entry: Entry<Job<C>>) -> Option<Bytes> {
+    fn begin(&mut self, now: Instant, mut entry: Entry<Asked<C>>) -> Option<Bytes> {
         let slave = entry.slave;
-        if wants_settling(self.exchange.as_ref(), &entry) && self.may_settle(now, slave) {
-            entry.work.settled = true;
+        if wants_echo_read(self.exchange.as_ref(), &entry) && self.may_read_echo(now, slave) {
+            entry.work.echo_was_read = true;
             self.schedule.put_back(entry);
-            return self.begin_read(now, slave, Purpose::Settle);
+            return self.begin_read(now, slave, Purpose::EchoRead);
         }
         self.called_at = Some(now);
         if entry.work.attempts == 0 && entry.work.last.is_none() {
@@ -169,7 +157,7 @@ impl<C> Master<C> {
 
     /// Whether no late answer can be taken for that of the read that finds out about the echo. Only a Stop comes here
     /// while one can: it is sent as it is, and asks before its next attempt.
-    fn may_settle(&self, now: Instant, slave: u8) -> bool {
+    fn may_read_echo(&self, now: Instant, slave: u8) -> bool {
         let Some(station) = self.stations.get(&slave) else { return true };
         let read = shape_of(self.exchange.as_ref(), &station.harmless_read());
         station.doubt.wait(now, read).is_none()

@@ -23,7 +23,7 @@ pub(crate) struct ByHand {
 impl ByHand {
     /// A line whose port has been open for a while.
     pub(crate) fn new(config: LineConfig) -> Self {
-        let mut master = Master::new(config.clone());
+        let mut master = Master::new(Instant::now(), config.clone());
         let now = Instant::now() + Duration::from_secs(1);
         master.handle_up(now);
         Self { master, now: now + Duration::from_secs(1), config }

@@ -103,7 +103,7 @@ pub(crate) fn word(slave: u8, address: u16) -> u16 {
 impl Rig {
     pub(crate) fn new(seed: u64, config: LineConfig) -> Self {
         let start = Instant::now();
-        let mut master = Master::new(config.clone());
+        let mut master = Master::new(start, config.clone());
         master.handle_up(start);
         Self {
             master,

@@ -152,7 +152,7 @@ pub(crate) fn config(settings: UniTelwaySettings) -> LineConfig {
 impl Telway {
     pub(crate) fn new(seed: u64, config: LineConfig, habits: impl IntoIterator<Item = Habits>) -> Self {
         let start = Instant::now();
-        let mut master = Master::new(config);
+        let mut master = Master::new(start, config);
         master.handle_up(start);
         let slave = |habits| Slave { habits, outbox: VecDeque::new(), awaits_word: false };
         Self {

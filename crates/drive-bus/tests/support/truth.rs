@@ -100,7 +100,7 @@ fn truth(slave: u8, number: u64, count: u8) -> impl Iterator<Item = u16> {
 impl TruthLine {
     pub(crate) fn new(seed: u64, config: LineConfig, faults: Faults) -> Self {
         let now = Instant::now();
-        let mut master = Master::new(config.clone());
+        let mut master = Master::new(now, config.clone());
         master.handle_up(now);
         let mbap = config.protocol == Protocol::Tcp;
         let paced = config.far_end_paces == Some(true);

@@ -8,9 +8,9 @@ use tokio::time::Instant;
 use super::Master;
 
 /// The state of the port.
-pub(super) enum Link {
+pub(super) enum PortState {
     /// The port is open.
-    Up,
+    Open,
     /// It was lost a moment ago, or is being opened for the first time: what waits goes on waiting.
     Opening,
     /// It cannot be opened: nothing is accepted.
@@ -21,7 +21,7 @@ impl<C> Master<C> {
     /// The port is open.
     pub fn handle_up(&mut self, now: Instant) {
         tracing::debug!(endpoint = ?self.config.endpoint, "line up");
-        self.link = Link::Up;
+        self.port = PortState::Open;
         self.exchange.reset();
         self.quiet_from = now;
         self.exchange_end = now;
@@ -32,7 +32,7 @@ impl<C> Master<C> {
     /// The port is lost. What waits goes on waiting.
     pub fn handle_lost(&mut self, now: Instant, reason: &str) {
         tracing::debug!(endpoint = ?self.config.endpoint, reason, "line lost");
-        self.link = Link::Opening;
+        self.port = PortState::Opening;
         self.stats.lost += 1;
         self.exchange.reset();
         self.fail_flight(now, reason);
@@ -41,7 +41,7 @@ impl<C> Master<C> {
 
     /// The port cannot be opened. What waits without a lifetime ends; what has one expires.
     pub fn handle_down(&mut self, reason: &str) {
-        if let Link::Opening = mem::replace(&mut self.link, Link::Down(reason.to_owned())) {
+        if let PortState::Opening = mem::replace(&mut self.port, PortState::Down(reason.to_owned())) {
             tracing::debug!(endpoint = ?self.config.endpoint, reason, "line down");
         }
         for entry in self.schedule.withdraw_all(|entry| entry.terms.lifetime.is_none()) {

@@ -1,0 +1,70 @@
+//! Until when a request waits besides the silences and its slave's pause, and which stops the line waits for.
+//!
+//! A request waits for the latest of these:
+//! - the **exchange with its slave that was put aside** goes on. The write of a stop ends that instead, unless it is a
+//!   stop's itself;
+//! - no **answer that may still come** could be taken for its own, nor for that of the read which asks the adapter for its
+//!   echo on its behalf. The write of a stop waits for neither;
+//! - the stop of a slave that is off-line, once it was sent in vain, for **its share of the line**.
+//!
+//! A stop that waits for none of them **holds the line**: nothing less urgent starts, not in its slave's pause either. One
+//! that has to wait lets the others go first.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use drive_core::Class;
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+use super::{Asked, Purpose, aside::Aside, offline::Offline, station::Station};
+use crate::{answer, exchange::Exchange, pdu, schedule::Entry, shape::Shape};
+
+/// How long what may not overtake an exchange that was put aside waits until it is looked at again: less than a poll of
+/// UNI-TELWAY takes, so that nothing is late for it.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// What the rule looks at.
+pub(super) struct Waits<'a, C> {
+    pub(super) exchange: &'a dyn Exchange,
+    pub(super) stations: &'a BTreeMap<u8, Box<Station>>,
+    pub(super) aside: &'a BTreeMap<u8, Aside<C>>,
+    pub(super) offline: &'a Offline,
+}
+
+impl<C> Waits<'_, C> {
+    /// Until when it waits. `None`: for nothing.
+    pub(super) fn until(&self, now: Instant, entry: &Entry<Asked<C>>) -> Option<Instant> {
+        let is_stop = entry.terms.class == Class::Stop;
+        let goes_at_once = is_stop && entry.work.is_write;
+        let aside = self.aside.get(&entry.slave).filter(|aside| !(goes_at_once && !aside.is_stop()));
+        let aside = aside.map(|aside| aside.at.max(now + LOOK));
+        let station = self.stations.get(&entry.slave);
+        let doubt = station.filter(|_| !goes_at_once).and_then(|station| {
+            let read = wants_echo_read(self.exchange, entry)
+                .then(|| shape_of(self.exchange, &station.harmless_read()));
+            station.place(now, entry).1.max(read.and_then(|read| station.doubt.wait(now, read)))
+        });
+        let share = self.offline.stop_at(entry.slave).filter(|_| is_stop);
+        aside.max(doubt).max(share).filter(|until| *until > now)
+    }
+}
+
+impl<C> Aside<C> {
+    /// Whether it is the exchange of a stop.
+    fn is_stop(&self) -> bool {
+        matches!(&self.flight.purpose, Purpose::Call(Some(entry)) if entry.terms.class == Class::Stop)
+    }
+}
+
+/// The shape of the answer to `request`.
+pub(super) fn shape_of(exchange: &dyn Exchange, request: &Request<'_>) -> Shape {
+    exchange.shape(&pdu::encode(request).unwrap_or_default())
+}
+
+/// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.
+pub(super) fn wants_echo_read<C>(exchange: &dyn Exchange, entry: &Entry<Asked<C>>) -> bool {
+    exchange.echo_is_unknown()
+        && !entry.work.echo_was_read
+        && entry.slave != 0
+        && answer::equals_its_request(&entry.work.request)
+}
