@@ -6,10 +6,10 @@ use std::{hint::black_box, sync::Arc, time::Duration};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use drive_bus::{
     Echo, LineConfig, answer,
-    exchange::{Exchange, rtu, rtu::Rtu},
+    exchange::{Machine, rtu, rtu::Rtu},
     master::Master,
     pdu,
-    schedule::{Choice, Readiness, Rules, Schedule},
+    schedule::{Chosen, Readiness, Rules, Schedule},
 };
 use drive_core::{Class, Terms, serial::SerialSettings};
 use tokio::time::Instant;
@@ -73,8 +73,8 @@ fn schedule(criterion: &mut Criterion) {
                 takes: Duration::from_millis(20),
                 holds_line: false,
             }) {
-                Choice::Send(entry) => entry.work,
-                Choice::Wait(_) | Choice::Idle => 0,
+                Chosen::Send(entry) => entry.work,
+                Chosen::Wait(_) | Chosen::Idle => 0,
             },
             BatchSize::SmallInput,
         );

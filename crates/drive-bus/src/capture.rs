@@ -22,7 +22,8 @@ pub use self::pcapng::{ReadError, Writer, read};
 
 use crate::{config::LineConfig, protocol::Protocol};
 
-/// How many frames may wait for a slow disk before the next are left out.
+/// How many frames may wait for a slow disk before the next are left out: those of a minute at 19200 bit/s, and less than
+/// 2 MiB.
 const BACKLOG: usize = 4_096;
 
 /// Who sent a frame.

@@ -16,7 +16,7 @@
 //! println!("ETA {:04X}h", state_word[0]);
 //!
 //! let mut all: Context = line.broadcast().into();
-//! all.write_single_register(8501, 0).await??; // returns after the turnaround, nobody answers
+//! all.write_single_register(8501, 0).await??; // returns after the pause, nobody answers
 //! line.close().await;
 //! # Ok(())
 //! # }
@@ -41,10 +41,10 @@
 //!
 //! What the line sees to:
 //! - **silences**: 3.5 characters of the real character length before each request, each slave's own pause
-//!   ([`SlaveSettings::turnaround`]), [`LineConfig::slave_change_gap`], the turnaround after a broadcast;
+//!   ([`SlaveSettings::turnaround`]), [`LineConfig::slave_change_gap`], the pause after a broadcast;
 //! - **the right answer**: every answer is checked against its request; late, foreign, damaged and echoed frames are
 //!   recognised and counted, never returned;
-//! - **order**: the classes of [`drive_core::Class`], see [`schedule`];
+//! - **order**: the classes of [`drive_core::Class`]; inside one, every slave in turn and the earliest deadline first;
 //! - **slaves that do not answer**: timeouts learned per slave, fast failure while off-line, probes;
 //! - **the port**: opened again when it was lost.
 //!
@@ -53,28 +53,38 @@
 //! [`PortError`](drive_core::PortError) inside `tokio_modbus::Error::Transport`;
 //! [`PortError::from_modbus`](drive_core::PortError::from_modbus) takes it out.
 //!
+//! A slave is what the Modbus Organization calls a server, and Modbus TCP a unit.
+//!
 //! # Inside
-//! [`exchange`], [`schedule`] and [`master`] are pure: no clock, no port. One task per line reads, writes and waits.
+//! What decides is pure: no clock, no port. One task per line reads, writes and waits. The modules that are hidden here
+//! are public for the tests and measurements of this workspace; they change with any version.
 
 /// The examples of the README, which compile.
 #[cfg(all(doctest, feature = "serial"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+#[doc(hidden)]
 pub mod answer;
 pub mod capture;
 pub mod config;
+#[doc(hidden)]
 pub mod exchange;
 mod line;
+#[doc(hidden)]
 pub mod master;
+#[doc(hidden)]
 pub mod pdu;
 pub mod protocol;
+#[doc(hidden)]
 pub mod schedule;
+#[doc(hidden)]
 pub mod shape;
 mod shared;
 mod slave;
 pub mod stats;
 mod task;
+#[doc(hidden)]
 pub mod timeout;
 mod transport;
 #[cfg(feature = "unitelway")]

@@ -91,7 +91,7 @@ impl Line {
         Slave::new(Arc::clone(&self.handle), address)
     }
 
-    /// All slaves at once: writes return after [`LineConfig::broadcast_turnaround`] with a confirmation made up by the
+    /// All slaves at once: writes return after [`LineConfig::broadcast_pause`] with a confirmation made up by the
     /// line, because nobody answers a broadcast; reads are refused with
     /// [`PortError::NotCarried`](drive_core::PortError::NotCarried).
     #[must_use]

@@ -74,7 +74,7 @@ impl Protocol {
     }
 
     /// The silence before any request: t3.5 in RTU. The other protocols need none to tell frames apart; a slave needs it
-    /// to let go of the line, and gets a character's time in ASCII and the link's turnaround in UNI-TELWAY.
+    /// to let go of the line, and gets a character's time in ASCII and its own silence in UNI-TELWAY.
     #[must_use]
     pub const fn silence(&self, serial: SerialSettings) -> Duration {
         match self {
@@ -84,7 +84,7 @@ impl Protocol {
             #[cfg(feature = "ascii")]
             Self::Ascii(_) => serial.bits(serial.format().bits()),
             #[cfg(feature = "unitelway")]
-            Self::UniTelway(settings) => serial.bits(settings.turnaround_bits),
+            Self::UniTelway(settings) => serial.bits(settings.silence_bits),
         }
     }
 

@@ -19,10 +19,11 @@ use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
 use drive_core::{Class, Terms};
 use tokio::time::Instant;
 
-/// At most every so-many-th turn goes to what has aged.
+/// At most every so-many-th turn goes to what has aged: a stream of commands keeps three quarters of the line.
 const AGED_TURN: u32 = 4;
 
-/// A keep-alive ages so many times as fast as anything else.
+/// A keep-alive ages so many times as fast as anything else: after 0.1 s, where the watchdogs of these drives have
+/// seconds as delivered.
 const KEEP_ALIVE_AGING: u32 = 10;
 
 /// At least every so-many-th turn goes to Background while some waits: 5 %.
@@ -79,7 +80,7 @@ pub struct Readiness {
 
 /// What to do next.
 #[derive(Debug)]
-pub enum Choice<T> {
+pub enum Chosen<T> {
     /// Send this.
     Send(Entry<T>),
     /// Choose again at this time, or when something arrives.
@@ -238,7 +239,7 @@ impl<T> Schedule<T> {
     }
 
     /// Chooses what is sent next at `now`; `readiness` says when each entry could be.
-    pub fn choose(&mut self, now: Instant, readiness: impl FnMut(&Entry<T>) -> Readiness) -> Choice<T> {
+    pub fn choose(&mut self, now: Instant, readiness: impl FnMut(&Entry<T>) -> Readiness) -> Chosen<T> {
         self.readiness.clear();
         self.readiness.extend(self.queued.iter().map(readiness));
         match self.best(now) {
@@ -247,10 +248,10 @@ impl<T> Schedule<T> {
                 let entry = self.queued.swap_remove(index);
                 let round = self.round.entry(entry.terms.class).or_default();
                 *round = (*round).max(entry.rank.0);
-                Choice::Send(entry)
+                Chosen::Send(entry)
             }
-            Some(Best::At(at)) => Choice::Wait(at),
-            None => Choice::Idle,
+            Some(Best::At(at)) => Chosen::Wait(at),
+            None => Chosen::Idle,
         }
     }
 

@@ -24,20 +24,23 @@ use crate::{
     transport::{BoxedStream, Connector, OpenError, Opening, poll_read_now},
 };
 
-/// How long a frame may wait for room in the system's buffer. A port that takes none for so long is as good as gone.
+/// How long a frame may wait for room in the system's buffer. That has room for many frames and is empty when one is sent,
+/// so that a port which takes none for a second is as good as gone; a stop must not wait for it longer.
 const WRITE_LIMIT: Duration = Duration::from_secs(1);
 
-/// How often a port that gives bytes without end is read before anything else is done.
+/// How often a port that gives bytes without end is read before anything else is done: 8 KiB, twice what Linux keeps for a
+/// terminal, so that what lay there is taken and no babbler keeps the line from deciding.
 const MOST_READS: u32 = 16;
 
-/// First and longest time between two attempts to open the port again.
+/// First and longest time between two attempts to open the port again: soon enough for whoever has put the plug back, and
+/// seldom enough for a port that is away for a week.
 const REOPEN_BACKOFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
 
 pub(crate) struct Task {
     shared: Arc<Shared>,
     endpoint: Endpoint,
     connector: Connector,
-    port: Port,
+    port: Connection,
     timer: Timer,
     watch: Option<Watch>,
     /// When the answer that is awaited is worth being awake for.
@@ -49,7 +52,7 @@ pub(crate) struct Task {
     ended: Vec<(Caller, Outcome)>,
 }
 
-enum Port {
+enum Connection {
     Open(BoxedStream),
     Opening(Opening<OpenError>),
     Waiting(Instant),
@@ -75,9 +78,9 @@ impl Task {
         let port = match stream {
             Some(stream) => {
                 up(&shared, &config.endpoint);
-                Port::Open(stream)
+                Connection::Open(stream)
             }
-            None => Port::Waiting(Instant::now()),
+            None => Connection::Waiting(Instant::now()),
         };
         Self {
             shared,
@@ -102,7 +105,7 @@ impl Task {
                 Event::Received(Err(error)) => self.lose(&error.to_string()),
                 Event::Opened(Ok(stream)) => {
                     up(&self.shared, &self.endpoint);
-                    self.port = Port::Open(stream);
+                    self.port = Connection::Open(stream);
                 }
                 Event::Opened(Err(error)) => {
                     self.shared.master().handle_down(&error.to_string());
@@ -141,7 +144,7 @@ impl Task {
                 }
                 return (!finished).then_some(deadline);
             };
-            let Port::Open(stream) = &mut self.port else { return Some(deadline) };
+            let Connection::Open(stream) = &mut self.port else { return Some(deadline) };
             match write(stream, &frame).await {
                 Ok(()) => {
                     let now = Instant::now();
@@ -167,7 +170,7 @@ impl Task {
             let (now, master) = (Instant::now(), self.shared.master());
             (master.is_over(now), master.may_send())
         };
-        let Port::Open(_) = self.port else { return };
+        let Connection::Open(_) = self.port else { return };
         if is_over || (may_send && self.endpoint.is_connection()) {
             // The runtime itself may have been away, or has not looked at the port since the last answer.
             yield_now().await;
@@ -175,7 +178,7 @@ impl Task {
             return;
         }
         for _ in 0..MOST_READS {
-            let Port::Open(stream) = &mut self.port else { return };
+            let Connection::Open(stream) = &mut self.port else { return };
             // Whoever waits for more asks again.
             let mut context = Context::from_waker(Waker::noop());
             match poll_read_now(stream.as_mut(), &mut context, &mut self.received) {
@@ -200,12 +203,12 @@ impl Task {
 
     async fn next_event(&mut self, deadline: Option<Instant>) -> Event {
         let Self { shared, connector, port, timer, watch, awake, received, .. } = self;
-        if let Port::Waiting(until) = port
+        if let Connection::Waiting(until) = port
             && *until <= Instant::now()
         {
-            *port = connector.connect().map_or(Port::Gone, Port::Opening);
+            *port = connector.connect().map_or(Connection::Gone, Connection::Opening);
         }
-        let open_at = if let Port::Waiting(until) = port { Some(*until) } else { None };
+        let open_at = if let Connection::Waiting(until) = port { Some(*until) } else { None };
         let wake_at = [deadline, open_at].into_iter().flatten().min();
         let watched = awake.as_ref().map(|awake| awake.start);
         let watched = watched.filter(|start| wake_at.is_none_or(|wake_at| *start < wake_at));
@@ -219,7 +222,9 @@ impl Task {
                 (None, None) => Poll::Pending,
             }) => {}
         }
-        let (Some(watch), Port::Open(stream), Some(_)) = (watch, port, watched) else { return Event::Woken };
+        let (Some(watch), Connection::Open(stream), Some(_)) = (watch, port, watched) else {
+            return Event::Woken;
+        };
         let began = Instant::now();
         let event = tokio::select! {
             biased;
@@ -237,19 +242,19 @@ impl Task {
         let now = Instant::now();
         self.shared.master().handle_lost(now, reason);
         self.port = if self.backoff > REOPEN_BACKOFF.0 {
-            Port::Waiting(now + self.backoff)
+            Connection::Waiting(now + self.backoff)
         } else if let Some(opening) = self.connector.connect() {
             // The first attempt is made at once: a plug that was pulled and put back, a server that started anew.
-            Port::Opening(opening)
+            Connection::Opening(opening)
         } else {
             self.shared.master().handle_down(reason);
-            Port::Gone
+            Connection::Gone
         };
         self.lengthen_backoff();
     }
 
     fn wait_to_open(&mut self) {
-        self.port = Port::Waiting(Instant::now() + self.backoff);
+        self.port = Connection::Waiting(Instant::now() + self.backoff);
         self.lengthen_backoff();
     }
 
@@ -308,10 +313,10 @@ async fn read_awake(
     }
 }
 
-async fn port_event(port: &mut Port, received: &mut [u8]) -> Event {
+async fn port_event(port: &mut Connection, received: &mut [u8]) -> Event {
     match port {
-        Port::Open(stream) => Event::Received(stream.read(received).await),
-        Port::Opening(opening) => Event::Opened(opening.await),
-        Port::Waiting(_) | Port::Gone => std::future::pending().await,
+        Connection::Open(stream) => Event::Received(stream.read(received).await),
+        Connection::Opening(opening) => Event::Opened(opening.await),
+        Connection::Waiting(_) | Connection::Gone => std::future::pending().await,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// What the clock of a computer adds to any measured time.
+/// What the clock and the scheduler of a computer add to any measured time, the G of RFC 6298: a few ticks of 1 ms.
 const GRANULARITY: Duration = Duration::from_millis(5);
 
 /// A response timeout: from the end of a request to the first character of its answer.

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use drive_bus::{
     Echo, Line, LineConfig, Protocol,
     exchange::{
-        Exchange, Failure, Step, Stray,
+        Failure, Machine, Step, Stray,
         ascii::{Ascii, AsciiSettings, frame},
     },
 };

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use drive_bus::{
     Echo, LineConfig,
-    exchange::{Exchange, Step, mbap::Mbap, rtu},
+    exchange::{Machine, Step, mbap::Mbap, rtu},
 };
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
 use support::{

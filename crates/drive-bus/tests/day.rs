@@ -162,7 +162,7 @@ fn the_bound_of_a_stop_grows_with_what_may_be_in_front_of_it() {
     assert!(config().worst_case_stop(5, 253) > short);
     assert!(LineConfig { response_timeout: SECOND, ..config() }.worst_case_stop(5, 18) > short + 400 * MS);
     assert!(LineConfig { echo: Echo::Auto, ..config() }.worst_case_stop(5, 18) > short);
-    assert!(LineConfig { broadcast_turnaround: SECOND, ..config() }.worst_case_stop(5, 18) > SECOND);
+    assert!(LineConfig { broadcast_pause: SECOND, ..config() }.worst_case_stop(5, 18) > SECOND);
 }
 
 proptest! {

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use drive_bus::{
     Echo, LineConfig,
     exchange::{
-        Exchange, Failure, Step, Stray,
+        Failure, Machine, Step, Stray,
         ascii::{Ascii, AsciiSettings},
         rtu::Rtu,
     },
@@ -43,7 +43,7 @@ fn damaged(request: &[u8]) -> Vec<u8> {
 }
 
 /// A read whose echo is damaged and whose answer comes after a pause, then a write that nobody answers.
-fn story<M: Exchange>(mut script: Script<M>, answer: &[u8], echoes: Echo) {
+fn story<M: Machine>(mut script: Script<M>, answer: &[u8], echoes: Echo) {
     let request = script.ask(1, &READ);
     assert_eq!(script.hear(&damaged(&request)), Step::More);
     if script.machine.deadline().is_some_and(|deadline| deadline < script.now + PATIENCE / 2) {
@@ -106,7 +106,7 @@ fn a_value_behind_a_damaged_echo_is_the_one_that_was_asked_for() {
 }
 
 #[test]
-fn the_read_that_settles_the_echo_is_never_a_request_whose_answer_equals_it() {
+fn the_read_that_asks_for_the_echo_is_never_a_request_whose_answer_equals_it() {
     let mut line = ByHand::new(LineConfig { echo: Echo::Auto, ..LineConfig::stream(SERIAL) });
     let loop_back = || Request::Custom(8, Cow::Borrowed(&[0, 0, 0xA5, 0x37]));
     line.ask(1, 1, READ, Terms::default());
@@ -130,7 +130,7 @@ fn the_read_that_settles_the_echo_is_never_a_request_whose_answer_equals_it() {
 }
 
 #[test]
-fn the_read_that_settles_the_echo_waits_for_late_answers_and_a_stop_does_not_wait_for_it() {
+fn the_read_that_asks_for_the_echo_waits_for_late_answers_and_a_stop_does_not_wait_for_it() {
     let config = LineConfig { echo: Echo::Auto, retries: 0, ..LineConfig::stream(SERIAL) };
     let unanswered = || {
         let mut line = ByHand::new(config.clone());
@@ -156,7 +156,7 @@ fn the_read_that_settles_the_echo_waits_for_late_answers_and_a_stop_does_not_wai
 
 #[test]
 fn the_echo_of_a_request_that_was_given_up_while_it_was_sent_is_no_late_answer() {
-    fn given_up<M: Exchange>(mut script: Script<M>) {
+    fn given_up<M: Machine>(mut script: Script<M>) {
         let request = script.ask(1, &READ);
         script.machine.abandon();
         assert_eq!(script.hear(&request), Step::More);

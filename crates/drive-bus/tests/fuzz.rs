@@ -6,7 +6,7 @@ use std::{sync::Arc, time::Duration};
 
 use drive_bus::{
     Echo,
-    exchange::{Exchange, Step, mbap::Mbap, rtu, rtu::Rtu},
+    exchange::{Machine, Step, mbap::Mbap, rtu, rtu::Rtu},
     pdu,
 };
 use drive_core::serial::SerialSettings;
@@ -39,7 +39,7 @@ fn chunks() -> impl Strategy<Value = Vec<Vec<u8>>> {
 }
 
 fn feed(
-    machine: &mut dyn Exchange,
+    machine: &mut dyn Machine,
     request: Request<'static>,
     chunks: &[Vec<u8>],
     mut now: Instant,
@@ -64,7 +64,7 @@ fn feed(
     now + 1_000 * MS
 }
 
-fn answers(machine: &mut dyn Exchange, now: Instant, answer: impl Fn(&[u8]) -> Vec<u8>) {
+fn answers(machine: &mut dyn Machine, now: Instant, answer: impl Fn(&[u8]) -> Vec<u8>) {
     let request = Request::ReadInputRegisters(0, 1);
     let pdu = pdu::encode(&request).unwrap();
     let sent = machine.start(1, Arc::new(request), &pdu);

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use drive_bus::{
     Echo,
     exchange::{
-        Exchange, Step,
+        Machine, Step,
         ascii::{self, Ascii, AsciiSettings},
     },
 };

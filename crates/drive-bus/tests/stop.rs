@@ -136,7 +136,7 @@ fn the_bound_of_a_stop_holds_on_modbus_tcp_with_a_slaves_own_pause() {
     let pause = SlaveSettings { turnaround: 200 * MS, ..SlaveSettings::default() };
     let config = LineConfig {
         response_timeout: 50 * MS,
-        broadcast_turnaround: 50 * MS,
+        broadcast_pause: 50 * MS,
         ..LineConfig::modbus_tcp("gateway:502")
     }
     .slave(1, pause);
@@ -156,7 +156,7 @@ fn the_bound_of_a_stop_holds_on_modbus_tcp_with_a_slaves_own_pause() {
 #[test]
 fn the_bound_of_a_stop_holds_on_an_unpaced_stream_whose_slave_dribbles() {
     let config =
-        LineConfig { response_timeout: 50 * MS, broadcast_turnaround: 50 * MS, unpaced: true, ..config() };
+        LineConfig { response_timeout: 50 * MS, broadcast_pause: 50 * MS, unpaced: true, ..config() };
     let bound = config.worst_case_stop(5, 5);
     let mut line = ByHand::new(config);
     line.ask(1, 1, READ, Terms::default());

@@ -1,7 +1,7 @@
 //! What is known of each slave's link.
 
 /// After how many silences a slave counts as one that has no word for "nothing to say", and how often it is listened to
-/// for one all the same.
+/// for one all the same. Two may have been lost; and one poll in vain in 32 exchanges costs 3 ms of each.
 const SILENCES: u32 = 3;
 const LISTENED_TO: u32 = 32;
 

@@ -19,9 +19,9 @@
 //! assert_eq!(frame[..4], [0x10, 0x02, 1, 12]);
 //! machine.handle_sent(now, now + Duration::from_millis(500));
 //!
-//! // It acknowledges, and is polled after the turnaround.
+//! // It acknowledges, and is polled after the silence.
 //! assert_eq!(machine.handle_bytes(now, &[0x06]), Step::More);
-//! now = machine.deadline().expect("the turnaround");
+//! now = machine.deadline().expect("the silence");
 //! assert_eq!(machine.handle_timeout(now), Step::Send(poll(1)));
 //! # let _ = (data_frame(1, &[]), Reply::Done);
 //! # Ok(())

@@ -70,7 +70,7 @@ pub enum Stray {
 pub struct UniTelway {
     pub(crate) settings: UniTelwaySettings,
     pub(crate) speed: Speed,
-    pub(crate) turnaround: Duration,
+    pub(crate) silence: Duration,
     chunk_gap: Duration,
     pub(crate) known: BTreeMap<u8, Known>,
     pub(crate) current: Option<Current>,
@@ -96,7 +96,7 @@ impl UniTelway {
         Self {
             settings,
             speed,
-            turnaround: speed.bits(settings.turnaround_bits),
+            silence: speed.bits(settings.silence_bits),
             chunk_gap,
             known: BTreeMap::new(),
             current: None,

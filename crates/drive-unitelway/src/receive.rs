@@ -61,7 +61,7 @@ impl UniTelway {
             (Stage::Asking, ACK) => {
                 current.waiting_since = None;
                 current.refusals = 0;
-                self.after_turnaround(now, Next::Poll(Wanted::Reply))
+                self.after_silence(now, Next::Poll(Wanted::Reply))
             }
             // What stands among other bytes is no refusal: the slave may have taken the request.
             (Stage::Asking, NAK) if alone => {
@@ -71,7 +71,7 @@ impl UniTelway {
                     return self.end(Err(Failure::Refused("NAK")));
                 }
                 // It may refuse because nobody has come for what it holds.
-                self.after_turnaround(now, Next::Poll(Wanted::Room))
+                self.after_silence(now, Next::Poll(Wanted::Room))
             }
             (Stage::Polling(wanted), EOT) if alone => {
                 // Of a slave whose earlier reply may still be on its way it proves nothing, nor does one to an earlier poll.
@@ -127,7 +127,7 @@ impl UniTelway {
                     Ok(answer) => {
                         let said = self.speed.characters(1 + POLL_LEN + frame::len(message.len()));
                         self.took = current.requested.map(|end| {
-                            now.saturating_duration_since(end).saturating_sub(said + self.turnaround)
+                            now.saturating_duration_since(end).saturating_sub(said + self.silence)
                         });
                         current.result =
                             Some(if current.is_proven { Ok(answer) } else { Err(Failure::Doubted(DOUBTED)) });
@@ -169,7 +169,7 @@ impl UniTelway {
 
     /// Answers a data frame.
     fn answer_with(&mut self, now: Instant, signal: u8, then: Then) -> Step {
-        self.after_turnaround(now, Next::Signal(signal, then))
+        self.after_silence(now, Next::Signal(signal, then))
     }
 
     fn noise(&mut self, len: usize) -> Step {

@@ -10,7 +10,7 @@ use crate::{
 /// Start bit, 8 data bits, odd parity, stop bit: the link has one format.
 const CHARACTER_BITS: u64 = 11;
 
-/// How many replies that are not its request's an exchange takes from a slave.
+/// How many replies that are not its request's an exchange takes from a slave: more than any is known to keep.
 pub(crate) const LEFTOVERS: u32 = 16;
 /// Characters of a poll.
 pub(crate) const POLL_LEN: usize = 3;
@@ -25,7 +25,7 @@ pub struct UniTelwaySettings {
     /// The category in each request, 0 to 7. The manual's sample has 7 (p. 12/36).
     pub category: u8,
     /// The silence before each of our transmissions inside an exchange, in bits.
-    pub turnaround_bits: u32,
+    pub silence_bits: u32,
     /// How long a slave may take to begin its acknowledgement, or what it answers to a poll.
     pub link_timeout: Duration,
     /// From a poll that brought nothing, or a refusal, to the next attempt, at first; it grows with the time that the
@@ -38,12 +38,13 @@ pub struct UniTelwaySettings {
 }
 
 impl Default for UniTelwaySettings {
-    /// The standard header, category 7, 10 bits, 100 ms, 5 ms, 1, 1 s.
+    /// The standard header, category 7, 10 bits, 100 ms, 5 ms, 1, 1 s. None but the category stands in the card's manual; the
+    /// others are those of public implementations, or chosen so that a slow slave is not lost.
     fn default() -> Self {
         Self {
             header: NetworkHeader::default(),
             category: CATEGORIES,
-            turnaround_bits: 10,
+            silence_bits: 10,
             link_timeout: Duration::from_millis(100),
             poll_pause: Duration::from_millis(5),
             repeats: 1,
@@ -96,7 +97,7 @@ pub fn longest(
     reply: usize,
 ) -> Duration {
     let speed = Speed::new(baud);
-    let said = |characters| speed.bits(settings.turnaround_bits) + speed.characters(characters);
+    let said = |characters| speed.bits(settings.silence_bits) + speed.characters(characters);
     // A request; a poll with a reply, and our word to it; the last poll, which may bring one more.
     let asked = said(request) + settings.link_timeout + speed.characters(1);
     let polled = said(POLL_LEN) + settings.link_timeout + speed.characters(reply) + chunk_gap + said(1);

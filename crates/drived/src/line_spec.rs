@@ -113,7 +113,7 @@ pub(crate) fn needed_silence(config: &LineConfig) -> Option<(Duration, String)> 
     let name = match config.protocol {
         _ if silence.is_zero() => return None,
         Protocol::Ascii(_) => "a character in ASCII is".to_owned(),
-        Protocol::UniTelway(settings) => format!("UNI-TELWAY's {} bits are", settings.turnaround_bits),
+        Protocol::UniTelway(settings) => format!("UNI-TELWAY's {} bits are", settings.silence_bits),
         _ => "t3.5 is".to_owned(),
     };
     Some((silence, name))

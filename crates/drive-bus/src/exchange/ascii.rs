@@ -28,12 +28,12 @@ use self::{
     frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver},
 };
 use super::{
-    Exchange, Failure, Step, Stray,
+    Failure, Machine, Step, Stray,
     echo::{Echo, EchoState, MAYBE_ECHO},
 };
 use crate::answer;
 
-/// What may come in during one exchange before it is given up: somebody who never stops talking.
+/// What may come in during one exchange before it is given up, as in RTU.
 const MAX_RECEIVED: usize = 4 * MAX_FRAME;
 
 /// What a line in Modbus ASCII can be set to.
@@ -203,7 +203,7 @@ impl Ascii {
     }
 }
 
-impl Exchange for Ascii {
+impl Machine for Ascii {
     fn carries(&self, _: u8, request: &Request<'_>, _: Class) -> Result<(), String> {
         match new_delimiter(request) {
             Some(BEGIN) => Err("a frame that ends with \":\" has no end".to_owned()),

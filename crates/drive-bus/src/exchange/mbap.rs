@@ -9,7 +9,7 @@ use bytes::{Buf, BufMut, Bytes, BytesMut};
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Answer, Exchange, Failure, Step, Stray};
+use super::{Answer, Failure, Machine, Step, Stray};
 use crate::{answer, pdu::MAX_PDU};
 
 /// Transaction number, protocol number, length (2 bytes each), unit.
@@ -86,7 +86,7 @@ impl Mbap {
     }
 }
 
-impl Exchange for Mbap {
+impl Machine for Mbap {
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, pdu: &Bytes) -> Bytes {
         // What came before the request is no answer to it, whatever its number.
         self.current = None;

@@ -1,6 +1,6 @@
 //! Exchanges: one request and its answer, as bytes. Pure: time is an argument, bytes go in and come out.
 //!
-//! A protocol of the line is an implementation of [`Exchange`]. Families never see which one it is.
+//! A protocol of the line is an implementation of [`Machine`]. Families never see which one it is.
 
 #[cfg(feature = "ascii")]
 pub mod ascii;
@@ -22,7 +22,7 @@ use tokio_modbus::{ExceptionCode, Request, Response};
 use crate::{config::LineConfig, pdu, protocol::Protocol, shape::Shape};
 
 /// The machine of what a line of this configuration speaks.
-pub(crate) fn of(config: &LineConfig) -> Box<dyn Exchange> {
+pub(crate) fn of(config: &LineConfig) -> Box<dyn Machine> {
     let (serial, chunk_gap, echo) = (config.serial, config.chunk_gap, config.echo);
     match config.protocol {
         Protocol::Rtu => Box::new(rtu::Rtu::new(serial, chunk_gap, echo)),
@@ -41,11 +41,11 @@ pub type Answer = Result<Response, ExceptionCode>;
 /// What an exchange wants next.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// More bytes, or the passing of [`Exchange::deadline`].
+    /// More bytes, or the passing of [`Machine::deadline`].
     More,
-    /// These bytes sent now; the exchange goes on. [`Exchange::handle_sent`] **must** follow.
+    /// These bytes sent now; the exchange goes on. [`Machine::handle_sent`] **must** follow.
     Send(Bytes),
-    /// The line is free for other slaves until this time, when [`Exchange::resume`] goes on.
+    /// The line is free for other slaves until this time, when [`Machine::resume`] goes on.
     Wait(Instant),
     /// Nothing: it is over.
     Done(Result<Answer, Failure>),
@@ -103,7 +103,7 @@ impl Stray {
 }
 
 /// The machine of one protocol, used for one exchange after another.
-pub trait Exchange: Send {
+pub trait Machine: Send {
     /// Whether the protocol has a form for this request to this slave, and whether the class may carry it.
     ///
     /// # Errors

@@ -19,12 +19,13 @@ pub use self::frame::{frame, is_frame};
 
 use self::frame::MAX_FRAME;
 use super::{
-    Exchange, Failure, Step, Stray,
+    Failure, Machine, Step, Stray,
     echo::{Echo, EchoState},
     pace::Pace,
 };
 
-/// What may come in during one exchange before it is given up: somebody who never stops talking.
+/// What may come in during one exchange before it is given up, for somebody never stops talking: an echo, a stray, the
+/// answer, and one frame more.
 const MAX_RECEIVED: usize = 4 * MAX_FRAME;
 
 /// How long an exchange may go on after the time of its answer is over, because something is still coming in.
@@ -102,7 +103,7 @@ impl Rtu {
     }
 }
 
-impl Exchange for Rtu {
+impl Machine for Rtu {
     fn set_far_end_paces(&mut self, paces: bool) {
         self.pace.set_far_end_paces(paces);
     }

@@ -11,7 +11,7 @@ use tokio_modbus::{
     prelude::{ConformityLevel, DeviceIdObject, ReadDeviceIdentificationResponse},
 };
 
-use super::{Exchange, Failure, Step, Stray};
+use super::{Failure, Machine, Step, Stray};
 use crate::shape::Shape;
 
 /// The function code under which a UNI-TE request itself travels in a [`Request::Custom`]: the data are its code and its
@@ -79,7 +79,7 @@ impl UniTelway {
     }
 }
 
-impl Exchange for UniTelway {
+impl Machine for UniTelway {
     fn carries(&self, slave: u8, request: &Request<'_>, class: Class) -> Result<(), String> {
         let unite = encode(request)?;
         if unite.is_specific() && class < Class::Command {

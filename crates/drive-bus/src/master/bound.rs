@@ -19,8 +19,7 @@ impl<C> Master<C> {
             _ => station.timeout.current(),
         });
         let timeout = timeouts.max().unwrap_or(self.config.response_timeout);
-        let broadcast =
-            if self.stats.broadcasts > 0 { self.config.broadcast_turnaround } else { Duration::ZERO };
+        let broadcast = if self.stats.broadcasts > 0 { self.config.broadcast_pause } else { Duration::ZERO };
         let (request, answer) = self.longest;
         self.config.stop_bound(
             (request, answer),

@@ -6,10 +6,12 @@ use tokio::time::Instant;
 
 use crate::{config::DOUBLE, shape::Shape};
 
-/// How long anything strange is remembered.
+/// How long anything strange is remembered. Longer than a serial server or a gateway usually keeps an answer (its own
+/// timeouts are seconds), and it costs only a word more in a read.
 const MEMORY: Duration = Duration::from_secs(60);
 
-/// How many shapes are remembered.
+/// How many shapes are remembered: the reads that a family has in rotation, in all their lengths, and some writes. There are
+/// thirty thousand slaves on a thousand lines.
 const MOST: usize = 16;
 
 /// What is known of the answers of one slave: which are owed, which came unasked, and which came last.

@@ -27,7 +27,7 @@ use tokio_modbus::Request;
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
-    exchange::{self, Answer, Exchange, Step, Stray},
+    exchange::{self, Answer, Machine, Step, Stray},
     pdu,
     schedule::{Entry, Rules, Schedule, Ticket},
     shape::Shape,
@@ -43,13 +43,14 @@ use station::Station;
 /// How a call ends.
 pub type Outcome = Result<Answer, PortError>;
 
-/// How long a request waits before it may take an aged turn.
+/// How long a request waits before it may take an aged turn: the lifetime of a command, and longer than the sweep of a line of
+/// 31 drives.
 const AGING: Duration = Duration::from_secs(1);
 
 /// The machine of one line. `C` is whoever waits for an answer.
 pub struct Master<C> {
     config: LineConfig,
-    exchange: Box<dyn Exchange>,
+    exchange: Box<dyn Machine>,
     schedule: Schedule<Asked<C>>,
     /// Boxed, because a node of the map has room for eleven.
     stations: BTreeMap<u8, Box<Station>>,

@@ -15,11 +15,12 @@ use super::{
 };
 use crate::{
     answer, pdu,
-    schedule::{Choice, Entry, Readiness},
+    schedule::{Chosen, Entry, Readiness},
     shape,
 };
 
-/// A line without any silence for so long has somebody else on it that sends for ever.
+/// A line without any silence for so long has somebody else on it that sends for ever: the longest frame at 9600 bit/s takes
+/// 0.3 s. At lower speeds it is as long as two of them.
 const NEVER_QUIET: Duration = Duration::from_secs(1);
 
 impl<C> Master<C> {
@@ -67,9 +68,9 @@ impl<C> Master<C> {
             self.choose_at = Some(at);
         }
         let at = match self.choose(now, free_at, stop_at) {
-            Choice::Send(entry) => return self.begin(now, entry),
-            Choice::Wait(at) => Some(at),
-            Choice::Idle => None,
+            Chosen::Send(entry) => return self.begin(now, entry),
+            Chosen::Wait(at) => Some(at),
+            Chosen::Idle => None,
         };
         if let Some((_, slave)) = due {
             return self.resume(now, slave);
@@ -78,7 +79,7 @@ impl<C> Master<C> {
         None
     }
 
-    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Choice<Asked<C>> {
+    fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Chosen<Asked<C>> {
         let Self { schedule, stations, aside, config, last_slave, exchange, offline, .. } = self;
         let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline };
         schedule.choose(now, |entry| {
@@ -254,7 +255,7 @@ impl<C> Master<C> {
             end,
             timeout,
             answer_by,
-            unanswered_until: unanswered.then(|| end + self.config.broadcast_turnaround),
+            unanswered_until: unanswered.then(|| end + self.config.broadcast_pause),
         });
         self.exchange.handle_sent(end - taken_in, answer_by);
         self.last_slave = (flight.slave != 0).then_some(flight.slave);

@@ -14,10 +14,12 @@ use crate::{
     timeout::LearnedTimeout,
 };
 
-/// How long a slave is probed after somebody last asked for it.
+/// How long a slave is probed after somebody last asked for it: whoever still cares asks more often, and an address that
+/// was tried once is left alone.
 const INTEREST: Duration = Duration::from_secs(60);
 
-/// By how many words a read is lengthened at the most, to tell its answer from others.
+/// By how many words a read is lengthened at the most, to tell its answer from others: four lengths are more than the answers
+/// that are ever owed at once, and three words are 3 ms at 19200 bit/s.
 const MOST_SPARE: u8 = 3;
 
 /// One slave, as seen by the master.

@@ -17,7 +17,7 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use super::{Asked, Purpose, aside::Aside, offline::Offline, station::Station};
-use crate::{answer, exchange::Exchange, pdu, schedule::Entry, shape::Shape};
+use crate::{answer, exchange::Machine, pdu, schedule::Entry, shape::Shape};
 
 /// How long what may not overtake an exchange that was put aside waits until it is looked at again: less than a poll of
 /// UNI-TELWAY takes, so that nothing is late for it.
@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(1);
 
 /// What the rule looks at.
 pub(super) struct Waits<'a, C> {
-    pub(super) exchange: &'a dyn Exchange,
+    pub(super) exchange: &'a dyn Machine,
     pub(super) stations: &'a BTreeMap<u8, Box<Station>>,
     pub(super) aside: &'a BTreeMap<u8, Aside<C>>,
     pub(super) offline: &'a Offline,
@@ -36,7 +36,7 @@ impl<C> Waits<'_, C> {
     pub(super) fn until(&self, now: Instant, entry: &Entry<Asked<C>>) -> Option<Instant> {
         let is_stop = entry.terms.class == Class::Stop;
         let goes_at_once = is_stop && entry.work.is_write;
-        let aside = self.aside.get(&entry.slave).filter(|aside| !(goes_at_once && !aside.is_stop()));
+        let aside = self.aside.get(&entry.slave).filter(|aside| !goes_at_once || aside.is_stop());
         let aside = aside.map(|aside| aside.at.max(now + LOOK));
         let station = self.stations.get(&entry.slave);
         let doubt = station.filter(|_| !goes_at_once).and_then(|station| {
@@ -57,12 +57,12 @@ impl<C> Aside<C> {
 }
 
 /// The shape of the answer to `request`.
-pub(super) fn shape_of(exchange: &dyn Exchange, request: &Request<'_>) -> Shape {
+pub(super) fn shape_of(exchange: &dyn Machine, request: &Request<'_>) -> Shape {
     exchange.shape(&pdu::encode(request).unwrap_or_default())
 }
 
 /// Whether the adapter is to be asked for its echo before this request: otherwise its answer would prove nothing.
-pub(super) fn wants_echo_read<C>(exchange: &dyn Exchange, entry: &Entry<Asked<C>>) -> bool {
+pub(super) fn wants_echo_read<C>(exchange: &dyn Machine, entry: &Entry<Asked<C>>) -> bool {
     exchange.echo_is_unknown()
         && !entry.work.echo_was_read
         && entry.slave != 0

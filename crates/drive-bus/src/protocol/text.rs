@@ -113,7 +113,7 @@ mod tests {
             "ascii,character-gap=5s,delimiter=23h",
             "unitelway",
             "unitelway,header=simplified,category=0,link-timeout=200ms",
-            "unitelway,header=0102030405,turnaround-bits=20,poll-pause=15ms,repeats=3,busy-timeout=2s",
+            "unitelway,header=0102030405,silence-bits=20,poll-pause=15ms,repeats=3,busy-timeout=2s",
         ] {
             assert_eq!(text.parse::<Protocol>().unwrap().to_string(), text);
         }
@@ -125,7 +125,7 @@ mod tests {
         let settings = UniTelwaySettings {
             header: NetworkHeader::Simplified,
             category: 1,
-            turnaround_bits: 2,
+            silence_bits: 2,
             link_timeout: Duration::from_millis(3),
             poll_pause: Duration::from_millis(4),
             repeats: 5,
@@ -142,7 +142,7 @@ mod tests {
             ("modbus", "expected rtu, ascii or unitelway"),
             ("rtu,header=simplified", "not a setting of rtu: expected NAME=VALUE with one of none"),
             ("ascii,header=simplified", "one of character-gap, delimiter"),
-            ("unitelway,simplified", "one of header, category, turnaround-bits, link-timeout"),
+            ("unitelway,simplified", "one of header, category, silence-bits, link-timeout"),
             ("unitelway,", "\"\" is not a setting"),
             ("unitelway,header=short", "simplified, standard"),
             ("unitelway,header=00FE0000", "simplified, standard"),

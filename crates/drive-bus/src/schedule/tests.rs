@@ -16,8 +16,8 @@ fn push(schedule: &mut Schedule<u32>, now: Instant, slave: u8, terms: Terms, wor
 fn order(schedule: &mut Schedule<u32>, now: Instant) -> Vec<u32> {
     std::iter::from_fn(|| {
         match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false }) {
-            Choice::Send(entry) => Some(entry.work),
-            Choice::Wait(_) | Choice::Idle => None,
+            Chosen::Send(entry) => Some(entry.work),
+            Chosen::Wait(_) | Chosen::Idle => None,
         }
     })
     .collect()
@@ -119,18 +119,18 @@ fn a_pause_of_one_slave_is_spent_on_another_unless_a_command_would_wait_for_it()
     };
     push(&mut schedule, now, 1, Terms::of(Class::Status), 1);
     push(&mut schedule, now, 2, Terms::of(Class::Background), 2);
-    assert!(matches!(schedule.choose(now, readiness), Choice::Send(entry) if entry.work == 2));
+    assert!(matches!(schedule.choose(now, readiness), Chosen::Send(entry) if entry.work == 2));
 
     push(&mut schedule, now, 1, Terms::of(Class::Command), 3);
     push(&mut schedule, now, 2, Terms::of(Class::Background), 4);
-    assert!(matches!(schedule.choose(now, readiness), Choice::Wait(at) if at == now + 5 * MS));
+    assert!(matches!(schedule.choose(now, readiness), Chosen::Wait(at) if at == now + 5 * MS));
     // A pause that is longer than the other's exchange is not waited for.
     let long = |entry: &Entry<u32>| Readiness {
         at: if entry.slave == 1 { now + 50 * MS } else { now },
         takes: 20 * MS,
         holds_line: false,
     };
-    assert!(matches!(schedule.choose(now, long), Choice::Send(entry) if entry.work == 4));
+    assert!(matches!(schedule.choose(now, long), Chosen::Send(entry) if entry.work == 4));
 }
 
 #[test]
@@ -145,9 +145,9 @@ fn nothing_starts_while_a_stop_holds_the_line_for_its_slaves_pause() {
             _ => Readiness { at: now, takes: MS, holds_line: false },
         }
     };
-    assert!(matches!(schedule.choose(now, waits(true)), Choice::Wait(at) if at == pause));
-    assert!(matches!(schedule.choose(now, waits(false)), Choice::Send(entry) if entry.work == 2));
-    assert!(matches!(schedule.choose(now, waits(false)), Choice::Wait(at) if at == pause));
+    assert!(matches!(schedule.choose(now, waits(true)), Chosen::Wait(at) if at == pause));
+    assert!(matches!(schedule.choose(now, waits(false)), Chosen::Send(entry) if entry.work == 2));
+    assert!(matches!(schedule.choose(now, waits(false)), Chosen::Wait(at) if at == pause));
 }
 
 #[test]
@@ -249,7 +249,7 @@ proptest! {
                         .map(|(slave, class)| (slave, class, oldest_of(&schedule, slave, class)))
                         .collect();
                     match schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false }) {
-                        Choice::Send(entry) => {
+                        Chosen::Send(entry) => {
                             let class = entry.terms.class;
                             prop_assert!(!stops || class == Class::Stop, "a stop is overtaken");
                             prop_assert!(entry.expires().is_none_or(|expires| expires > now));
@@ -265,8 +265,8 @@ proptest! {
                             prop_assert!(turns_without_background < BACKGROUND_TURN);
                             ended.push(entry.work);
                         }
-                        Choice::Wait(_) => prop_assert!(false, "everything is ready"),
-                        Choice::Idle => prop_assert!(schedule.is_empty()),
+                        Chosen::Wait(_) => prop_assert!(false, "everything is ready"),
+                        Chosen::Idle => prop_assert!(schedule.is_empty()),
                     }
                 }
                 Event::Withdraw(ticket) => {

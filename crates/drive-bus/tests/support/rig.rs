@@ -88,7 +88,7 @@ struct Asked {
     at: Instant,
     ticket: Ticket,
     sent: bool,
-    settled: bool,
+    echo_was_read: bool,
 }
 
 fn is_write(request: &Request<'_>) -> bool {
@@ -148,8 +148,15 @@ impl Rig {
         let call = self.next_call;
         self.next_call += 1;
         let ticket = self.master.submit(self.now, slave, request.clone(), terms, call)?;
-        let asked =
-            Asked { slave, request, class: terms.class, at: self.now, ticket, sent: false, settled: false };
+        let asked = Asked {
+            slave,
+            request,
+            class: terms.class,
+            at: self.now,
+            ticket,
+            sent: false,
+            echo_was_read: false,
+        };
         self.asked.insert(call, asked);
         Ok(call)
     }
@@ -239,7 +246,7 @@ impl Rig {
             let slaves = self.master.stats(self.now).slaves;
             let dead = |stop: &Asked| slaves.get(&stop.slave).is_some_and(|slave| slave.offline);
             let overtaken = stops().any(|stop| is_write(&stop.request) && !stop.sent && !dead(stop));
-            assert!(!overtaken || self.settles(slave, pdu), "{pdu:02X?} to {slave} overtakes a stop");
+            assert!(!overtaken || self.reads_echo(slave, pdu), "{pdu:02X?} to {slave} overtakes a stop");
         }
         for asked in self.asked.values_mut().filter(|asked| asked.class == Class::Stop) {
             if !asked.sent && sent(asked) {
@@ -252,13 +259,16 @@ impl Rig {
     }
 
     /// Whether this read finds out about the echo for a Stop that waits.
-    fn settles(&mut self, slave: u8, pdu: &[u8]) -> bool {
-        let unsettled = |asked: &&mut Asked| {
-            is_write(&asked.request) && asked.class == Class::Stop && asked.slave == slave && !asked.settled
+    fn reads_echo(&mut self, slave: u8, pdu: &[u8]) -> bool {
+        let unread = |asked: &&mut Asked| {
+            is_write(&asked.request)
+                && asked.class == Class::Stop
+                && asked.slave == slave
+                && !asked.echo_was_read
         };
         self.config.echo == Echo::Auto
             && pdu[0] == 3
-            && self.asked.values_mut().find(unsettled).map(|asked| asked.settled = true).is_some()
+            && self.asked.values_mut().find(unread).map(|asked| asked.echo_was_read = true).is_some()
     }
 
     fn answer(&mut self, slave: u8, pdu: &[u8], end: Instant) {

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_bus::{
-    exchange::{Exchange, Step, Stray},
+    exchange::{Machine, Step, Stray},
     pdu,
 };
 use drive_core::Class;
@@ -21,7 +21,7 @@ pub(crate) struct Script<M> {
     pub(crate) now: Instant,
 }
 
-impl<M: Exchange> Script<M> {
+impl<M: Machine> Script<M> {
     pub(crate) fn new(machine: M) -> Self {
         Self { machine, now: Instant::now() }
     }

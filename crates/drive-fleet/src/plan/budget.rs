@@ -43,7 +43,7 @@ impl LineBudget {
             protocol: config.protocol,
             response: Duration::from_millis(10),
             response_timeout: config.response_timeout,
-            broadcast_turnaround: config.broadcast_turnaround,
+            broadcast_turnaround: config.broadcast_pause,
             slave_change_gap: config.slave_change_gap,
             offline_after: config.offline_after,
             segments: 1,

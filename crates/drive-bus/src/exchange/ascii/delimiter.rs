@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, mem};
 
 use tokio_modbus::Request;
 
-/// After how many unanswered requests a slave may wait for another last character.
+/// After how many unanswered requests a slave may wait for another last character: one may have been lost.
 const DOUBT_AFTER: u32 = 2;
 
 /// Which last character each slave waits for.

@@ -16,7 +16,8 @@ use crate::{
     shape::Shape,
 };
 
-/// How many bits of an echo may change before it is no echo any more.
+/// How many bits of an echo may change before it is no echo any more: a damaged byte. Two frames that have nothing to do with
+/// each other differ in half of their bits.
 const FEW_BITS: u32 = 8;
 
 /// What stands at one place of what was received.

@@ -69,10 +69,10 @@ pub(super) const UNI_TELWAY: &[Setting<UniTelwaySettings>] = &[
         say: |settings| settings.category.to_string(),
     },
     Setting {
-        name: "turnaround-bits",
+        name: "silence-bits",
         expected: NUMBER,
-        set: |settings, text| text.parse::<u16>().ok().map(|value| settings.turnaround_bits = value.into()),
-        say: |settings| settings.turnaround_bits.to_string(),
+        set: |settings, text| text.parse::<u16>().ok().map(|value| settings.silence_bits = value.into()),
+        say: |settings| settings.silence_bits.to_string(),
     },
     Setting {
         name: "link-timeout",
