@@ -105,16 +105,25 @@ impl Running {
 
     /// The same with an environment of its own.
     pub(crate) fn of(command: &mut Command) -> Self {
+        Self::with_output(command, Stdio::piped)
+    }
+
+    /// Nobody reads what it says.
+    pub(crate) fn start_unread(arguments: &[&str]) -> Self {
+        Self::with_output(&mut drived(arguments), Stdio::null)
+    }
+
+    fn with_output(command: &mut Command, output: fn() -> Stdio) -> Self {
         let runtime = command.get_envs().find(|(name, _)| *name == "XDG_RUNTIME_DIR");
         let runtime = runtime.and_then(|(_, folder)| folder).map(PathBuf::from);
         let mut child = command
             .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
+            .stdout(output())
+            .stderr(output())
             .spawn()
             .expect("the program starts");
         let input = child.stdin.take();
-        let lines = Some(BufReader::new(child.stdout.take().expect("stdout is piped")));
+        let lines = child.stdout.take().map(BufReader::new);
         Self { child, input, lines, runtime }
     }
 

@@ -4,10 +4,11 @@ import { writeDemo } from './demo.js';
 import { setAttribute, setClass, setText } from './dom.js';
 import { clock } from './format.js';
 import { askToken, logOut } from './login.js';
-import { onChange, plant, start } from './plant.js';
 import { overview } from './overview.js';
+import { onChange, plant, start } from './plant.js';
 import { watchStop, writeAccount } from './stop.js';
 import { named, switchLanguage, t, writeTexts } from './texts.js';
+import { eventText, word } from './words.js';
 
 /** The views by the first word of the address; those that are not needed for the first look are loaded when they are. */
 const VIEWS = {
@@ -91,5 +92,5 @@ function tellAlarm() {
   const newest = plant.events.find(event => event.kind === 'event' && event.alarm);
   if (!newest || newest === told) return;
   told = newest;
-  setText(place('alarms'), named(newest.drive, newest.text));
+  setText(place('alarms'), named(newest.drive, [word(newest.event), eventText(newest)].filter(Boolean).join(' ')));
 }

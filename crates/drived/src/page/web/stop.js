@@ -5,7 +5,7 @@ import { el } from './dom.js';
 import { clock } from './format.js';
 import { askToken } from './login.js';
 import { plant } from './plant.js';
-import { t } from './texts.js';
+import { named, t } from './texts.js';
 import { outcome } from './words.js';
 
 const AGAIN_MS = 1_000;
@@ -107,17 +107,19 @@ function headline() {
 function counts() {
   if (!account.drives) return null;
   const shown = [['confirmed', account.confirmed], ['pending', account.pending], ['not_reachable', account.notReachable], ['not_confirmed', account.bad]];
-  return el('dl.counts', {}, ...shown.filter(([name, count]) => name !== 'not_confirmed' || count).flatMap(([name, count]) => [
-    el(count ? `dd.${name}` : 'dd', { 'data-count': name }, String(count)), el('dt', {}, t(`stop_${name}`))]));
+  return el('dl.counts', {}, ...shown.filter(([name, count]) => name !== 'not_confirmed' || count).map(([name, count]) =>
+    el('div', {}, el('dt', {}, t(`stop_${name}`)), el(count ? `dd.${name}` : 'dd', { 'data-count': name }, String(count)))));
 }
 
 /** Who is not accounted for yet, by name, while they are few enough to be read. */
 function notYet() {
   const left = (account.drives ?? []).filter(one => one.outcome !== 'confirmed');
-  if (!left.length) return null;
-  const names = left.slice(0, NAMED).map(one => `${one.drive} (${outcome(one.outcome)})`).join(', ');
-  const rest = left.length > NAMED ? ` ${t('stop_others', { count: left.length - NAMED })}` : '';
-  return el('p.left', {}, names + rest);
+  const texts = [...new Set(left.map(one => one.outcome))].map(what => {
+    const names = left.filter(one => one.outcome === what).map(one => one.drive);
+    const rest = names.length > NAMED ? ` ${t('stop_others', { count: names.length - NAMED })}` : '';
+    return named(outcome(what), names.slice(0, NAMED).join(', ') + rest);
+  });
+  return texts.length ? el('p.left', {}, texts.join(' · ')) : null;
 }
 
 function isOpen(one) {

@@ -76,6 +76,7 @@ const TABLE = {
   warning_present: ['an alarm of the drive is present', 'une alarme du variateur est présente'],
   lost_now: ['does not answer', 'ne répond plus'],
   values_old: ['values are old', 'valeurs anciennes'],
+  fault_unexplained: ['the drive has not said why yet', 'le variateur n’a pas encore dit pourquoi'],
   fault_number: ['fault {code}', 'défaut {code}'],
 
   // One drive.

@@ -39,5 +39,5 @@ function lostText({ error }) {
 export function faultText(drive) {
   const { fault, status } = drive;
   if (!fault) return status?.fault_code ? t('fault_number', { code: status.fault_code }) : word('fault');
-  return [fault.mnemonic ?? fault.code, faultMeaning(fault)].filter(Boolean).join(' ');
+  return [fault.mnemonic ?? (fault.code && t('fault_number', { code: fault.code })), faultMeaning(fault)].filter(Boolean).join(' ') || t('fault_unexplained');
 }

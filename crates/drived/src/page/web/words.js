@@ -97,6 +97,8 @@ const COMMANDS = [
     `démarrage ${direction === 'forward' ? 'en avant' : 'en arrière'}${at ? ` à ${number(at)}` : ''}`],
   [/^setpoint (.+)$/, value => `consigne ${number(value)}`],
   [/^(?:stop|stop along the ramp|ramp stop)$/, () => 'arrêt sur rampe'],
+  [/^stop by ramp$/, () => 'arrêt sur rampe'],
+  [/^stop by freewheel$/, () => 'arrêt roue libre'],
   [/^fast stop$/, () => 'arrêt rapide'],
   [/^freewheel stop$/, () => 'arrêt roue libre'],
   [/^DC injection stop$/i, () => 'arrêt par injection de courant continu'],
@@ -125,6 +127,17 @@ export function command(given) {
     if (found) return french(...found.slice(1));
   }
   return said;
+}
+
+/** What happened, without the kind of event that stands before it; what is not known here is told in the daemon's words. */
+export function eventText({ event, text = '' }) {
+  const kind = String(event).replaceAll('_', ' ');
+  const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^: /, '') : text;
+  const change = rest.match(/^(\w+) to (\w+)$/);
+  if (change) return `${word(change[1])} → ${word(change[2])}`;
+  const given = rest.match(/^(.+) by (.+): (confirmed|not confirmed|unknown|refused|expired|superseded)(.*)$/);
+  if (given) return `${command({ command: given[1] })}, ${given[2]}: ${outcome(given[3])}${given[4]}`;
+  return rest;
 }
 
 /** The state of a drive as its row says it first: a lost drive is lost, whatever it showed last. */

@@ -1,0 +1,133 @@
+//! The page of the built program, looked at by a headless Chromium over Playwright. Where they are not installed the tests
+//! print why they are skipped; where `CI` is set they fail instead, because `.ci/run` installs them.
+
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    env,
+    io::{BufRead as _, BufReader},
+    net::TcpListener,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::{Mutex, PoisonError},
+};
+
+use support::{File, Running, Sim};
+
+/// One browser at a time is enough for a machine with two processors.
+static ONE_BY_ONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn the_page_of_the_demo_loads_and_no_view_complains_in_the_console() {
+    look_at_the_demo("loads");
+}
+
+#[test]
+fn a_trip_comes_first_in_the_list_with_its_meaning_what_to_do_and_why_no_start() {
+    look_at_three_pumps("trip");
+}
+
+#[test]
+fn stop_all_by_its_key_accounts_for_every_drive_and_stands_in_the_events() {
+    look_at_the_demo("stop_all");
+}
+
+#[test]
+fn on_a_phone_nothing_scrolls_sideways_and_stop_all_is_in_reach_of_a_thumb() {
+    look_at_the_demo("phone");
+}
+
+#[test]
+fn a_french_browser_is_shown_the_page_in_french_until_english_is_chosen() {
+    look_at_the_demo("french");
+}
+
+#[test]
+fn values_turn_grey_and_dated_when_their_line_is_cut_and_live_when_it_is_joined() {
+    look_at_three_pumps("cable");
+}
+
+#[test]
+fn a_stop_that_cannot_reach_the_daemon_says_so_loudly_and_is_sent_again() {
+    look_at_the_demo("away");
+}
+
+#[test]
+fn two_hundred_drives_are_listed_and_searched() {
+    let Some(python) = python() else { return };
+    let lines: Vec<_> = (0..8).map(|line| Sim::serve(&format!("page-{line}"), &["atv312@1-25"])).collect();
+    let mut text = String::new();
+    for (number, line) in lines.iter().enumerate() {
+        text += &format!("[lines.l{number}]\nport = \"{}\"\n", line.link());
+    }
+    for drive in 0..200 {
+        let (line, slave) = (drive / 25, drive % 25 + 1);
+        text += &format!(
+            "[[drives]]\nline = \"l{line}\"\ndrive = \"atv312@{slave}\"\nname = \"drive {}\"\n",
+            drive + 1
+        );
+    }
+    let config = File::new("page-200", &text);
+    look(&python, "many", &["run", "--config", config.path()], None);
+}
+
+fn look_at_three_pumps(scene: &str) {
+    let Some(python) = python() else { return };
+    let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-3"]);
+    let text = format!(
+        "[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n",
+        pumps.link()
+    );
+    let config = File::new(&format!("page-{scene}"), &text);
+    look(&python, scene, &["run", "--config", config.path()], Some(&mut pumps));
+}
+
+fn look_at_the_demo(scene: &str) {
+    if let Some(python) = python() {
+        look(&python, scene, &["demo"], None);
+    }
+}
+
+/// Plays a scene with the page of the program that these arguments start; what it wants to happen is said to the drives.
+fn look(python: &Path, scene: &str, arguments: &[&str], mut drives: Option<&mut Sim>) {
+    let _alone = ONE_BY_ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let port =
+        TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
+    let address = format!("127.0.0.1:{port}");
+    let _served = Running::start_unread(&[arguments, &["--http", &address]].concat());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page.py");
+    let mut looking = Command::new(python)
+        .arg(script)
+        .args([scene, &format!("http://{address}/")])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the script starts");
+    let orders = BufReader::new(looking.stdout.take().expect("it is piped")).lines();
+    for order in orders.map(|line| line.expect("it is text")) {
+        drives.as_mut().expect("it wants nothing of the demo").say(&order, "");
+    }
+    let seen = looking.wait().expect("it is a child");
+    assert!(seen.success(), "{scene} is not as it should be");
+}
+
+/// A Python with Playwright beside a Chromium, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.
+fn python() -> Option<PathBuf> {
+    let python = PathBuf::from(env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into()));
+    let there = runs(Command::new(&python).args(["-c", "import playwright"]))
+        && runs(Command::new("/usr/bin/chromium").arg("--version"));
+    assert!(
+        there || env::var_os("CI").is_none(),
+        "Chromium or the Python module playwright is not installed, and CI must have them"
+    );
+    if !there {
+        eprintln!("skipped: Chromium or the Python module playwright is not installed");
+    }
+    there.then_some(python)
+}
+
+fn runs(command: &mut Command) -> bool {
+    let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
+}
