@@ -245,6 +245,8 @@ fn a_command_is_audited_with_its_caller_and_a_token_names_the_commander() {
         "token panel removed",
         "login_failed",
         "\"outcome\":\"confirmed\"",
+        "\"kind\":\"outcome\"",
+        "pump 2: exit",
     ] {
         assert!(log.contains(told), "{told}: {log}");
     }

@@ -136,12 +136,16 @@ pub(crate) fn faults(drive: &str, faults: &Value) -> Result<(), Failure> {
 pub(crate) fn registers(rows: &[Value]) -> Result<(), Failure> {
     let mut table = Table::new(["register", "mnemonic", "value", "name", "access"]);
     for row in rows {
-        let text = |key: &str| match &row[key] {
-            Value::String(text) => text.clone(),
-            Value::Null => String::new(),
-            other => other.to_string(),
-        };
-        table.row([text("address"), text("mnemonic"), text("value"), text("name"), text("access")]);
+        let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
+        // A value that could not be read says why.
+        let value = row["text"].as_str().or_else(|| row["error"].as_str()).unwrap_or("-");
+        table.row([
+            row["address"].to_string(),
+            text("mnemonic"),
+            value.to_owned(),
+            text("name"),
+            words(&text("access")),
+        ]);
     }
     output::say_table(table)
 }

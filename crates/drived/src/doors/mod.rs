@@ -22,9 +22,11 @@ pub(crate) mod tokens;
 use std::{fs, io, net::SocketAddr, path::Path, sync::Arc, time::Duration};
 
 use axum::Router;
+use drive_fleet::Events;
 use tokio::{
     net::{TcpListener, TcpStream},
     sync::{mpsc, watch},
+    task::JoinHandle,
     time::{Instant, sleep, timeout},
 };
 
@@ -138,6 +140,11 @@ impl Doors {
     /// Becomes true when every door listens.
     pub(crate) fn listening(&self) -> watch::Receiver<bool> {
         self.listening.clone()
+    }
+
+    /// Keeps in the audit log what becomes of each command, until the fleet ends.
+    pub(crate) fn follow(&self, events: Events) -> JoinHandle<()> {
+        tokio::spawn(audit::follow(self.audit.clone(), events))
     }
 
     /// Lets nobody in any more, ends the event streams, and waits a little for answers that are under way.

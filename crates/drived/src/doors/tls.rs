@@ -57,3 +57,78 @@ impl Tls {
         tokio::time::timeout(AGREED_WITHIN, self.0.accept(stream)).await.ok()?.ok()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use tokio::{io::AsyncReadExt as _, net::TcpListener};
+    use tokio_rustls::{
+        TlsConnector,
+        rustls::{ClientConfig, RootCertStore},
+    };
+
+    use super::*;
+    use crate::doors::tests::Folder;
+
+    /// A certificate for localhost and its key, of these tests alone.
+    const CERTIFICATE: &str = include_str!("../../tests/tls/certificate.pem");
+    const KEY: &str = include_str!("../../tests/tls/key.pem");
+
+    fn files(folder: &Folder) -> TlsFiles {
+        let files = TlsFiles { certificate: folder.file("certificate.pem"), key: folder.file("key.pem") };
+        fs::write(&files.certificate, CERTIFICATE).unwrap();
+        fs::write(&files.key, KEY).unwrap();
+        #[cfg(unix)]
+        fs::set_permissions(&files.key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+        files
+    }
+
+    #[tokio::test]
+    async fn whoever_trusts_the_certificate_is_served_and_whoever_speaks_in_clear_is_not() {
+        let folder = Folder::new("tls");
+        let tls = Tls::open(&files(&folder)).unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let server = tokio::spawn(async move {
+            let mut served = Vec::new();
+            for _ in 0..2 {
+                let stream = listener.accept().await.unwrap().0;
+                served.push(tls.accept(stream).await.is_some());
+            }
+            served
+        });
+        let mut roots = RootCertStore::empty();
+        roots.add(CertificateDer::from_pem_slice(CERTIFICATE.as_bytes()).unwrap()).unwrap();
+        let config = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_safe_default_protocol_versions()
+            .unwrap()
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        let stream = TcpStream::connect(address).await.unwrap();
+        let connector = TlsConnector::from(Arc::new(config));
+        connector.connect("localhost".try_into().unwrap(), stream).await.unwrap();
+        let mut clear = TcpStream::connect(address).await.unwrap();
+        tokio::io::AsyncWriteExt::write_all(&mut clear, b"GET / HTTP/1.1\r\n\r\n").await.unwrap();
+        let mut answer = Vec::new();
+        let _ = clear.read_to_end(&mut answer).await;
+        assert!(!answer.starts_with(b"HTTP"), "{answer:?}");
+        assert_eq!(server.await.unwrap(), [true, false]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_key_that_everybody_can_read_or_that_is_another_certificates_is_refused() {
+        let folder = Folder::new("open-key");
+        let files = files(&folder);
+        fs::set_permissions(&files.key, std::os::unix::fs::PermissionsExt::from_mode(0o644)).unwrap();
+        let refused = |files: &TlsFiles| Tls::open(files).err().unwrap();
+        assert!(refused(&files).contains("everybody can read the key"));
+        for (certificate, key) in [(CERTIFICATE, "no key"), ("no certificate", KEY)] {
+            fs::set_permissions(&files.key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+            fs::write(&files.certificate, certificate).unwrap();
+            fs::write(&files.key, key).unwrap();
+            assert!(refused(&files).contains(".pem: "), "{}", refused(&files));
+        }
+    }
+}

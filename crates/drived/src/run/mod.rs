@@ -6,7 +6,7 @@ mod json;
 mod notify;
 mod report;
 
-use std::{io::IsTerminal as _, path::PathBuf};
+use std::{io::IsTerminal as _, path::PathBuf, time::Duration};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
@@ -24,6 +24,9 @@ use crate::{
     plant::Plant,
     signals::Ending,
 };
+
+/// How long the disk has for the last records of the audit log.
+const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 
 /// Watch and command the drives of a configuration
 ///
@@ -62,6 +65,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let doors = doors.open(api::router(plant).merge(page::router()));
+    let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let read = tokio::select! {
         () = ending.asked() => Ok(()),
@@ -80,6 +84,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
     if read.is_ok() {
         report.finish().await;
     }

@@ -2,7 +2,12 @@
 
 use serde_json::{Value, json};
 
-use crate::{client, failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{
+    client::{self, Told},
+    failure::Failure,
+    one_drive::OneDriveArgs,
+    output,
+};
 
 /// Reads registers.
 pub(super) async fn get(one: &OneDriveArgs, words: &[String]) -> Result<(), Failure> {
@@ -29,39 +34,43 @@ pub(super) async fn set(
     let mut daemon = one.daemon.connect().await?;
     let path = one.path(&mut daemon, Some(name), &["parameters", register]).await?;
     let written = daemon.put(&path, &json!({ "value": value, "save": save })).await?.done()?;
-    one.daemon.say(&written, |written| match written["text"].as_str() {
-        Some(text) => output::say(format_args!("{name} {text}")),
-        None => output::say(format_args!("{name} {register} is now {}", shown(&written["value"]))),
+    one.daemon.say(&written, |written| {
+        let text = |key: &str| written[key].as_str().unwrap_or_default().to_owned();
+        let what = if written["changed"] == true { "is now" } else { "was already" };
+        let kept = if save {
+            "saved where that was needed".to_owned()
+        } else {
+            format!("kept in {}", text("storage"))
+        };
+        output::say(format_args!("{name} {} {what} {} ({kept})", text("mnemonic"), text("text")))
     })
 }
 
 /// Saves the parameters of a drive to its EEPROM.
 pub(super) async fn save(one: &OneDriveArgs, name: Option<&str>) -> Result<(), Failure> {
-    let mut daemon = one.daemon.connect().await?;
-    let path = one.path(&mut daemon, name, &["save"]).await?;
-    let saved = daemon.post(&path, &json!({})).await?.done()?;
-    one.daemon.say(&saved, |saved| {
-        let name = name.unwrap_or_default();
-        output::say(format_args!(
-            "{name} {}",
-            saved["text"].as_str().unwrap_or("has saved its parameters to EEPROM")
-        ))
-    })
+    let done = "has saved its parameters to EEPROM: all that it kept in RAM, not one alone".to_owned();
+    one.tell(name, &Told { action: "save", body: json!({}), done }).await
 }
 
-/// Reads every register that can be read.
+/// Reads every register that can be read. The daemon reads them between its polls, and what it has read it keeps for a
+/// while: it is asked again until nothing is missing.
 pub(super) async fn dump(one: &OneDriveArgs, name: Option<&str>) -> Result<(), Failure> {
     let mut daemon = one.daemon.connect().await?;
-    let path = one.path(&mut daemon, name, &["parameters"]).await?;
-    let rows = daemon.get(&path).await?.done()?;
-    one.daemon.say(&rows, show)
+    let path = one.path(&mut daemon, name, &["parameters"]).await? + "?wait=30s";
+    let mut left = usize::MAX;
+    loop {
+        let rows = daemon.get(&path).await?.done()?;
+        let missing =
+            |row: &&Value| row["access"] != "write" && row["text"].is_null() && row["error"].is_null();
+        let now = rows.as_array().into_iter().flatten().filter(missing).count();
+        // Where it comes no further the drive is not there.
+        if now == 0 || now >= left {
+            return one.daemon.say(&rows, show);
+        }
+        left = now;
+    }
 }
 
 fn show(rows: &Value) -> Result<(), Failure> {
-    let all = rows.as_array().or_else(|| rows["parameters"].as_array());
-    client::registers(all.map_or(&[][..], Vec::as_slice))
-}
-
-fn shown(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+    client::registers(rows.as_array().map_or(&[][..], Vec::as_slice))
 }

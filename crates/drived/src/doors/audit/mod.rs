@@ -14,12 +14,13 @@ use std::{
     time::SystemTime,
 };
 
+use drive_fleet::{Event, EventKind, Events, Received};
 use serde::Serialize;
 use tokio::sync::oneshot;
 
 use self::file::File;
 pub(crate) use self::verify::{Verdict, verify};
-use super::rights::Caller;
+use super::rights::{Caller, Rights};
 
 /// Records that wait for the disk.
 const WAITING: usize = 256;
@@ -34,6 +35,8 @@ pub(crate) enum Kind {
     Command,
     /// What was answered to a command, and what became of it if that was known.
     Answer,
+    /// What became of a command at a drive, whoever gave it, and what was done with the drive at the exit.
+    Outcome,
     /// A token was right.
     Login,
     /// A session was ended by whoever had it.
@@ -151,6 +154,28 @@ impl Written {
 
     /// Leaves it to the disk.
     pub(crate) fn whenever(self) {}
+}
+
+/// Writes what becomes of each command at its drive until the fleet ends: also of one whose caller did not wait for it.
+pub(super) async fn follow(audit: Audit, mut events: Events) {
+    loop {
+        let Event { drive, kind, .. } = match events.recv().await {
+            Received::Event(event) => event,
+            Received::Missed(_) => continue,
+            Received::End => return,
+        };
+        let (caller, what, outcome) = match kind {
+            EventKind::Command { command, commander, outcome } => {
+                (commander.to_string(), format!("{drive}: {command}"), outcome.kind().to_owned())
+            }
+            EventKind::Exit(action) => ("drived".to_owned(), format!("{drive}: exit"), action.to_string()),
+            _ => continue,
+        };
+        let caller = Caller { name: caller, origin: "fleet".to_owned(), rights: Rights::ALL };
+        let record = Record { outcome: Some(outcome), ..Record::new(Kind::Outcome, &caller, what) };
+        // Where it cannot be written that is told by whoever writes.
+        let _ = audit.record(record).done().await;
+    }
 }
 
 fn write_all(mut file: File, records: &Receiver<Waiting>, failing: &AtomicBool) {
