@@ -1,19 +1,23 @@
 //! [`FleetBuilder`]: lines and drives become a fleet, after everything that can be checked beforehand is.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, RwLock},
+    time::Duration,
+};
 
 use drive_bus::{Line, Slave, SlaveSettings};
 use drive_core::{
     Capabilities, Drive, LineMismatch, SlaveAddress, SlaveAddressError, StopMode, WatchdogCapability,
 };
 use tokio::{
-    sync::{Mutex, Semaphore, broadcast, mpsc, watch},
+    sync::{broadcast, mpsc, watch},
     time::Instant,
 };
 
 use crate::{
     event::Event,
-    fleet::{Fleet, LineEntry},
+    fleet::{Fleet, LineEntry, Members},
     handle::Entry,
     plan::{Demand, LineBudget, PlanProblem, Reckoning, reckon},
     settings::{DriveSettings, Times, WatchdogContract},
@@ -34,6 +38,12 @@ pub enum FleetError {
     /// Two drives or two lines have one name.
     #[error("{0:?}: the name is taken")]
     NameTaken(String),
+    /// The fleet has no drive of this name.
+    #[error("there is no drive {0:?}")]
+    NoSuchDrive(String),
+    /// The fleet has shut down.
+    #[error("the fleet has shut down")]
+    ShutDown,
     /// A drive names a line that is not there.
     #[error("{drive}: there is no line {line:?}")]
     NoSuchLine {
@@ -111,6 +121,8 @@ struct Wire {
     name: String,
     line: Line,
     budget: LineBudget,
+    /// The line of a fleet that runs, and its drives.
+    standing: Option<(Arc<LineEntry>, Vec<Arc<Entry>>)>,
 }
 
 /// What a drive is before the fleet starts.
@@ -138,6 +150,17 @@ impl Fleet {
 }
 
 impl FleetBuilder {
+    /// Begins an addition to a fleet that runs.
+    pub(crate) fn addition(members: &Members) -> Self {
+        let wire = |entry: &Arc<LineEntry>| Wire {
+            name: entry.name.to_string(),
+            line: entry.line.clone(),
+            budget: entry.budget,
+            standing: Some((Arc::clone(entry), members.on(entry).cloned().collect())),
+        };
+        Self { lines: members.lines.iter().map(wire).collect(), ..Fleet::builder() }
+    }
+
     /// Adds a line. What it gives follows from its configuration, as [`LineBudget::of`] says.
     pub fn line(self, name: impl Into<String>, line: Line) -> Self {
         self.line_with(name, line, |budget| budget)
@@ -155,7 +178,7 @@ impl FleetBuilder {
         if self.lines.iter().any(|other| other.name == name) {
             self.problem.get_or_insert(FleetError::NameTaken(name.clone()));
         }
-        self.lines.push(Wire { name, line, budget });
+        self.lines.push(Wire { name, line, budget, standing: None });
         self
     }
 
@@ -199,7 +222,11 @@ impl FleetBuilder {
         open: impl FnOnce(Slave, SlaveAddress) -> Box<dyn Drive>,
     ) -> Result<Member, FleetError> {
         let drive = || settings.name.clone();
-        if self.members.iter().any(|other| other.settings.name == settings.name) {
+        let mut standing =
+            self.lines.iter().filter_map(|wire| wire.standing.as_ref()).flat_map(|(_, all)| all);
+        if self.members.iter().any(|other| other.settings.name == settings.name)
+            || standing.any(|entry| *entry.name == *settings.name)
+        {
             return Err(FleetError::NameTaken(drive()));
         }
         let Some((line, wire)) = self.lines.iter().enumerate().find(|(_, wire)| wire.name == line_name)
@@ -208,7 +235,10 @@ impl FleetBuilder {
         };
         let slave = SlaveAddress::try_from(address)
             .map_err(|problem| FleetError::NoAddress { drive: drive(), problem })?;
-        if self.members.iter().any(|other| other.line == line && other.drive.slave() == slave) {
+        let standing = wire.standing.as_ref().map(|(_, entries)| entries.as_slice()).unwrap_or_default();
+        if self.members.iter().any(|other| other.line == line && other.drive.slave() == slave)
+            || standing.iter().any(|entry| entry.slave == slave)
+        {
             return Err(FleetError::AddressTaken { drive: drive(), line: line_name.to_owned(), slave });
         }
         let opened = open(wire.line.slave(address), slave);
@@ -240,37 +270,51 @@ impl FleetBuilder {
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
     pub fn start(self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(EVENTS);
-        let (lines, members) = self.check()?;
-        let turns: Vec<_> = lines.iter().map(|_| Arc::new(Semaphore::new(1))).collect();
-        let entries = members
-            .into_iter()
-            .map(|member| {
-                let turns =
-                    turns.get(member.line).map(Arc::clone).unwrap_or_else(|| Arc::new(Semaphore::new(1)));
-                spawn(member, &events, turns)
-            })
-            .collect();
-        Ok(Fleet::new(lines, entries, &events, first))
+        let members = self.enlist(&Members::default(), &events)?;
+        Ok(Fleet::new(members, events, first))
     }
 
-    fn check(self) -> Result<(Vec<LineEntry>, Vec<Member>), FleetError> {
+    /// Starts the drives that are added to those that are there, if all of it can work.
+    pub(crate) fn enlist(
+        self,
+        standing: &Members,
+        events: &broadcast::Sender<Event>,
+    ) -> Result<Members, FleetError> {
+        let (lines, added) = self.check()?;
+        let mut all = Members { lines, entries: standing.entries.clone() };
+        for member in added {
+            if let Some(line) = all.lines.get(member.line) {
+                member.keep_pause(&line.line);
+                all.entries.push(spawn(member, events, Arc::clone(line)));
+            }
+        }
+        Ok(all)
+    }
+
+    fn check(self) -> Result<(Vec<Arc<LineEntry>>, Vec<Member>), FleetError> {
         let Self { lines, members, problem, refuses_plans, .. } = self;
         if let Some(problem) = problem {
             return Err(problem);
         }
-        let mut entries = Vec::with_capacity(lines.len());
-        for (number, Wire { name, line, budget }) in lines.into_iter().enumerate() {
-            let members = || members.iter().filter(|member| member.line == number);
-            let demands: Vec<_> = members().map(Member::demand).collect();
-            let Reckoning { plan, problem } = reckon(budget, &demands, 0);
+        let mut planned = Vec::with_capacity(lines.len());
+        for (number, wire) in lines.into_iter().enumerate() {
+            let standing = wire.standing.iter().flat_map(|(_, entries)| entries).map(|entry| entry.demand());
+            let added = members.iter().filter(|member| member.line == number).map(Member::demand);
+            let demands: Vec<_> = standing.chain(added).collect();
+            let Reckoning { plan, problem } = reckon(wire.budget, &demands, 0);
             if let Some(problem) = problem.filter(|_| refuses_plans) {
-                return Err(FleetError::Plan { line: name, problem });
+                return Err(FleetError::Plan { line: wire.name, problem });
             }
-            members().for_each(|member| member.keep_pause(&line));
-            let commands = Mutex::new(Instant::now());
-            entries.push(LineEntry { name: Arc::from(name), line, plan, commands });
+            planned.push((wire, plan));
         }
-        Ok((entries, members))
+        let entry = |(Wire { name, line, budget, standing }, plan)| match standing {
+            Some((entry, _)) => {
+                entry.set_plan(plan);
+                entry
+            }
+            None => Arc::new(LineEntry::new(name, line, budget, plan)),
+        };
+        Ok((planned.into_iter().map(entry).collect(), members))
     }
 }
 
@@ -383,8 +427,8 @@ fn check_watchdog(
     Ok(())
 }
 
-fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore>) -> Arc<Entry> {
-    let Member { line, settings, mut drive } = member;
+fn spawn(member: Member, events: &broadcast::Sender<Event>, line: Arc<LineEntry>) -> Arc<Entry> {
+    let Member { settings, mut drive, .. } = member;
     let (slave, capabilities) = (drive.slave(), drive.capabilities());
     let broadcasts = StopMode::ALL
         .into_iter()
@@ -401,15 +445,24 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, turns: Arc<Semaphore
     let (urgent, urgent_box) = mpsc::unbounded_channel();
     let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
-    let desk =
-        Desk { supervisor, events: events.clone(), snapshots, exit, callers: BTreeMap::new(), next_call: 0 };
+    let desk = Desk {
+        supervisor,
+        events: events.clone(),
+        snapshots,
+        exit,
+        callers: BTreeMap::new(),
+        next_call: 0,
+        accepts: None,
+    };
+    let turns = Arc::clone(&line.turns);
     tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box, turns }.run());
     Arc::new(Entry {
         name,
         line,
         slave,
         capabilities,
-        settings,
+        watchdog,
+        settings: RwLock::new(Arc::new(settings)),
         broadcasts,
         messages,
         urgent,

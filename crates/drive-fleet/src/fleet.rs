@@ -4,7 +4,7 @@ use std::{
     fmt,
     future::poll_fn,
     pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError, RwLock},
     task::{Context, Poll, ready},
     time::Duration,
 };
@@ -13,14 +13,17 @@ use drive_bus::Line;
 use futures_core::Stream;
 use futures_util::future::join_all;
 use tokio::{
-    sync::broadcast::{self, error::RecvError},
+    sync::{
+        Semaphore,
+        broadcast::{self, error::RecvError},
+    },
     time::Instant,
 };
 
 use crate::{
     event::{Event, ExitAction},
     handle::{DriveHandle, Entry},
-    plan::LinePlan,
+    plan::{LineBudget, LinePlan},
     task::Urgent,
 };
 
@@ -28,71 +31,119 @@ use crate::{
 pub(crate) struct LineEntry {
     pub(crate) name: Arc<str>,
     pub(crate) line: Line,
-    pub(crate) plan: LinePlan,
+    pub(crate) budget: LineBudget,
+    plan: Mutex<LinePlan>,
     /// When the commands of groups may use it again; who holds it is using it.
     pub(crate) commands: tokio::sync::Mutex<Instant>,
+    /// The turn that its drives take one after the other.
+    pub(crate) turns: Arc<Semaphore>,
+}
+
+impl LineEntry {
+    pub(crate) fn new(name: String, line: Line, budget: LineBudget, plan: LinePlan) -> Self {
+        Self {
+            name: Arc::from(name),
+            line,
+            budget,
+            plan: Mutex::new(plan),
+            commands: tokio::sync::Mutex::new(Instant::now()),
+            turns: Arc::new(Semaphore::new(1)),
+        }
+    }
+
+    pub(crate) fn plan(&self) -> LinePlan {
+        *self.plan.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn set_plan(&self, plan: LinePlan) {
+        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = plan;
+    }
+}
+
+/// Who belongs to the fleet.
+#[derive(Clone, Default)]
+pub(crate) struct Members {
+    pub(crate) lines: Vec<Arc<LineEntry>>,
+    pub(crate) entries: Vec<Arc<Entry>>,
+}
+
+impl Members {
+    pub(crate) fn on<'a>(&'a self, line: &'a Arc<LineEntry>) -> impl Iterator<Item = &'a Arc<Entry>> {
+        self.entries.iter().filter(move |entry| Arc::ptr_eq(&entry.line, line))
+    }
 }
 
 /// Many drives on many lines, each watched by a task of its own. Cheap to clone.
+///
+/// Lines and drives come and go while it runs: [`extend`](Self::extend), [`reconfigure`](Self::reconfigure),
+/// [`remove`](Self::remove), [`remove_line`](Self::remove_line). The others notice nothing of it, and neither do readers of
+/// events.
 ///
 /// [`shutdown`](Self::shutdown) is the end that acts by each drive's policy. When the last handle is dropped without it
 /// the tasks end and nothing is written: the drives go on until their own watchdogs act.
 #[derive(Clone)]
 pub struct Fleet {
-    inner: Arc<Inner>,
+    pub(crate) inner: Arc<Inner>,
 }
 
-struct Inner {
-    lines: Vec<LineEntry>,
-    entries: Vec<Arc<Entry>>,
-    /// The tasks hold the senders, so that readers see the end of the fleet.
-    events: broadcast::WeakSender<Event>,
+pub(crate) struct Inner {
+    members: RwLock<Arc<Members>>,
+    /// One change of the members at a time.
+    pub(crate) changing: Mutex<()>,
+    /// Gone when the fleet has shut down, so that readers see its end.
+    events: Mutex<Option<broadcast::Sender<Event>>>,
     /// For the first reader, which misses nothing of the start.
     first: Mutex<Option<broadcast::Receiver<Event>>>,
 }
 
 impl fmt::Debug for Fleet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let drives: Vec<_> = self.inner.entries.iter().map(|entry| &entry.name).collect();
+        let members = self.members();
+        let drives: Vec<_> = members.entries.iter().map(|entry| &entry.name).collect();
         f.debug_struct("Fleet").field("drives", &drives).finish_non_exhaustive()
     }
 }
 
 impl Fleet {
     pub(crate) fn new(
-        lines: Vec<LineEntry>,
-        entries: Vec<Arc<Entry>>,
-        events: &broadcast::Sender<Event>,
+        members: Members,
+        events: broadcast::Sender<Event>,
         first: broadcast::Receiver<Event>,
     ) -> Self {
-        let (events, first) = (events.downgrade(), Mutex::new(Some(first)));
-        Self { inner: Arc::new(Inner { lines, entries, events, first }) }
+        let inner = Inner {
+            members: RwLock::new(Arc::new(members)),
+            changing: Mutex::default(),
+            events: Mutex::new(Some(events)),
+            first: Mutex::new(Some(first)),
+        };
+        Self { inner: Arc::new(inner) }
     }
 
     /// The drive with a name.
     #[must_use]
     pub fn drive(&self, name: &str) -> Option<DriveHandle> {
-        let entry = self.inner.entries.iter().find(|entry| &*entry.name == name)?;
+        let members = self.members();
+        let entry = members.entries.iter().find(|entry| &*entry.name == name)?;
         Some(DriveHandle::new(Arc::clone(entry)))
     }
 
     /// All drives, in the order in which they were added.
     #[must_use]
     pub fn drives(&self) -> Vec<DriveHandle> {
-        self.inner.entries.iter().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
+        self.members().entries.iter().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
     /// The lines by their names, in the order in which they were added.
     #[must_use]
     pub fn lines(&self) -> Vec<(Arc<str>, Line)> {
-        self.inner.lines.iter().map(|entry| (Arc::clone(&entry.name), entry.line.clone())).collect()
+        self.members().lines.iter().map(|entry| (Arc::clone(&entry.name), entry.line.clone())).collect()
     }
 
     /// The drives of a line, in the order in which they were added.
     #[must_use]
     pub fn drives_on(&self, line: &str) -> Vec<DriveHandle> {
-        let number = self.inner.lines.iter().position(|entry| &*entry.name == line);
-        let on_line = self.inner.entries.iter().filter(|entry| Some(entry.line) == number);
+        let members = self.members();
+        let on_line = members.entries.iter().filter(|entry| &*entry.line.name == line);
         on_line.map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
@@ -100,45 +151,57 @@ impl Fleet {
     #[must_use]
     pub fn events(&self) -> Events {
         let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).take();
-        Events::new(first.or_else(|| self.inner.events.upgrade().map(|events| events.subscribe())))
+        Events::new(first.or_else(|| self.sender().map(|events| events.subscribe())))
     }
 
     /// The reckoning of a line.
     #[must_use]
     pub fn plan(&self, line: &str) -> Option<LinePlan> {
-        self.inner.lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan)
+        self.members().lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan())
     }
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
     /// a drive that is still stopping then has [`ExitAction::TimeOver`].
     #[must_use = "a drive that was not stopped may run"]
     pub async fn shutdown(&self, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
-        let entries = &self.inner.entries;
-        let tell = |message: fn() -> Urgent| {
-            for entry in entries {
-                // A task that is gone has its action in the watch.
-                let _ = entry.urgent.send(message());
-            }
-        };
-        let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
-        tell(|| Urgent::Exit);
-        let actions = match tokio::time::timeout(limit, all_done()).await {
-            Ok(actions) => actions,
-            Err(_) => {
-                tell(|| Urgent::ExitTimeOver);
-                all_done().await
-            }
-        };
-        entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
+        let actions = end(&self.members().entries, limit).await;
+        self.inner.events.lock().unwrap_or_else(PoisonError::into_inner).take();
+        actions
     }
 
-    pub(crate) fn line_entries(&self) -> &[LineEntry] {
-        &self.inner.lines
+    pub(crate) fn members(&self) -> Arc<Members> {
+        Arc::clone(&self.inner.members.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    pub(crate) fn entries(&self) -> &[Arc<Entry>] {
-        &self.inner.entries
+    /// Exchanges the members. Who changes them holds [`Inner::changing`].
+    pub(crate) fn set_members(&self, members: Members) {
+        *self.inner.members.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(members);
     }
+
+    /// Where events are told; `None` after the shut-down.
+    pub(crate) fn sender(&self) -> Option<broadcast::Sender<Event>> {
+        self.inner.events.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Has the policies of these drives act. What is not done after `limit` is given up.
+pub(crate) async fn end(entries: &[Arc<Entry>], limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
+    let tell = |message: fn() -> Urgent| {
+        for entry in entries {
+            // A task that is gone has its action in the watch.
+            let _ = entry.urgent.send(message());
+        }
+    };
+    let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
+    tell(|| Urgent::Exit);
+    let actions = match tokio::time::timeout(limit, all_done()).await {
+        Ok(actions) => actions,
+        Err(_) => {
+            tell(|| Urgent::ExitTimeOver);
+            all_done().await
+        }
+    };
+    entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
 }
 
 async fn exit_action(entry: &Entry) -> ExitAction {

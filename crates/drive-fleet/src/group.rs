@@ -17,7 +17,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
-    fleet::{Fleet, LineEntry},
+    fleet::{Fleet, LineEntry, Members},
     handle::{DriveHandle, Entry},
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     snapshot::{Link, Snapshot, has_reached},
@@ -137,7 +137,7 @@ impl fmt::Display for GroupFailure {
 
 impl std::error::Error for GroupFailure {}
 
-/// Several drives of a fleet, commanded together.
+/// Several drives of a fleet, commanded together. A drive that has left the fleet since refuses every command.
 #[derive(Debug, Clone)]
 pub struct Group {
     fleet: Fleet,
@@ -183,13 +183,22 @@ impl Group {
     async fn stop_each(&self, mode: StopMode, anyhow: bool, told: &impl Fn(&str, &Outcome)) -> StopReport {
         let mut report = StopReport::default();
         let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
-            self.members.iter().cloned().partition(|member| member.entry.settings.control);
+            self.members.iter().cloned().partition(|member| member.entry.settings().control);
         report.read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
+        let standing = self.fleet.members();
         let mut stops = Vec::new();
-        for (number, line) in self.fleet.line_entries().iter().enumerate() {
-            let members = members.iter().filter(|member| member.entry.line == number);
-            let write = self.common_write(number, mode).filter(|_| !anyhow);
+        for line in &standing.lines {
+            let members = members.iter().filter(|member| Arc::ptr_eq(&member.entry.line, line));
+            let write = self.common_write(&standing, line, mode).filter(|_| !anyhow);
             stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow, told));
+        }
+        // Drives that have left the fleet since.
+        let gone =
+            |member: &&DriveHandle| !standing.lines.iter().any(|line| Arc::ptr_eq(line, &member.entry.line));
+        for member in members.iter().filter(gone) {
+            let outcome = Outcome::Refused(Refused::ShutDown);
+            told(member.name(), &outcome);
+            report.unconfirmed.push((Arc::clone(member.name()), outcome));
         }
         for (broadcast, outcomes) in join_all(stops).await {
             report.broadcasts.extend(broadcast);
@@ -205,11 +214,16 @@ impl Group {
     }
 
     /// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
-    fn common_write(&self, line: usize, mode: StopMode) -> Option<BroadcastWrite> {
+    fn common_write(
+        &self,
+        standing: &Members,
+        line: &Arc<LineEntry>,
+        mode: StopMode,
+    ) -> Option<BroadcastWrite> {
         let group: BTreeSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
-        let mut on_line = self.fleet.entries().iter().filter(|entry| entry.line == line);
+        let mut on_line = standing.entries.iter().filter(|entry| Arc::ptr_eq(&entry.line, line));
         let write = |entry: &Arc<Entry>| {
-            let allowed = entry.settings.control && group.contains(&entry.name);
+            let allowed = entry.settings().control && group.contains(&entry.name);
             let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
             write.filter(|_| allowed)
         };
@@ -298,12 +312,12 @@ impl Group {
     /// Commands a drive when its line is free for it: no other group's command is under way there, and the polls have had
     /// their share since the last.
     async fn on_line<T>(&self, member: &DriveHandle, command: impl AsyncFnOnce() -> T) -> T {
-        let Some(line) = self.fleet.line_entries().get(member.entry.line) else { return command().await };
+        let line = &member.entry.line;
         let mut free_at = line.commands.lock().await;
         sleep_until(*free_at).await;
         let begun = Instant::now();
         let ended = command().await;
-        *free_at = Instant::now() + line.plan.rest_after(begun.elapsed());
+        *free_at = Instant::now() + line.plan().rest_after(begun.elapsed());
         ended
     }
 
@@ -336,7 +350,7 @@ async fn stop_line(
     };
     let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
     let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
-    let patience = line.plan.stop_all(mute) + line.line.worst_case_stop();
+    let patience = line.plan().stop_all(mute) + line.line.worst_case_stop();
     let stops: Vec<_> =
         members.into_iter().map(|member| stop_one(member, mode, anyhow, patience, told)).collect();
     // Both at once: the broadcast is first on the line, and no start of before can come behind it.
@@ -358,7 +372,7 @@ async fn stop_one(
 /// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it
 /// was given before. What is remembered of the setpoint for later commands ends with a lost status, and this does not.
 async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Outcome) {
-    let after = member.entry.settings.times.reference;
+    let after = member.entry.settings().times.reference;
     let setpoint = setpoint.or(member.snapshot().setpoint);
     let is_there = |snapshot: &Snapshot| {
         let status = snapshot.fresh_status(Instant::now());

@@ -1,8 +1,15 @@
 //! [`DriveHandle`]: one drive of a fleet, as its users hold it.
 
-use std::{fmt, pin::pin, sync::Arc, time::Duration};
+use std::{
+    fmt,
+    pin::pin,
+    sync::{Arc, PoisonError, RwLock},
+    time::Duration,
+};
 
-use drive_core::{BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode};
+use drive_core::{
+    BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode, WatchdogCapability,
+};
 use tokio::{
     sync::{mpsc, oneshot, watch},
     time::{Instant, sleep},
@@ -10,7 +17,9 @@ use tokio::{
 
 use crate::{
     event::ExitAction,
+    fleet::LineEntry,
     outcome::{Order, Outcome, Refused, Until},
+    plan::Demand,
     settings::DriveSettings,
     snapshot::Snapshot,
     supervisor::Leave,
@@ -20,16 +29,36 @@ use crate::{
 /// What the handles of a drive share.
 pub(crate) struct Entry {
     pub(crate) name: Arc<str>,
-    pub(crate) line: usize,
+    pub(crate) line: Arc<LineEntry>,
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
-    pub(crate) settings: DriveSettings,
+    pub(crate) watchdog: Option<WatchdogCapability>,
+    /// They may be exchanged.
+    pub(crate) settings: RwLock<Arc<DriveSettings>>,
     /// The writes that stop every drive of its family on a line, by mode.
     pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
     pub(crate) messages: mpsc::Sender<Message>,
     pub(crate) urgent: mpsc::UnboundedSender<Urgent>,
     pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
     pub(crate) exit: watch::Receiver<Option<ExitAction>>,
+}
+
+impl Entry {
+    pub(crate) fn settings(&self) -> Arc<DriveSettings> {
+        Arc::clone(&self.settings.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// What it wants of its line.
+    pub(crate) fn demand(&self) -> Demand {
+        let settings = self.settings();
+        Demand {
+            drive: self.name.to_string(),
+            capabilities: self.capabilities,
+            watchdog_capability: self.watchdog,
+            periods: settings.periods,
+            watchdog: settings.watchdog,
+        }
+    }
 }
 
 /// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives.
@@ -83,8 +112,8 @@ impl DriveHandle {
 
     /// What it was told.
     #[must_use]
-    pub fn settings(&self) -> &DriveSettings {
-        &self.entry.settings
+    pub fn settings(&self) -> Arc<DriveSettings> {
+        self.entry.settings()
     }
 
     /// What is known of it now.

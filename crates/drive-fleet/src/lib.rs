@@ -51,6 +51,7 @@ mod handle;
 #[cfg(feature = "serde")]
 mod json;
 mod limits;
+mod membership;
 mod outcome;
 mod plan;
 mod settings;

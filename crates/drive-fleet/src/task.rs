@@ -16,6 +16,7 @@ use tokio::{
 use crate::{
     event::{Event, ExitAction},
     outcome::{Order, Outcome, Refused},
+    settings::DriveSettings,
     snapshot::Snapshot,
     supervisor::{Asker, CallId, Job, Leave, Output, Reply, Step, Supervisor, Turn},
 };
@@ -49,7 +50,9 @@ pub(crate) enum Urgent {
         patience: Option<Duration>,
         reply: oneshot::Sender<Outcome>,
     },
-    /// The fleet shuts down.
+    /// Other settings.
+    Settings(Arc<DriveSettings>),
+    /// The fleet shuts down, or the drive leaves it.
     Exit,
     /// The time for shutting down is over.
     ExitTimeOver,
@@ -74,6 +77,9 @@ impl Task {
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
         loop {
+            if let Some(accepted) = desk.accepts.take() {
+                drive.accept_self_restart(&accepted.iter().map(String::as_str).collect::<Vec<_>>());
+            }
             let step = desk.supervisor.next(Instant::now());
             desk.publish();
             let (call, until) = match step {
@@ -179,6 +185,8 @@ pub(crate) struct Desk {
     pub(crate) exit: watch::Sender<Option<ExitAction>>,
     pub(crate) callers: BTreeMap<CallId, oneshot::Sender<Outcome>>,
     pub(crate) next_call: u64,
+    /// Which restarts the drive is to accept from its next call on.
+    pub(crate) accepts: Option<Vec<String>>,
 }
 
 impl Desk {
@@ -206,6 +214,11 @@ impl Desk {
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
                 let asker = self.caller(name, reply);
                 self.supervisor.handle_stop(now, asker, mode, anyhow, patience)
+            }
+            Urgent::Settings(settings) => {
+                self.accepts = Some(settings.accept_self_restart.clone());
+                self.supervisor.handle_settings(now, &settings);
+                false
             }
             Urgent::Exit => self.supervisor.handle_exit(now),
             Urgent::ExitTimeOver => {

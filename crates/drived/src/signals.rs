@@ -1,4 +1,5 @@
-//! Being asked to end: Ctrl-C, and SIGTERM where there is one.
+//! What the program is asked by signals: to end (Ctrl-C, SIGTERM, SIGQUIT), to read its configuration again (SIGHUP), to say how
+//! its drives are (SIGUSR1, SIGUSR2).
 
 use std::io;
 
@@ -13,6 +14,8 @@ pub(crate) struct Ending {
     interrupt: tokio::signal::unix::Signal,
     #[cfg(unix)]
     terminate: tokio::signal::unix::Signal,
+    #[cfg(unix)]
+    quit: tokio::signal::unix::Signal,
 }
 
 impl Ending {
@@ -25,6 +28,7 @@ impl Ending {
             at: None,
             interrupt: listen(SignalKind::interrupt())?,
             terminate: listen(SignalKind::terminate())?,
+            quit: listen(SignalKind::quit())?,
         })
     }
 
@@ -54,6 +58,7 @@ impl Ending {
         tokio::select! {
             _ = self.interrupt.recv() => {}
             _ = self.terminate.recv() => {}
+            _ = self.quit.recv() => {}
         }
     }
 
@@ -65,6 +70,80 @@ impl Ending {
             std::future::pending().await
         }
     }
+}
+
+/// What a daemon is asked besides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wish {
+    /// To read its configuration again.
+    Reload,
+    /// To say how its drives are.
+    State,
+    /// To end, because its terminal was closed.
+    End,
+}
+
+/// Hears what a daemon is asked besides ending, from when it is made.
+#[cfg(unix)]
+pub(crate) struct Wishes {
+    hangup: tokio::signal::unix::Signal,
+    user: [tokio::signal::unix::Signal; 2],
+    /// Whether it began on a terminal whose end means something to it.
+    on_terminal: bool,
+}
+
+#[cfg(unix)]
+impl Wishes {
+    pub(crate) fn listen() -> Result<Self, Failure> {
+        use tokio::signal::unix::{SignalKind, signal};
+        // Asked before the signal is listened to, which ends its being ignored.
+        let on_terminal = has_terminal() && !is_hangup_ignored();
+        let listen = |kind| signal(kind).map_err(|error| cannot_listen(&error));
+        let user = [listen(SignalKind::user_defined1())?, listen(SignalKind::user_defined2())?];
+        Ok(Self { hangup: listen(SignalKind::hangup())?, user, on_terminal })
+    }
+
+    /// The next. SIGHUP means that the configuration is to be read again, unless the terminal on which the program began is
+    /// gone. Safe to drop.
+    pub(crate) async fn next(&mut self) -> Wish {
+        let [one, two] = &mut self.user;
+        tokio::select! {
+            _ = self.hangup.recv() => match self.on_terminal && !has_terminal() {
+                true => Wish::End,
+                false => Wish::Reload,
+            },
+            _ = one.recv() => Wish::State,
+            _ = two.recv() => Wish::State,
+        }
+    }
+}
+
+#[cfg(not(unix))]
+pub(crate) struct Wishes;
+
+#[cfg(not(unix))]
+impl Wishes {
+    pub(crate) fn listen() -> Result<Self, Failure> {
+        Ok(Self)
+    }
+
+    pub(crate) async fn next(&mut self) -> Wish {
+        std::future::pending().await
+    }
+}
+
+/// Whether the program has a terminal. A daemon has none, and one that was closed is none any more.
+#[cfg(unix)]
+fn has_terminal() -> bool {
+    std::fs::File::open("/dev/tty").is_ok()
+}
+
+/// Whether `nohup` or the like has the end of the terminal ignored, as Linux tells it.
+#[cfg(unix)]
+fn is_hangup_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
 }
 
 fn cannot_listen(error: &io::Error) -> Failure {

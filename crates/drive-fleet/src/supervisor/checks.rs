@@ -91,6 +91,23 @@ impl Checks {
         self.contract.filter(|_| self.armed).map(|contract| contract.timeout).or(self.fixed)
     }
 
+    /// Other settings hold from now on: what depends on them is checked anew.
+    pub(crate) fn reconfigure(&mut self, now: Instant, settings: &DriveSettings) {
+        if settings.watchdog != self.contract {
+            self.contract = settings.watchdog;
+            self.armed = false;
+            self.watchdog_at = Some(now);
+            self.watchdog = match self.contract {
+                Some(_) => WatchdogCheck::Unchecked,
+                None => WatchdogCheck::NoContract { found: None },
+            };
+        }
+        if settings.accept_self_restart != self.accepted_restarts {
+            self.accepted_restarts.clone_from(&settings.accept_self_restart);
+            self.restarts_at = Some(now);
+        }
+    }
+
     /// A connection begins: everything is checked anew.
     pub(crate) fn connected(&mut self, now: Instant) {
         self.identity = IdentityCheck::Unchecked;
@@ -153,7 +170,10 @@ impl Checks {
     /// The watchdog as it was found, if something else was written to it and it is still the drive to which that was written.
     pub(crate) fn to_restore(&self) -> Option<Watchdog> {
         let known = matches!(self.identity, IdentityCheck::Same(_) | IdentityCheck::CannotSay);
-        let verified = matches!(self.watchdog, WatchdogCheck::Verified(_));
+        let verified = matches!(
+            self.watchdog,
+            WatchdogCheck::Verified(_) | WatchdogCheck::NoContract { found: Some(_) }
+        );
         self.found.filter(|_| self.written && known && verified)
     }
 

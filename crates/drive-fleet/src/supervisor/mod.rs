@@ -164,6 +164,14 @@ impl Supervisor {
         }
     }
 
+    /// Other settings hold from now on. The motor, the orders and the stops under way go on.
+    pub(crate) fn handle_settings(&mut self, now: Instant, settings: &DriveSettings) {
+        self.checks.reconfigure(now, settings);
+        self.pace.reconfigure(now, settings.periods);
+        self.settings = settings.clone();
+        self.changed = true;
+    }
+
     /// The drive's name.
     pub(crate) fn name(&self) -> Arc<str> {
         Arc::clone(&self.name)

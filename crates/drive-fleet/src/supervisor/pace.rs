@@ -19,6 +19,15 @@ impl Pace {
         Self { periods, status_due: now, slow_due: (!periods.slow.is_zero()).then_some(now) }
     }
 
+    /// Other periods hold from now on.
+    pub(crate) fn reconfigure(&mut self, now: Instant, periods: Periods) {
+        if periods != self.periods {
+            self.periods = periods;
+            self.status_due = self.status_due.min(now + periods.running);
+            self.slow_due = (!periods.slow.is_zero()).then_some(now + periods.slow);
+        }
+    }
+
     pub(crate) const fn status_due(&self) -> Instant {
         self.status_due
     }

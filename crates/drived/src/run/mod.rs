@@ -4,6 +4,7 @@ mod descriptors;
 mod exit;
 mod json;
 mod notify;
+pub(crate) mod reload;
 mod report;
 
 use std::{io::IsTerminal as _, path::PathBuf, time::Duration};
@@ -13,16 +14,17 @@ use drive_fleet::{Fleet, FleetBuilder};
 
 use self::{
     notify::Notify,
+    reload::Reloader,
     report::{Form, Report},
 };
 use crate::{
     api,
-    config::{Config, DrivePart, Http, LinePart},
+    config::{Config, Http, LinePart},
     doors::Doors,
     failure::Failure,
     journal, one_drive, page,
     plant::Plant,
-    signals::Ending,
+    signals::{Ending, Wish, Wishes},
 };
 
 /// How long the disk has for the last records of the audit log.
@@ -57,6 +59,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
     let mut ending = Ending::listen()?;
     let notify = Notify::start();
+    let mut wishes = Wishes::listen()?;
     let lines = start_lines(&config)?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
@@ -64,35 +67,66 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
+    let shutdown = config.shutdown;
+    let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
     let doors = doors.open(api::router(plant).merge(page::router()));
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
-    let read = tokio::select! {
-        () = ending.asked() => Ok(()),
-        result = report.ended() => {
-            // Without this program the drives' watchdogs would stop their motors.
-            tracing::warn!("nobody reads stdout any more: the drives are watched on, Ctrl-C ends it");
-            ending.asked().await;
-            result
+    let mut read = None;
+    loop {
+        tokio::select! {
+            () = ending.asked() => break,
+            wish = wishes.next() => match wish {
+                Wish::Reload => drop(tokio::spawn(told(reloader.clone()))),
+                Wish::State => tell_state(&fleet),
+                Wish::End => {
+                    tracing::warn!("the terminal is closed: the program ends by each drive's policy");
+                    break;
+                }
+            },
+            result = report.ended(), if read.is_none() => {
+                // Without this program the drives' watchdogs would stop their motors.
+                tracing::warn!("nobody reads stdout any more: the drives are watched on, Ctrl-C ends it");
+                read = Some(result);
+            }
         }
-    };
+    }
     drop(watching);
     let stopping = notify.stopping(fleet.clone());
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
-    let ended = exit::end(&fleet, config.shutdown, &mut ending).await;
+    let ended = exit::end(&fleet, shutdown, &mut ending).await;
     drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
-    if read.is_ok() {
+    if read.is_none() {
         report.finish().await;
     }
     let _ = closed.await;
-    for line in lines {
+    for (_, line) in fleet.lines() {
         one_drive::close(&line).await;
     }
-    ended.and(read)
+    ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Reads the configuration again and says what became of it.
+async fn told(reloader: Reloader) {
+    match reloader.reload(false).await {
+        Ok(done) if done.is_empty() => tracing::info!("configuration read again: nothing has changed"),
+        Ok(done) => tracing::info!("configuration read again: {}", done.join("; ")),
+        Err(failure @ Failure::Drive(_)) => tracing::error!("configuration read again: {failure}"),
+        Err(failure) => tracing::error!("the old configuration holds on: {failure}"),
+    }
+}
+
+/// Says in the log how each drive is.
+fn tell_state(fleet: &Fleet) {
+    for (line, _) in fleet.lines() {
+        for drive in fleet.drives_on(&line) {
+            tracing::info!("{line}: {}: {}", drive.name(), report::text(&drive.snapshot()));
+        }
+    }
 }
 
 /// Starts every line. One whose port cannot be opened is tried again; its drives are lost meanwhile, and the others run.
@@ -106,11 +140,7 @@ fn build(config: &Config, lines: &[Line]) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        for DrivePart { name, settings, options } in &part.drives {
-            builder = builder.drive(&part.name, name.slave.number(), settings.clone(), |port, slave| {
-                name.family.open_with(port, slave, &options.values)
-            });
-        }
+        builder = part.drives.iter().fold(builder, |builder, drive| reload::add(builder, part, drive));
     }
     builder
 }

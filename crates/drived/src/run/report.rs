@@ -107,7 +107,7 @@ impl Writer {
 }
 
 /// What a person reads of a drive.
-fn text(snapshot: &Snapshot) -> String {
+pub(super) fn text(snapshot: &Snapshot) -> String {
     let status = snapshot.status.as_ref().map(|status| status.value.to_string());
     let pending = if snapshot.stop.is_some() { "; stop pending" } else { "" };
     match (snapshot.link, status) {

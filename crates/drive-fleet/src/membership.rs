@@ -1,0 +1,110 @@
+//! Who belongs to a fleet that runs: lines and drives come, change and go, and the others notice nothing.
+
+use std::{
+    sync::{Arc, PoisonError},
+    time::Duration,
+};
+
+use drive_bus::Line;
+
+use crate::{
+    builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
+    event::ExitAction,
+    fleet::{Fleet, LineEntry, Members, end},
+    plan::reckon,
+    settings::DriveSettings,
+    task::Urgent,
+};
+
+impl Fleet {
+    /// Adds lines and drives, all of them or none. Drives may also be on lines that the fleet has.
+    ///
+    /// ```no_run
+    /// # use drive_core::{Drive, SlaveAddress};
+    /// # fn atv312(port: drive_bus::Slave, slave: SlaveAddress) -> Box<dyn Drive> { unimplemented!() }
+    /// # fn example(fleet: drive_fleet::Fleet) -> Result<(), drive_fleet::FleetError> {
+    /// use drive_fleet::DriveSettings;
+    ///
+    /// fleet.extend(|fleet| {
+    ///     fleet.drive("north", 7, DriveSettings::watched("pump 7"), |port, slave| atv312(port, slave))
+    /// })
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`FleetError`] with what does not fit; nothing was added then. [`FleetError::ShutDown`] after the end of the fleet.
+    pub fn extend(&self, add: impl FnOnce(FleetBuilder) -> FleetBuilder) -> Result<(), FleetError> {
+        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        let events = self.sender().ok_or(FleetError::ShutDown)?;
+        let standing = self.members();
+        let members = add(FleetBuilder::addition(&standing)).enlist(&standing, &events)?;
+        self.set_members(members);
+        Ok(())
+    }
+
+    /// Gives a drive other settings. Its task, its snapshot, its orders and a stop under way go on; what depends on the
+    /// settings is checked anew. Whether its line can keep the new periods is not judged here.
+    ///
+    /// # Errors
+    /// [`FleetError::NoSuchDrive`]; [`FleetError::Setting`] for settings that contradict themselves or the family, and for a
+    /// drive that would not be under control any more: that one is [removed](Self::remove), so that its policy acts, and
+    /// added again.
+    pub fn reconfigure(&self, settings: DriveSettings) -> Result<(), FleetError> {
+        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        let members = self.members();
+        let entry = members.entries.iter().find(|entry| *entry.name == *settings.name);
+        let Some(entry) = entry else { return Err(FleetError::NoSuchDrive(settings.name)) };
+        let released = (entry.settings().control && !settings.control).then(|| SettingProblem {
+            setting: "control",
+            reason: "a drive under control is removed, by its policy, before it is only read".to_owned(),
+        });
+        let checked = check_settings(&settings, entry.capabilities, entry.watchdog);
+        if let Some(problem) = released.or_else(|| checked.err()) {
+            return Err(FleetError::Setting { drive: settings.name, problem });
+        }
+        let settings = Arc::new(settings);
+        *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
+        // A task that is gone has nothing to change.
+        let _ = entry.urgent.send(Urgent::Settings(settings));
+        replan(&members, &entry.line);
+        Ok(())
+    }
+
+    /// Takes drives out of the fleet: the policy of each acts as at a [`shutdown`](Self::shutdown), within `limit`, and what
+    /// was done is listed. Handles of it refuse every command from then on. Names that the fleet does not have are left out.
+    ///
+    /// # Cancellation
+    /// When the future is dropped the policies go on, and the drives stay listed.
+    #[must_use = "a drive that was not stopped may run"]
+    pub async fn remove(&self, drives: &[&str], limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
+        let is_meant = |name: &str| drives.contains(&name);
+        let leaving: Vec<_> =
+            self.members().entries.iter().filter(|entry| is_meant(&entry.name)).cloned().collect();
+        let actions = end(&leaving, limit).await;
+        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut members = Members::clone(&self.members());
+        members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));
+        leaving.iter().for_each(|left| replan(&members, &left.line));
+        self.set_members(members);
+        actions
+    }
+
+    /// Takes a line without drives out of the fleet, and gives it. `None` where the fleet has no such line, or drives on it.
+    pub fn remove_line(&self, line: &str) -> Option<Line> {
+        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut members = Members::clone(&self.members());
+        let at = members.lines.iter().position(|entry| &*entry.name == line)?;
+        if members.on(members.lines.get(at)?).next().is_some() {
+            return None;
+        }
+        let removed = members.lines.remove(at);
+        self.set_members(members);
+        Some(removed.line.clone())
+    }
+}
+
+/// Reckons a line anew whose drives have changed.
+fn replan(members: &Members, line: &Arc<LineEntry>) {
+    let demands: Vec<_> = members.on(line).map(|entry| entry.demand()).collect();
+    line.set_plan(reckon(line.budget, &demands, 0).plan);
+}

@@ -1,0 +1,117 @@
+//! `run` and the signals: a configuration that is read again, and a program that no signal kills without its policies.
+#![cfg(unix)]
+
+mod support;
+
+use std::process::{Command, Stdio};
+
+use support::{File, Running, Sim};
+
+fn configuration(port: &str, drives: &[(u8, &str)]) -> String {
+    let head = format!("snapshots = \"500ms\"\n[lines.bench]\nport = \"{port},19200,8E1\"\n");
+    let drive = |(address, keys): &(u8, &str)| {
+        format!(
+            "[[drives]]\nline = \"bench\"\ndrive = \"atv312@{address}\"\nname = \"pump {address}\"\n{keys}\n"
+        )
+    };
+    drives.iter().map(drive).fold(head, |text, drive| text + &drive)
+}
+
+#[test]
+fn a_hangup_reads_the_configuration_again_and_touches_only_what_has_changed() {
+    let sim = Sim::serve("reload", &["atv312@1-3"]);
+    sim.on("atv312@1", &["setpoint", "30Hz"]).assert_done();
+    sim.on("atv312@1", &["start"]).assert_done();
+    let file = File::new("reload", &configuration(sim.link(), &[(1, "control = true"), (2, "")]));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    for _ in 0..2 {
+        daemon.wait_for(r#""event":"connected""#);
+    }
+    let changed = "control = true\nalarms = { current = 50 }\non_exit_adopted = \"leave\"";
+    std::fs::write(file.path(), configuration(sim.link(), &[(1, changed), (3, "")]))
+        .expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log(
+        "pump 1 has other settings and goes on; pump 2 removed, by its policy of the exit; pump 3 added",
+    );
+    let connected = daemon.wait_for(r#""event":"connected""#);
+    assert!(connected.contains("pump 3"), "{connected}");
+    let shown = loop {
+        let snapshot = daemon.wait_for(r#""kind":"snapshot""#);
+        if snapshot.contains("pump 1") {
+            break snapshot;
+        }
+    };
+    assert!(shown.contains(r#""state":"running""#) && shown.contains(r#""lost":0"#), "{shown}");
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+}
+
+#[test]
+fn a_configuration_with_an_error_is_not_taken_and_the_old_one_holds_on() {
+    let sim = Sim::serve("wrong-reload", &["atv312@1"]);
+    let file = File::new("wrong-reload", &configuration(sim.link(), &[(1, "")]));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"connected""#);
+    std::fs::write(file.path(), configuration(sim.link(), &[(1, "running = \"soon\"")]))
+        .expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log("the old configuration holds on");
+    daemon.wait_for(r#""kind":"snapshot""#);
+    assert_eq!(daemon.interrupt().0, Some(0));
+}
+
+#[test]
+fn sigusr1_says_how_the_drives_are_and_sigquit_ends_the_program_by_its_policies() {
+    let sim = Sim::serve("signals", &["atv312@1"]);
+    let file = File::new("signals", &configuration(sim.link(), &[(1, "control = true")]));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"connected""#);
+    for signal in ["-USR1", "-USR2"] {
+        daemon.signal(signal);
+        daemon.wait_for_log("bench: pump 1: ");
+    }
+    daemon.signal("-QUIT");
+    let (code, rest) = daemon.end();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains(r#""event":"exit""#), "{rest}");
+}
+
+#[test]
+fn a_closed_terminal_ends_the_program_by_its_policies() {
+    let sim = Sim::serve("terminal", &["atv312@1"]);
+    let told = support::path("terminal.log");
+    let file = File::new("terminal", &configuration(sim.link(), &[(1, "control = true")]));
+    // script gives the program a terminal of its own; when it is killed that terminal is closed.
+    let program = format!(
+        "exec {} run --json --config {} >{} 2>&1",
+        env!("CARGO_BIN_EXE_drived"),
+        file.path(),
+        told.display()
+    );
+    let mut terminal = Command::new("script")
+        .args(["-q", "-c", &program, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("script runs");
+    wait_for(&told, r#""event":"connected""#);
+    terminal.kill().expect("it runs");
+    terminal.wait().expect("it ends");
+    wait_for(&told, "the terminal is closed: the program ends by each drive's policy");
+    wait_for(&told, r#""event":"exit""#);
+    std::fs::remove_file(&told).expect("it is there");
+}
+
+/// Waits until a file contains this.
+#[expect(clippy::disallowed_methods, reason = "a file tells nobody that it has grown")]
+fn wait_for(file: &std::path::Path, text: &str) {
+    for _ in 0..600 {
+        if std::fs::read_to_string(file).is_ok_and(|said| said.contains(text)) {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    panic!("it does not say {text:?}: {:?}", std::fs::read_to_string(file));
+}
