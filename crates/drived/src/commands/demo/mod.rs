@@ -57,6 +57,10 @@ impl Args {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let page = match args.http {
+        Http::At(address) => format!("its page: http://{address}/"),
+        Http::Off => "without its page".to_owned(),
+    };
     let doors = Doors::prepare(DoorsConfig::of_demo(args.socket).with(Some(args.http), None)?)?;
     let mut ending = Ending::listen()?;
     let plant = Plant::start()?;
@@ -65,7 +69,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let doors = doors.open(api::router(faces).merge(page::router()));
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
-    let show = Show { plant: &plant, incoming, until, ending: &mut ending };
+    let show = Show { plant: &plant, page, incoming, until, ending: &mut ending };
     let why = if io::stdout().is_terminal() { screen::run(show).await? } else { plain::run(show).await? };
     doors.close().await;
     farewell(&plant, why)
@@ -74,6 +78,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 /// What the two ways of showing the demo need.
 struct Show<'a> {
     plant: &'a Plant,
+    /// Where its page is, in words.
+    page: String,
     incoming: Events,
     until: Option<time::Instant>,
     ending: &'a mut Ending,

@@ -20,7 +20,8 @@ const LOOK: Duration = Duration::from_millis(100);
 const REPORT: Duration = Duration::from_secs(5);
 
 pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
-    let Show { plant, mut incoming, until, ending } = show;
+    let Show { plant, page, mut incoming, until, ending } = show;
+    output::say(&page)?;
     let began = Instant::now();
     let seconds = |at: Instant| at.saturating_duration_since(began).as_millis();
     let mut meters: Vec<Meter> = plant.lines.iter().map(|_| Meter::new()).collect();

@@ -17,7 +17,7 @@ const FRAME: Duration = Duration::from_millis(100);
 const REMEMBERED: usize = 200;
 
 pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
-    let Show { plant, mut incoming, until, ending } = show;
+    let Show { plant, page, mut incoming, until, ending } = show;
     let mut screen = Screen::open().map_err(|error| Failure::output(&error))?;
     let began = Instant::now();
     let mut meters: Vec<Meter> = plant.lines.iter().map(|_| Meter::new()).collect();
@@ -51,6 +51,7 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
         let picture = table::Picture {
             began,
             waited_for: (act != Act::Playing).then(|| waited_for(plant)),
+            page: &page,
             units: plant.units.iter().map(|unit| (unit.name, unit.view())).collect(),
             lines: plant.lines.iter().zip(&meters).map(|(line, meter)| meter.cells(line)).collect(),
             events: &events,

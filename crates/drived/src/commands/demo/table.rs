@@ -32,6 +32,8 @@ pub(super) struct Picture<'a> {
     pub(super) began: Instant,
     /// The drives that are still waited for, once the motors are being stopped.
     pub(super) waited_for: Option<String>,
+    /// Where its page is, in words.
+    pub(super) page: &'a str,
     pub(super) units: Vec<(DriveName, View)>,
     /// The cells of each line, under [`HEADS`].
     pub(super) lines: Vec<[String; 8]>,
@@ -61,7 +63,7 @@ impl Picture<'_> {
                 (format!(" stopping, waiting for {drives}"), " Ctrl-C: leave now ", Color::Yellow)
             }
             None => (
-                " drived demo  simulated drives, nothing real moves".to_owned(),
+                format!(" drived demo  nothing real moves; {}", self.page),
                 " Ctrl-C: stop the motors ",
                 Color::Cyan,
             ),
@@ -267,6 +269,7 @@ mod tests {
         let picture = Picture {
             began: Instant::now(),
             waited_for: None,
+            page: "its page: http://127.0.0.1:7580/",
             units: vec![(name("atv312@1"), view), (name("atv21@2"), View::default())],
             lines: vec![
                 ["19200 8E1", "97.00 %", "7.1", "900", "2.01 ms", "2.00 ms", "0", "0"].map(str::to_owned),

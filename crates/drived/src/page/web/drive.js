@@ -12,6 +12,9 @@ import { trend } from './trend.js';
 import { SEVERE, trouble } from './trouble.js';
 import { setpointText, stateWord, word } from './words.js';
 
+/** Measurements are read seldom: what is older than this says so, though it is the latest that there is. */
+const DATED_FROM_MS = 3_000;
+
 const BIG = [
   ['frequency', drive => quantity(drive.status?.output_frequency_hz, 1, 'Hz'), 'status'],
   ['setpoint', drive => setpointText(drive.setpoint), undefined],
@@ -91,8 +94,9 @@ export function drive(root, name) {
     setText(freshness, quality(shown.status) === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
     setAttribute(freshness, 'data-quality', quality(shown.status));
     BIG.forEach(([, , group], index) => {
-      const isOld = group && quality(shown[group]) === 'stale';
-      setText(big[index].children[2], isOld ? old(age(shown[group], shown)) : '');
+      const ms = group && age(shown[group], shown);
+      const isDated = ms !== undefined && (quality(shown[group]) === 'stale' || ms > DATED_FROM_MS);
+      setText(big[index].children[2], isDated ? old(ms) : '');
     });
   }
 }
