@@ -69,7 +69,7 @@ pub struct Capabilities {
     /// The silence that a slave of this family needs after its answer before the next request, above t3.5.
     pub turnaround: Duration,
     /// Exchanges of one [`Drive::status`](crate::Drive::status) of a drive that stands or runs, at the most, once what is
-    /// read only once is known: what a plan reckons with, whatever is configured in the drive. One that is stopping or has
+    /// read only once is known: what a plan counts, whatever is configured in the drive. One that is stopping or has
     /// tripped may take one more.
     pub status_exchanges: u8,
     /// Exchanges of one [`Drive::measurements`](crate::Drive::measurements).

@@ -19,7 +19,7 @@ use crate::{
     event::Event,
     fleet::{Fleet, LineEntry, Members},
     handle::Entry,
-    plan::{Demand, LineBudget, PlanProblem, Reckoning, reckon},
+    plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
     settings::{DriveSettings, Times, WatchdogContract},
     supervisor::Supervisor,
     task::{Desk, Task},
@@ -301,7 +301,7 @@ impl FleetBuilder {
             let standing = wire.standing.iter().flat_map(|(_, entries)| entries).map(|entry| entry.demand());
             let added = members.iter().filter(|member| member.line == number).map(Member::demand);
             let demands: Vec<_> = standing.chain(added).collect();
-            let Reckoning { plan, problem } = reckon(wire.budget, &demands, 0);
+            let Forecast { plan, problem } = forecast(wire.budget, &demands, 0);
             if let Some(problem) = problem.filter(|_| refuses_plans) {
                 return Err(FleetError::Plan { line: wire.name, problem });
             }

@@ -154,7 +154,7 @@ impl Fleet {
         Events::new(first.or_else(|| self.sender().map(|events| events.subscribe())))
     }
 
-    /// The reckoning of a line.
+    /// The plan of a line.
     #[must_use]
     pub fn plan(&self, line: &str) -> Option<LinePlan> {
         self.members().lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan())

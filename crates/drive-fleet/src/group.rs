@@ -24,7 +24,7 @@ use crate::{
     supervisor::Leave,
 };
 
-/// Mute drives that a stop of a line is reckoned with at least.
+/// Mute drives that a stop of a line allows for at least.
 const MUTE: u32 = 3;
 
 /// A name that no drive of the fleet has.

@@ -68,7 +68,7 @@ pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
-pub use plan::{Demand, Feed, LineBudget, LinePlan, PlanProblem, Reckoning, plan, reckon};
+pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
 pub use settings::{
     Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
     OnLoss, Periods, Times, WatchdogContract,

@@ -11,7 +11,7 @@ use crate::{
     builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
     event::ExitAction,
     fleet::{Fleet, LineEntry, Members, end},
-    plan::reckon,
+    plan::forecast,
     settings::DriveSettings,
     task::Urgent,
 };
@@ -103,8 +103,8 @@ impl Fleet {
     }
 }
 
-/// Reckons a line anew whose drives have changed.
+/// Plans a line anew whose drives have changed.
 fn replan(members: &Members, line: &Arc<LineEntry>) {
     let demands: Vec<_> = members.on(line).map(|entry| entry.demand()).collect();
-    line.set_plan(reckon(line.budget, &demands, 0).plan);
+    line.set_plan(forecast(line.budget, &demands, 0).plan);
 }

@@ -10,7 +10,7 @@ type Nanos = u128;
 
 const MS: Nanos = 1_000_000;
 const S: Nanos = 1_000 * MS;
-/// An Altivar 312 answers within this, as the plan reckons it.
+/// An Altivar 312 answers within this, as the plan has it.
 const RESPONSE: Nanos = 10 * MS;
 
 /// So many characters of 11 bits (8E1).
@@ -76,7 +76,7 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
     let out = ended.assert_done();
     assert!(out.starts_with("line north: 31 drives on /dev/nowhere, 19200 8E1 rtu"), "{out}");
     let family = Family::Atv312.capabilities();
-    assert_eq!(family.status_exchanges, 1, "the figures below reckon with one");
+    assert_eq!(family.status_exchanges, 1, "the figures below count one");
     let slow_reads = Nanos::from(family.measurement_exchanges);
 
     // What the probes of the dead take, a twentieth, the living do without.
@@ -220,7 +220,7 @@ fn what_is_wrong_in_a_file_is_told_with_its_line_and_field() {
         assert_ne!(text, good, "{instead_of}");
         let ended = run(&["plan", "--config", File::new("wrong-plan", &text).path()]);
         ended.assert_refused(2, told);
-        assert_eq!(ended.out, "", "nothing is reckoned");
+        assert_eq!(ended.out, "", "nothing is calculated");
     }
     run(&["plan", "--config", "nowhere.toml"]).assert_refused(2, "nowhere.toml: cannot be read");
 }
@@ -269,7 +269,7 @@ fn a_line_of_the_command_line_has_the_figures_of_the_same_line_in_a_file() {
 }
 
 #[test]
-fn modbus_tcp_has_no_speed_to_reckon_with() {
+fn modbus_tcp_has_no_speed_to_plan_with() {
     let out = run(&["plan", "--line", "tcp://gateway:502", "--drive", "atv312@1-4"]);
     let out = out.assert_done();
     assert!(!out.contains("38400"), "{out}");

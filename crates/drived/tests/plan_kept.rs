@@ -6,8 +6,8 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, Reaction, SerialSettings};
 use drive_families::Family;
 use drive_fleet::{
-    Demand, DriveHandle, DriveSettings, Fleet, GroupStart, LineBudget, Periods, Reckoning, Until,
-    WatchdogContract, reckon,
+    Demand, DriveHandle, DriveSettings, Fleet, Forecast, GroupStart, LineBudget, Periods, Until,
+    WatchdogContract, forecast,
 };
 use drive_sim::{SimLine, Wiring, models::atv312::Atv312};
 use tokio::time::{Instant, sleep, timeout_at};
@@ -78,7 +78,7 @@ async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_
     fleet.all().start(start).await.expect("all start");
 
     for dead in [0, 3] {
-        let Reckoning { plan, problem } = reckon(budget, &demands, dead);
+        let Forecast { plan, problem } = forecast(budget, &demands, dead);
         assert_eq!(problem, None);
         machines.iter().take(dead).for_each(drive_sim::SimSlave::mute);
         // Until the line has found out, and every drive had its slow set.

@@ -7,7 +7,7 @@ use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
 use crate::settings::{Periods, WatchdogContract};
 
-/// Words that an exchange of a status or of measurements is reckoned with.
+/// Words that an exchange of a status or of measurements is counted with.
 const WORDS: usize = 8;
 /// Bytes of a request without what its protocol puts round it, and of an answer besides its words.
 const REQUEST: usize = 5;
@@ -50,7 +50,7 @@ impl LineBudget {
         }
     }
 
-    /// One exchange that reads eight words, with the silences that belong to it; what one poll is reckoned with.
+    /// One exchange that reads eight words, with the silences that belong to it; what one poll is counted as.
     #[must_use]
     pub fn read_slot(&self) -> Duration {
         self.serial.map_or(self.response, |serial| {

@@ -157,28 +157,28 @@ impl Feed {
     }
 }
 
-/// Reckons a line with its drives.
+/// Plans a line with its drives.
 ///
 /// # Errors
 /// [`PlanProblem`] when it cannot work.
 pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProblem> {
-    let Reckoning { plan, problem } = reckon(budget, drives, 0);
+    let Forecast { plan, problem } = forecast(budget, drives, 0);
     problem.map_or(Ok(plan), Err)
 }
 
 /// What a line would be like, and why it would not work, if it would not.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Reckoning {
+pub struct Forecast {
     /// The figures, also of a line that cannot work.
     pub plan: LinePlan,
     /// Why it cannot work.
     pub problem: Option<PlanProblem>,
 }
 
-/// Reckons a line on which so many of the drives are dead. Those that ask least of the line are taken for dead: whoever
+/// Plans a line on which so many of the drives are dead. Those that ask least of the line are taken for dead: whoever
 /// dies leaves it with no more to do.
 #[must_use]
-pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
+pub fn forecast(budget: LineBudget, drives: &[Demand], dead: usize) -> Forecast {
     let alone = drives.len() == 1;
     let mut living: Vec<(&Demand, Load)> =
         drives.iter().map(|demand| (demand, Load::of(budget, demand, alone))).collect();
@@ -220,7 +220,7 @@ pub fn reckon(budget: LineBudget, drives: &[Demand], dead: usize) -> Reckoning {
         let is_living = |demand: &&Demand| living.iter().any(|(living, _)| std::ptr::eq(*living, *demand));
         drives.iter().filter(is_living).find_map(|demand| stale(&plan, demand))
     });
-    Reckoning { plan, problem }
+    Forecast { plan, problem }
 }
 
 /// Whether there are more stations on a segment than its drives allow, the drives shared evenly among the segments.

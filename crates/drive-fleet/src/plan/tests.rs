@@ -98,8 +98,8 @@ fn mute_drives_lengthen_the_stop_of_all_by_their_lost_answers_only() {
 #[test]
 fn dead_drives_leave_their_polls_and_take_their_probes() {
     let every = without_measurements(drives(31, 1_000 * MS, Some(10_000 * MS)));
-    let Reckoning { plan: whole, .. } = reckon(budget(), &every, 0);
-    let Reckoning { plan: dead, problem } = reckon(budget(), &every, 3);
+    let Forecast { plan: whole, .. } = forecast(budget(), &every, 0);
+    let Forecast { plan: dead, problem } = forecast(budget(), &every, 3);
     assert_eq!(problem, None);
     assert_eq!(dead.sweep, stretched(budget().read_slot() * 28, 950_000));
     assert_eq!(dead.utilisation_ppm, 50_000 + 28 * whole.utilisation_ppm / 31);

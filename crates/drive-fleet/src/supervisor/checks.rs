@@ -18,7 +18,7 @@ use crate::{
 const AGAIN: Duration = Duration::from_secs(1);
 
 /// The part of a watchdog's time after which it is fed by a frame of its own, if no poll has fed it: a half. The
-/// plan reckons with the same part.
+/// plan counts on the same part.
 pub const FEED_PART: u32 = 2;
 
 #[derive(Debug)]

@@ -98,7 +98,7 @@ impl Reloader {
                     .filter(is_added)
                     .fold(builder, |builder, drive| add(builder, part, drive));
             }
-            // The file was reckoned as a whole.
+            // The file was planned as a whole.
             builder.whatever_the_plan()
         });
         added.map_err(|error| input(&error))?;

@@ -1,10 +1,10 @@
-//! A line in the cases for which it is reckoned.
+//! A line in the cases for which it is planned.
 
 use std::time::Duration;
 
 use drive_bus::{Echo, LineConfig};
 use drive_core::Capabilities;
-use drive_fleet::{Demand, LineBudget, Reckoning, reckon};
+use drive_fleet::{Demand, Forecast, LineBudget, forecast};
 
 use crate::{drive_spec::DriveName, line_spec};
 
@@ -12,13 +12,13 @@ use crate::{drive_spec::DriveName, line_spec};
 const AROUND_WRITE: usize = 6;
 const AROUND_ANSWER: usize = 2;
 
-/// How many dead drives are reckoned with.
+/// How many dead drives a plan allows for.
 const DEAD: usize = 3;
 
-/// The speed for which a line is reckoned besides its own.
+/// The speed for which a line is planned besides its own.
 const OTHER_SPEED: u32 = 38_400;
 
-/// A line to be reckoned, from the command line or from a file.
+/// A line to be planned, from the command line or from a file.
 #[derive(Debug)]
 pub(super) struct PlannedLine {
     /// Its name, where the file gives it one.
@@ -32,12 +32,12 @@ pub(super) struct PlannedLine {
 #[derive(Debug)]
 pub(super) struct Case {
     pub(super) label: String,
-    pub(super) reckoning: Reckoning,
+    pub(super) forecast: Forecast,
     /// How long a stop waits until it is on the wire, at the most.
     pub(super) stop_to_the_wire: Duration,
     /// How long it takes at the most until all living drives have confirmed a stop.
     pub(super) all_stopped: Duration,
-    /// Why the case cannot be, though it can be reckoned.
+    /// Why the case cannot be, though it can be calculated.
     pub(super) hypothetical: Option<String>,
 }
 
@@ -65,12 +65,12 @@ impl PlannedLine {
             ..LineBudget::of(config)
         };
         let demands: Vec<Demand> = self.drives.iter().map(|(_, demand)| demand.clone()).collect();
-        let reckoning = reckon(budget, &demands, dead);
+        let forecast = forecast(budget, &demands, dead);
         let stop_to_the_wire = self.stop_to_the_wire(config);
-        let stop_all = reckoning.plan.stop_all(u32::try_from(dead).unwrap_or(u32::MAX));
-        // It begins with an exchange of the usual length that is under way, and here the longest is reckoned with.
+        let stop_all = forecast.plan.stop_all(u32::try_from(dead).unwrap_or(u32::MAX));
+        // It begins with an exchange of the usual length that is under way, and here the longest is counted.
         let all_stopped = stop_all.saturating_sub(budget.lost_slot()) + stop_to_the_wire;
-        Case { label, reckoning, stop_to_the_wire, all_stopped, hypothetical: None }
+        Case { label, forecast, stop_to_the_wire, all_stopped, hypothetical: None }
     }
 
     /// The longest wait of a stop, once the line knows whether its adapter echoes.

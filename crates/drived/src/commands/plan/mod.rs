@@ -1,4 +1,4 @@
-//! `drived plan`: what lines will be like, reckoned before the cable is pulled.
+//! `drived plan`: what lines will be like, calculated before the cable is pulled.
 
 mod line;
 mod sheet;
@@ -62,13 +62,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             return Err(Failure::Input("expected --config FILE, or --line and --drive".to_owned()));
         }
     };
-    let reckoned: Vec<(&PlannedLine, Vec<Case>)> = lines.iter().map(|line| (line, line.cases())).collect();
-    for (line, cases) in &reckoned {
+    let forecasts: Vec<(&PlannedLine, Vec<Case>)> = lines.iter().map(|line| (line, line.cases())).collect();
+    for (line, cases) in &forecasts {
         Sheet { line, cases }.say()?;
         output::say("")?;
     }
-    if reckoned.len() > 1 {
-        sheet::say_all_lines(&reckoned)?;
+    if forecasts.len() > 1 {
+        sheet::say_all_lines(&forecasts)?;
         output::say("")?;
     }
     output::say(

@@ -48,7 +48,7 @@ impl Sheet<'_> {
         }
         // Why it cannot work as it is planned is what the command ends with.
         for case in self.cases.iter().skip(1) {
-            if let Some(problem) = &case.reckoning.problem {
+            if let Some(problem) = &case.forecast.problem {
                 output::say(format_args!("{} it cannot work: {problem}", case.label))?;
             }
         }
@@ -60,18 +60,18 @@ impl Sheet<'_> {
         let mut row = |label: &str, cell: &dyn Fn(&Case) -> String| {
             table.cells([label.to_owned()].into_iter().chain(self.cases.iter().map(cell)));
         };
-        let works = |case: &Case| if case.reckoning.problem.is_none() { "yes" } else { "NO" }.to_owned();
+        let works = |case: &Case| if case.forecast.problem.is_none() { "yes" } else { "NO" }.to_owned();
         row("works", &works);
-        row("cycle: one status of every drive", &|case| output::bound(case.reckoning.plan.sweep));
-        row("used by polls and watchdogs", &|case| output::percent(case.reckoning.plan.utilisation_ppm));
-        row("left for commands", &|case| output::percent(case.reckoning.plan.left_ppm()));
+        row("cycle: one status of every drive", &|case| output::bound(case.forecast.plan.sweep));
+        row("used by polls and watchdogs", &|case| output::percent(case.forecast.plan.utilisation_ppm));
+        row("left for commands", &|case| output::percent(case.forecast.plan.left_ppm()));
         row(ON_THE_WIRE, &|case| output::bound(case.stop_to_the_wire));
         row(ALL_STOPPED, &|case| output::bound(case.all_stopped));
         for alike in self.alike() {
             row(&drive_spec::listed(&alike.names), &|_| String::new());
             let periods = alike.periods;
             let mut age = |what: String, of: &dyn Fn(&LinePlan) -> Duration| {
-                row(&format!("  {what}, age up to"), &|case| match case.reckoning.plan {
+                row(&format!("  {what}, age up to"), &|case| match case.forecast.plan {
                     plan if plan.is_overloaded() => "no limit".to_owned(),
                     plan => output::bound(of(&plan)),
                 });
@@ -93,7 +93,7 @@ impl Sheet<'_> {
             }
             match alike.watchdog {
                 Some(timeout) => row(&format!("  watchdog of {timeout:?}, fed within"), &|case| {
-                    fed(case.reckoning.plan.feed(timeout))
+                    fed(case.forecast.plan.feed(timeout))
                 }),
                 None => row("  no watchdog to feed", &|_| String::new()),
             }

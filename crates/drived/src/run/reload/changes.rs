@@ -131,14 +131,14 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
     let budgets = |config: &Config| -> BTreeMap<String, _> {
         config.lines.iter().map(|line| (line.name.clone(), line.budget)).collect()
     };
-    let (reckoned, kept) = (budgets(new), budgets(old));
+    let (planned, kept) = (budgets(new), budgets(old));
     for (is_other, what) in [
         (old.snapshots != new.snapshots, "snapshots"),
         (old.shutdown != new.shutdown, "shutdown"),
         (old.doors != new.doors, "http, socket, tokens, audit"),
         (old.groups != new.groups, "groups"),
         (
-            kept.iter().any(|(name, budget)| reckoned.get(name).is_some_and(|other| other != budget)),
+            kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
             "response and segments of lines",
         ),
     ] {
