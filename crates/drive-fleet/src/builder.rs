@@ -451,6 +451,7 @@ fn spawn(member: Member, events: &broadcast::Sender<Event>, line: Arc<LineEntry>
         snapshots,
         exit,
         callers: BTreeMap::new(),
+        askers: BTreeMap::new(),
         next_call: 0,
         accepts: None,
     };

@@ -8,7 +8,8 @@ use std::{
 };
 
 use drive_core::{
-    BroadcastWrite, Capabilities, Direction, Setpoint, SlaveAddress, StopMode, WatchdogCapability,
+    BroadcastWrite, Capabilities, Direction, Faults, Row, Setpoint, SlaveAddress, StopMode,
+    WatchdogCapability, Written,
 };
 use tokio::{
     sync::{mpsc, oneshot, watch},
@@ -22,7 +23,7 @@ use crate::{
     plan::Demand,
     settings::DriveSettings,
     snapshot::Snapshot,
-    supervisor::Leave,
+    supervisor::{Leave, Question, Told},
     task::{Message, Urgent},
 };
 
@@ -269,6 +270,47 @@ impl DriveHandle {
             Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
             Err(refused) => Outcome::Refused(refused),
         }
+    }
+
+    /// Reads the present faults and the history, when the drive's turn comes.
+    ///
+    /// # Errors
+    /// Why they cannot be read.
+    pub async fn faults(&self) -> Result<Faults, Refused> {
+        match self.question(Question::Faults).await? {
+            Told::Faults(faults) => Ok(faults),
+            _ => Err(Refused::ShutDown),
+        }
+    }
+
+    /// Reads a row of the family, when the drive's turn comes.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub async fn read_parameter(&self, row: &'static Row) -> Result<u16, Refused> {
+        match self.question(Question::Read(row)).await? {
+            Told::Word(word) => Ok(word),
+            _ => Err(Refused::ShutDown),
+        }
+    }
+
+    /// Writes a row of the family, when the drive's turn comes, unless it holds the word already, and reads it back. For
+    /// those who may command the drive.
+    ///
+    /// # Errors
+    /// Why it is not written, or not confirmed.
+    pub async fn write_parameter(&self, row: &'static Row, word: u16) -> Result<Written, Refused> {
+        match self.question(Question::Write(row, word)).await? {
+            Told::Written(written) => Ok(written),
+            _ => Err(Refused::ShutDown),
+        }
+    }
+
+    async fn question(&self, question: Question) -> Result<Told, Refused> {
+        let (reply, told) = oneshot::channel();
+        let name = Arc::clone(&self.commander);
+        self.post(Message::Question { question, name, reply })?;
+        told.await.unwrap_or(Err(Refused::ShutDown))
     }
 
     fn post(&self, message: Message) -> Result<(), Refused> {

@@ -18,7 +18,7 @@ use crate::{
     outcome::{Order, Outcome, Refused},
     settings::DriveSettings,
     snapshot::Snapshot,
-    supervisor::{Asker, CallId, Job, Leave, Output, Reply, Step, Supervisor, Turn},
+    supervisor::{Asker, CallId, Job, Leave, Output, Question, Reply, Step, Supervisor, Told, Turn},
 };
 
 /// What waits its turn.
@@ -33,6 +33,8 @@ pub(crate) enum Message {
         name: Arc<str>,
         reply: oneshot::Sender<Outcome>,
     },
+    /// A question.
+    Question { question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
     /// The question whether a start would be sent now.
     Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
 }
@@ -184,6 +186,7 @@ pub(crate) struct Desk {
     pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
     pub(crate) exit: watch::Sender<Option<ExitAction>>,
     pub(crate) callers: BTreeMap<CallId, oneshot::Sender<Outcome>>,
+    pub(crate) askers: BTreeMap<CallId, oneshot::Sender<Result<Told, Refused>>>,
     pub(crate) next_call: u64,
     /// Which restarts the drive is to accept from its next call on.
     pub(crate) accepts: Option<Vec<String>>,
@@ -196,6 +199,16 @@ impl Desk {
             Message::Order { order, leave, expires, name, reply } => {
                 let asker = self.caller(name, reply);
                 self.supervisor.handle_order(now, asker, order, leave, expires)
+            }
+            Message::Question { question, name, reply } => {
+                // Who does not wait any more leaves his place to the next.
+                self.askers.retain(|_, asker| !asker.is_closed());
+                let askers = &self.askers;
+                self.supervisor.forget_questions(|id| !askers.contains_key(&id));
+                let id = self.new_call();
+                self.askers.insert(id, reply);
+                self.supervisor.handle_question(id, &name, question);
+                false
             }
             Message::Ask { name, setpoint, reply } => {
                 let _ = reply.send(self.supervisor.leave(now, &name, setpoint));
@@ -229,10 +242,14 @@ impl Desk {
     }
 
     fn caller(&mut self, name: Arc<str>, reply: oneshot::Sender<Outcome>) -> Asker {
-        let id = CallId(self.next_call);
-        self.next_call += 1;
+        let id = self.new_call();
         self.callers.insert(id, reply);
         Asker::Caller { id, name }
+    }
+
+    const fn new_call(&mut self) -> CallId {
+        self.next_call += 1;
+        CallId(self.next_call)
     }
 
     /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.
@@ -247,6 +264,11 @@ impl Desk {
                     tracing::debug!(%drive, "{kind}");
                     // Without a reader there is nobody to tell.
                     let _ = self.events.send(Event { drive, at: Instant::now(), kind });
+                }
+                Output::Told(id, told) => {
+                    if let Some(asker) = self.askers.remove(&id) {
+                        let _ = asker.send(told);
+                    }
                 }
                 Output::Answer(id, outcome) => {
                     if let Some(caller) = self.callers.remove(&id) {
@@ -292,5 +314,10 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         Job::SelfRestarts => Reply::SelfRestarts(drive.self_restarts().await),
         Job::Faults => Reply::Faults(drive.faults().await),
         Job::Measurements => Reply::Measurements(drive.measurements().await),
+        Job::Ask(Question::Faults) => Reply::Told(drive.faults().await.map(Told::Faults)),
+        Job::Ask(Question::Read(row)) => Reply::Told(drive.read_parameter(row).await.map(Told::Word)),
+        Job::Ask(Question::Write(row, word)) => {
+            Reply::Told(drive.write_parameter(row, word).await.map(Told::Written))
+        }
     }
 }

@@ -8,6 +8,8 @@ use drive_core::{
 };
 use tokio::time::Instant;
 
+use super::questions::{Question, Told};
+
 /// What to do now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
@@ -61,6 +63,8 @@ pub(crate) enum Job {
     SelfRestarts,
     Faults,
     Measurements,
+    /// What somebody asks.
+    Ask(Question),
 }
 
 impl Job {
@@ -75,6 +79,7 @@ impl Job {
                 | Self::SelfRestarts
                 | Self::Faults
                 | Self::Measurements
+                | Self::Ask(Question::Faults | Question::Read(_))
         )
     }
 }
@@ -95,6 +100,7 @@ pub(crate) enum Reply {
     SelfRestarts(Result<Vec<SelfRestart>>),
     Faults(Result<Faults>),
     Measurements(Result<Measurements>),
+    Told(Result<Told>),
 }
 
 impl Reply {
@@ -110,6 +116,7 @@ impl Reply {
             Self::SelfRestarts(result) => result.as_ref().err(),
             Self::Faults(result) => result.as_ref().err(),
             Self::Measurements(result) => result.as_ref().err(),
+            Self::Told(told) => told.as_ref().err(),
         };
         error.filter(|error| {
             matches!(error, Error::Port { .. } | Error::Exception { .. } | Error::Answer { .. })

@@ -12,6 +12,7 @@ mod observe;
 mod orders;
 mod pace;
 mod permission;
+mod questions;
 mod stopping;
 #[cfg(test)]
 mod tests;
@@ -32,17 +33,19 @@ use self::{
     exit::Exit,
     orders::{Active, Queued},
     pace::Pace,
+    questions::Questions,
     stopping::Stopping,
     withdraw::Withdrawal,
 };
 pub(crate) use self::{
     job::{Job, Reply, Step, Turn},
     permission::Leave,
+    questions::{Question, Told},
 };
 use crate::{
     event::{EventKind, ExitAction},
     limits::Given,
-    outcome::{Outcome, Unknown},
+    outcome::{Outcome, Refused, Unknown},
     settings::DriveSettings,
     snapshot::{Counters, Link, Snapshot, Timed, Trip},
 };
@@ -79,6 +82,8 @@ pub(crate) enum Output {
     Event(EventKind),
     /// To one caller.
     Answer(CallId, Outcome),
+    /// To one who asked a question.
+    Told(CallId, Result<Told, Refused>),
 }
 
 /// The supervisor of one drive.
@@ -99,6 +104,7 @@ pub(crate) struct Supervisor {
     pace: Pace,
     active: Option<Active>,
     queue: VecDeque<Queued>,
+    questions: Questions,
     stopping: Option<Stopping>,
     /// How many stops were asked of it.
     stops: u64,
@@ -143,6 +149,7 @@ impl Supervisor {
             pace: Pace::new(now, settings.periods),
             active: None,
             queue: VecDeque::new(),
+            questions: Questions::new(),
             stopping: None,
             stops: 0,
             withdrawal: None,
@@ -255,7 +262,7 @@ impl Supervisor {
         if let Some(job) = self.checks.job(now, self.settings.control, self.stands()) {
             return Some(job);
         }
-        (self.pace.slow_due() <= now).then_some(Job::Measurements)
+        self.question_job().or_else(|| (self.pace.slow_due() <= now).then_some(Job::Measurements))
     }
 
     fn lifetime(&self, now: Instant, job: Job) -> Option<Duration> {
@@ -337,6 +344,7 @@ impl Supervisor {
                     self.emit(event);
                 }
             }
+            Reply::Told(told) => self.handle_told(told),
             Reply::Withdrawn(result) => self.handle_withdrawn(now, result),
             Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
             Reply::Stopped(result) => self.handle_stopped(now, result),

@@ -8,6 +8,7 @@ use tokio::time::Instant;
 use super::{Asker, Supervisor};
 use crate::{
     event::{EventKind, Limit},
+    outcome::Refused,
     settings::{OnFault, OnLoss},
     snapshot::{Link, Timed, Trip},
 };
@@ -233,5 +234,6 @@ impl Supervisor {
         self.given = None;
         self.explanations = 0;
         self.end_orders_by_loss();
+        self.end_questions(&Refused::NotConnected);
     }
 }

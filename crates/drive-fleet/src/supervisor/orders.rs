@@ -249,6 +249,7 @@ impl Supervisor {
 
     pub(super) fn refuse_queue(&mut self) {
         self.end_queue(&Refused::ShutDown);
+        self.end_questions(&Refused::ShutDown);
     }
 
     fn end_active(&mut self, unsent: Refused, sent: Unconfirmed) {

@@ -92,6 +92,19 @@ impl<S: Send + Sync> FromRequestParts<S> for Wait {
     }
 }
 
+/// `?wait=`, where many answers of a drive are waited for: as long as may be unless it is said.
+pub(super) struct Patience(pub(super) Duration);
+
+impl<S: Send + Sync> FromRequestParts<S> for Patience {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let is_said = parts.uri.query().is_some_and(|query| query.contains("wait="));
+        let Wait(wait) = Wait::from_request_parts(parts, state).await?;
+        Ok(Self(if is_said { wait } else { LONGEST_WAIT }))
+    }
+}
+
 /// A body in JSON; an empty one, and `null`, stand for an object without members.
 pub(super) struct Sent<T>(pub(super) T);
 

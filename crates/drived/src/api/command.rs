@@ -105,6 +105,11 @@ pub(super) struct Plain {
 #[serde(transparent)]
 pub(super) struct Reset(Plain);
 
+/// Saves the parameters to EEPROM.
+#[derive(Debug, Deserialize)]
+#[serde(transparent)]
+pub(super) struct Save(Plain);
+
 /// Gives control back to the panel or the terminals.
 #[derive(Debug, Deserialize)]
 #[serde(transparent)]
@@ -141,6 +146,12 @@ impl Asks for Reset {
 impl Asks for Release {
     fn asked(self) -> Asked {
         self.0.asked_to(Action::Release)
+    }
+}
+
+impl Asks for Save {
+    fn asked(self) -> Asked {
+        self.0.asked_to(Action::Save)
     }
 }
 

@@ -57,8 +57,10 @@ fn operation(route: &Route, generator: &mut SchemaGenerator, bodies: &mut Schema
     for Answer { status, about, content, describe } in &route.answers {
         let schema = describe.map(|describe| json!({ "schema": describe(generator) })).unwrap_or_default();
         let schema = if schema.is_null() { json!({}) } else { schema };
-        responses
-            .insert(status.to_string(), json!({ "description": about, "content": { *content: schema } }));
+        responses.insert(
+            status.to_string(),
+            json!({ "description": about, "content": content_of(content, schema) }),
+        );
     }
     let problem = generator.subschema_for::<Problem>();
     for status in &route.problems {
@@ -73,4 +75,8 @@ fn operation(route: &Route, generator: &mut SchemaGenerator, bodies: &mut Schema
         operation.insert("requestBody".to_owned(), json!({ "content": content }));
     }
     operation
+}
+
+fn content_of(kind: &str, schema: Value) -> Value {
+    if kind.is_empty() { json!({}) } else { json!({ kind: schema }) }
 }

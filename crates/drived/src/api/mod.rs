@@ -1,9 +1,12 @@
 //! The HTTP API v1 over the plant: a table of routes, from which both the router and its description are made.
 
 mod ask;
+mod capture;
 mod command;
+pub(crate) mod demo;
 mod document;
 mod health;
+mod parameter;
 mod problem;
 mod read;
 mod routes;
@@ -12,14 +15,18 @@ mod stream;
 mod tests;
 
 use axum::{
-    Router,
+    Extension, Router,
     body::Bytes,
     extract::DefaultBodyLimit,
     http::header::{CACHE_CONTROL, CONTENT_TYPE},
     routing::{any, get},
 };
 
-use self::{problem::Problem, routes::routes};
+use self::{
+    demo::Stage,
+    problem::Problem,
+    routes::{Route, demo_routes, routes},
+};
 use crate::plant::Plant;
 
 /// The largest body that is read.
@@ -28,7 +35,17 @@ const LARGEST_BODY: usize = 64 << 10;
 /// Everything under `/api/v1`, `/healthz` and `/readyz`. Who asks is a [`Caller`](crate::doors::Caller) in the extensions
 /// of each request.
 pub(crate) fn router(plant: Plant) -> Router {
-    let routes = routes();
+    of(routes(), plant)
+}
+
+/// The same with what a demonstration has besides.
+pub(crate) fn demo_router(plant: Plant, stage: Stage) -> Router {
+    let mut all = routes();
+    all.extend(demo_routes());
+    of(all, plant).layer(Extension(stage))
+}
+
+fn of(routes: Vec<Route>, plant: Plant) -> Router {
     let document = Bytes::from(document::of(&routes).to_string());
     let headers = [(CONTENT_TYPE, "application/json"), (CACHE_CONTROL, "no-store")];
     let router = Router::new().route(document::PATH, get(move || async move { (headers, document) }));

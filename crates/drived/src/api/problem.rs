@@ -140,6 +140,13 @@ impl Problem {
         }
     }
 
+    /// A drive cannot be asked, or refuses.
+    pub(super) fn refused(refused: &drive_fleet::Refused) -> Self {
+        let why = Refused { outcome: OutcomeWord::Refused, reason: refused.word() };
+        let kind = Self::new(StatusCode::CONFLICT, refused.to_string());
+        Self { kind: REFUSED, why: Some(Why::Refused(why)), ..kind }
+    }
+
     /// A command that has ended, and not by a confirmation.
     pub(super) fn of_command(command: &CommandView) -> Self {
         let (status, title, kind) = match command.outcome {

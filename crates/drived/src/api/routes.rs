@@ -5,15 +5,20 @@ use axum::{
     http::Method,
     routing::{MethodFilter, MethodRouter, on},
 };
+use drive_core::Faults;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::{
-    command::{self, NewSetpoint, Plain, Release, Reset, Start, Stop},
-    health, read, stream,
+    capture,
+    command::{self, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    demo, health,
+    parameter::{self, NewValue},
+    read, stream,
 };
 use crate::plant::{
     Plant,
     history::HistoryView,
+    parameters::{ParameterView, WrittenView},
     views::{CommandView, DriveView, LineView, StateView},
 };
 
@@ -57,6 +62,8 @@ const WAIT: Parameter = Parameter {
     about: "how long the outcome is waited for: 0 to 30s, 2s unless it is said",
     kind: "string",
 };
+const SECONDS: Parameter =
+    Parameter { name: "seconds", about: "how long: 1 to 600, 10 unless it is said", kind: "integer" };
 const SINCE: Parameter =
     Parameter { name: "since", about: "the revision that the reader has", kind: "integer" };
 
@@ -96,6 +103,31 @@ impl Route {
         route
     }
 
+    fn write<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let route = Self::new(Method::PUT, path, handler, about);
+        let mut route = route.answers::<WrittenView>(200, "it holds the value");
+        route.body = Some(SchemaGenerator::subschema_for::<NewValue>);
+        route.problems.extend([404, 409, 413, 415, 422, 504]);
+        route
+    }
+
+    /// Something that is done at once and has nothing to say.
+    fn deed<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let done = Answer { status: 204, about: "it is done", content: "", describe: None };
+        let mut route = Self::new(Method::POST, path, handler, about).answer(done);
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([404, 413, 415, 422]);
+        route
+    }
+
     fn answers<A: JsonSchema>(self, status: u16, about: &'static str) -> Self {
         self.answer(Answer {
             status,
@@ -121,6 +153,14 @@ impl Route {
     }
 }
 
+/// What a demonstration has besides.
+pub(super) fn demo_routes() -> Vec<Route> {
+    vec![
+        Route::deed::<_, _, demo::Trip>("/api/v1/demo/trip", demo::trip, "Trips a simulated drive"),
+        Route::deed::<_, _, demo::Cable>("/api/v1/demo/cable", demo::cable, "Pulls or plugs in a cable"),
+    ]
+}
+
 /// All of them.
 pub(super) fn routes() -> Vec<Route> {
     let mut routes = reads();
@@ -142,6 +182,30 @@ fn reads() -> Vec<Route> {
         Route::get("/api/v1/drives/{name}", read::drive, "One drive").answers::<DriveView>(200, "the drive"),
         Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
             .answers::<HistoryView>(200, "the history"),
+        Route::get("/api/v1/drives/{name}/faults", parameter::faults, "What a drive says of its faults")
+            .answers::<Faults>(200, "the present faults, the alarms and the history")
+            .or_problem(409)
+            .or_problem(504),
+        Route::get("/api/v1/drives/{name}/parameters", parameter::parameters, "The registers of a drive")
+            .with_query(WAIT)
+            .answers::<Vec<ParameterView>>(200, "every register, with what could be read in time"),
+        Route::get(
+            "/api/v1/drives/{name}/parameters/{register}",
+            parameter::parameter,
+            "One register, read now",
+        )
+        .answers::<ParameterView>(200, "the register")
+        .or_problem(409)
+        .or_problem(504),
+        Route::get("/api/v1/lines/{name}/capture", capture::capture, "What is on the line from now on")
+            .with_query(SECONDS)
+            .answer(Answer {
+                status: 200,
+                about: "a pcapng file",
+                content: "application/x-pcapng",
+                describe: None,
+            })
+            .or_problem(503),
         Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
         Route::get("/api/v1/lines/{name}", read::line, "One line").answers::<LineView>(200, "the line"),
         Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
@@ -209,6 +273,16 @@ fn commands() -> Vec<Route> {
             "/api/v1/groups/{name}/release",
             command::to_group::<Release>,
             "Gives control of a group back to panels or terminals",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/save",
+            command::to_drive::<Save>,
+            "Saves the parameters of a drive to its EEPROM",
+        ),
+        Route::write(
+            "/api/v1/drives/{name}/parameters/{register}",
+            parameter::write,
+            "Writes a register, unless it holds the value, and reads it back",
         ),
         Route::command::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
     ]

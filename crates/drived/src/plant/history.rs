@@ -75,6 +75,7 @@ impl History {
         let now = Instant::now();
         let mut rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         push(&mut rings.times, now);
+        rings.drives.retain(|name, _| drives.iter().any(|drive| drive.name() == name));
         let known = rings.times.len();
         for drive in drives {
             let ring = rings.drives.entry(Arc::clone(drive.name())).or_default();

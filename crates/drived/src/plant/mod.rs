@@ -2,6 +2,7 @@
 
 pub(crate) mod commands;
 pub(crate) mod history;
+pub(crate) mod parameters;
 mod progress;
 pub(crate) mod revisions;
 #[cfg(test)]
@@ -18,6 +19,7 @@ use self::views::{DaemonView, DriveView, LineView, StateView};
 use self::{
     commands::Log,
     history::{History, HistoryView},
+    parameters::Words,
     progress::Progress,
     revisions::Revisions,
 };
@@ -37,6 +39,7 @@ struct Inner {
     group_starts: Mutex<()>,
     revisions: Revisions,
     history: History,
+    words: Words,
     progress: Progress,
 }
 
@@ -51,6 +54,7 @@ impl Plant {
             group_starts: Mutex::default(),
             revisions: Revisions::new(),
             history: History::default(),
+            words: Words::default(),
             progress: Progress::default(),
         });
         watching::start(&inner);

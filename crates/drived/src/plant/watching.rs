@@ -1,6 +1,7 @@
 //! What turns the fleet into revisions: its events, and every change of a drive or a line.
 
 use std::{
+    collections::BTreeMap,
     sync::{Arc, Weak},
     time::Duration,
 };
@@ -8,7 +9,10 @@ use std::{
 use drive_fleet::{DriveHandle, Events, Received};
 use schemars::JsonSchema;
 use serde::Serialize;
-use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout};
+use tokio::{
+    task::AbortHandle,
+    time::{Instant, MissedTickBehavior, interval, sleep_until, timeout},
+};
 
 use super::{
     Inner,
@@ -37,9 +41,17 @@ pub(crate) struct TickView {
 pub(super) fn start(plant: &Arc<Inner>) {
     tokio::spawn(events(Arc::downgrade(plant), plant.fleet.events()));
     tokio::spawn(lines(Arc::downgrade(plant)));
-    for (name, _) in plant.fleet.lines() {
-        for drive in plant.fleet.drives_on(&name) {
-            tokio::spawn(changes(Arc::downgrade(plant), Arc::clone(&name), drive));
+}
+
+/// Watches the drives that are not watched yet: those that a reload has brought, too.
+fn watch(plant: &Arc<Inner>, watched: &mut BTreeMap<Arc<str>, AbortHandle>) {
+    for (line, _) in plant.fleet.lines() {
+        for drive in plant.fleet.drives_on(&line) {
+            if watched.get(drive.name()).is_none_or(AbortHandle::is_finished) {
+                let (plant, line, name) =
+                    (Arc::downgrade(plant), Arc::clone(&line), Arc::clone(drive.name()));
+                watched.insert(name, tokio::spawn(changes(plant, line, drive)).abort_handle());
+            }
         }
     }
 }
@@ -88,12 +100,13 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
 async fn lines(plant: Weak<Inner>) {
     let mut looks = interval(LINES);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut told: Vec<LineView> = Vec::new();
+    let (mut told, mut watched): (Vec<LineView>, _) = Default::default();
     let mut tick_at = Instant::now() + TICK;
     loop {
         looks.tick().await;
         let Some(plant) = plant.upgrade() else { return };
         plant.progress.look(&plant.fleet);
+        watch(&plant, &mut watched);
         if plant.revisions.readers() > 0 {
             let lines = plant.lines();
             for line in lines.iter().filter(|line| !told.contains(line)) {

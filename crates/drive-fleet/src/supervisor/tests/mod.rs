@@ -3,11 +3,12 @@
 mod connection;
 mod control;
 mod orders;
+mod questions;
 mod stops;
 
 use drive_core::{
     Command, Control, Direction, Exchange, Frequency, Identity, Measurements, PortError, Reaction, Refusal,
-    Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Watchdog,
+    Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Watchdog, Written, registers::Storage,
 };
 
 use super::*;
@@ -39,6 +40,8 @@ struct Paper {
     /// Whether it has a word that withdraws a run command.
     withdraws: bool,
     self_restarts: Vec<SelfRestart>,
+    /// The content of every register.
+    register: u16,
     log: Vec<Job>,
 }
 
@@ -69,6 +72,7 @@ impl Paper {
             stops_by: None,
             withdraws: true,
             self_restarts: Vec::new(),
+            register: 0,
             log: Vec::new(),
         }
     }
@@ -190,6 +194,19 @@ impl Paper {
                 let watchdog = self.watchdog;
                 Reply::Watchdog(self.result(watchdog))
             }
+            Job::Ask(Question::Write(_, word)) => {
+                let changed = self.register != word;
+                self.register = word;
+                let written = Written { changed, storage: Storage::Volatile };
+                Reply::Told(self.result(Told::Written(written)))
+            }
+            Job::Ask(Question::Read(_)) => {
+                let word = self.register;
+                Reply::Told(self.result(Told::Word(word)))
+            }
+            Job::Ask(Question::Faults) => {
+                Reply::Told(self.result(Told::Faults(drive_core::Faults::default())))
+            }
             Job::Faults => Reply::Faults(self.result(drive_core::Faults::default())),
             Job::Measurements => {
                 let measurements = Measurements { reference: self.reference, ..Measurements::default() };
@@ -294,7 +311,7 @@ impl Rig {
     fn events(&self) -> Vec<&'static str> {
         let names = self.outputs.iter().filter_map(|output| match output {
             Output::Event(kind) => Some(kind.name()),
-            Output::Answer(..) => None,
+            Output::Answer(..) | Output::Told(..) => None,
         });
         names.collect()
     }

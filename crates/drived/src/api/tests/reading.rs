@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+use drive_fleet::DriveSettings;
+use serde_json::json;
+
 use super::*;
 
 #[tokio::test(start_paused = true)]
@@ -51,4 +54,147 @@ async fn a_tripped_drive_says_what_the_fault_means_and_what_to_do() {
     assert_eq!((&drive["fault"]["code"], &drive["fault"]["mnemonic"]), (&9.into(), &"OCF".into()), "{drive}");
     assert!(drive["fault"]["remedy"].is_string() && drive["start_refused"].is_string(), "{drive}");
     assert!(drive["fault"]["at_trip"]["age_ms"].is_u64(), "the freeze-frame says how old it is: {drive}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_value_behind_a_cut_cable_is_in_no_output_shown_as_live() {
+    let TestPlant { plant, line, .. } = TestPlant::of(2).await;
+    let start = json!({"id": "run", "setpoint": {"frequency_hz": 30.0}});
+    assert_eq!(command(&plant, "/api/v1/drives/pump%201/start", &start).await.0, StatusCode::OK);
+    tokio::time::sleep(Duration::from_secs(15)).await;
+    let (_, before) = get(&plant, "/api/v1/drives/pump%201/history").await;
+    assert_eq!(before["frequency_hz"].as_array().unwrap().last().unwrap(), &json!(30.0), "{before}");
+    line.cut();
+    tokio::time::sleep(Duration::from_secs(10)).await;
+    for path in [
+        "/api/v1/state",
+        "/api/v1/drives",
+        "/api/v1/drives/pump%201",
+        "/api/v1/commands/run",
+        "/api/v1/drives/pump%201/history",
+    ] {
+        let (status, told) = get(&plant, path).await;
+        assert_eq!(status, StatusCode::OK);
+        nothing_is_live(&told, path);
+    }
+    let (_, history) = get(&plant, "/api/v1/drives/pump%201/history").await;
+    for column in ["frequency_hz", "setpoint_hz", "current_a", "torque_percent"] {
+        assert!(history[column].as_array().unwrap().last().unwrap().is_null(), "{column}");
+    }
+    assert_eq!(get(&plant, "/api/v1/drives/pump%201/faults").await.0, StatusCode::CONFLICT);
+    let (_, parameters) = get(&plant, "/api/v1/drives/pump%201/parameters").await;
+    assert!(parameters.as_array().unwrap().iter().all(|row| row["value"].is_null()), "never read, so none");
+}
+
+/// Whatever has a quality says that it is old, and how old.
+fn nothing_is_live(told: &Value, path: &str) {
+    if let Some(quality) = told.get("quality") {
+        assert!(quality == "stale" || quality == "missing", "{path}: {told}");
+        assert_eq!(quality == "stale", told["age_ms"].is_u64(), "{path}: {told}");
+    }
+    assert_ne!(told.get("reached"), Some(&Value::Bool(true)), "{path}");
+    match told {
+        Value::Array(all) => all.iter().for_each(|one| nothing_is_live(one, path)),
+        Value::Object(all) => all.values().for_each(|one| nothing_is_live(one, path)),
+        _ => {}
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_history_is_ten_minutes_long_and_no_longer() {
+    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    tokio::time::sleep(Duration::from_secs(700)).await;
+    let (_, history) = get(&plant, "/api/v1/drives/pump%201/history").await;
+    for column in ["time_unix_ms", "frequency_hz", "setpoint_hz", "current_a", "torque_percent"] {
+        assert_eq!(history[column].as_array().unwrap().len(), 1_200, "{column}");
+    }
+    assert_eq!(history["step_ms"], 500);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_faults_and_their_history_are_read_from_the_drive() {
+    let TestPlant { plant, machines, .. } = TestPlant::of(1).await;
+    machines[0].trip(9);
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let (status, faults) = get(&plant, "/api/v1/drives/pump%201/faults").await;
+    assert_eq!(status, StatusCode::OK, "{faults}");
+    assert_eq!(
+        (&faults["present"][0]["mnemonic"], &faults["present"][0]["code"]),
+        (&"OCF".into(), &9.into())
+    );
+    assert!(faults["present"][0]["remedy"].is_string() && faults["history"].is_array(), "{faults}");
+}
+
+fn put(path: &str, body: &Value) -> Request<Body> {
+    let request = Request::put(path).header("content-type", "application/json");
+    request.body(Body::from(body.to_string())).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_parameter_is_read_and_written_by_an_engineer_and_kept_from_everybody_else() {
+    let plant = TestPlant::with(2, |name| match name.as_str() {
+        "pump 2" => DriveSettings::watched(name),
+        _ => DriveSettings::controlled(name),
+    })
+    .await;
+    let path = "/api/v1/drives/pump%201/parameters/ACC";
+    let (status, row) = get(&plant.plant, path).await;
+    // BBV51701: ACC, 9001, in steps of Inr, factory setting 3.0 s with Inr 0.1.
+    assert_eq!(
+        (status, &row["value"], &row["address"]),
+        (StatusCode::OK, &30.0.into(), &9001.into()),
+        "{row}"
+    );
+    assert_eq!((&row["unit"], &row["access"]), (&"× Inr".into(), &"read_write".into()), "{row}");
+    let operator = Rights { engineer: false, ..ALL };
+    let (status, _) = send(api(&plant.plant, "operator", operator), put(path, &json!({"value": "50"}))).await;
+    assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::FORBIDDEN, Some(30)));
+    for value in [json!("50"), json!(50.0)] {
+        let (status, told) = send(api(&plant.plant, "chief", ALL), put(path, &json!({"value": value}))).await;
+        assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::OK, Some(50)), "{told}");
+    }
+    for (path, body, status) in [
+        (path, json!({"value": "fast"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (path, json!({"value": "40000"}), StatusCode::UNPROCESSABLE_ENTITY),
+        ("/api/v1/drives/pump%201/parameters/ETA", json!({"value": "1"}), StatusCode::UNPROCESSABLE_ENTITY),
+        ("/api/v1/drives/pump%201/parameters/NIX", json!({"value": "1"}), StatusCode::NOT_FOUND),
+        ("/api/v1/drives/pump%201/parameters/CMD", json!({"value": "000Fh"}), StatusCode::CONFLICT),
+        ("/api/v1/drives/pump%202/parameters/ACC", json!({"value": "50"}), StatusCode::CONFLICT),
+    ] {
+        let (told, problem) = send(api(&plant.plant, "chief", ALL), put(path, &body)).await;
+        assert_eq!(told, status, "{path} {body}: {problem}");
+    }
+    let (_, rows) = get(&plant.plant, "/api/v1/drives/pump%201/parameters").await;
+    let rows = rows.as_array().unwrap();
+    let unread = rows
+        .iter()
+        .filter(|row| row["value"].is_null() && row["error"].is_null() && row["access"] != "write");
+    assert_eq!(unread.count(), 0, "half a minute is enough for one drive");
+}
+
+// In real time: a thread writes the file, and a paused clock would not wait for it.
+#[tokio::test]
+async fn a_capture_is_a_file_that_begins_as_pcapng_and_ends_in_time() {
+    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    let request = Request::get("/api/v1/lines/north/capture?seconds=2").body(Body::empty()).unwrap();
+    let response = api(&plant, "reader", ALL).oneshot(request).await.unwrap();
+    assert_eq!(response.headers()["content-type"], "application/x-pcapng");
+    let file = response.into_body().collect().await.unwrap().to_bytes();
+    let frames = drive_bus::capture::read(&file).unwrap();
+    assert!(!frames.is_empty());
+    assert_eq!(get(&plant, "/api/v1/lines/north/capture?seconds=0").await.0, StatusCode::BAD_REQUEST);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_program_is_ready_while_its_lines_are_asked_whether_or_not_anybody_answers() {
+    let TestPlant { plant, line, .. } = TestPlant::of(1).await;
+    assert_eq!(get(&plant, "/healthz").await.0, StatusCode::OK);
+    line.cut();
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    assert_eq!(get(&plant, "/readyz").await.0, StatusCode::OK, "a cut cable is no standstill of the program");
+    plant.fleet().lines().remove(0).1.close().await;
+    let _ = plant.fleet().shutdown(Duration::from_secs(1)).await;
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    let (status, problem) = get(&plant, "/readyz").await;
+    assert_eq!(status, StatusCode::SERVICE_UNAVAILABLE, "{problem}");
 }

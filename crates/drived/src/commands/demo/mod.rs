@@ -66,7 +66,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let plant = Plant::start()?;
     let groups = plant.groups();
     let faces = crate::plant::Plant::start(plant.fleet.clone(), groups, true);
-    let doors = doors.open(api::router(faces).merge(page::router()));
+    let doors = doors.open(api::demo_router(faces, plant.stage()).merge(page::router()));
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, page, incoming, until, ending: &mut ending };

@@ -11,6 +11,7 @@ use tokio::{sync::watch, task::AbortHandle};
 
 use super::{STOPPING, story, unit::Unit};
 use crate::{
+    api::demo::Stage,
     config::Group,
     drive_spec::DriveName,
     failure::Failure,
@@ -45,6 +46,7 @@ pub(super) struct Plant {
 pub(super) struct PlantLine {
     pub(super) settings: SerialSettings,
     pub(super) line: Line,
+    simulated: SimLine,
     /// The units on it, by their place in the plant.
     pub(super) units: Range<usize>,
 }
@@ -80,7 +82,7 @@ impl Plant {
                     |port, slave| name.family.open_with(port, slave, &simulated::options()),
                 );
             }
-            lines.push(PlantLine { settings, line, units: first..members.len() });
+            lines.push(PlantLine { settings, line, simulated, units: first..members.len() });
         }
         let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
         let units: Vec<Unit> = members
@@ -90,6 +92,19 @@ impl Plant {
             .collect();
         let story = tokio::spawn(story::tell(units.clone())).abort_handle();
         Ok(Self { lines, units, fleet, story, ended: watch::Sender::new(None) })
+    }
+
+    /// What can be tripped and pulled by hand.
+    pub(super) fn stage(&self) -> Stage {
+        let machine = |unit: &Unit| {
+            let code = simulated::trip_code(unit.name.family);
+            (unit.name.to_string(), (unit.machine.clone(), code))
+        };
+        let line = |line: &PlantLine| (line.settings.to_string(), line.simulated.clone());
+        Stage {
+            machines: self.units.iter().map(machine).collect(),
+            lines: self.lines.iter().map(line).collect(),
+        }
     }
 
     /// The drives of each family, as groups.

@@ -227,7 +227,7 @@ async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
 }
 
 /// The word for a person's text, refused here when access or range forbid it: nothing is sent then.
-fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
+pub(crate) fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
     let refuse = |why: String| Failure::Input(format!("{} ({}): {why}", row.code, row.address));
     if !row.access.is_writable() {
         return Err(refuse("the register can only be read".to_owned()));
@@ -272,7 +272,7 @@ fn with_range(row: &Row) -> String {
     }
 }
 
-fn factory(row: &Row) -> String {
+pub(crate) fn factory(row: &Row) -> String {
     match row.factory {
         Factory::None => String::new(),
         Factory::Value(word) => {
@@ -282,7 +282,7 @@ fn factory(row: &Row) -> String {
     }
 }
 
-fn range(row: &Row) -> String {
+pub(crate) fn range(row: &Row) -> String {
     let span =
         |low, high| format!("{} to {}", output::in_unit(row.unit, low), output::in_unit(row.unit, high));
     let listed = || {

@@ -308,6 +308,7 @@ fn order(action: Action) -> Option<Order> {
         Action::Setpoint { setpoint, until } => Order::Setpoint { setpoint, until },
         Action::Reset => Order::ResetFaults,
         Action::Release => Order::Release,
+        Action::Save => Order::Persist,
         Action::Stop(StopMode::Ramp | StopMode::Fast | StopMode::Freewheel | StopMode::DcInjection) => {
             return None;
         }

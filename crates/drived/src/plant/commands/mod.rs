@@ -46,11 +46,20 @@ pub(crate) enum Target {
 /// What is to be done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Action {
-    Start { direction: Direction, setpoint: Option<Setpoint>, until: Until },
+    Start {
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+        until: Until,
+    },
     Stop(StopMode),
-    Setpoint { setpoint: Setpoint, until: Until },
+    Setpoint {
+        setpoint: Setpoint,
+        until: Until,
+    },
     Reset,
     Release,
+    /// To EEPROM.
+    Save,
 }
 
 /// Why a command is not taken at all.
@@ -74,6 +83,7 @@ impl Action {
             Self::Setpoint { .. } => "setpoint",
             Self::Reset => "reset",
             Self::Release => "release",
+            Self::Save => "save",
         }
     }
 
@@ -87,6 +97,7 @@ impl Action {
             Self::Setpoint { setpoint, .. } => format!("setpoint {setpoint}"),
             Self::Reset => "fault reset".to_owned(),
             Self::Release => "release".to_owned(),
+            Self::Save => "save to EEPROM".to_owned(),
         }
     }
 }
@@ -118,6 +129,7 @@ impl Plant {
     fn begin(&self, caller: &Caller, request: Request) -> Result<log::Told, Rejected> {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
+            Action::Save => (caller.rights.engineer, "save parameters"),
             _ => (caller.rights.operate, "operate"),
         };
         if !has_right {

@@ -37,6 +37,7 @@ fn verdict_of(action: Action, snapshot: &Snapshot, ended: Instant) -> Option<Out
             _ => either(!status.is_fault()),
         },
         Action::Release => status.control.and_then(|control| either(control != Control::Bus)),
+        Action::Save => None,
         Action::Setpoint { setpoint, .. } => {
             let measured = snapshot.measurements.as_ref().filter(|measured| measured.at > ended)?;
             measured.value.reference.and_then(|reference: Setpoint| either(reference == setpoint))

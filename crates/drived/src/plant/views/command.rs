@@ -16,7 +16,7 @@ pub(crate) struct CommandView {
     /// The group; absent where a drive, or all, are meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) group: Option<String>,
-    /// `start`, `stop`, `setpoint`, `reset` or `release`.
+    /// `start`, `stop`, `setpoint`, `reset`, `release` or `save`.
     pub(crate) action: &'static str,
     /// The action in words.
     pub(crate) command: String,

@@ -1,0 +1,81 @@
+//! Questions: what somebody wants read or written beside orders, in class Background, on the drive's turn.
+
+use std::{collections::VecDeque, mem};
+
+use drive_core::{Faults, Result, Row, Written};
+
+use super::{CallId, Job, Output, Supervisor, permission::QUEUE};
+use crate::{outcome::Refused, snapshot::Link};
+
+/// What is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Question {
+    /// The present faults and the history.
+    Faults,
+    /// The word of a row.
+    Read(&'static Row),
+    /// Write a word to a row, unless it holds it.
+    Write(&'static Row, u16),
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Told {
+    Faults(Faults),
+    Word(u16),
+    Written(Written),
+}
+
+/// The questions that wait, the first perhaps in flight.
+pub(super) type Questions = VecDeque<(CallId, Question)>;
+
+impl Supervisor {
+    /// Somebody asks. One that is dropped for something more urgent is asked again: a write looks first at what is there.
+    pub(crate) fn handle_question(&mut self, id: CallId, name: &str, question: Question) {
+        match self.refuse_question(name, question) {
+            Some(refused) => self.outputs.push_back(Output::Told(id, Err(refused))),
+            None => self.questions.push_back((id, question)),
+        }
+    }
+
+    fn refuse_question(&self, name: &str, question: Question) -> Option<Refused> {
+        if let Question::Write(..) = question {
+            if !self.settings.control {
+                return Some(Refused::ReadOnly);
+            }
+            if !self.settings.commanders.allow(name) {
+                return Some(Refused::Commander(name.to_owned()));
+            }
+        }
+        if self.is_exiting() {
+            return Some(Refused::ShutDown);
+        }
+        if self.link != Link::Connected {
+            return Some(Refused::NotConnected);
+        }
+        (self.questions.len() >= QUEUE).then_some(Refused::QueueFull)
+    }
+
+    /// Askers do not wait any more. What is in flight is finished.
+    pub(crate) fn forget_questions(&mut self, gone: impl Fn(CallId) -> bool) {
+        let mut in_flight = matches!(self.in_flight, Some(Job::Ask(_)));
+        self.questions.retain(|(id, _)| std::mem::take(&mut in_flight) || !gone(*id));
+    }
+
+    pub(super) fn question_job(&self) -> Option<Job> {
+        self.questions.front().map(|(_, question)| Job::Ask(*question))
+    }
+
+    pub(super) fn handle_told(&mut self, told: Result<Told>) {
+        if let Some((id, _)) = self.questions.pop_front() {
+            self.outputs.push_back(Output::Told(id, told.map_err(Refused::from)));
+        }
+    }
+
+    /// Nobody can be asked any more.
+    pub(super) fn end_questions(&mut self, refused: &Refused) {
+        for (id, _) in mem::take(&mut self.questions) {
+            self.outputs.push_back(Output::Told(id, Err(refused.clone())));
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The registers of a drive, read and written in turns between its polls.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
+
+use drive_core::{
+    Row, Written,
+    registers::{Access, Form, Storage},
+};
+use drive_fleet::{DriveHandle, Refused};
+use schemars::JsonSchema;
+use serde::Serialize;
+use tokio::time::{Instant, timeout_at};
+
+use super::Plant;
+use crate::{
+    commands::param::{factory, range},
+    json::milliseconds,
+};
+
+/// A word that was read this lately is not read again for a list.
+const YOUNG: Duration = Duration::from_secs(60);
+
+/// Words that were read, by drive and address.
+#[derive(Default)]
+pub(super) struct Words(Mutex<BTreeMap<(String, u16), (u16, Instant)>>);
+
+/// One register, and what the drive holds in it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct ParameterView {
+    pub(crate) mnemonic: &'static str,
+    pub(crate) address: u16,
+    pub(crate) name: &'static str,
+    /// In its unit, or the mnemonic of a listed value; absent where it has not been read, or can only be written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) value: Option<ValueView>,
+    /// The value with its unit or its meaning.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) text: Option<String>,
+    /// The word.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) raw: Option<u16>,
+    /// How long ago it was read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) age_ms: Option<u64>,
+    /// Why it could not be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) error: Option<String>,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub(crate) unit: &'static str,
+    /// `read`, `read_write`, `write_stopped` or `write`.
+    pub(crate) access: &'static str,
+    /// Where a written value lives: `RAM`, `RAM until saved`, `EEPROM` or `unknown`.
+    pub(crate) storage: String,
+    /// Which values it takes, in words; empty where the manual says nothing.
+    pub(crate) range: String,
+    /// The factory setting; empty where there is none.
+    pub(crate) factory: String,
+}
+
+/// A value.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum ValueView {
+    Number(f64),
+    Text(String),
+}
+
+/// What became of a written register.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct WrittenView {
+    #[serde(flatten)]
+    pub(crate) parameter: ParameterView,
+    /// Whether the drive held another value before.
+    pub(crate) changed: bool,
+}
+
+impl ParameterView {
+    fn of(row: &Row, word: Option<(u16, Instant)>, error: Option<String>) -> Self {
+        let raw = word.map(|(raw, _)| raw);
+        Self {
+            mnemonic: row.code,
+            address: row.address,
+            name: row.name,
+            value: raw.map(|raw| ValueView::of(row, raw)),
+            text: raw.map(|raw| row.show(raw)),
+            raw,
+            age_ms: word.map(|(_, at)| milliseconds(at.elapsed())),
+            error,
+            unit: row.unit.symbol,
+            access: match row.access {
+                Access::Read => "read",
+                Access::ReadWrite => "read_write",
+                Access::WriteStopped => "write_stopped",
+                Access::Write => "write",
+            },
+            storage: row.storage.to_string(),
+            range: range(row),
+            factory: factory(row),
+        }
+    }
+}
+
+impl ValueView {
+    fn of(row: &Row, raw: u16) -> Self {
+        match (row.choice(raw), row.unit.form) {
+            (Some(choice), _) => Self::Text(choice.code.to_owned()),
+            (None, Form::Number) => {
+                let step = 10_f64.powi(i32::from(row.unit.decimals));
+                Self::Number(f64::from(row.unit.number(raw)) / step)
+            }
+            (None, Form::Bits | Form::Code) => Self::Text(row.unit.show(raw)),
+        }
+    }
+}
+
+impl Words {
+    fn of(&self, drive: &DriveHandle, row: &Row) -> Option<(u16, Instant)> {
+        let words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        words.get(&(drive.name().to_string(), row.address)).copied()
+    }
+
+    fn keep(&self, drive: &DriveHandle, row: &Row, word: Option<u16>) -> Option<(u16, Instant)> {
+        let mut words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (drive.name().to_string(), row.address);
+        let word = word.map(|word| (word, Instant::now()));
+        match word {
+            Some(word) => words.insert(key, word),
+            None => words.remove(&key),
+        };
+        word
+    }
+}
+
+impl Plant {
+    /// Every register of a drive, with what could be read of it until `wait` is over: one that was not read has no value,
+    /// and the next call goes on there.
+    pub(crate) async fn parameters(&self, drive: &DriveHandle, wait: Duration) -> Vec<ParameterView> {
+        let until = Instant::now() + wait;
+        let mut views = Vec::new();
+        for row in drive.capabilities().rows {
+            let mut word = self.0.words.of(drive, row);
+            let mut error = None;
+            let is_young = word.is_some_and(|(_, at)| at.elapsed() <= YOUNG);
+            if row.access.is_readable() && !is_young && Instant::now() < until {
+                match timeout_at(until, drive.read_parameter(row)).await {
+                    Ok(Ok(raw)) => word = self.0.words.keep(drive, row, Some(raw)),
+                    Ok(Err(refused)) => error = Some(refused.to_string()),
+                    Err(_) => {}
+                }
+            }
+            views.push(ParameterView::of(row, word, error));
+        }
+        views
+    }
+
+    /// One register of a drive, read now.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub(crate) async fn parameter(
+        &self,
+        drive: &DriveHandle,
+        row: &'static Row,
+    ) -> Result<ParameterView, Refused> {
+        let raw = drive.read_parameter(row).await?;
+        Ok(ParameterView::of(row, self.0.words.keep(drive, row, Some(raw)), None))
+    }
+
+    /// Writes one register of a drive, unless it holds the word already, and reads it back. It goes on when nobody waits.
+    ///
+    /// # Errors
+    /// Why it is not written, or not confirmed.
+    pub(crate) async fn write_parameter(
+        &self,
+        drive: &DriveHandle,
+        row: &'static Row,
+        word: u16,
+    ) -> Result<WrittenView, Refused> {
+        self.0.words.keep(drive, row, None);
+        let Written { changed, storage } = drive.write_parameter(row, word).await?;
+        let parameter = ParameterView::of(row, self.0.words.keep(drive, row, Some(word)), None);
+        let how = if changed { "is now" } else { "was already" };
+        let kept = match storage {
+            Storage::Volatile => "lost at power-off",
+            Storage::RamUntilSaved => "lost at power-off unless it is saved",
+            Storage::Eeprom => "kept in EEPROM",
+            Storage::Unknown => "the manual does not say whether it is kept",
+        };
+        let text = Some(format!("{} {how} {} ({kept})", row.code, row.show(word)));
+        Ok(WrittenView { parameter: ParameterView { text, ..parameter }, changed })
+    }
+}
