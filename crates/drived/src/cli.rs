@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, check, demo, families, faults, param, plan, poll, release, reload, reset, scan, setpoint, sim,
-        start, status, stop, token, watch,
+        audit, check, demo, families, faults, init, param, plan, poll, release, reload, reset, scan,
+        setpoint, sim, start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -21,7 +21,7 @@ Before wiring:      families, plan
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; watch, reload
-One line, read:     scan, poll
+One line, read:     scan, poll; init writes a configuration from a scan
 The plant's drives: check, plan, run, token, audit, each with --config FILE
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
@@ -46,6 +46,7 @@ pub(crate) enum Command {
     Sim(sim::Args),
     Plan(plan::Args),
     Scan(scan::Args),
+    Init(init::Args),
     Poll(poll::Args),
     Status(status::Args),
     Start(start::Args),
@@ -85,6 +86,7 @@ impl Command {
             Self::Sim(args) => sim::run(args).await,
             Self::Plan(args) => plan::run(&args),
             Self::Scan(args) => scan::run(args).await,
+            Self::Init(args) => init::run(args).await,
             Self::Poll(args) => poll::run(args).await,
             Self::Status(args) => status::run(args).await,
             Self::Start(args) => start::run(args).await,

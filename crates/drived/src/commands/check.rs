@@ -1,6 +1,6 @@
 //! `drived check`: what a configuration means.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 use drive_fleet::{
     Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted,
@@ -25,6 +25,11 @@ pub(crate) struct Args {
     config: PathBuf,
 }
 
+/// How long the end may take behind the exit of the drives.
+const CLOSING: Duration = Duration::from_secs(10);
+/// `TimeoutStopSec` of the packaged unit.
+const PACKAGED: Duration = Duration::from_secs(90);
+
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
     for LinePart { name, config, drives, .. } in &config.lines {
@@ -43,6 +48,17 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             output::say_table(table)?;
         }
     }
+    let needed = config.shutdown + CLOSING;
+    output::say(format_args!(
+        "as a service it needs TimeoutStopSec={}s: shutdown is {:?}, and the lines are closed after it{}",
+        needed.as_secs(),
+        config.shutdown,
+        match needed > PACKAGED {
+            true =>
+                "; THE PACKAGED UNIT HAS LESS: systemctl edit drived, or motors are left to their watchdogs",
+            false => "",
+        }
+    ))?;
     output::say(format_args!(
         "{} is a configuration that can work; drived plan --config {0} calculates its lines",
         args.config.display()

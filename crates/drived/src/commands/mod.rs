@@ -5,6 +5,7 @@ pub(crate) mod check;
 pub(crate) mod demo;
 pub(crate) mod families;
 pub(crate) mod faults;
+pub(crate) mod init;
 pub(crate) mod param;
 pub(crate) mod plan;
 pub(crate) mod poll;

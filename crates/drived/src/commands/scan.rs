@@ -41,6 +41,16 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let mut found = Found::default();
+    let (config, _) = over(&args, |slave, answer| found.note(slave, answer)).await?;
+    found.conclude(args.addresses.0.len(), &line_spec::written(&config))
+}
+
+/// Asks every address, and tells what is there. Gives how the line was asked, and whether all were asked: Ctrl-C ends it.
+pub(super) async fn over(
+    args: &Args,
+    mut note: impl FnMut(SlaveAddress, Answer) -> Result<(), Failure>,
+) -> Result<(LineConfig, bool), Failure> {
     if args.wait.0.is_zero() {
         return Err(Failure::Input("--wait 0: expected how long to wait for each answer".to_owned()));
     }
@@ -49,22 +59,19 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut ending = Ending::listen()?;
     let line = one_drive::open_line(config.clone()).await?;
     announce(&config, args.addresses.0.len())?;
-
-    let mut found = Found::default();
     let scan = async {
         for &slave in &args.addresses.0 {
             let answer = look(&line, &config, slave).await?;
-            found.note(slave, answer)?;
+            note(slave, answer)?;
         }
-        Ok(())
+        Ok(true)
     };
     let ended = tokio::select! {
         ended = scan => ended,
-        () = ending.asked() => Ok(()),
+        () = ending.asked() => Ok(false),
     };
     one_drive::close(&line).await;
-    ended?;
-    found.conclude(args.addresses.0.len(), &line_spec::written(&config))
+    Ok((config, ended?))
 }
 
 /// Each address is asked once, however many are silent.
@@ -95,7 +102,7 @@ fn announce(config: &LineConfig, addresses: usize) -> Result<(), Failure> {
 
 /// What is at an address.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Answer {
+pub(super) enum Answer {
     Silence,
     /// Something answers that cannot be understood.
     Damaged(String),
@@ -105,12 +112,12 @@ enum Answer {
 
 /// A family that a slave could be of.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Likeness {
-    family: Family,
+pub(super) struct Likeness {
+    pub(super) family: Family,
     /// Whether it says so itself, by its name.
-    certain: bool,
+    pub(super) certain: bool,
     /// What it says it is.
-    says: Option<String>,
+    pub(super) says: Option<String>,
 }
 
 /// Asks one address.
@@ -172,7 +179,7 @@ fn says(identity: &Identity) -> Option<String> {
 
 /// What has been found so far.
 #[derive(Debug, Default)]
-struct Found {
+pub(super) struct Found {
     answered: usize,
     damaged: usize,
     /// The addresses of each family that is the only likely one there.
@@ -181,7 +188,7 @@ struct Found {
 
 impl Found {
     /// Prints what is at an address, if anything is.
-    fn note(&mut self, slave: SlaveAddress, answer: Answer) -> Result<(), Failure> {
+    pub(super) fn note(&mut self, slave: SlaveAddress, answer: Answer) -> Result<(), Failure> {
         let text = match answer {
             Answer::Silence => return Ok(()),
             Answer::Damaged(why) => {
@@ -201,7 +208,7 @@ impl Found {
         output::say(format_args!("{slave:>5}  {text}"))
     }
 
-    fn conclude(self, addresses: usize, line: &str) -> Result<(), Failure> {
+    pub(super) fn conclude(self, addresses: usize, line: &str) -> Result<(), Failure> {
         let Self { answered, damaged, known } = self;
         if answered + damaged == 0 {
             return Err(Failure::Drive(format!(
@@ -224,7 +231,7 @@ impl Found {
     }
 }
 
-fn describe(alike: &[Likeness]) -> String {
+pub(super) fn describe(alike: &[Likeness]) -> String {
     let one = |likeness: &Likeness| match &likeness.says {
         Some(says) => format!("{} ({says})", likeness.family),
         None => likeness.family.to_string(),
