@@ -4,7 +4,7 @@ import { path, read } from './api.js';
 import { el, table } from './dom.js';
 import { faultMeaning, faultRemedy } from './fault_texts.js';
 import { clock, MISSING, quantity } from './format.js';
-import { t } from './texts.js';
+import { named, t } from './texts.js';
 import { word } from './words.js';
 
 const FRAME = [
@@ -36,7 +36,7 @@ export function faultPanel(name) {
     const said = el('div', {},
       el('h2', {}, t('fault_of', { code: fault.code ?? '', mnemonic: fault.mnemonic ?? '' })),
       el('p.meaning', {}, faultMeaning(fault)),
-      ...(remedy ? [el('p', {}, el('b', {}, `${t('what_to_do')}: `), remedy)] : []),
+      ...(remedy ? [el('p', {}, el('b', {}, named(t('what_to_do'), '')), remedy)] : []),
       ...(fault.by_watchdog ? [el('p', {}, t('by_watchdog'))] : []),
       history(drive));
     return fault.before || fault.at_trip ? [said, frame(fault)] : [said];
@@ -58,7 +58,8 @@ export function faultPanel(name) {
 export async function readHistory(place, drive) {
   try {
     const { history = [] } = await read(path('drives', drive.name, 'faults'));
-    place.replaceChildren(history.length ? el('ol.history', {}, ...history.map(fault => {
+    place.replaceChildren(history.length ? el('ol.history', {}, ...history.map(({ entry, ...past }) => {
+      const fault = { ...past, ...entry };
       const remedy = faultRemedy(fault);
       return el('li', {}, el('b', {}, `${fault.code ?? ''} ${fault.mnemonic ?? ''} `), faultMeaning(fault),
         remedy ? el('small', {}, ` – ${remedy}`) : null);

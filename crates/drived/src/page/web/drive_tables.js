@@ -18,6 +18,8 @@ const MEASUREMENTS = [
   ['running_time', 'running_time_h', 0, 'h'], ['powered_time', 'powered_time_h', 0, 'h'], ['energy', 'output_energy_kwh', 0, 'kWh'],
   ['energy_counts', 'output_energy_counts', 0, ''],
 ];
+/** A parameter that was read longer ago says so. */
+const DATED_FROM_MS = 60_000;
 const COUNTERS = [['polls', 'polls'], ['answered', 'answered'], ['missed', 'missed'], ['failures', 'failures'], ['times_lost', 'lost'], ['trips', 'trips'], ['saves', 'saves']];
 
 /** The tables of the drive `name`: `element`, `update(drive)`. */
@@ -98,9 +100,14 @@ async function readParameters(name, place) {
   const said = el('p.hint', {}, t('reading_parameters'));
   place.replaceChildren(said);
   try {
-    const answer = await read(path('drives', name, 'parameters'));
-    const rows = Array.isArray(answer) ? answer : answer.parameters ?? answer.rows ?? [];
-    place.replaceChildren(table('', [t('register'), t('name'), [t('value'), 'right'], t('factory'), t('access')], rows.map(row => parameterRow(name, row))));
+    // One answer holds what could be read in its time; the next goes on from there.
+    for (let left = Infinity, rows; left > 0;) {
+      rows = await read(`${path('drives', name, 'parameters')}?wait=5s`);
+      const open = rows.filter(row => row.access !== 'write' && row.value === undefined && !row.error).length;
+      place.replaceChildren(open ? said : '', table('', [t('register'), t('name'), [t('value'), 'right'], t('factory'), t('access')], rows.map(row => parameterRow(name, row))));
+      if (open >= left || !place.isConnected) break;
+      left = open;
+    }
   } catch (problem) {
     setText(said, problem.message);
     said.classList.add('bad');
@@ -109,22 +116,23 @@ async function readParameters(name, place) {
 
 function parameterRow(name, row) {
   const value = el('td.right', {}, valueText(row));
-  const line = el('tr', {}, el('th', { scope: 'row' }, `${row.mnemonic ?? row.code ?? ''} ${row.address ?? ''}`),
-    el('td', {}, row.name ?? row.description ?? ''), value, el('td', {}, row.factory ?? ''), el('td', {}, word(row.access)));
-  if (!plant.daemon.rights.engineer || !String(row.access).includes('write')) return line;
+  const differs = row.factory && row.text !== undefined && row.text !== row.factory && String(row.value) !== row.factory;
+  const line = el('tr', {}, el('th', { scope: 'row' }, `${row.mnemonic} ${row.address}`), el('td', {}, row.name, row.range ? el('small', {}, ` ${row.range}`) : null),
+    value, el('td', {}, row.factory, differs ? el('b', {}, ` · ${t('differs')}`) : null), el('td', {}, word(row.access)));
+  if (!plant.daemon.rights.engineer || row.access === 'read') return line;
   const field = el('input.small', { value: row.value ?? '', 'aria-label': row.mnemonic });
   const write = async event => {
     event.preventDefault();
-    const mnemonic = row.mnemonic ?? row.code ?? String(row.address);
-    if (!await confirmed(t('confirm_parameter', { drive: name, name: mnemonic, value: field.value }), t('set'))) return;
-    carryOut(name, 'parameter', () => post(path('drives', name, 'parameters', mnemonic), { value: field.value }, 'PUT'));
+    if (!await confirmed(t('confirm_parameter', { drive: name, name: row.mnemonic, value: field.value }), t('set'))) return;
+    const number = Number(field.value.replace(',', '.'));
+    const given = field.value.trim() === '' || Number.isNaN(number) ? field.value : number;
+    carryOut(name, 'parameter', () => post(path('drives', name, 'parameters', row.mnemonic), { value: given }, 'PUT'));
   };
   value.replaceChildren(el('form.inline', { onsubmit: write }, field, row.unit ?? '', el('button', {}, t('set'))));
   return line;
 }
 
-function valueText(row) {
-  const value = row.value ?? row.raw;
-  const text = typeof value === 'number' ? quantity(value, Number.isInteger(value) ? 0 : 2) : value ?? MISSING;
-  return row.unit && !String(text).includes(row.unit) ? `${text}\u00a0${row.unit}` : String(text);
+function valueText({ text, error, age_ms: ms }) {
+  if (error) return error;
+  return ms > DATED_FROM_MS ? `${text} (${old(ms)})` : text ?? MISSING;
 }

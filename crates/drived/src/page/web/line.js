@@ -1,13 +1,12 @@
-// The lines: how much of them is used, what each drive's exchanges take, what went wrong, and the last of them.
+// The lines: how much of them is used, what each drive's exchanges take, what went wrong, and a capture of them.
 
-import { address, path, read } from './api.js';
-import { el, setAttribute, setText, table } from './dom.js';
-import { clock, duration, MISSING, quantity } from './format.js';
+import { address, path } from './api.js';
+import { el, setText, table } from './dom.js';
+import { duration, MISSING, quantity } from './format.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
 import { word } from './words.js';
 
-const READ_MS = 2_000;
 /** Kinds that a slave's exchanges have, and those that only the line can tell. */
 const ERRORS = ['no_answer', 'damaged', 'late', 'mismatched', 'exception'];
 const LINE_ERRORS = [...ERRORS, 'foreign', 'echo'];
@@ -45,19 +44,13 @@ export function line(root, name) {
   const big = ['utilisation', 'worst_stop', 'cycle', 'exchanges', 'errors'].map(text => el('div', {}, el('dt', {}, t(text)), el('dd.number')));
   const kinds = el('p.hint');
   const slaves = el('div.wide');
-  const last = el('div.wide.last');
-  const hold = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => setAttribute(hold, 'aria-pressed', String(!held())) }, t('hold'));
-  const held = () => hold.getAttribute('aria-pressed') === 'true';
-  const lately = el('section.panel', { hidden: true }, el('div.headline', {}, el('h2', {}, t('last_exchanges')),
-    el('span.chips', {}, hold, el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture')))), last);
   root.append(
     el('header.drive-head', {}, el('div', {}, el('h1', { tabindex: -1 }, name), place)),
     el('dl.big', {}, ...big),
-    el('section.panel', {}, el('h2', {}, t('exchange_times')), slaves, kinds), lately);
+    el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('exchange_times')),
+      el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture'))), slaves, kinds));
   update();
-  readLast();
-  const timer = setInterval(readLast, READ_MS);
-  return { update: names => (names.has('state') || names.has(`line ${name}`)) && update(), end: () => clearInterval(timer) };
+  return { update: names => (names.has('state') || names.has(`line ${name}`)) && update() };
 
   function update() {
     const now = plant.lines.get(name);
@@ -73,21 +66,6 @@ export function line(root, name) {
     slaves.replaceChildren(table('', [[t('slave'), 'right'], t('drive'), t('state'), t('answer_times'), [t('usual'), 'right'], [t('of_hundred'), 'right'],
       [t('longest'), 'right'], [t('exchanges'), 'right'], ...ERRORS.map(kind => [word(kind), 'right'])], rows.map(row => slaveRow(row, longest))));
   }
-
-  async function readLast() {
-    if (held() || document.hidden) return;
-    try {
-      const { last: exchanges } = await read(path('lines', name));
-      lately.hidden = !exchanges;
-      if (!exchanges) return;
-      last.replaceChildren(table('', [t('time'), [t('slave'), 'right'], t('request'), t('answer'), t('result'), [t('took'), 'right']], exchanges.map(one =>
-        el(one.result === 'ok' ? 'tr' : 'tr.in-trouble', {}, el('td', {}, clock(one.time_unix_ms)), el('td.right', {}, one.slave),
-          el('td', {}, el('code', {}, one.request)), el('td', {}, el('code', {}, one.answer || MISSING)), el('td', {}, word(one.result)),
-          el('td.right', {}, quantity(one.took_ms, 1, 'ms'))))));
-    } catch {
-      // The header says that the daemon is away; the next reading shows the rest.
-    }
-  }
 }
 
 function slaveRow(row, longest) {
@@ -100,7 +78,7 @@ function slaveRow(row, longest) {
     part.style.transform = `scaleX(${(ms / longest).toFixed(3)})`;
     spread.append(part);
   }
-  const answers = row.off_line ? offLine(row) : row.exchanges ? t('answers') : t('no_answer_yet');
+  const answers = row.off_line ? t('only_probed', { count: row.probes ?? 0 }) : row.exchanges ? t('answers') : t('no_answer_yet');
   return el(row.off_line ? 'tr.in-trouble' : 'tr', {},
     el('td.right', {}, row.slave),
     el('th', { scope: 'row' }, el('a', { href: `#/drive/${encodeURIComponent(row.drive)}` }, row.drive ?? MISSING)),
@@ -108,11 +86,6 @@ function slaveRow(row, longest) {
     ...['p50', 'p99', 'max'].map(key => el('td.right', {}, quantity(times?.[key], 1, 'ms'))),
     el('td.right', {}, quantity(row.exchanges, 0)),
     ...ERRORS.map(kind => el(errors[kind] ? 'td.right.some' : 'td.right', {}, quantity(errors[kind], 0))));
-}
-
-function offLine(row) {
-  if (row.next_probe_ms !== undefined) return t('next_probe', { time: duration(row.next_probe_ms) });
-  return t('only_probed', { count: row.probes ?? 0 });
 }
 
 function sum(errors) {

@@ -67,8 +67,10 @@ const WORDS = {
   echo: ['own echo', 'écho propre'],
   ok: ['ok', 'ok'],
   // Access of a parameter.
-  read_only: ['read', 'lecture'],
+  read: ['read', 'lecture'],
   read_write: ['read, write', 'lecture, écriture'],
+  write_stopped: ['read, write at standstill', 'lecture, écriture à l’arrêt'],
+  write: ['write', 'écriture'],
   // Kinds of events.
   tripped: ['Tripped', 'Défaut'],
   trip_explained: ['Trip explained', 'Défaut expliqué'],
