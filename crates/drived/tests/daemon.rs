@@ -12,7 +12,7 @@ struct Daemon {
     running: Option<Running>,
     sim: Sim,
     socket: PathBuf,
-    _file: File,
+    file: File,
 }
 
 const WATCHED: &str = "control = true\nwatchdog = { time = \"10s\", reaction = \"ramp\" }";
@@ -35,7 +35,7 @@ impl Daemon {
         for _ in 0..2 {
             running.wait_for(r#""event":"watchdog_verified""#);
         }
-        Self { running: Some(running), sim, socket, _file: file }
+        Self { running: Some(running), sim, socket, file }
     }
 
     fn socket(&self) -> &str {
@@ -285,4 +285,56 @@ fn a_certificate_that_is_missing_or_none_ends_the_program_before_a_drive_is_spok
         let config = File::new("tls", &text);
         run(&["run", "--config", config.path()]).assert_refused(2, reason);
     }
+}
+
+#[test]
+fn a_daemon_is_told_to_read_its_configuration_again() {
+    let daemon = Daemon::start("reloaded", "");
+    assert!(daemon.ask(&["reload"]).assert_done().starts_with("nothing has changed"));
+    let file = daemon.file.path();
+    let text = std::fs::read_to_string(file).expect("it is there");
+    std::fs::write(file, text.replace("[defaults]", "[defaults]\nfrequency = { high = 40 }"))
+        .expect("it can be written");
+    let would = daemon.ask(&["reload", "--dry-run"]);
+    assert!(would.assert_done().contains("pump 1"), "{would:?}");
+    let done = daemon.ask(&["reload"]);
+    assert!(done.assert_done().contains("pump 1"), "{done:?}");
+    assert!(daemon.ask(&["reload"]).assert_done().starts_with("nothing has changed"));
+    daemon.ask(&["setpoint", "pump 1", "45Hz"]).assert_refused(1, "pump 1: refused");
+    std::fs::write(file, "nonsense").expect("it can be written");
+    daemon.ask(&["reload"]).assert_refused(2, "nonsense");
+    daemon.ask(&["status"]).assert_done();
+}
+
+#[test]
+fn registers_and_faults_of_a_drive_are_read_and_written_through_the_daemon() {
+    let mut daemon = Daemon::start("registers", "");
+    let got = daemon.ask(&["param", "get", "pump 1", "ACC", "9002"]);
+    let out = got.assert_done();
+    assert!(out.contains("9001") && out.contains("ACC") && out.contains("dEC"), "{out}");
+    let set = daemon.ask(&["param", "set", "pump 1", "ACC", "45"]);
+    assert!(set.assert_done().starts_with("pump 1 ACC is now 45"), "{set:?}");
+    let again = daemon.ask(&["param", "set", "pump 1", "ACC", "45"]);
+    assert!(again.assert_done().starts_with("pump 1 ACC was already 45"), "{again:?}");
+    let saved = daemon.ask(&["param", "save", "pump 1"]);
+    assert!(saved.assert_done().starts_with("pump 1 has saved its parameters to EEPROM"), "{saved:?}");
+    assert!(daemon.ask(&["param", "list", "pump 1"]).assert_done().contains("acceleration ramp time"));
+    daemon.ask(&["param", "set", "pump 1", "ETA", "1"]).assert_refused(2, "can only be read");
+    daemon.ask(&["param", "get", "pump 1", "NOPE"]).assert_refused(2, "NOPE");
+    daemon.ask(&["param", "get", "pump 1"]).assert_refused(2, "expected NAME and one or more");
+
+    assert!(daemon.ask(&["faults", "pump 1"]).assert_done().starts_with("pump 1 has no fault"));
+    daemon.sim.say("atv312@1 trip OCF", "done");
+    daemon.running.as_mut().expect("it runs").wait_for(r#""event":"tripped""#);
+    let faults = daemon.ask(&["faults", "pump 1"]);
+    let out = faults.assert_done();
+    assert!(
+        out.contains("pump 1 has tripped, fault 9 OCF: overcurrent") && out.contains("what to do: "),
+        "{out}"
+    );
+    let status = daemon.ask(&["status"]);
+    assert!(status.assert_done().contains("fault OCF"), "{status:?}");
+    daemon.ask(&["start", "pump 1"]).assert_refused(1, "pump 1: refused");
+    let reset = daemon.ask(&["reset", "pump 1"]);
+    assert!(reset.assert_done().starts_with("pump 1 has no fault: the drive shows"), "{reset:?}");
 }

@@ -9,6 +9,7 @@ mod health;
 mod parameter;
 mod problem;
 mod read;
+mod reload;
 mod routes;
 mod stream;
 #[cfg(test)]
@@ -22,6 +23,7 @@ use axum::{
     routing::{any, get},
 };
 
+pub(crate) use self::reload::reload_router;
 use self::{
     demo::Stage,
     problem::Problem,

@@ -124,7 +124,7 @@ impl Prepared {
         let (sessions, failures) = Default::default();
         let gate = Gate { router, tokens, audit: audit.clone(), sessions, failures, end: end.clone() };
         let shared = Shared { gate: Arc::new(gate), end, _here: here };
-        audit.record(Record::new(Kind::Daemon, &this_program(), "the daemon serves")).whenever();
+        audit.record(Record::of_program(Kind::Daemon, "the daemon serves")).whenever();
         #[cfg(unix)]
         if let Some(entrance) = self.socket {
             tokio::spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
@@ -142,6 +142,11 @@ impl Doors {
         self.listening.clone()
     }
 
+    /// The audit log, for what does not come through a door.
+    pub(crate) fn audit(&self) -> Audit {
+        self.audit.clone()
+    }
+
     /// Keeps in the audit log what becomes of each command, until the fleet ends.
     pub(crate) fn follow(&self, events: Events) -> JoinHandle<()> {
         tokio::spawn(audit::follow(self.audit.clone(), events))
@@ -149,16 +154,10 @@ impl Doors {
 
     /// Lets nobody in any more, ends the event streams, and waits a little for answers that are under way.
     pub(crate) async fn close(mut self) {
-        self.audit.record(Record::new(Kind::Daemon, &this_program(), "the daemon ends")).whenever();
+        self.audit.record(Record::of_program(Kind::Daemon, "the daemon ends")).whenever();
         self.ended.send_replace(true);
         let _ = timeout(DRAINED_WITHIN, self.gone.recv()).await;
     }
-}
-
-/// The daemon itself, in the audit log.
-fn this_program() -> Caller {
-    let origin = format!("process {}", std::process::id());
-    Caller { name: "drived".to_owned(), origin, rights: Rights::ALL }
 }
 
 async fn until_the_end(shared: Shared, serve: impl Future<Output = ()>) {

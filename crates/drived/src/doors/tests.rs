@@ -140,7 +140,7 @@ impl Rig {
 
     /// What the audit log has of it, kind and outcome, once all is written.
     async fn audited(&self) -> Vec<String> {
-        let last = Record::new(Kind::Daemon, &this_program(), "last");
+        let last = Record::of_program(Kind::Daemon, "last");
         self.gate.audit.record(last).done().await.unwrap();
         let text = fs::read_to_string(self.folder.file("audit")).unwrap();
         let told = |line: &str| {

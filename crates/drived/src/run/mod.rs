@@ -20,7 +20,10 @@ use self::{
 use crate::{
     api,
     config::{Config, Http, LinePart},
-    doors::Doors,
+    doors::{
+        Doors,
+        audit::{Audit, Kind, Record},
+    },
     failure::Failure,
     journal, one_drive, page,
     plant::Plant,
@@ -69,7 +72,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let shutdown = config.shutdown;
     let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
-    let doors = doors.open(api::router(plant).merge(page::router()));
+    let doors =
+        doors.open(api::router(plant).merge(api::reload_router(reloader.clone())).merge(page::router()));
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let mut read = None;
@@ -77,7 +81,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         tokio::select! {
             () = ending.asked() => break,
             wish = wishes.next() => match wish {
-                Wish::Reload => drop(tokio::spawn(told(reloader.clone()))),
+                Wish::Reload => drop(tokio::spawn(told(reloader.clone(), doors.audit()))),
                 Wish::State => tell_state(&fleet),
                 Wish::End => {
                     tracing::warn!("the terminal is closed: the program ends by each drive's policy");
@@ -111,8 +115,14 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 }
 
 /// Reads the configuration again and says what became of it.
-async fn told(reloader: Reloader) {
-    match reloader.reload(false).await {
+async fn told(reloader: Reloader, audit: Audit) {
+    let reloaded = reloader.reload(false).await;
+    let text = match &reloaded {
+        Ok(done) => done.join("; "),
+        Err(failure) => failure.to_string(),
+    };
+    audit.record(Record::of_program(Kind::Configuration, format!("read again: {text}"))).whenever();
+    match reloaded {
         Ok(done) if done.is_empty() => tracing::info!("configuration read again: nothing has changed"),
         Ok(done) => tracing::info!("configuration read again: {}", done.join("; ")),
         Err(failure @ Failure::Drive(_)) => tracing::error!("configuration read again: {failure}"),

@@ -35,14 +35,7 @@ pub(super) async fn set(
     let path = one.path(&mut daemon, Some(name), &["parameters", register]).await?;
     let written = daemon.put(&path, &json!({ "value": value, "save": save })).await?.done()?;
     one.daemon.say(&written, |written| {
-        let text = |key: &str| written[key].as_str().unwrap_or_default().to_owned();
-        let what = if written["changed"] == true { "is now" } else { "was already" };
-        let kept = if save {
-            "saved where that was needed".to_owned()
-        } else {
-            format!("kept in {}", text("storage"))
-        };
-        output::say(format_args!("{name} {} {what} {} ({kept})", text("mnemonic"), text("text")))
+        output::say(format_args!("{name} {}", written["text"].as_str().unwrap_or_default()))
     })
 }
 

@@ -31,6 +31,8 @@ const WAITING: usize = 256;
 pub(crate) enum Kind {
     /// The daemon began or ended to serve.
     Daemon,
+    /// The configuration was read again, not by a command.
+    Configuration,
     /// A command came; it is carried out after this has been written.
     Command,
     /// What was answered to a command, and what became of it if that was known.
@@ -82,6 +84,14 @@ impl Record {
             outcome: None,
             status: None,
         }
+    }
+}
+
+impl Record {
+    /// What the program itself has done.
+    pub(crate) fn of_program(kind: Kind, what: impl Into<String>) -> Self {
+        let origin = format!("process {}", std::process::id());
+        Self::new(kind, &Caller { name: "drived".to_owned(), origin, rights: Rights::ALL }, what)
     }
 }
 

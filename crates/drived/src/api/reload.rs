@@ -1,0 +1,50 @@
+//! Reading the configuration again, for engineers.
+
+use axum::{
+    Json, Router,
+    extract::{Query, State, rejection::QueryRejection},
+    http::StatusCode,
+    routing::post,
+};
+use serde::{Deserialize, Serialize};
+
+use super::{ask::By, problem::Problem};
+use crate::{failure::Failure, run::reload::Reloader};
+
+#[derive(Debug, Deserialize)]
+struct Asked {
+    /// Only say what would change.
+    #[serde(default)]
+    dry_run: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Changes {
+    dry_run: bool,
+    /// What was done, or would be, a sentence each.
+    changes: Vec<String>,
+}
+
+/// `POST /api/v1/reload`, for a program that has a configuration.
+pub(crate) fn reload_router(reloader: Reloader) -> Router {
+    Router::new().route("/api/v1/reload", post(reload)).with_state(reloader)
+}
+
+async fn reload(
+    State(reloader): State<Reloader>,
+    By(caller): By,
+    asked: Result<Query<Asked>, QueryRejection>,
+) -> Result<Json<Changes>, Problem> {
+    if !caller.rights.engineer {
+        return Err(Problem::lacks_right(&caller, "reload the configuration"));
+    }
+    let Query(Asked { dry_run }) = asked?;
+    // Nobody who goes away leaves it half done.
+    let reloading = tokio::spawn(async move { reloader.reload(dry_run).await });
+    match reloading.await {
+        Ok(Ok(changes)) => Ok(Json(Changes { dry_run, changes })),
+        Ok(Err(Failure::Input(why))) => Err(Problem::unprocessable(why)),
+        Ok(Err(failure)) => Err(Problem::new(StatusCode::INTERNAL_SERVER_ERROR, failure.to_string())),
+        Err(error) => Err(Problem::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string())),
+    }
+}
