@@ -48,21 +48,11 @@ pub(crate) struct Entry {
 
 /// Tells until the fleet has ended. Safe to drop: what was held back is not told then.
 pub(crate) async fn keep(fleet: Fleet, mut events: Events, mut tell: impl FnMut(Entry)) {
-    let places = Place::all(&fleet);
-    // Whoever holds the fleet says how long it lives.
-    drop(fleet);
-    let drives: BTreeMap<Arc<str>, DriveHandle> = places
-        .iter()
-        .flat_map(|place| &place.drives)
-        .map(|drive| (Arc::clone(drive.name()), drive.clone()))
-        .collect();
-    let mut teller = Teller::new(
-        Instant::now(),
-        places.iter().map(|place| {
-            let drives = place.drives.iter().map(|drive| (Arc::clone(drive.name()), drive.slave().number()));
-            (place.name.to_string(), drives.collect())
-        }),
-    );
+    let mut teller = Teller::new(Instant::now());
+    let mut places = Vec::new();
+    // Those that a reload has taken out are told of to their end.
+    let mut drives = BTreeMap::new();
+    look(&fleet, &mut teller, &mut places, &mut drives);
     let mut looks = interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     loop {
@@ -70,6 +60,9 @@ pub(crate) async fn keep(fleet: Fleet, mut events: Events, mut tell: impl FnMut(
             biased;
             received = events.recv() => match received {
                 Received::Event(event) => {
+                    if !drives.contains_key(&event.drive) {
+                        look(&fleet, &mut teller, &mut places, &mut drives);
+                    }
                     if let Some(drive) = drives.get(&event.drive) {
                         teller.handle_event(Instant::now(), &event, &drive.snapshot());
                     }
@@ -84,9 +77,10 @@ pub(crate) async fn keep(fleet: Fleet, mut events: Events, mut tell: impl FnMut(
                 }
             },
             _ = looks.tick() => {
+                look(&fleet, &mut teller, &mut places, &mut drives);
                 let now = Instant::now();
-                for (index, place) in places.iter().enumerate() {
-                    teller.handle_look(now, index, || LineLook::at(place));
+                for place in &places {
+                    teller.handle_look(now, &place.name, LineLook::at(place));
                 }
                 teller.handle_time(now);
             }
@@ -94,6 +88,21 @@ pub(crate) async fn keep(fleet: Fleet, mut events: Events, mut tell: impl FnMut(
         while let Some(entry) = teller.poll_entry() {
             tell(entry);
         }
+    }
+}
+
+/// Who belongs to the fleet now.
+fn look(
+    fleet: &Fleet,
+    teller: &mut Teller,
+    places: &mut Vec<Place>,
+    drives: &mut BTreeMap<Arc<str>, DriveHandle>,
+) {
+    *places = Place::all(fleet);
+    for place in &*places {
+        drives.extend(place.drives.iter().map(|drive| (Arc::clone(drive.name()), drive.clone())));
+        let on_line = place.drives.iter().map(|drive| (Arc::clone(drive.name()), drive.slave().number()));
+        teller.handle_members(Instant::now(), &place.name, on_line.collect());
     }
 }
 

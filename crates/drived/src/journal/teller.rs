@@ -145,24 +145,40 @@ pub(super) struct Teller {
 }
 
 impl Teller {
-    /// For lines with the names and addresses of their drives.
-    pub(super) fn new(now: Instant, lines: impl Iterator<Item = (String, Vec<(Arc<str>, u8)>)>) -> Self {
-        let mut drives = BTreeMap::new();
-        let lines = lines.enumerate().map(|(line, (name, on_line))| {
-            for (drive, _) in &on_line {
-                drives.insert(Arc::clone(drive), DriveState { line, ..DriveState::default() });
-            }
-            LineState { name, drives: on_line, away: None, noise: Noise::new(now) }
-        });
+    pub(super) fn new(now: Instant) -> Self {
         Self {
-            lines: lines.collect(),
-            drives,
+            lines: Vec::new(),
+            drives: BTreeMap::new(),
             held: Vec::new(),
             together: BTreeMap::new(),
             repeats: Repeats::default(),
             entries: VecDeque::new(),
             began: now,
         }
+    }
+
+    /// A line has these drives, by name and address. Lines and drives that are gone are remembered: what is told of their
+    /// end has their names.
+    pub(super) fn handle_members(&mut self, now: Instant, line: &str, drives: Vec<(Arc<str>, u8)>) {
+        let index = self.index_of(line).unwrap_or(self.lines.len());
+        for (drive, _) in &drives {
+            self.state(drive).line = index;
+        }
+        match self.lines.get_mut(index) {
+            Some(line) => line.drives = drives,
+            None => {
+                self.lines.push(LineState {
+                    name: line.to_owned(),
+                    drives,
+                    away: None,
+                    noise: Noise::new(now),
+                });
+            }
+        }
+    }
+
+    fn index_of(&self, line: &str) -> Option<usize> {
+        self.lines.iter().position(|other| other.name == line)
     }
 
     /// What is to be told, in order.
@@ -244,9 +260,10 @@ impl Teller {
         self.entries.push_back(Entry { level: Level::WARN, text });
     }
 
-    /// It is time to look at a line; `look` is called where there is something to compare.
-    pub(super) fn handle_look(&mut self, now: Instant, index: usize, look: impl FnOnce() -> LineLook) {
-        let LineLook { is_open, why, stats, drives } = look();
+    /// How a line is now.
+    pub(super) fn handle_look(&mut self, now: Instant, line: &str, look: LineLook) {
+        let LineLook { is_open, why, stats, drives } = look;
+        let Some(index) = self.index_of(line) else { return };
         let Some(line) = self.lines.get_mut(index) else { return };
         match (is_open, line.away) {
             (true, Some((since, true))) => {

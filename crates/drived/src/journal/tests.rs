@@ -233,3 +233,29 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         assert!(same <= 3, "{same} times {:?}", one.text);
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_a_reload_adds_is_told_of_by_its_line_and_name() {
+    let settings = SerialSettings::MODBUS_DEFAULT;
+    let simulated = SimLine::new(Wiring::rtu(settings));
+    for address in [1, 2] {
+        simulated.add_boxed(address, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    }
+    let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
+    let open = |port: drive_bus::Slave, slave: SlaveAddress| {
+        Family::Atv312.open_with(port, slave, &Options::default())
+    };
+    let builder = Fleet::builder().line("north", line);
+    let fleet = builder.drive("north", 1, DriveSettings::watched("pump 1"), open).start().unwrap();
+    let (start, told) = (Instant::now(), Told::default());
+    let heard = told.clone();
+    let journal = tokio::spawn(keep(fleet.clone(), fleet.events(), move |entry| {
+        heard.0.lock().unwrap_or_else(PoisonError::into_inner).push((start.elapsed(), entry));
+    }));
+    sleep_until(start + Duration::from_secs(10)).await;
+    fleet.extend(|fleet| fleet.drive("north", 2, DriveSettings::watched("pump 2"), open)).unwrap();
+    sleep_until(start + Duration::from_secs(20)).await;
+    let _ = fleet.shutdown(Duration::from_secs(5)).await;
+    journal.await.unwrap();
+    told.assert_once(Level::INFO, &["north: connected: pump 2 at standstill"]);
+}

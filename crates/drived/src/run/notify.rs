@@ -73,13 +73,11 @@ impl Notify {
     }
 
     /// The configuration is read again.
-    #[allow(dead_code, reason = "for the reload")]
     pub(crate) fn reloading(&self) {
         self.say(vec![Word::Reloading]);
     }
 
     /// It has been read again.
-    #[allow(dead_code, reason = "for the reload")]
     pub(crate) fn reloaded(&self) {
         self.say(vec![Word::Ready]);
     }
