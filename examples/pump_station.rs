@@ -11,7 +11,7 @@ use std::{error::Error, time::Duration};
 use drive_atv312::Atv312;
 use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, Reaction, SerialSettings, StopMode};
-use drive_fleet::{DriveHandle, DriveSettings, EventKind, Fleet, Order, Received, Until, WatchdogContract};
+use drive_fleet::{DriveHandle, DriveSettings, EventKind, Fleet, Received, WatchdogContract};
 use drive_sim::{SimLine, Wiring, models};
 use tokio::time::{interval, sleep};
 
@@ -94,9 +94,7 @@ async fn share(healthy: &[DriveHandle], demand: u16) {
             pump.set_setpoint(each).await
         } else {
             println!("  {} joins", pump.name());
-            // One order: no start at whatever the pump was given before.
-            let setpoint = Some(each.into());
-            pump.order(Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce }).await
+            pump.start_at(Direction::Forward, each).await
         };
         if !outcome.is_confirmed() {
             println!("  {}: {outcome}", pump.name());
