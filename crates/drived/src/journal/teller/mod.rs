@@ -1,5 +1,7 @@
 //! Decides what is told, when and how: a pure machine. Time is an argument, it does no input or output.
 
+mod telling;
+
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
@@ -373,17 +375,6 @@ impl Teller {
         }
     }
 
-    /// Tells a return: by itself, unless others have come back a moment before or are expected to, with their line.
-    fn back(&mut self, now: Instant, drive: &Arc<str>, level: Level, after: Duration, said: String) {
-        let with_line = std::mem::take(&mut self.state(drive).with_line);
-        if with_line || self.together.contains_key(&(self.line_of(drive), Fate::Back)) {
-            self.share(now, drive, Fate::Back, level, after, said);
-        } else {
-            self.say(now, drive, level, "back", format!("back after {}, {said}", Span(after)));
-            self.expect(now, drive, Fate::Back);
-        }
-    }
-
     fn lost(
         &mut self,
         now: Instant,
@@ -493,102 +484,6 @@ impl Teller {
             self.share(now, drive, Fate::AtExit, Level::INFO, Duration::ZERO, said.to_owned());
         } else {
             self.say(now, drive, Level::ERROR, "exit", format!("at the exit: {action}"));
-        }
-    }
-
-    /// Tells what was held back, with the drive's own explanation where it has given one.
-    fn release(&mut self, now: Instant, Held { drive, what, .. }: Held, explanation: Option<String>) {
-        match what {
-            What::Trip { when, is_new, code } => {
-                let explanation = explanation.or_else(|| code.map(|code| format!("code {code}")));
-                let why = explanation.map(|why| format!(": {why}")).unwrap_or_default();
-                let (level, still) = if is_new { (Level::ERROR, "") } else { (Level::WARN, "still ") };
-                let about = format!("tripped{why}");
-                match when {
-                    When::First => self.say(now, &drive, level, &about, format!("connected, tripped{why}")),
-                    When::Back(after) => self.back(now, &drive, level, after, format!("{still}tripped{why}")),
-                    When::Heard(None) => self.say(now, &drive, level, &about, format!("tripped{why}")),
-                    When::Heard(Some(turned)) => {
-                        self.say(now, &drive, level, &about, format!("tripped at {}{why}", Hertz(turned)));
-                    }
-                }
-            }
-            What::FaultCleared => {
-                self.say(now, &drive, Level::INFO, "cleared", "shows no fault any more".to_owned());
-            }
-            What::StopUnconfirmed { since, attempts, outcome } => {
-                let text = format!(
-                    "STOP NOT CONFIRMED for {} after {attempts} attempts, the motor may turn: {outcome}",
-                    Span(since)
-                );
-                self.say(now, &drive, Level::ERROR, "stop", text);
-            }
-        }
-    }
-
-    /// Others may share this fate within a few seconds: they are told together.
-    fn expect(&mut self, now: Instant, drive: &Arc<str>, fate: Fate) {
-        let all = Together {
-            until: now + TOGETHER,
-            level: Level::INFO,
-            longest: Duration::ZERO,
-            drives: Vec::new(),
-        };
-        self.together.entry((self.line_of(drive), fate)).or_insert(all);
-    }
-
-    fn share(
-        &mut self,
-        now: Instant,
-        drive: &Arc<str>,
-        fate: Fate,
-        level: Level,
-        time: Duration,
-        said: String,
-    ) {
-        self.expect(now, drive, fate);
-        let Some(all) = self.together.get_mut(&(self.line_of(drive), fate)) else { return };
-        // The most severe level is the smallest.
-        all.level = all.level.min(level);
-        all.longest = all.longest.max(time);
-        all.drives.push((Arc::clone(drive), said));
-    }
-
-    fn tell_together(&mut self, key: (usize, Fate)) {
-        let Some(Together { level, longest, mut drives, .. }) = self.together.remove(&key) else { return };
-        let (index, fate) = key;
-        let Some(line) = self.lines.get(index).filter(|_| !drives.is_empty()) else { return };
-        let place = |name: &Arc<str>| line.drives.iter().position(|(other, _)| other == name);
-        drives.sort_by_key(|(name, _)| place(name));
-        let (all, longest) = (listed(&drives, line.drives.len()), Span(longest));
-        let line = line.name.as_str();
-        let text = match fate {
-            Fate::Connected => format!("{line}: connected: {all}"),
-            Fate::Identified => format!("{line}: identified: {all}"),
-            Fate::Silent => format!("{line}: never heard, for {longest}: {all}"),
-            Fate::Lost => format!("{line}: also lost, no answer for up to {longest}: {all}"),
-            Fate::Back => format!("{line}: back after up to {longest}: {all}"),
-            Fate::AtExit => format!("{line}: at the exit: {all}"),
-        };
-        self.entries.push_back(Entry { level, text });
-    }
-
-    fn hold(&mut self, until: Instant, drive: &Arc<str>, what: What) {
-        self.held.push(Held { until, drive: Arc::clone(drive), what });
-    }
-
-    /// Says something of a drive, unless the same has been said often enough.
-    fn say(&mut self, now: Instant, drive: &Arc<str>, level: Level, about: &str, text: String) {
-        let line = self.lines.get(self.line_of(drive)).map_or("", |line| line.name.as_str());
-        let first = text.split([' ', ':']).next().unwrap_or_default();
-        let separator = if VERBS.contains(&first) { " " } else { ": " };
-        let text = format!("{line}: {drive}{separator}{text}");
-        self.note(now, format!("{drive} {about}"), level, text);
-    }
-
-    fn note(&mut self, now: Instant, key: String, level: Level, text: String) {
-        if self.repeats.admit(now, key, level, &text) {
-            self.entries.push_back(Entry { level, text });
         }
     }
 
