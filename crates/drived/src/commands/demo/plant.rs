@@ -90,7 +90,7 @@ impl Plant {
             .zip(fleet.drives())
             .map(|((name, machine), handle)| Unit::new(name, machine, handle))
             .collect();
-        let story = tokio::spawn(story::tell(units.clone())).abort_handle();
+        let story = tokio::spawn(story::tell(units.clone(), fleet.clone())).abort_handle();
         Ok(Self { lines, units, fleet, story, ended: watch::Sender::new(None) })
     }
 

@@ -1,9 +1,10 @@
 //! What happens in the demo, and when.
 
-use std::time::Duration;
+use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
-use drive_core::{Direction, Frequency, StopMode};
+use drive_core::{Command, Direction, Frequency, StopMode};
 use drive_families::Family;
+use drive_fleet::{Event, EventKind, Events, Fleet, Received};
 use drive_sim::Panel;
 use tokio::time::{self, Instant};
 
@@ -15,6 +16,9 @@ const LENGTH: Duration = Duration::from_secs(30);
 
 /// It begins when every drive can be started, and at the latest after this time.
 const PATIENCE: Duration = Duration::from_secs(15);
+
+/// By whom the orders of the story are given.
+pub(super) const TELLER: &str = "the demo";
 
 /// Somebody at the plant does something with one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,25 +34,50 @@ struct Scene {
     deed: Deed,
 }
 
-/// Tells the story again and again.
-pub(super) async fn tell(units: Vec<Unit>) {
+/// Tells the story again and again. A drive that somebody else has commanded is left to him from then on: a motor that
+/// was stopped by a person does not start again.
+pub(super) async fn tell(units: Vec<Unit>, fleet: Fleet) {
     let ready_by = Instant::now() + PATIENCE;
     for unit in &units {
         unit.is_ready_by(ready_by).await;
     }
+    let mut events = fleet.events();
+    let mut left_alone = BTreeSet::new();
     let families: Vec<Family> = units.iter().map(|unit| unit.name.family).collect();
     loop {
         let began = Instant::now();
         for scene in scenes(&families) {
-            time::sleep_until(began + scene.at).await;
-            let Some(unit) = units.get(scene.unit) else { continue };
+            hear_until(began + scene.at, &mut events, &mut left_alone).await;
+            let unit = units.get(scene.unit).filter(|unit| !left_alone.contains(&*unit.name.to_string()));
+            let Some(unit) = unit else { continue };
             match scene.deed {
                 Deed::Order(order) => unit.order(order),
                 Deed::Trip => unit.machine.trip(simulated::trip_code(unit.name.family)),
                 Deed::Panel(action) => unit.machine.panel(action),
             }
         }
-        time::sleep_until(began + LENGTH).await;
+        hear_until(began + LENGTH, &mut events, &mut left_alone).await;
+    }
+}
+
+/// Notes until then which drives are commanded by others.
+async fn hear_until(then: Instant, events: &mut Events, left_alone: &mut BTreeSet<Arc<str>>) {
+    loop {
+        let received = tokio::select! {
+            biased;
+            received = events.recv() => received,
+            () = time::sleep_until(then) => return,
+        };
+        match received {
+            Received::Event(Event { drive, kind: EventKind::Command { command, commander, .. }, .. }) => {
+                // A run command of the story is withdrawn by the fleet when the drive trips.
+                if &*commander != TELLER && command != Command::Withdraw {
+                    left_alone.insert(drive);
+                }
+            }
+            Received::Event(_) | Received::Missed(_) => {}
+            Received::End => return time::sleep_until(then).await,
+        }
     }
 }
 
@@ -95,7 +124,37 @@ fn scenes(families: &[Family]) -> Vec<Scene> {
 
 #[cfg(test)]
 mod tests {
+    use drive_core::SlaveAddress;
+    use drive_fleet::{DriveHandle, DriveSettings};
+
     use super::*;
+    use crate::{drive_spec::DriveName, plant::testing::TestPlant};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_a_person_has_stopped_is_not_started_by_the_story() {
+        let named = |name: String| DriveSettings::controlled(name.replace("pump ", "atv312@"));
+        let TestPlant { plant, machines, .. } = TestPlant::with(2, named).await;
+        let fleet = plant.fleet();
+        let unit = |((address, machine), handle): ((u8, &drive_sim::SimSlave), DriveHandle)| {
+            let slave = SlaveAddress::try_from(address).unwrap();
+            Unit::new(DriveName { family: Family::Atv312, slave }, machine.clone(), handle)
+        };
+        let units = (1..).zip(&machines).zip(fleet.drives()).map(unit).collect();
+        let story = tokio::spawn(tell(units, fleet.clone()));
+        // The second drive trips never, and runs until it is stopped.
+        let second = fleet.drive("atv312@2").unwrap();
+        second
+            .wait_until(|known| known.status.as_ref().is_some_and(|status| status.value.state.is_moving()))
+            .await;
+        assert!(second.commanded_by("somebody").stop(StopMode::Fast).await.is_confirmed());
+        for _ in 0..LENGTH.as_secs() * 4 {
+            time::sleep(Duration::from_millis(500)).await;
+            assert!(!machines[1].observe().running);
+        }
+        let trips = fleet.drive("atv312@1").unwrap().snapshot().counters.trips;
+        assert!(trips > 1, "the story goes on with the other: {trips}");
+        story.abort();
+    }
 
     impl Scene {
         fn order(&self) -> Option<Order> {

@@ -7,6 +7,7 @@ use drive_fleet::{DriveHandle, Freshness, Outcome};
 use drive_sim::SimSlave;
 use tokio::{sync::watch, time::Instant};
 
+use super::story::TELLER;
 use crate::drive_spec::DriveName;
 
 /// A handle of one drive; cheap to clone.
@@ -59,7 +60,7 @@ pub(super) struct View {
 
 impl Unit {
     pub(super) fn new(name: DriveName, machine: SimSlave, handle: DriveHandle) -> Self {
-        Self { name, machine, handle, last: Arc::new(watch::Sender::new(None)) }
+        Self { name, machine, handle: handle.commanded_by(TELLER), last: Arc::new(watch::Sender::new(None)) }
     }
 
     /// Gives an order; its outcome is shown when it is known.

@@ -74,7 +74,7 @@ async function followUp(answer, mine) {
   while (mine === run && account.drives.some(isOpen)) {
     await pause(LOOK_MS);
     try {
-      take(await read(path('commands', answer.id)));
+      take(await read(`${path('commands', answer.id)}?wait=0`));
       account.unreadable = false;
     } catch {
       if (!account.unreadable) show({ unreadable: true });
