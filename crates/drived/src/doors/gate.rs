@@ -213,32 +213,48 @@ impl Gate {
     /// Who asks. A token that is wrong is never taken for none.
     fn caller(&self, door: &Door, peer: Peer, headers: &HeaderMap, stops: bool) -> Result<Caller, Refusal> {
         let without = freely(door, peer, headers);
+        match self.bearer(peer, headers, stops, &without) {
+            // A file of tokens that cannot be read keeps nobody from a stop that needs none.
+            Err(Unlet::Unreadable(_)) if stops && without.rights.stop => Ok(without),
+            Err(Unlet::Unreadable(error)) => Err(unreadable(error)),
+            Err(Unlet::Refused(refusal)) => Err(refusal),
+            Ok(token) => Ok(token.map_or(without.clone(), |token| of_token(&token, without))),
+        }
+    }
+
+    /// The token by which somebody comes, if any.
+    fn bearer(
+        &self,
+        peer: Peer,
+        headers: &HeaderMap,
+        stops: bool,
+        without: &Caller,
+    ) -> Result<Option<Token>, Unlet> {
         let Some(authorization) = headers.get(header::AUTHORIZATION) else {
             let session = sessions::cookie(headers)
                 .and_then(|cookie| lock(&self.sessions).token(cookie, Instant::now()).map(str::to_owned));
             // A session that is over is no wrong token: who had it is anybody again, and the page says so.
-            let token = match (session, &self.tokens) {
-                (Some(hash), Some(tokens)) => tokens.of_hash(&hash).map_err(unreadable)?,
-                _ => None,
+            return match (session, &self.tokens) {
+                (Some(hash), Some(tokens)) => Ok(tokens.of_hash(&hash)?),
+                _ => Ok(None),
             };
-            return Ok(token.map_or(without.clone(), |token| of_token(&token, without)));
         };
         // Whoever has a right token stops his motors, whatever others do at the same address.
         if !stops {
-            self.wait(peer)?;
+            self.wait(peer).map_err(Unlet::Refused)?;
         }
         let secret = authorization.to_str().ok().and_then(|text| text.split_once(' '));
         let secret = secret
             .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
             .map(|(_, secret)| secret.trim());
         match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
-            Some(token) => Ok(of_token(&token, without)),
-            None => Err(self.failed(peer, without)),
+            Some(token) => Ok(Some(token)),
+            None => Err(Unlet::Refused(self.failed(peer, without.clone()))),
         }
     }
 
-    fn token(&self, secret: &str) -> Result<Option<Token>, Refusal> {
-        self.tokens.as_ref().map_or(Ok(None), |tokens| tokens.find(secret).map_err(unreadable))
+    fn token(&self, secret: &str) -> Result<Option<Token>, TokenError> {
+        self.tokens.as_ref().map_or(Ok(None), |tokens| tokens.find(secret))
     }
 
     fn log_in(&self, door: &Door, peer: Peer, caller: Caller, body: &[u8]) -> Result<Response, Refusal> {
@@ -249,7 +265,9 @@ impl Gate {
         self.wait(peer)?;
         let Login { token: secret } = serde_json::from_slice(body)
             .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
-        let Some(token) = self.token(secret.trim())? else { return Err(self.failed(peer, caller)) };
+        let Some(token) = self.token(secret.trim()).map_err(unreadable)? else {
+            return Err(self.failed(peer, caller));
+        };
         let session = tokens::new_secret().map_err(unreadable)?;
         lock(&self.sessions).begin(&session, &token.sha256, Instant::now());
         let caller = of_token(&token, caller);
@@ -312,7 +330,23 @@ fn freely(door: &Door, peer: Peer, headers: &HeaderMap) -> Caller {
 }
 
 fn of_token(token: &Token, without: Caller) -> Caller {
-    Caller { name: token.name.clone(), rights: token.role.rights(), ..without }
+    let rights = token.role.rights();
+    // Nobody stops less because he has said who he is.
+    let stop = rights.stop || without.rights.stop;
+    Caller { name: token.name.clone(), rights: Rights { stop, ..rights }, ..without }
+}
+
+/// Why somebody is not let in.
+enum Unlet {
+    Refused(Refusal),
+    /// Who he is cannot be looked at.
+    Unreadable(TokenError),
+}
+
+impl From<TokenError> for Unlet {
+    fn from(error: TokenError) -> Self {
+        Self::Unreadable(error)
+    }
 }
 
 /// Whether a path is that of a stop.

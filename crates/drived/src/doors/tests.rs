@@ -196,7 +196,8 @@ async fn on_loopback_to_see_and_to_stop_need_no_login_and_a_proxy_is_no_loopback
 async fn a_token_has_the_rights_of_its_role_until_it_is_removed() {
     let rig = Rig::new("roles");
     for (name, role, rights) in [
-        ("a", Role::View, "v"),
+        // What nobody needs a login for is not lost by one.
+        ("a", Role::View, "vs"),
         ("b", Role::Stop, "vs"),
         ("c", Role::Operate, "vso"),
         ("d", Role::Engineer, "vsoe"),
@@ -207,6 +208,21 @@ async fn a_token_has_the_rights_of_its_role_until_it_is_removed() {
         rig.gate.tokens.as_ref().unwrap().remove(name).unwrap();
         rig.ask(&asked).await.assert_refused(401);
     }
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn tokens_that_cannot_be_read_keep_nobody_from_a_stop_that_needs_none() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let rig = Rig::new("unreadable");
+    let bearer = format!("Bearer {}", rig.token("panel", Role::Operate));
+    let headers = [("authorization", bearer.as_str())];
+    fs::set_permissions(rig.folder.file("tokens"), fs::Permissions::from_mode(0o644)).unwrap();
+    rig.ask(&Asked { headers: &headers, ..START }).await.assert_refused(503);
+    let stop = rig.ask(&Asked { headers: &headers, ..STOP }).await;
+    assert_eq!(stop.body, "anonymous http 127.0.0.1 vs");
+    let forwarded = [headers[0], ("x-forwarded-for", "10.0.0.7")];
+    rig.ask(&Asked { headers: &forwarded, ..STOP }).await.assert_refused(503);
 }
 
 #[tokio::test]
