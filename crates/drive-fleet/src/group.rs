@@ -49,6 +49,12 @@ impl Fleet {
         Ok(Group::new(self.clone(), members.collect::<Result<_, _>>()?))
     }
 
+    /// These drives of this fleet as one group. One that has left the fleet stays a member of it, and refuses every command.
+    #[must_use]
+    pub fn group_of(&self, members: impl IntoIterator<Item = DriveHandle>) -> Group {
+        Group::new(self.clone(), members.into_iter().collect())
+    }
+
     /// Stops every drive: see [`Group::stop`].
     pub async fn stop_all(&self, mode: StopMode) -> StopReport {
         self.all().stop(mode).await

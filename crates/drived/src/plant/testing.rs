@@ -55,3 +55,10 @@ impl TestPlant {
         Self { plant, line, machines }
     }
 }
+
+impl Plant {
+    /// No group starts before what it gives is dropped.
+    pub(crate) async fn hold_group_starts(&self) -> impl Drop {
+        self.0.group_starts.lock().await
+    }
+}

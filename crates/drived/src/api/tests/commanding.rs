@@ -183,6 +183,29 @@ async fn a_client_that_goes_away_leaves_no_half_done_start() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_group_whose_drive_has_left_is_not_started_and_nobody_else_for_it_but_it_is_stopped() {
+    let plant = TestPlant::of(3).await;
+    let (start, all) = (json!({"setpoint": {"frequency_hz": 30.0}}), "/api/v1/groups/pumps/start");
+    // A drive leaves while a start of its group waits for its turn.
+    let turn = plant.plant.hold_group_starts().await;
+    let late = json!({"id": "late", "setpoint": {"frequency_hz": 30.0}, "expires_in_ms": 10_000});
+    let (status, _) = command(&plant.plant, &format!("{all}?wait=0"), &late).await;
+    assert_eq!(status, StatusCode::ACCEPTED);
+    let _ = plant.plant.fleet().remove(&["pump 1"], Duration::from_secs(30)).await;
+    drop(turn);
+    sleep(Duration::from_secs(30)).await;
+    let (_, told) = get(&plant.plant, "/api/v1/commands/late").await;
+    assert_eq!(told["outcome"], "refused", "{told}");
+    assert!((0..3).all(|index| !is_running(&plant, index)));
+    assert_eq!(command(&plant.plant, all, &start).await.0, StatusCode::NOT_FOUND);
+    let path = "/api/v1/drives/pump%202/start";
+    assert_eq!(command(&plant.plant, path, &start).await.0, StatusCode::OK);
+    let (_, stopped) = command(&plant.plant, "/api/v1/groups/pumps/stop?wait=30s", &Value::Null).await;
+    assert_eq!((&stopped["outcome"], &stopped["confirmed"]), (&"confirmed".into(), &2.into()), "{stopped}");
+    assert!(!is_running(&plant, 1));
+}
+
+#[tokio::test(start_paused = true)]
 async fn two_callers_at_once_each_get_their_own_outcome_and_the_newer_setpoint_wins() {
     let plant = TestPlant::of(1).await;
     assert_eq!(

@@ -213,11 +213,7 @@ impl Work {
     }
 
     fn group(&self) -> Group {
-        let names = self.0.members.iter().map(|member| &**member.name());
-        let fleet = self.0.plant.fleet();
-        // The names are those of members, so that the group has them all.
-        let group = fleet.group(names).unwrap_or_else(|_| fleet.all());
-        group.commanded_by(&self.0.head.caller)
+        self.0.plant.fleet().group_of(self.0.members.iter().cloned())
     }
 
     /// Waits until what is not known is.

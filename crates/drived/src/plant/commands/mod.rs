@@ -136,6 +136,13 @@ impl Plant {
             return Err(Rejected::NoRight { caller: caller.name.clone(), right });
         }
         let drives = self.named(&request.target)?;
+        let is_gone = |name: &&String| self.fleet().drive(name).is_none();
+        // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
+        if let Some(gone) = drives.iter().find(is_gone)
+            && (matches!(request.target, Target::Drive(_)) || !matches!(request.action, Action::Stop(_)))
+        {
+            return Err(Rejected::NoDrive(gone.clone()));
+        }
         let work = Work::new(self.clone(), caller, &request, drives);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
@@ -150,7 +157,6 @@ impl Plant {
     /// The names of the drives that are meant.
     fn named(&self, target: &Target) -> Result<Vec<String>, Rejected> {
         match target {
-            Target::Drive(name) if self.fleet().drive(name).is_none() => Err(Rejected::NoDrive(name.clone())),
             Target::Drive(name) => Ok(vec![name.clone()]),
             Target::Group(name) => {
                 let group = self.0.groups.iter().find(|group| group.name == *name);
