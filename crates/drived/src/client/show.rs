@@ -16,7 +16,8 @@ use crate::{
 pub(crate) fn overview(state: &Value, target: &Target) -> Result<(), Failure> {
     let drives: Vec<&Value> = of_target(state, target).collect();
     let mut sorted = drives.clone();
-    sorted.sort_by_key(|drive| (trouble(drive), name(drive)));
+    // Stable: behind those in trouble the order is that of the configuration.
+    sorted.sort_by_key(|drive| trouble(drive));
     let mut table = Table::new(["drive", "state", "output", "setpoint", "current", "age"]);
     for drive in sorted {
         let status = &drive["status"];
