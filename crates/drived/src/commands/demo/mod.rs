@@ -58,8 +58,8 @@ impl Args {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let page = match args.http {
-        Http::At(address) => format!("its page: http://{address}/"),
-        Http::Off => "without its page".to_owned(),
+        Http::At(address) => format!("page: http://{address}/"),
+        Http::Off => "without a page".to_owned(),
     };
     let doors = Doors::prepare(DoorsConfig::of_demo(args.socket).with(Some(args.http), None)?)?;
     let mut ending = Ending::listen()?;

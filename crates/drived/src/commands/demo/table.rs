@@ -62,11 +62,9 @@ impl Picture<'_> {
             Some(drives) => {
                 (format!(" stopping, waiting for {drives}"), " Ctrl-C: leave now ", Color::Yellow)
             }
-            None => (
-                format!(" drived demo  nothing real moves; {}", self.page),
-                " Ctrl-C: stop the motors ",
-                Color::Cyan,
-            ),
+            None => {
+                (format!(" drived demo, simulated  {}", self.page), " Ctrl-C: stop the motors ", Color::Cyan)
+            }
         };
         let room = usize::from(width).saturating_sub(right.len());
         let left = match left.chars().count() > room {
@@ -269,7 +267,7 @@ mod tests {
         let picture = Picture {
             began: Instant::now(),
             waited_for: None,
-            page: "its page: http://127.0.0.1:7580/",
+            page: "page: http://127.0.0.1:7580/",
             units: vec![(name("atv312@1"), view), (name("atv21@2"), View::default())],
             lines: vec![
                 ["19200 8E1", "97.00 %", "7.1", "900", "2.01 ms", "2.00 ms", "0", "0"].map(str::to_owned),
@@ -286,6 +284,7 @@ mod tests {
         let screen = drawn(80, 24);
         assert!(screen.contains("atv312@1  running    rev █████···┃·  25.0/40.0    2.3 A bus"), "{screen}");
         assert!(screen.contains("✓ start rev"), "{screen}");
+        assert!(screen.contains("page: http://127.0.0.1:7580/ "), "{screen}");
         assert!(screen.contains("atv21@2   no answer"), "{screen}");
         assert!(screen.contains("19200 8E1 97.00 %   7.1       900"), "{screen}");
     }
