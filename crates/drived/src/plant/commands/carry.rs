@@ -53,10 +53,7 @@ struct Inner {
 }
 
 impl Work {
-    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, drives: Vec<String>) -> Self {
-        let fleet = plant.fleet();
-        let commanded = |name: &String| Some(fleet.drive(name)?.commanded_by(&caller.name));
-        let members: Vec<DriveHandle> = drives.iter().filter_map(commanded).collect();
+    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, members: Vec<DriveHandle>) -> Self {
         let head = CommandView {
             id: request.id.clone().unwrap_or_else(new_id),
             drive: None,

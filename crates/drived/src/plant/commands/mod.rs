@@ -135,15 +135,19 @@ impl Plant {
         if !has_right {
             return Err(Rejected::NoRight { caller: caller.name.clone(), right });
         }
-        let drives = self.named(&request.target)?;
-        let is_gone = |name: &&String| self.fleet().drive(name).is_none();
-        // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
-        if let Some(gone) = drives.iter().find(is_gone)
-            && (matches!(request.target, Target::Drive(_)) || !matches!(request.action, Action::Stop(_)))
-        {
-            return Err(Rejected::NoDrive(gone.clone()));
+        let fleet = self.fleet();
+        let may_be_less =
+            matches!(request.action, Action::Stop(_)) && !matches!(request.target, Target::Drive(_));
+        let mut members = Vec::new();
+        for name in self.named(&request.target)? {
+            match fleet.drive(&name) {
+                Some(drive) => members.push(drive.commanded_by(&caller.name)),
+                // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
+                None if may_be_less => {}
+                None => return Err(Rejected::NoDrive(name)),
+            }
         }
-        let work = Work::new(self.clone(), caller, &request, drives);
+        let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
             Found::New(command) => {
