@@ -1,6 +1,7 @@
-//! The page tells every fault of the manuals in French, too.
+//! The page tells the faults of the manuals, and why a drive refuses, in French too.
 
-use drive_core::FaultEntry;
+use drive_core::{Control, FaultEntry, Refusal};
+use drive_fleet::{LimitProblem, Refused};
 
 #[test]
 fn every_fault_and_alarm_of_every_family_has_its_french_text_on_the_page() {
@@ -20,5 +21,64 @@ fn every_fault_and_alarm_of_every_family_has_its_french_text_on_the_page() {
         for text in [entry.meaning, entry.remedy] {
             assert!(french.contains(&format!("  '{text}': '")), "{}: {text}", entry.mnemonic);
         }
+    }
+}
+
+/// The texts in quotes that stand in a source, without its comments and its tests.
+fn quoted(source: &str) -> impl Iterator<Item = &str> {
+    let code = source.split("#[cfg(test)]").next().unwrap_or_default();
+    let lines = code.lines().map(str::trim_start).filter(|line| !line.starts_with("//"));
+    lines.flat_map(|line| line.split('"').skip(1).step_by(2)).filter(|text| text.contains(' '))
+}
+
+#[test]
+fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/");
+    let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("it is read");
+    let french = read("drived/src/page/web/sentences_fr.js").replace("\\'", "'");
+    let mut sentences: Vec<String> = Vec::new();
+    for family in ["atv21", "atv28", "atv58", "atv312", "3g3ev"] {
+        let folder = std::fs::read_dir(format!("{root}drive-{family}/src")).expect("it is a folder");
+        for file in folder.map(|file| file.expect("it is listed").path()) {
+            let Ok(source) = std::fs::read_to_string(&file) else { continue };
+            for before in ["by: \"", "remedy: \"", "Refusal::Settings("] {
+                let texts = source.split(before).skip(1).filter_map(|rest| {
+                    let rest = rest.trim_start().trim_start_matches('"');
+                    rest.split_once('"').map(|(text, _)| text.to_owned())
+                });
+                sentences.extend(texts.filter(|text| !text.is_empty() && !text.contains('\n')));
+            }
+        }
+    }
+    // Those that stand in tables of pairs.
+    let in_pairs = read("drive-atv21/src/control.rs");
+    // Its macro puts texts together that begin or end with a blank, for the inputs by name.
+    let whole =
+        |text: &&str| !text.starts_with([' ', ',']) && !text.ends_with(' ') && !text.starts_with("input ");
+    sentences.extend(quoted(&in_pairs).filter(whole).map(str::to_owned));
+    let refused = [
+        Refused::ReadOnly,
+        Refused::NotConnected,
+        Refused::Stale,
+        Refused::IdentityChanged,
+        Refused::IdentityUnchecked,
+        Refused::WatchdogUnverified,
+        Refused::StopPending,
+        Refused::Stopped,
+        Refused::Superseded,
+        Refused::QueueFull,
+        Refused::ShutDown,
+        Refused::Limit(LimitProblem::NotInHertz),
+        Refused::Limit(LimitProblem::UnknownSetpoint),
+    ];
+    sentences.extend(refused.iter().map(ToString::to_string));
+    let controls = [Control::Bus, Control::Terminals, Control::Panel, Control::Local, Control::OtherBus];
+    let mut refusals: Vec<Refusal> = controls.map(Refusal::NotInControl).to_vec();
+    refusals.extend([Refusal::Tripped, Refusal::DirectionForbidden, Refusal::NothingToSave]);
+    refusals.extend([Refusal::EepromLife, Refusal::MotorRunning]);
+    sentences.extend(refusals.iter().map(ToString::to_string));
+    assert!(sentences.len() > 70, "only {} sentences were found", sentences.len());
+    for sentence in sentences {
+        assert!(french.contains(&format!("  '{sentence}': '")), "{sentence}");
     }
 }

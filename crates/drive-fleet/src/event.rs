@@ -7,7 +7,10 @@ use drive_core::{
 };
 use tokio::time::Instant;
 
-use crate::{outcome::Outcome, snapshot::Trip};
+use crate::{
+    outcome::{Outcome, Tenths},
+    snapshot::Trip,
+};
 
 /// Something that happened to a drive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -200,8 +203,10 @@ impl fmt::Display for EventKind {
         f.write_str(self.name())?;
         match self {
             Self::Connected(status) => write!(f, ": {status}"),
-            Self::Lost { silent_for, error: Some(error) } => write!(f, " for {silent_for:?}: {error}"),
-            Self::Lost { silent_for, error: None } => write!(f, " for {silent_for:?}"),
+            Self::Lost { silent_for, error: Some(error) } => {
+                write!(f, " for {}: {error}", Tenths(*silent_for))
+            }
+            Self::Lost { silent_for, error: None } => write!(f, " for {}", Tenths(*silent_for)),
             Self::StateChanged { from, to } => write!(f, ": {from} to {to}"),
             Self::Tripped(trip) | Self::TripExplained(trip) => trip_details(f, trip),
             Self::Warning { present } => write!(f, ": {}", if *present { "present" } else { "gone" }),
@@ -247,7 +252,7 @@ impl fmt::Display for EventKind {
             }
             Self::StopTookCommand(other) => write!(f, " from {other}, and keeps it until it is released"),
             Self::StopUnconfirmed { since, attempts, outcome } => {
-                write!(f, " since {since:?} after {attempts} attempts: {outcome}")
+                write!(f, " since {} after {attempts} attempts: {outcome}", Tenths(*since))
             }
             Self::Exit(action) => write!(f, ": {action}"),
             Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed => Ok(()),
@@ -258,7 +263,7 @@ impl fmt::Display for EventKind {
 fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
     match trip.watchdog_after {
         Some(silence) if trip.by_watchdog => {
-            write!(f, " by its communication watchdog after {silence:?} without a message")?;
+            write!(f, " by its communication watchdog after {} without a message", Tenths(silence))?;
         }
         _ if trip.by_watchdog => f.write_str(" by its communication watchdog")?,
         _ => {}

@@ -158,7 +158,7 @@ impl fmt::Display for LastSeen {
 }
 
 /// A time as a person reads it.
-struct Tenths(Duration);
+pub(crate) struct Tenths(pub(crate) Duration);
 
 impl fmt::Display for Tenths {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -5,6 +5,7 @@ import { el, table } from './dom.js';
 import { faultMeaning, faultRemedy } from './fault_texts.js';
 import { clock, MISSING, quantity } from './format.js';
 import { named, t } from './texts.js';
+import { told } from './told.js';
 import { word } from './words.js';
 
 const FRAME = [
@@ -65,7 +66,7 @@ export async function readHistory(place, drive) {
         remedy ? el('small', {}, ` – ${remedy}`) : null);
     })) : el('p', {}, t('history_empty')));
   } catch (problem) {
-    place.replaceChildren(el('p.bad', {}, problem.message));
+    place.replaceChildren(el('p.bad', {}, told(problem.message)));
   }
 }
 

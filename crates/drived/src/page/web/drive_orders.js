@@ -8,6 +8,7 @@ import { carryOut, isDone, onOrder, orderText, ordersOf } from './orders.js';
 import { plant } from './plant.js';
 import { setpointControl } from './setpoint.js';
 import { t } from './texts.js';
+import { told } from './told.js';
 import { faultText } from './trouble.js';
 import { word } from './words.js';
 
@@ -44,7 +45,7 @@ export function ordersPanel(name) {
     for (const one of [forward, reverse]) one.disabled = readOnly || Boolean(drive.start_refused);
     reset.disabled = readOnly || !tripped;
     release.disabled = readOnly;
-    setText(why, readOnly ? t('only_read_long') : [drive.start_refused && t('start_refused', { why: drive.start_refused }),
+    setText(why, readOnly ? t('only_read_long') : [drive.start_refused && t('start_refused', { why: told(drive.start_refused) }),
       !tripped && t('reset_not_now')].filter(Boolean).join(' '));
     setAttribute(stop, 'disabled', readOnly);
   }

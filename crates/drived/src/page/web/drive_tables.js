@@ -9,6 +9,7 @@ import { carryOut } from './orders.js';
 import { age, plant, quality } from './plant.js';
 import { bitName } from './status_bits.js';
 import { t } from './texts.js';
+import { told } from './told.js';
 import { word } from './words.js';
 
 const MEASUREMENTS = [
@@ -78,7 +79,7 @@ function identity(drive) {
     [t('firmware'), is.firmware ?? MISSING],
     ...(is.codes?.length ? [[t('identity_codes'), is.codes.map(({ code, value }) => `${code} ${value}`).join(', ')]] : []),
     [t('checked'), word(is.check) || MISSING],
-    [t('watchdog'), [word(watchdog.check), watchdog.why].filter(Boolean).join(': ') || MISSING],
+    [t('watchdog'), [word(watchdog.check), told(watchdog.why)].filter(Boolean).join(': ') || MISSING],
     ...(watchdog.time_ms !== undefined ? [[t('watchdog_time'), [duration(watchdog.time_ms), word(watchdog.reaction)].filter(Boolean).join(', ')]] : []),
     [t('starts_by_itself'), drive.starts_by_itself?.join(', ') || t('no')],
     [t('commanders'), drive.commanders?.join(', ') || t('anyone')],
@@ -109,7 +110,7 @@ async function readParameters(name, place) {
       left = open;
     }
   } catch (problem) {
-    setText(said, problem.message);
+    setText(said, told(problem.message));
     said.classList.add('bad');
   }
 }

@@ -4,6 +4,7 @@ import { arrange, download, el, setText } from './dom.js';
 import { clock, duration } from './format.js';
 import { plant } from './plant.js';
 import { language, t } from './texts.js';
+import { told } from './told.js';
 import { command, eventText, outcome, word } from './words.js';
 
 const SHOWN = 300;
@@ -70,6 +71,6 @@ function cells(event) {
   const time = clock(event.time_unix_ms);
   if (event.kind !== 'command') return [time, event.drive ?? '', word(event.event), eventText(event), '', '', ''];
   return [time, event.drive ?? '', word('command'), command(event), [event.caller, event.origin].filter(Boolean).join(', '),
-    [outcome(event.outcome), event.outcome === 'confirmed' ? '' : event.text].filter(Boolean).join(': '),
+    [outcome(event.outcome), event.outcome === 'confirmed' ? '' : told(event.text)].filter(Boolean).join(': '),
     event.outcome === 'pending' ? '' : duration(event.took_ms)];
 }

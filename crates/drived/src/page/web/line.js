@@ -5,6 +5,7 @@ import { el, setText, table } from './dom.js';
 import { duration, MISSING, quantity } from './format.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
+import { told } from './told.js';
 import { word } from './words.js';
 
 /** Kinds that a slave's exchanges have, and those that only the line can tell. */
@@ -22,7 +23,7 @@ export function lines(root) {
     const had = body.contains(document.activeElement);
     body.replaceChildren(...[...plant.lines.values()].map(line => el(line.link === 'away' ? 'tr.in-trouble' : 'tr', {},
       el('th', { scope: 'row' }, el('a', { href: `#/line/${encodeURIComponent(line.name)}` }, line.name)),
-      el('td', {}, [line.port, line.protocol, line.link === 'away' && (line.error ?? t('line_away'))].filter(Boolean).join(' · ')),
+      el('td', {}, [line.port, line.protocol, line.link === 'away' && (told(line.error) || t('line_away'))].filter(Boolean).join(' · ')),
       el('td.right', {}, quantity(line.utilisation_percent, 0, '%')),
       el('td.right', {}, duration(line.cycle_ms)),
       el('td.right', {}, duration(line.worst_case_stop_ms)),
@@ -55,7 +56,7 @@ export function line(root, name) {
   function update() {
     const now = plant.lines.get(name);
     if (!now) return;
-    setText(place, [now.port, now.protocol, now.link === 'away' && (now.error ?? t('line_away'))].filter(Boolean).join(' · '));
+    setText(place, [now.port, now.protocol, now.link === 'away' && (told(now.error) || t('line_away'))].filter(Boolean).join(' · '));
     place.classList.toggle('bad', now.link === 'away');
     const values = [quantity(now.utilisation_percent, 0, '%'), duration(now.worst_case_stop_ms), duration(now.cycle_ms),
       quantity(now.exchanges, 0), quantity(sum(now.errors), 0)];

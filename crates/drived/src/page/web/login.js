@@ -4,6 +4,7 @@ import { post } from './api.js';
 import { el } from './dom.js';
 import { start } from './plant.js';
 import { t } from './texts.js';
+import { told } from './told.js';
 
 let open = false;
 
@@ -43,7 +44,7 @@ export function askToken() {
       start();
       setTimeout(() => dialog.close(), 1_500);
     } catch (problem) {
-      said.textContent = problem.status === 401 || problem.status === 403 ? t('login_wrong') : problem.message;
+      said.textContent = problem.status === 401 || problem.status === 403 ? t('login_wrong') : told(problem.message);
     }
   }
 }

@@ -5,6 +5,7 @@ import { el, setClass, setText } from './dom.js';
 import { clock, duration } from './format.js';
 import { askToken } from './login.js';
 import { named, t } from './texts.js';
+import { told } from './told.js';
 import { command, outcome, word } from './words.js';
 
 const KEPT = 20;
@@ -44,10 +45,10 @@ export async function carryOut(to, action, send) {
 export function orderText(order) {
   const what = order.command ? command(order) : word(order.action);
   if (order.outcome === 'pending') return named(what, t('sent_at', { time: clock(order.at) }));
-  if (order.outcome === 'not_sent') return named(what, t('not_sent', { why: order.text }));
+  if (order.outcome === 'not_sent') return named(what, t('not_sent', { why: told(order.text) }));
   const how = t('outcome_after', { outcome: outcome(order.outcome), time: clock(order.endedAt), took: duration(order.took_ms ?? order.endedAt - order.at) });
   const counts = order.drives ? ` (${order.confirmed}/${order.drives.length})` : '';
-  return `${named(what, how)}${counts}${order.text ? `. ${order.text}` : ''}`;
+  return `${named(what, how)}${counts}${order.text ? `. ${told(order.text)}` : ''}`;
 }
 
 /** Whether an order did what it asked for. */

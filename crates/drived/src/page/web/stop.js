@@ -6,6 +6,7 @@ import { clock } from './format.js';
 import { askToken } from './login.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
+import { told } from './told.js';
 import { outcome } from './words.js';
 
 const AGAIN_MS = 1_000;
@@ -60,7 +61,7 @@ async function stopAll() {
       }
       if (problem.lacksRight) askToken();
       const over = problem.status !== 0 || Date.now() - began > GIVE_UP_MS;
-      show({ phase: over ? 'over' : 'failed', why: problem.status === 0 ? undefined : problem.message, tries: account.tries + 1 });
+      show({ phase: over ? 'over' : 'failed', why: problem.status === 0 ? undefined : told(problem.message), tries: account.tries + 1 });
       if (over) return;
       await pause(AGAIN_MS);
     }

@@ -5,6 +5,7 @@ import { el, setText, table } from './dom.js';
 import { clock, quantity } from './format.js';
 import { plant, quality } from './plant.js';
 import { language, t } from './texts.js';
+import { told } from './told.js';
 
 const KEPT_S = 600;
 const WINDOWS = { trend_minute: 60, trend_ten: KEPT_S };
@@ -68,7 +69,7 @@ export function trend(root, name) {
       for (const column of values) column.splice(history.time_unix_ms.length, since);
       draw();
     } catch (problem) {
-      setText(said, t('trend_missing', { why: problem.message }));
+      setText(said, t('trend_missing', { why: told(problem.message) }));
     }
   }
 

@@ -2,7 +2,8 @@
 
 import { faultMeaning } from './fault_texts.js';
 import { quality } from './plant.js';
-import { language, t } from './texts.js';
+import { t } from './texts.js';
+import { told } from './told.js';
 import { word } from './words.js';
 
 const STOP_IS_LATE_MS = 5_000;
@@ -20,19 +21,17 @@ export function trouble(drive) {
   if (state === 'fault' || state === 'fault_reaction') return { rank: 1, text: faultText(drive) };
   if (drive.link === 'lost') return { rank: 2, text: lostText(drive) };
   if (drive.identity?.check === 'changed') return { rank: 3, text: t('identity_changed') };
-  if (drive.watchdog?.check === 'broken') return { rank: 3, text: t('watchdog_broken', { why: drive.watchdog.why ?? '' }) };
+  if (drive.watchdog?.check === 'broken') return { rank: 3, text: t('watchdog_broken', { why: told(drive.watchdog.why) }) };
   if (drive.status?.warning) return { rank: 4, text: t('warning_present') };
   if (quality(drive.status) === 'stale') return { rank: 5, text: t('values_old') };
-  if (drive.link === 'connecting') return { rank: CONNECTING, text: drive.error ?? '' };
+  if (drive.link === 'connecting') return { rank: CONNECTING, text: told(drive.error) };
   if (drive.stop) return { rank: FINE, text: t('stop_waits', { count: drive.stop.attempts }) };
   if (drive.control === false) return { rank: FINE, text: t('only_read') };
   return { rank: FINE, text: '' };
 }
 
-/** The daemon's own words are English: beside French they are the detail. */
 function lostText({ error }) {
-  if (!error) return t('lost_now');
-  return language() === 'en' ? error : `${t('lost_now')} (${error})`;
+  return told(error) || t('lost_now');
 }
 
 /** Code, mnemonic and meaning of the present fault. */

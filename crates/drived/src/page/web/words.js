@@ -1,7 +1,8 @@
 // The API's words (states, outcomes, kinds of stop, checks …) in plain words of both languages.
 
 import { quantity } from './format.js';
-import { language, t } from './texts.js';
+import { language, named, t } from './texts.js';
+import { told } from './told.js';
 
 const WORDS = {
   // States of a drive.
@@ -105,6 +106,7 @@ const COMMANDS = [
   [/^freewheel stop$/, () => 'arrêt roue libre'],
   [/^DC injection stop$/i, () => 'arrêt par injection de courant continu'],
   [/^fault reset$/, () => 'acquittement du défaut'],
+  [/^withdrawal of the run command$/, () => 'retrait de l’ordre de marche'],
   [/^release$/, () => 'rendre la main'],
 ];
 
@@ -131,15 +133,19 @@ export function command(given) {
   return said;
 }
 
-/** What happened, without the kind of event that stands before it; what is not known here is told in the daemon's words. */
+/** What happened, without the kind of event that stands before it. */
 export function eventText({ event, text = '' }) {
   const kind = String(event).replaceAll('_', ' ');
   const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^: /, '') : text;
   const change = rest.match(/^(\w+) to (\w+)$/);
   if (change) return `${word(change[1])} → ${word(change[2])}`;
-  const given = rest.match(/^(.+) by (.+): (confirmed|not confirmed|unknown|refused|expired|superseded)(.*)$/);
-  if (given) return `${command({ command: given[1] })}, ${given[2]}: ${outcome(given[3])}${given[4]}`;
-  return rest;
+  const given = rest.match(/^(.+) by (.+?): (confirmed|not confirmed|outcome unknown|refused|expired)(?:: (.+))?$/);
+  if (given) {
+    const [, what, who, how, why] = given;
+    const became = why ? named(outcome(how), told(why)) : outcome(how);
+    return named(`${command({ command: what })}, ${told(who)}`, became);
+  }
+  return told(rest);
 }
 
 /** The state of a drive as its row says it first: a lost drive is lost, whatever it showed last. */

@@ -1,0 +1,235 @@
+// The daemon's sentences in French: why it refuses, what a drive says instead, what to do. They come in English, put
+// together from the phrases and patterns here; the manuals' mnemonics stay as they are. What is not here stays English.
+
+import { FAULTS_FR } from './faults_fr.js';
+
+/** Whole sentences, and the phrases that stand in others. */
+export const SENTENCES_FR = {
+  // Why a command is refused.
+  'the drive is only read: its settings say control = false': 'le variateur est seulement lu : sa configuration indique control = false',
+  'the drive does not answer': 'le variateur ne répond pas',
+  'its status is too old': 'son état est trop ancien',
+  'it is another drive than before: accept its identity first': 'ce n’est plus le même variateur : accepter d’abord son identité',
+  'it has not been possible to check which drive it is': 'son identité n’a pas pu être contrôlée',
+  'its communication watchdog is not verified': 'sa surveillance de communication n’est pas vérifiée',
+  'a stop of it is not confirmed yet': 'un arrêt n’est pas encore confirmé',
+  'a stop came before it was sent': 'un arrêt est arrivé avant son envoi',
+  'a later command took its place before it was sent': 'un ordre ultérieur l’a remplacé avant son envoi',
+  'too many commands for this drive wait': 'trop d’ordres attendent pour ce variateur',
+  'the fleet has shut down': 'le service est arrêté',
+  'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
+  'another start of a group was under way': 'un autre démarrage de groupe était en cours',
+  'nobody of the group was started: another of its drives was not ready': 'aucun variateur du groupe n’a été démarré : un autre n’était pas prêt',
+  'the group was stopped again, because not all of its drives started': 'le groupe a été arrêté de nouveau, car tous ses variateurs n’ont pas démarré',
+  'the drive has tripped: remove the cause, then reset it': 'le variateur est en défaut : supprimer la cause, puis acquitter',
+  'this bus commands the drive already: stop it first': 'ce bus commande déjà le variateur : l’arrêter d’abord',
+  'the terminals command the drive: switch off the input that gives them command, or set the channel of commands to the bus': 'le bornier commande le variateur : ouvrir l’entrée qui lui donne la commande, ou régler le canal de commande sur le bus',
+  'the panel commands the drive: give command back at the panel, or set the channel of commands to the bus': 'le terminal commande le variateur : y rendre la commande, ou régler le canal de commande sur le bus',
+  'the terminals or the panel command the drive: switch off what forces local control, or set the channel of commands to the bus': 'le bornier ou le terminal commande le variateur : supprimer le forçage local, ou régler le canal de commande sur le bus',
+  'another bus commands the drive: give command back there, or set the channel of commands to this one': 'un autre bus commande le variateur : y rendre la commande, ou régler le canal de commande sur celui-ci',
+  'the drive\'s settings forbid this direction: allow it there, or start the other way': 'les réglages du variateur interdisent ce sens : l’y autoriser, ou démarrer dans l’autre sens',
+  'nothing has changed since the last save: change a parameter first': 'rien n’a changé depuis la dernière sauvegarde : modifier d’abord un paramètre',
+  'the saves that were counted have used up the EEPROM\'s life: replace the drive, or correct the count': 'les sauvegardes comptées ont épuisé la durée de vie de l’EEPROM : remplacer le variateur, ou corriger le compte',
+  'the motor runs: stop it first': 'le moteur tourne : l’arrêter d’abord',
+  'the limits are in hertz, give the setpoint in hertz': 'les limites sont en hertz : donner la consigne en hertz',
+  'the drive has limits: give the setpoint with the start': 'le variateur a des limites : donner la consigne avec le démarrage',
+
+  // What to do about a state of the drive.
+  'switch on the supply of its power part and wait until it is ready': 'mettre sous tension sa partie puissance et attendre qu’il soit prêt',
+  'wait until the motor stands': 'attendre l’arrêt du moteur',
+  'stop it first': 'l’arrêter d’abord',
+  'remove the cause, then reset it': 'supprimer la cause, puis acquitter',
+  'start it first': 'le démarrer d’abord',
+  'see what its display says, for its manual does not explain its status word': 'voir son afficheur, car son manuel n’explique pas ce mot d’état',
+
+  // What became of it.
+  'a later command took its place': 'un ordre ultérieur l’a remplacé',
+  'a stop came': 'un arrêt est arrivé',
+  'the drive tripped': 'le variateur est passé en défaut',
+  'the drive was lost': 'la liaison avec le variateur a été perdue',
+  'no answer yet': 'pas encore de réponse',
+  'the drive has never been seen': 'le variateur n’a jamais été vu',
+  'left as it is': 'laissé tel quel',
+  'left turning, it was not started here': 'laissé en marche, il n’a pas été démarré ici',
+  'given up, its stop is not confirmed': 'abandonné, son arrêt n’est pas confirmé',
+
+  // Who commands by itself.
+  'the demo': 'la démonstration',
+  tripped: 'après un défaut',
+
+  // What the line or the drive answered.
+  'the drive does not have this function': 'le variateur n’a pas cette fonction',
+  'the drive does not have this register, or not for this access': 'le variateur n’a pas ce registre, ou pas pour cet accès',
+  'the drive does not take this value or quantity': 'le variateur n’accepte pas cette valeur ou cette quantité',
+  'the drive refuses it now: stop the motor first, and see that it is supplied and not busy': 'le variateur refuse pour l’instant : arrêter d’abord le moteur, vérifier qu’il est alimenté et libre',
+  'the drive could not complete it': 'le variateur n’a pas pu l’achever',
+  'the drive has accepted it and takes long for it': 'le variateur l’a accepté et met du temps à l’exécuter',
+  'the drive is busy': 'le variateur est occupé',
+  'a code that the manual does not list': 'un code que le manuel ne cite pas',
+  'the register cannot hold it': 'le registre ne peut pas la contenir',
+  'expired before it was sent': 'délai passé avant l’envoi',
+  'superseded by a later call before it was sent': 'remplacé par un appel ultérieur avant l’envoi',
+  'the line is closed': 'la ligne est fermée',
+
+  // Altivar 21.
+  'a freewheel stop that the bus has not ordered (ST = OFF, FD01 bit 11)': 'un arrêt roue libre que le bus n’a pas demandé (ST = OFF, FD01 bit 11)',
+  'see to the input or the setting that holds it': 'voir l’entrée ou le réglage qui le maintient',
+  'another command word in FA00 than was written': 'un autre mot de commande dans FA00 que celui écrit',
+  'see who else writes to this drive': 'chercher qui d’autre écrit dans ce variateur',
+  'another reference than that of FA01 (FE02 shows it)': 'une autre référence que celle de FA01 (FE02 la montre)',
+  'give the setpoint again, and see to the drive\'s lower limit': 'redonner la consigne et vérifier la petite vitesse du variateur',
+  'switch it off first, or set CMOD = 2': 'l’ouvrir d’abord, ou régler CMOD = 2',
+  'the keypad (FE45 = 1)': 'le terminal (FE45 = 1)',
+  'press its LOC/REM key, or set CMOD = 2': 'appuyer sur sa touche LOC/REM, ou régler CMOD = 2',
+  'the terminal strip (FE45 = 0)': 'le bornier (FE45 = 0)',
+  'switch off the input whose function is 48, 52 or 53 (F110 to F113, F118), or set CMOD = 2': 'ouvrir l’entrée dont la fonction est 48, 52 ou 53 (F110 à F113, F118), ou régler CMOD = 2',
+  'local control (FD01 bit 15)': 'la commande locale (FD01 bit 15)',
+  'press the keypad\'s LOC/REM key': 'appuyer sur la touche LOC/REM du terminal',
+  'a source that the manual does not list (FE45)': 'une source que le manuel ne cite pas (FE45)',
+  'set CMOD = 2': 'régler CMOD = 2',
+  'set FMOD = 4, or switch off the input that switches the reference (F112 = 38) or forces local control (48)': 'régler FMOD = 4, ou ouvrir l’entrée qui commute la référence (F112 = 38) ou force le local (48)',
+  'the analog input VIA (FE46 = 1)': 'l’entrée analogique VIA (FE46 = 1)',
+  'the analog input VIB (FE46 = 2)': 'l’entrée analogique VIB (FE46 = 2)',
+  'the keypad\'s reference (FE46 = 3)': 'la référence du terminal (FE46 = 3)',
+  'press its LOC/REM key, or set FMOD = 4': 'appuyer sur sa touche LOC/REM, ou régler FMOD = 4',
+  'the up and down inputs (FE46 = 5)': 'les entrées plus vite et moins vite (FE46 = 5)',
+  'a preset speed (FE46 = 255)': 'une vitesse présélectionnée (FE46 = 255)',
+  'stop by the bus, or switch off the inputs that choose it': 'arrêter par le bus, ou ouvrir les entrées qui la choisissent',
+  'a reference that the manual does not list (FE46)': 'une référence que le manuel ne cite pas (FE46)',
+  'CMOD = 2 leaves the command with the bus: set CMOD to 0 or 1': 'CMOD = 2 laisse la commande au bus : régler CMOD à 0 ou 1',
+  'FA20 bit 12 works only with FA00 bit 15, the command priority: open the drive with Authority::Priority': 'FA20 bit 12 n’agit qu’avec FA00 bit 15, la priorité de commande : ouvrir le variateur avec Authority::Priority',
+
+  // Altivar 28 and 58.
+  'another reference (FrH is not the reference of the bus)': 'une autre référence (FrH n’est pas la référence du bus)',
+  'see which inputs are in use: preset speeds (SP2 to SP7), jog, summing inputs, the PI regulator': 'voir quelles entrées servent : vitesses présélectionnées (SP2 à SP7), pas à pas, entrées sommatrices, régulateur PI',
+  'a run command of the terminals (LI1 or LI2)': 'un ordre de marche du bornier (LI1 ou LI2)',
+  'open the input first: it might start the motor': 'ouvrir d’abord l’entrée : elle pourrait démarrer le moteur',
+  'a reference on the bus (LFr or LFRD) is negative: give a setpoint in its unit first': 'une référence du bus (LFr ou LFRD) est négative : donner d’abord une consigne dans son unité',
+  'another reference (the mapped reference is not that of W401)': 'une autre référence (la référence affectée n’est pas celle de W401)',
+  'see which input gives it, or correct the map of the words': 'voir quelle entrée la donne, ou corriger l’affectation des mots',
+  'the reference W401 is negative: give a setpoint first': 'la référence W401 est négative : donner d’abord une consigne',
+
+  // Altivar 312.
+  'see which inputs and channels are in use (Fr1, Fr2, rFC, SA2, SA3, PS2 to PS16, JOG, PIF)': 'voir quelles entrées et quels canaux servent (Fr1, Fr2, rFC, SA2, SA3, PS2 à PS16, JOG, PIF)',
+  'a run command of the terminals (LI1, or the input of rrS)': 'un ordre de marche du bornier (LI1, ou l’entrée de rrS)',
+  'open the input first, or set tCt to trn': 'ouvrir d’abord l’entrée, ou régler tCt sur trn',
+  'a summing input (SA2, AI2 as the drive leaves the factory, or SA3)': 'une entrée sommatrice (SA2, AI2 en réglage usine, ou SA3)',
+  'set SA2 and SA3 to nO': 'régler SA2 et SA3 sur nO',
+  'the PI regulator (PIF)': 'le régulateur PI (PIF)',
+  'set PIF to nO, or regulate by PISP': 'régler PIF sur nO, ou réguler par PISP',
+  'the reference channel Fr1, which is not Mdb,': 'le canal de référence Fr1, qui n’est pas Mdb,',
+  'the reference channel Fr2, which is not Mdb,': 'le canal de référence Fr2, qui n’est pas Mdb,',
+  'a reference channel, Fr1 or Fr2, of which none is Mdb,': 'un canal de référence, Fr1 ou Fr2, dont aucun n’est Mdb,',
+  'set Fr1 to Mdb and rFC to Fr1': 'régler Fr1 sur Mdb et rFC sur Fr1',
+  'the reference channel Fr2, selected by rFC (LRS3 bit 0),': 'le canal de référence Fr2, sélectionné par rFC (LRS3 bit 0),',
+  'the reference channel Fr1, selected by rFC (LRS3 bit 0),': 'le canal de référence Fr1, sélectionné par rFC (LRS3 bit 0),',
+  'set rFC so that the channel which is Mdb is selected': 'régler rFC de sorte que le canal Mdb soit sélectionné',
+  'a stop by a logic input (nSt, FSt or dCI)': 'un arrêt par une entrée logique (nSt, FSt ou dCI)',
+  'close the input of nSt or FSt, or open that of dCI': 'fermer l’entrée de nSt ou FSt, ou ouvrir celle de dCI',
+  'jog operation (JOG) by its input': 'la marche pas à pas (JOG) par son entrée',
+  'open the input, or set JOG to nO': 'ouvrir l’entrée, ou régler JOG sur nO',
+  'a preset speed (PS2 to PS16) by its input': 'une vitesse présélectionnée (PS2 à PS16) par son entrée',
+  'open the input, or set PS2 to PS16 to nO': 'ouvrir l’entrée, ou régler PS2 à PS16 sur nO',
+  'a function is assigned to bit 11 of CMD, so it does not reverse: free that bit': 'une fonction est affectée au bit 11 de CMD, qui n’inverse donc pas : libérer ce bit',
+  'AdC injects current into a motor at rest without a run command (p. 41): disable operation first, by a freewheel stop': 'AdC injecte du courant dans un moteur à l’arrêt sans ordre de marche (p. 41) : verrouiller d’abord, par un arrêt roue libre',
+  'the access level is none that the manual lists: set LAC to L1, L2 or L3': 'le niveau d’accès n’est pas de ceux du manuel : régler LAC sur L1, L2 ou L3',
+  'the drive checks no consistency and is locked on standstill (CMI bit 15): clear that bit': 'le variateur ne contrôle pas la cohérence et est verrouillé à l’arrêt (CMI bit 15) : remettre ce bit à 0',
+  'the drive is locked on standstill (CMI bit 13): clear that bit': 'le variateur est verrouillé à l’arrêt (CMI bit 13) : remettre ce bit à 0',
+  'the drive is saving its parameters to EEPROM (ETI bit 0): try again in a moment': 'le variateur enregistre ses paramètres en EEPROM (ETI bit 0) : réessayer dans un instant',
+  'the reference on the bus is negative: give a setpoint before the start': 'la référence du bus est négative : donner une consigne avant le démarrage',
+  'by Atr the drive resets its fault and starts the motor again by itself, for as long as tAr says': 'par Atr le variateur acquitte son défaut et redémarre seul le moteur, aussi longtemps que le dit tAr',
+
+  // 3G3EV.
+  'the panel or the terminals (run command, bit A of 002Ch)': 'la console ou le bornier (ordre de marche, bit A de 002Ch)',
+  'give the command back at the panel, or set n02 = 5, save it, and switch the drive off and on': 'rendre la commande à la console, ou régler n02 = 5, enregistrer, puis couper et remettre le variateur sous tension',
+  'the panel or the terminals (reference, bit 9 of 002Ch)': 'la console ou le bornier (référence, bit 9 de 002Ch)',
+  'give the reference back at the panel, or set n02 = 5, save it, and switch the drive off and on': 'rendre la référence à la console, ou régler n02 = 5, enregistrer, puis couper et remettre le variateur sous tension',
+  'another reference than that of 0002h (0023h shows it)': 'une autre référence que celle de 0002h (0023h la montre)',
+  'give the setpoint again, and see to the inputs that choose a speed (n06 to n08)': 'redonner la consigne et vérifier les entrées qui choisissent une vitesse (n06 à n08)',
+  'another command word in 0001h than was written': 'un autre mot de commande dans 0001h que celui écrit',
+  'something that keeps the output off (bit 8 of 002Ch)': 'quelque chose qui maintient la sortie coupée (bit 8 de 002Ch)',
+  'see to the inputs (n06 to n08)': 'vérifier les entrées (n06 à n08)',
+  'n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again': 'n39 a été modifié et agit à la prochaine mise sous tension : couper et remettre le variateur, puis forget() le relit',
+};
+
+const WORDS_FR = {
+  'not ready': 'non prêt', disabled: 'verrouillé', ready: 'prêt', running: 'en marche', stopping: 'décélération', 'quick stop': 'arrêt rapide',
+  'fault reaction': 'réaction au défaut', fault: 'défaut', unknown: 'inconnu', forward: 'avant', reverse: 'arrière', warning: 'alarme',
+  'at reference': 'à la consigne', 'control: bus': 'commande : bus', 'control: terminals': 'commande : bornier', 'control: panel': 'commande : terminal',
+  'control: local': 'commande : locale', 'control: other bus': 'commande : autre bus',
+};
+
+// Longer patterns stand before those that would take a part of them.
+const PATTERNS = [
+  [/^after ([\d.]+) s the drive says (.+), ([\d.]+) s ago$/, (after, status, ago) => `après ${number(after)} s le variateur indique ${state(status)}, il y a ${number(ago)} s`],
+  [/^the drive has said nothing for ([\d.]+) s$/, time => `le variateur n’a rien dit pendant ${number(time)} s`],
+  [/^the drive was last seen (.+), ([\d.]+) s ago$/, (status, ago) => `vu pour la dernière fois ${state(status)}, il y a ${number(ago)} s`],
+  [/^the drive says (.+)$/, status => `le variateur indique ${state(status)}`],
+  [/^the drive's state is "(.+?)": (.+)$/, (status, remedy) => `état du variateur : « ${state(status)} » : ${french(remedy)}`],
+  [/^the drive has tripped \(fault (\d+)\): remove the cause, then reset it$/, code => `le variateur est en défaut (${code}) : supprimer la cause, puis acquitter`],
+  [/^"(.+)" may not command this drive$/, name => `« ${name} » n’a pas le droit de commander ce variateur`],
+  [/^(\S+ Hz) is outside the limits (\S+ Hz) to (\S+ Hz)$/, (asked, low, high) => `${number(asked)} est hors des limites ${number(low)} à ${number(high)}`],
+  [/^(\S+ Hz) is outside the limits from (\S+ Hz)$/, (asked, low) => `${number(asked)} est au-dessous de la limite ${number(low)}`],
+  [/^(\S+ Hz) is outside the limits up to (\S+ Hz)$/, (asked, high) => `${number(asked)} est au-dessus de la limite ${number(high)}`],
+  [/^(\S+ Hz) is in the forbidden band (\S+ Hz) to (\S+ Hz)$/, (asked, low, high) => `${number(asked)} est dans la bande interdite ${number(low)} à ${number(high)}`],
+  [/^(\S+ Hz) is too far from the last setpoint: (\S+ Hz) to (\S+ Hz) is allowed now$/, (asked, low, high) =>
+    `${number(asked)} est trop loin de la dernière consigne : ${number(low)} à ${number(high)} à présent`],
+  [/^(?:input )?(\w+) by its function forced local control \((F\d+) = 48\)$/, (input, code) => `${input} par sa fonction forçage local (${code} = 48)`],
+  [/^(?:input )?(\w+) by its function forced operation \((F\d+) = 52\)$/, (input, code) => `${input} par sa fonction fonctionnement forcé (${code} = 52)`],
+  [/^(?:input )?(\w+) by its function forced run \((F\d+) = 53\)$/, (input, code) => `${input} par sa fonction marche forcée (${code} = 53)`],
+  [/^switch it off, or give (F\d+) another function$/, code => `l’ouvrir, ou donner à ${code} une autre fonction`],
+  [/^(?:input )?(\w+), which is on, with the terminals in command once FA00 is 0,$/, input => `${input}, qui est fermée, le bornier commandant dès que FA00 vaut 0,`],
+  [/^setpoint (.+?): (.+)$/, (setpoint, why) => `consigne ${number(setpoint)} : ${french(why)}`],
+  [/^(.+) decides instead: (.+)$/, (by, remedy) => `${french(by)} décide à la place : ${french(remedy)}`],
+  [/^(.+): switch (\w+) off, or accept it by name \(accept-self-restart \w+\)$/, (what, code) => `${french(what)} : désactiver ${code}, ou l’accepter par son nom (accept-self-restart ${code})`],
+  [/^slave (\d+), (reading|writing) register (\d+) \((\w+)\): (.+)$/, (slave, verb, register, hex, why) =>
+    `esclave ${slave}, ${verb === 'reading' ? 'lecture' : 'écriture'} du registre ${register} (${hex}) : ${french(why)}`],
+  [/^slave (\d+), function (\w+): (.+)$/, (slave, code, why) => `esclave ${slave}, fonction ${code} : ${french(why)}`],
+  [/^slave (\d+): (.+)$/, (slave, why) => `esclave ${slave} : ${french(why)}`],
+  [/^exception (\w+), (.+)$/, (code, meaning) => `exception ${code}, ${french(meaning)}`],
+  [/^no answer within (.+)$/, time => `sans réponse pendant ${number(time)}`],
+  [/^the answer was damaged \((.+)\)$/, why => `réponse altérée (${why})`],
+  [/^the answer does not fit the request \((.+)\)$/, why => `la réponse ne correspond pas à la demande (${why})`],
+  [/^the outcome of the write is unknown \((.+)\)$/, why => `l’issue de l’écriture est inconnue (${french(why)})`],
+  [/^the slave is off-line, (.+)$/, when => `l’esclave est hors ligne, ${french(when)}`],
+  [/^the line is down \((.+)\)$/, why => `la ligne est coupée (${why})`],
+  [/^the drive allows (.+) to (.+)$/, (low, high) => `le variateur admet ${number(low)} à ${number(high)}`],
+  [/^the drive takes steps of (.+)$/, step => `le variateur procède par pas de ${number(step)}`],
+  [/^the watchdog is (.+); the contract says (.+)$/, (is, contract) => `surveillance : ${reaction(is)} ; contrat : ${reaction(contract)}`],
+  [/^for ([\d.]+) s(?:: (.+))?$/, (time, why) => `depuis ${number(time)} s${why ? ` : ${french(why)}` : ''}`],
+  [/^fault (\d+)$/, code => `défaut ${code}`],
+  [/^(\d+) (\w+): (.+)$/, (code, mnemonic, meaning) => `${code} ${mnemonic} : ${FAULTS_FR[meaning] ?? meaning}`],
+  [/^by its communication watchdog(?: after (.+) without a message)?(?:: (.+))?$/, (time, what) =>
+    `par sa surveillance de communication${time ? ` après ${number(time)} sans message` : ''}${what ? ` : ${french(what)}` : ''}`],
+  [/^next probe in (.+)$/, time => `prochain essai dans ${number(time)}`],
+  [/^by (bus|terminals|panel|local|other bus)$/, who => ({ bus: 'par le bus', terminals: 'par le bornier', panel: 'par le terminal', local: 'en local', 'other bus': 'par un autre bus' })[who]],
+  [/^(present|gone)$/, how => (how === 'present' ? 'présente' : 'disparue')],
+  [/^this needs a token with the right to (.+)$/, right => `il faut un jeton avec le droit « ${right} »`],
+  [/^there is no (drive|group) "(.+)"$/, (what, name) => `il n’y a pas de ${what === 'drive' ? 'variateur' : 'groupe'} « ${name} »`],
+];
+
+/** A sentence of the daemon in French; what is not known here stays as it is. */
+export function french(text) {
+  if (SENTENCES_FR[text]) return SENTENCES_FR[text];
+  for (const [pattern, put] of PATTERNS) {
+    const found = text.match(pattern);
+    if (found) return put(...found.slice(1));
+  }
+  const parts = text.split('; ');
+  return parts.length > 1 ? parts.map(french).join(' ; ') : text;
+}
+
+function state(text) {
+  return text.split(', ').map(part => WORDS_FR[part] ?? number(part)).join(', ');
+}
+
+/** A time and what the drive does after it. */
+function reaction(text) {
+  const reactions = { nothing: 'rien', freewheel: 'roue libre', 'ramp stop': 'arrêt sur rampe', 'fast stop': 'arrêt rapide', 'DC injection': 'injection de courant continu',
+    'trip (how the motor stops is not in the manual)': 'défaut (le manuel ne dit pas comment le moteur s’arrête)' };
+  return text.replace(/, then (.+)$/, (whole, then) => `, puis ${reactions[then] ?? then}`).replace(/^off/, 'coupée');
+}
+
+function number(text) {
+  return text.replace(/(\d)\.(\d)/g, '$1,$2');
+}
