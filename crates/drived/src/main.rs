@@ -3,6 +3,8 @@
 #![forbid(unsafe_code)]
 
 mod api;
+#[allow(dead_code, unused_imports)]
+mod broker;
 mod cli;
 mod client;
 mod commanded;

@@ -30,7 +30,6 @@ use tokio::{
     time::{Instant, sleep, timeout},
 };
 
-pub(crate) use self::rights::{Caller, Rights, Role};
 #[cfg(unix)]
 use self::socket::Unbound;
 #[cfg(unix)]
@@ -43,6 +42,10 @@ use self::{
     host::Hosts,
     tls::Tls,
     tokens::Tokens,
+};
+pub(crate) use self::{
+    rights::{Caller, Rights, Role},
+    tls::identity,
 };
 use crate::{
     config::{DoorsConfig, HttpConfig, SocketConfig},

@@ -29,26 +29,13 @@ impl Tls {
     ///
     /// One of them is missing, is none, can be read by everybody, or they do not belong together.
     pub(super) fn open(files: &TlsFiles) -> Result<Self, String> {
-        let TlsFiles { certificate, key } = files;
-        let of = |file: &Path, error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-        let chain = CertificateDer::pem_file_iter(certificate).map_err(|error| of(certificate, &error))?;
-        let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| of(certificate, &error))?;
-        if chain.is_empty() {
-            return Err(of(certificate, &"there is no certificate in it: expected PEM"));
-        }
-        let secret = PrivateKeyDer::from_pem_file(key).map_err(|error| of(key, &error))?;
-        #[cfg(unix)]
-        if std::fs::metadata(key)
-            .is_ok_and(|known| std::os::unix::fs::PermissionsExt::mode(&known.permissions()) & 0o007 != 0)
-        {
-            return Err(of(key, &format_args!("everybody can read the key: chmod o= {}", key.display())));
-        }
+        let (chain, secret) = identity(files)?;
         let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
             .with_safe_default_protocol_versions()
             .map_err(|error| error.to_string())?
             .with_no_client_auth()
             .with_single_cert(chain, secret)
-            .map_err(|error| of(certificate, &error))?;
+            .map_err(|error| of(&files.certificate, &error))?;
         Ok(Self(TlsAcceptor::from(Arc::new(config))))
     }
 
@@ -56,6 +43,40 @@ impl Tls {
     pub(super) async fn accept(&self, stream: TcpStream) -> Option<TlsStream<TcpStream>> {
         tokio::time::timeout(AGREED_WITHIN, self.0.accept(stream)).await.ok()?.ok()
     }
+}
+
+/// A certificate with those who vouch for it, and its key.
+///
+/// # Errors
+///
+/// One of them is missing, is none, or can be read by everybody.
+pub(crate) fn identity(
+    files: &TlsFiles,
+) -> Result<(Vec<CertificateDer<'static>>, PrivateKeyDer<'static>), String> {
+    let TlsFiles { certificate, key } = files;
+    let chain = CertificateDer::pem_file_iter(certificate).map_err(|error| of(certificate, &error))?;
+    let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| of(certificate, &error))?;
+    if chain.is_empty() {
+        return Err(of(certificate, &"there is no certificate in it: expected PEM"));
+    }
+    let secret = PrivateKeyDer::from_pem_file(key).map_err(|error| of(key, &error))?;
+    private(key)?;
+    Ok((chain, secret))
+}
+
+/// Refuses a secret that everybody on this machine can read.
+fn private(file: &Path) -> Result<(), String> {
+    #[cfg(unix)]
+    if std::fs::metadata(file)
+        .is_ok_and(|known| std::os::unix::fs::PermissionsExt::mode(&known.permissions()) & 0o007 != 0)
+    {
+        return Err(of(file, &format_args!("everybody can read it: chmod o= {}", file.display())));
+    }
+    Ok(())
+}
+
+fn of(file: &Path, error: &dyn std::fmt::Display) -> String {
+    format!("{}: {error}", file.display())
 }
 
 #[cfg(test)]
@@ -123,7 +144,7 @@ mod tests {
         let files = files(&folder);
         fs::set_permissions(&files.key, std::os::unix::fs::PermissionsExt::from_mode(0o644)).unwrap();
         let refused = |files: &TlsFiles| Tls::open(files).err().unwrap();
-        assert!(refused(&files).contains("everybody can read the key"));
+        assert!(refused(&files).contains("everybody can read it"));
         for (certificate, key) in [(CERTIFICATE, "no key"), ("no certificate", KEY)] {
             fs::set_permissions(&files.key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
             fs::write(&files.certificate, certificate).unwrap();
