@@ -146,6 +146,54 @@ fn end_of(bucket: usize) -> Duration {
     Duration::from_nanos((((SUB + within + 1) as u64 * 1_000) << octave) / SUB as u64)
 }
 
+/// The bounds of [`Spread`]: what requests and answers take on a wire, from a short one at high speed to the longest time-out
+/// that is usual.
+pub const BOUNDS: [Duration; 14] = {
+    const MILLISECONDS: [u64; 14] = [5, 8, 12, 16, 20, 25, 30, 40, 50, 75, 100, 250, 500, 1_000];
+    let mut bounds = [Duration::ZERO; 14];
+    let mut at = 0;
+    while at < bounds.len() {
+        bounds[at] = Duration::from_millis(MILLISECONDS[at]);
+        at += 1;
+    }
+    bounds
+};
+
+/// Durations counted by the fixed [`BOUNDS`], so that those of many slaves, lines and hosts can be added up.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Spread {
+    /// One for each bound and one for what is longer, up to the last that is not zero: most drives need few.
+    counts: Vec<u32>,
+    sum: Duration,
+}
+
+impl Spread {
+    /// Counts one duration.
+    pub fn record(&mut self, duration: Duration) {
+        let at = BOUNDS.partition_point(|bound| *bound < duration);
+        self.counts.resize(self.counts.len().max(at + 1), 0);
+        if let Some(count) = self.counts.get_mut(at) {
+            *count = count.saturating_add(1);
+        }
+        self.sum = self.sum.saturating_add(duration);
+    }
+
+    /// How many were not longer than each of the [`BOUNDS`], and at last how many there were.
+    pub fn up_to(&self) -> impl Iterator<Item = u64> + '_ {
+        let mut sum = 0;
+        (0..=BOUNDS.len()).map(move |at| {
+            sum += self.counts.get(at).copied().map_or(0, u64::from);
+            sum
+        })
+    }
+
+    /// All of them together.
+    #[must_use]
+    pub const fn sum(&self) -> Duration {
+        self.sum
+    }
+}
+
 /// How the calls ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -204,6 +252,8 @@ pub struct SlaveStats {
     pub link: Option<LinkCounters>,
     /// From the end of a request to the first character of its answer, as computed from the answer's end and length.
     pub response: Histogram,
+    /// Each exchange, from the first character of its request to the end of its answer, or of the wait for one.
+    pub exchanges: Spread,
 }
 
 impl SlaveStats {
@@ -228,6 +278,8 @@ pub struct ClassStats {
     pub sent: u64,
     /// From the call to the first bit on the line.
     pub wait: Histogram,
+    /// The same by fixed bounds.
+    pub waits: Spread,
 }
 
 /// What a line has counted since it was opened.
@@ -335,6 +387,17 @@ mod tests {
         }
         assert_eq!(histogram.count(), 4);
         assert_eq!(histogram.quantile(1_000).min(Duration::from_secs(1)), Duration::from_secs(1));
+    }
+
+    #[test]
+    fn a_spread_counts_a_duration_at_its_bound_as_not_longer() {
+        let mut spread = Spread::default();
+        assert_eq!(spread.up_to().max(), Some(0));
+        let micros = [0, 5_000, 5_001, 16_000, 999_999, 1_000_000, 1_000_001, 60_000_000];
+        micros.map(Duration::from_micros).into_iter().for_each(|duration| spread.record(duration));
+        let counted: Vec<u64> = spread.up_to().collect();
+        assert_eq!(counted, [2, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 6, 8]);
+        assert_eq!(spread.sum(), Duration::from_micros(micros.iter().sum()));
     }
 
     #[test]

@@ -168,6 +168,8 @@ pub struct PendingStop {
     pub attempts: u32,
     /// Whether the drive has shown that no run command is in force; what is missing then is standstill.
     pub taken: bool,
+    /// Whether it has gone without a confirmation for so long that it is an alarm.
+    pub alarm: bool,
 }
 
 /// A trip, with the statuses around it: the freeze-frame.

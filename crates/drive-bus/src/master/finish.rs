@@ -30,6 +30,7 @@ impl<C> Master<C> {
             Err(failure) => self.note_failure(now, &flight, failure),
         }
         let took = now.saturating_duration_since(flight.started);
+        self.station(slave).stats.exchanges.record(took);
         let answered = result.is_ok();
         match flight.purpose {
             Purpose::Call(Some(mut entry)) => match result {

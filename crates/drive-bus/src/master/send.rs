@@ -141,7 +141,9 @@ impl<C> Master<C> {
         if entry.work.attempts == 0 && entry.work.last.is_none() {
             let class = self.stats.class_mut(entry.terms.class);
             class.sent += 1;
-            class.wait.record(now.saturating_duration_since(entry.arrived));
+            let waited = now.saturating_duration_since(entry.arrived);
+            class.wait.record(waited);
+            class.waits.record(waited);
         } else {
             self.station(slave).stats.retries += 1;
         }

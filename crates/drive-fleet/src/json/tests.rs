@@ -72,7 +72,8 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
     let identity = Identity { model: Some("ATV312HU15N4".to_owned()), ..Identity::default() };
     let armed = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
     let restart = SelfRestart { code: "Atr", meaning: "starts the motor again by itself" };
-    let stop = PendingStop { mode: StopMode::Ramp, since: Instant::now(), attempts: 2, taken: false };
+    let stop =
+        PendingStop { mode: StopMode::Ramp, since: Instant::now(), attempts: 2, taken: false, alarm: true };
     let measurements = Some(Timed::<Measurements>::new(measurements, Instant::now()));
     advance(Duration::from_secs(10)).await;
     let snapshot = Snapshot {
@@ -96,7 +97,7 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
             "status": {"quality": "good", "age_ms": 120, "state": "running", "output_frequency_hz": 30.0, "raw": []},
             "measurements": {"quality": "good", "age_ms": 10_120, "before_trip": false, "torque_percent": 40.0, "raw": []},
             "setpoint": {"frequency_hz": 30.0}, "reached": true,
-            "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false},
+            "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false, "alarm": true},
             "started_here": true, "starts_by_itself": ["Atr"],
             "identity": {"check": "same", "model": "ATV312HU15N4", "codes": []},
             "watchdog": {"check": "verified", "time_ms": 10_000, "reaction": "ramp"},

@@ -47,7 +47,13 @@ struct Waiter {
 
 impl Stopping {
     pub(super) const fn pending(&self) -> PendingStop {
-        PendingStop { mode: self.used, since: self.since, attempts: self.attempts, taken: self.taken }
+        PendingStop {
+            mode: self.used,
+            since: self.since,
+            attempts: self.attempts,
+            taken: self.taken,
+            alarm: self.alarm_at.is_none(),
+        }
     }
 
     pub(super) fn wake_at(&self) -> Option<Instant> {
