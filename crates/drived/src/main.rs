@@ -19,6 +19,7 @@ mod journal;
 mod json;
 mod line_spec;
 mod logging;
+mod metrics;
 mod one_drive;
 mod output;
 mod page;

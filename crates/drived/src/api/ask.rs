@@ -34,7 +34,7 @@ impl<S: Send + Sync> FromRequestParts<S> for By {
 }
 
 /// Somebody who may see the plant.
-pub(super) struct Viewer(pub(super) Caller);
+pub(crate) struct Viewer(pub(crate) Caller);
 
 impl<S: Send + Sync> FromRequestParts<S> for Viewer {
     type Rejection = Problem;

@@ -23,7 +23,7 @@ use axum::{
     routing::{any, get},
 };
 
-pub(crate) use self::reload::reload_router;
+pub(crate) use self::{ask::Viewer, reload::reload_router};
 use self::{
     demo::Stage,
     problem::Problem,

@@ -5,6 +5,7 @@ pub(crate) mod history;
 pub(crate) mod parameters;
 mod progress;
 pub(crate) mod revisions;
+pub(crate) mod tally;
 #[cfg(test)]
 pub(crate) mod testing;
 pub(crate) mod views;
@@ -22,6 +23,7 @@ use self::{
     parameters::Words,
     progress::Progress,
     revisions::Revisions,
+    tally::Tally,
 };
 use crate::{config::Group, doors::Caller, json::unix};
 
@@ -41,6 +43,7 @@ struct Inner {
     history: History,
     words: Words,
     progress: Progress,
+    tally: Tally,
 }
 
 impl Plant {
@@ -56,6 +59,7 @@ impl Plant {
             history: History::default(),
             words: Words::default(),
             progress: Progress::default(),
+            tally: Tally::default(),
         });
         watching::start(&inner);
         history::start(&inner);
@@ -87,6 +91,11 @@ impl Plant {
     /// The stream of what happens.
     pub(crate) fn revisions(&self) -> &Revisions {
         &self.0.revisions
+    }
+
+    /// How many commands ended how.
+    pub(crate) fn tally(&self) -> &Tally {
+        &self.0.tally
     }
 
     pub(crate) fn lines(&self) -> Vec<LineView> {

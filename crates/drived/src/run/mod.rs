@@ -7,7 +7,7 @@ mod notify;
 pub(crate) mod reload;
 mod report;
 
-use std::{io::IsTerminal as _, path::PathBuf, time::Duration};
+use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
@@ -25,7 +25,7 @@ use crate::{
         audit::{Audit, Kind, Record},
     },
     failure::Failure,
-    journal, one_drive, page,
+    journal, metrics, one_drive, page,
     plant::Plant,
     signals::{Ending, Wish, Wishes},
 };
@@ -72,8 +72,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let shutdown = config.shutdown;
     let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
-    let doors =
-        doors.open(api::router(plant).merge(api::reload_router(reloader.clone())).merge(page::router()));
+    let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
+    let doors = doors.open(metrics::serve(router, plant, vec![Arc::new(reloader.clone())]));
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let mut read = None;

@@ -2,17 +2,23 @@
 
 mod changes;
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::{Arc, PoisonError},
+    time::Duration,
+};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
-use tokio::sync::Mutex;
+use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
 use super::notify::Notify;
 use crate::{
     config::{Config, DrivePart, LinePart},
     failure::Failure,
+    json::unix,
+    metrics::{Id, Samples, Source},
     one_drive,
 };
 
@@ -26,11 +32,14 @@ struct Inner {
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
+    /// Whether what was read last holds, and when what holds was read.
+    last: std::sync::Mutex<(bool, u64)>,
 }
 
 impl Reloader {
     pub(super) fn new(fleet: Fleet, notify: Notify, file: PathBuf, config: Config) -> Self {
-        Self(Arc::new(Inner { fleet, notify, file, config: Mutex::new(config) }))
+        let last = std::sync::Mutex::new((true, unix(Instant::now())));
+        Self(Arc::new(Inner { fleet, notify, file, config: Mutex::new(config), last }))
     }
 
     /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
@@ -43,6 +52,18 @@ impl Reloader {
     /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
     /// whose drive was removed may turn.
     pub(crate) async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+        let reloaded = self.read_again(dry_run).await;
+        if !dry_run {
+            let mut last = self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
+            *last = match &reloaded {
+                Ok(_) | Err(Failure::Drive(_)) => (true, unix(Instant::now())),
+                Err(_) => (false, last.1),
+            };
+        }
+        reloaded
+    }
+
+    async fn read_again(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
         let mut config = self.0.config.lock().await;
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
@@ -107,6 +128,14 @@ impl Reloader {
         }
         let alarms = actions.iter().filter(|(_, action)| action.is_alarm());
         Ok(alarms.map(|(name, action)| format!("{name}: {action}")).collect())
+    }
+}
+
+impl Source for Reloader {
+    fn collect(&self, samples: &mut Samples) {
+        let (is_successful, at) = *self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
+        samples.add(Id::ReloadSuccessful, &[], f64::from(u8::from(is_successful)));
+        samples.add(Id::ReloadTime, &[], at as f64 / 1_000.0);
     }
 }
 

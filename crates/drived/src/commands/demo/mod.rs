@@ -24,6 +24,7 @@ use crate::{
     config::{DoorsConfig, Http},
     doors::Doors,
     failure::Failure,
+    metrics,
     output::{self, Table},
     page,
     signals::Ending,
@@ -66,7 +67,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let plant = Plant::start()?;
     let groups = plant.groups();
     let faces = crate::plant::Plant::start(plant.fleet.clone(), groups, true);
-    let doors = doors.open(api::demo_router(faces, plant.stage()).merge(page::router()));
+    let router = api::demo_router(faces.clone(), plant.stage()).merge(page::router());
+    let doors = doors.open(metrics::serve(router, faces, Vec::new()));
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, page, incoming, until, ending: &mut ending };

@@ -265,7 +265,11 @@ impl Work {
         let Some(member) = self.0.members.get(number) else { return };
         let mut parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(part) = parts.get_mut(number) {
+            let is_first = part.outcome == OutcomeWord::Pending;
             *part = part.clone().ended_as(word, reason, text, member, self.0.request.arrived);
+            if is_first {
+                self.0.plant.tally().count(part);
+            }
         }
         drop(parts);
         self.0.changed.notify_one();

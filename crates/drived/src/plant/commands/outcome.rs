@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What became of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum OutcomeWord {
     /// It is not known yet.
@@ -23,6 +23,16 @@ pub(crate) enum OutcomeWord {
     /// A stop or a newer command took its place.
     Superseded,
 }
+
+drive_core::named! { OutcomeWord {
+    Pending => "pending",
+    Confirmed => "confirmed",
+    NotConfirmed => "not_confirmed",
+    Unknown => "unknown",
+    Refused => "refused",
+    Expired => "expired",
+    Superseded => "superseded",
+} }
 
 /// Nobody of a group was started, because another of its drives was not ready.
 pub(super) const GROUP_NOT_READY: &str = "group_not_ready";

@@ -1,0 +1,96 @@
+//! `/metrics`: what a metrics store scrapes, in Prometheus' text format 0.0.4, or in OpenMetrics 1.0 for whoever prefers it.
+//!
+//! Everything is read from snapshots and counters when it is asked for, by a writer of our own: the fleet's state is there
+//! already, so that a registry beside it would only have to be cleared of drives and values that are gone. A value that is
+//! not known or too old is absent. No task of a line waits for a scrape.
+
+mod drives;
+mod lines;
+mod negotiation;
+mod process;
+mod requests;
+mod samples;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use axum::{
+    Router,
+    extract::State,
+    http::{
+        HeaderMap, StatusCode,
+        header::{CACHE_CONTROL, CONTENT_TYPE, VARY},
+    },
+    middleware::from_fn_with_state,
+    response::{IntoResponse, Response},
+    routing::get,
+};
+use tokio::{sync::Mutex, time::Instant};
+
+use self::{negotiation::wanted, requests::Requests};
+pub(crate) use self::{
+    samples::{Samples, Source},
+    table::Id,
+};
+use crate::{api::Viewer, json::unix, plant::Plant};
+
+/// A router with `/metrics` of a plant and of `sources`, and with every answer of it counted.
+pub(crate) fn serve(router: Router, plant: Plant, sources: Vec<Arc<dyn Source>>) -> Router {
+    let requests = Requests::default();
+    let sources = sources.into_iter().chain([Arc::new(requests.clone()) as Arc<dyn Source>]).collect();
+    let began = (unix(Instant::now()), Instant::now());
+    let metrics = Arc::new(Metrics { plant, sources, began, turn: Mutex::default() });
+    let metrics = Router::new().route("/metrics", get(scrape)).with_state(metrics);
+    router.merge(metrics).layer(from_fn_with_state(requests, requests::count))
+}
+
+/// Whatever is told.
+struct Metrics {
+    plant: Plant,
+    sources: Vec<Arc<dyn Source>>,
+    /// The beginning, by the wall clock and by the steady one.
+    began: (u64, Instant),
+    /// One text is made at a time, however many ask.
+    turn: Mutex<()>,
+}
+
+impl Metrics {
+    fn samples(&self) -> Samples {
+        let mut samples = Samples::new();
+        samples.add(Id::BuildInfo, &[env!("CARGO_PKG_VERSION")], 1.0);
+        let (wall, steady) = self.began;
+        let drift = unix(Instant::now()) as f64 - wall as f64 - steady.elapsed().as_millis() as f64;
+        samples.add(Id::ClockDrift, &[], drift / 1_000.0);
+        let (fleet, counts) = (self.plant.fleet(), self.plant.tally().counts());
+        samples.add_histogram(Id::StopConfirm, &[], counts.stops_up_to(), counts.stopping.as_secs_f64());
+        for (name, line) in fleet.lines() {
+            let (plan, drives) = (fleet.plan(&name), fleet.drives_on(&name));
+            lines::collect(&name, &line, plan, &drives, &mut samples);
+            for drive in &drives {
+                drives::collect(&name, plan, drive, &mut samples);
+            }
+            lines::collect_commands(&name, &drives, &counts, &mut samples);
+        }
+        process::collect(&mut samples);
+        for source in &self.sources {
+            source.collect(&mut samples);
+        }
+        samples
+    }
+}
+
+async fn scrape(State(metrics): State<Arc<Metrics>>, _: Viewer, headers: HeaderMap) -> Response {
+    let format = wanted(&headers);
+    let turn = metrics.turn.lock().await;
+    let made = Arc::clone(&metrics);
+    // On a thread beside those that serve the lines.
+    let text = tokio::task::spawn_blocking(move || made.samples().text(format)).await;
+    drop(turn);
+    let headers = [(CONTENT_TYPE, format.content_type()), (CACHE_CONTROL, "no-store"), (VARY, "Accept")];
+    match text {
+        Ok(text) => (headers, text).into_response(),
+        Err(_) => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
+    }
+}
