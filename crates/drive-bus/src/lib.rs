@@ -76,6 +76,7 @@ pub mod master;
 #[doc(hidden)]
 pub mod pdu;
 pub mod protocol;
+pub mod record;
 #[doc(hidden)]
 pub mod schedule;
 #[doc(hidden)]

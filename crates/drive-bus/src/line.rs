@@ -13,6 +13,7 @@ use crate::{
     config::{LineConfig, SlaveSettings},
     master::Master,
     pdu::MAX_PDU,
+    record::Exchange,
     shared::{Handle, Shared},
     slave::Slave,
     stats::Stats,
@@ -114,6 +115,18 @@ impl Line {
     #[must_use]
     pub fn stats(&self) -> Stats {
         self.handle.shared.master().stats(Instant::now())
+    }
+
+    /// Keeps the last `count` exchanges from now on, each with its bytes: some 200 bytes an exchange. A line keeps none unless
+    /// it is asked to.
+    pub fn keep_exchanges(&self, count: usize) {
+        self.handle.shared.master().keep_exchanges(count);
+    }
+
+    /// The last exchanges that ended, the oldest first, as many as [are kept](Self::keep_exchanges).
+    #[must_use]
+    pub fn exchanges(&self) -> Vec<Exchange> {
+        self.handle.shared.master().exchanges()
     }
 
     /// How often the line's task has come round, to see from outside that it lives: asking makes it come round once more,

@@ -244,6 +244,8 @@ pub struct SlaveStats {
     pub went_offline: u64,
     /// Whether it is off-line now.
     pub offline: bool,
+    /// How long it takes until it is asked whether it is back, as far as is known; `None` unless it is off-line.
+    pub next_probe: Option<Duration>,
     /// The response timeout that holds now.
     pub response_timeout: Duration,
     /// What its own link had counted when it was last read, by
@@ -315,6 +317,8 @@ pub struct Stats {
     pub opened: u64,
     /// How often the port was lost.
     pub lost: u64,
+    /// Why the port was lost or cannot be opened; `None` while it is open, and before that is known.
+    pub away: Option<String>,
     /// Requests that wait now.
     pub queued: usize,
     /// The longest wait of a Stop until its first bit, while the line goes on as it has: with the response times that it

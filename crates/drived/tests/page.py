@@ -4,6 +4,7 @@ Waits for what is to be seen, never for a time. What a scene wants to happen to 
 `drived sim` takes it. A scene ends with the console looked at: no error, no request to anywhere else.
 """
 
+import re
 import socket
 import sys
 import time
@@ -31,6 +32,13 @@ def loads(page, url):
     page.locator("nav a").nth(1).click()
     page.locator("main a").first.click()
     expect(page.locator("td.spread .p50").first).to_be_attached()
+    exchanges = page.locator(".last tbody tr")
+    expect(exchanges).to_have_count(100)
+    # A read of holding registers, and its answer by the same slave.
+    slave = int(exchanges.first.locator("td").nth(1).inner_text().split()[0])
+    expect(exchanges.first.locator("td").nth(2)).to_have_text(re.compile(f"^{slave:02X} (03|04) "))
+    page.get_by_role("button", name="Hold").click()
+    expect(page.get_by_role("button", name="Go on")).to_be_visible()
 
 
 def trip(page, url):
@@ -101,7 +109,12 @@ def cable(page, url):
     page.goto(url)
     rows = page.locator(".rows .row")
     expect(page.locator(".rows .row[data-quality=good]")).to_have_count(3)
+    page.locator("nav a").nth(1).click()
+    page.locator("main a").first.click()
     happen("line cut")
+    expect(page.locator(".last tbody tr").first).to_contain_text("no answer")
+    expect(page.locator("table").first).to_contain_text(re.compile("off-line, only probed: [0-9]+ probes, the next in "))
+    page.locator("nav a").first.click()
     expect(page.locator(".rows .row[data-quality=stale]")).to_have_count(3)
     expect(rows.first.locator(".age")).to_contain_text("old")
     style = rows.first.locator(".number").first.evaluate("element => getComputedStyle(element).fontStyle")

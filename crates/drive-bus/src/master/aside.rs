@@ -6,7 +6,7 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::{Flight, Master, Purpose};
-use crate::exchange::Failure;
+use crate::{exchange::Failure, record::Ending};
 
 /// An exchange that waits.
 pub(super) struct Aside<C> {
@@ -20,6 +20,7 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take() else { return };
         self.stats.busy += now.saturating_duration_since(flight.started);
         self.exchange_end = now;
+        self.record.ended(now, flight.slave, flight.started, Ending::PutAside);
         self.aside.insert(flight.slave, Aside { flight, at });
     }
 

@@ -9,6 +9,7 @@ use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
     answer, config,
     exchange::{Answer, Failure},
+    record::Ending,
     schedule::Entry,
     shape,
 };
@@ -24,6 +25,7 @@ impl<C> Master<C> {
         self.exchange_end = now;
         let slave = flight.slave;
         let result = self.believe(now, &flight, result);
+        self.record.ended(now, slave, flight.started, Ending::of(&result));
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
@@ -265,6 +267,7 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take() else { return };
         self.exchange_end = now;
         self.exchange.abandon();
+        self.record.ended(now, flight.slave, flight.started, Ending::Unanswered);
         self.stats.broadcasts += u64::from(flight.slave == 0);
         self.stats.busy += now.saturating_duration_since(flight.started);
         let Purpose::Call(Some(entry)) = flight.purpose else { return };
@@ -278,6 +281,9 @@ impl<C> Master<C> {
     /// is never sent again.
     pub(super) fn fail_flight(&mut self, now: Instant, reason: &str) {
         self.to_send = None;
+        if let Some(flight) = &self.flight {
+            self.record.ended(now, flight.slave, flight.started, Ending::LineLost);
+        }
         let aside = std::mem::take(&mut self.aside).into_values().map(|aside| aside.flight);
         let flights: Vec<_> = self.flight.take().into_iter().chain(aside).collect();
         for flight in flights {

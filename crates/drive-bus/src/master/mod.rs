@@ -29,6 +29,7 @@ use crate::{
     config::{LineConfig, SlaveSettings},
     exchange::{self, Answer, Machine, Step, Stray},
     pdu,
+    record::{Ending, Exchange, Record},
     schedule::{Entry, Rules, Schedule, Ticket},
     shape::Shape,
     stats::Stats,
@@ -84,6 +85,7 @@ pub struct Master<C> {
     choose_at: Option<Instant>,
     opened_at: Option<Instant>,
     stats: Stats,
+    record: Record,
 }
 
 /// What is asked, and by whom.
@@ -163,7 +165,7 @@ impl<C> Master<C> {
             to_send: None,
             sending: None,
             outcomes: VecDeque::new(),
-            port: PortState::Opening,
+            port: PortState::Opening(None),
             far_end_paces: true,
             closing: false,
             quiet_from: now,
@@ -176,6 +178,7 @@ impl<C> Master<C> {
             choose_at: None,
             opened_at: None,
             stats: Stats::default(),
+            record: Record::default(),
             config,
         };
         master.set_far_end_paces(master.config.endpoint.is_serial());
@@ -295,6 +298,7 @@ impl<C> Master<C> {
         };
         self.exchange.abandon();
         self.to_send = None;
+        self.record.ended(now, flight.slave, flight.started, Ending::GivenUp);
         self.fear_late_answer(now, &flight);
         self.offline.probe_again(now, flight.slave);
         self.quiet_from = self.quiet_from.max(now);
@@ -320,6 +324,9 @@ impl<C> Master<C> {
         let goes_on = self.heard.filter(|(_, until)| now < *until + self.config.silence());
         self.heard = Some((goes_on.map_or(now, |(since, _)| since), now));
         self.quiet_from = self.quiet_from.max(now);
+        if self.flight.is_some() {
+            self.record.heard(bytes);
+        }
         let step = self.exchange.handle_bytes(now, bytes);
         self.act(now, step);
     }
@@ -466,6 +473,7 @@ impl<C> Master<C> {
         stats.queued = self.schedule.len();
         stats.echoing = self.exchange.echoes();
         stats.worst_case_stop = self.learned_worst_case_stop();
+        stats.away = self.port.away().map(str::to_owned);
         stats.slaves = self
             .stations
             .iter()
@@ -474,10 +482,22 @@ impl<C> Master<C> {
                 let mut stats = station.stats.clone();
                 stats.response_timeout = station.timeout.current();
                 stats.offline = self.offline.contains(*slave);
+                stats.next_probe = self.probe_at(*slave).map(|at| self.probe_in(now, at));
                 (*slave, stats)
             })
             .collect();
         stats
+    }
+
+    /// Keeps the last exchanges from now on.
+    pub fn keep_exchanges(&mut self, count: usize) {
+        self.record.keep(count);
+    }
+
+    /// The exchanges that are kept, the oldest first.
+    #[must_use]
+    pub fn exchanges(&self) -> Vec<Exchange> {
+        self.record.exchanges()
     }
 
     fn station(&mut self, slave: u8) -> &mut Station {

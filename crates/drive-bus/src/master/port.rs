@@ -11,10 +11,21 @@ use super::Master;
 pub(super) enum PortState {
     /// The port is open.
     Open,
-    /// It was lost a moment ago, or is being opened for the first time: what waits goes on waiting.
-    Opening,
+    /// It was lost a moment ago, for this reason, or is being opened for the first time: what waits goes on waiting.
+    Opening(Option<String>),
     /// It cannot be opened: nothing is accepted.
     Down(String),
+}
+
+impl PortState {
+    /// Why it is not open, as far as is known.
+    pub(super) fn away(&self) -> Option<&str> {
+        match self {
+            Self::Open => None,
+            Self::Opening(reason) => reason.as_deref(),
+            Self::Down(reason) => Some(reason),
+        }
+    }
 }
 
 impl<C> Master<C> {
@@ -32,7 +43,7 @@ impl<C> Master<C> {
     /// The port is lost. What waits goes on waiting.
     pub fn handle_lost(&mut self, now: Instant, reason: &str) {
         tracing::debug!(endpoint = ?self.config.endpoint, reason, "line lost");
-        self.port = PortState::Opening;
+        self.port = PortState::Opening(Some(reason.to_owned()));
         self.stats.lost += 1;
         self.exchange.reset();
         self.fail_flight(now, reason);
@@ -41,7 +52,7 @@ impl<C> Master<C> {
 
     /// The port cannot be opened. What waits without a lifetime ends; what has one expires.
     pub fn handle_down(&mut self, reason: &str) {
-        if let PortState::Opening = mem::replace(&mut self.port, PortState::Down(reason.to_owned())) {
+        if let PortState::Opening(_) = mem::replace(&mut self.port, PortState::Down(reason.to_owned())) {
             tracing::debug!(endpoint = ?self.config.endpoint, reason, "line down");
         }
         for entry in self.schedule.withdraw_all(|entry| entry.terms.lifetime.is_none()) {

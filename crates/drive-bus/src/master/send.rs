@@ -30,6 +30,7 @@ impl<C> Master<C> {
             Some(bytes) => bytes,
             None => self.next_exchange(now)?,
         };
+        self.record.sent(&bytes);
         self.sending = Some(Sending { since: now, characters: bytes.len() });
         Some(bytes)
     }

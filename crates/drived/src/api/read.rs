@@ -47,8 +47,10 @@ pub(super) async fn line(
     _: Viewer,
     Named(name): Named,
 ) -> Result<Response, Problem> {
-    let line = plant.lines().into_iter().find(|line| line.name == name);
-    line.map(|line| fresh(&line)).ok_or_else(|| Problem::not_found(format!("there is no line {name:?}")))
+    plant
+        .line(&name)
+        .map(|line| fresh(&line))
+        .ok_or_else(|| Problem::not_found(format!("there is no line {name:?}")))
 }
 
 pub(super) fn no_drive(name: &str) -> Problem {

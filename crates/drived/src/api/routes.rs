@@ -19,7 +19,7 @@ use crate::plant::{
     Plant,
     history::HistoryView,
     parameters::{ParameterView, WrittenView},
-    views::{CommandView, DriveView, LineView, StateView},
+    views::{CommandView, DriveView, LineDetailView, LineView, StateView},
 };
 
 /// How the schema of a type is made.
@@ -207,7 +207,8 @@ fn reads() -> Vec<Route> {
             })
             .or_problem(503),
         Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
-        Route::get("/api/v1/lines/{name}", read::line, "One line").answers::<LineView>(200, "the line"),
+        Route::get("/api/v1/lines/{name}", read::line, "One line, and what was on it lately")
+            .answers::<LineDetailView>(200, "the line and its last 100 exchanges"),
         Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
             .with_query(WAIT)
             .answers::<CommandView>(200, "the command, whatever its outcome"),

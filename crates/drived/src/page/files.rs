@@ -46,6 +46,7 @@ files![
     "format.js",
     "icon.svg",
     "line.js",
+    "line_last.js",
     "login.js",
     "main.js",
     "orders.js",

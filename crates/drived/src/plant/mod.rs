@@ -8,15 +8,17 @@ pub(crate) mod revisions;
 pub(crate) mod tally;
 #[cfg(test)]
 pub(crate) mod testing;
+mod usage;
 pub(crate) mod views;
 mod watching;
 
 use std::sync::Arc;
 
+use drive_bus::Line;
 use drive_fleet::{DriveHandle, Fleet};
 use tokio::{sync::Mutex, time::Instant};
 
-use self::views::{DaemonView, DriveView, LineView, StateView};
+use self::views::{DaemonView, DriveView, ExchangeView, LineDetailView, LineView, StateView};
 use self::{
     commands::Log,
     history::{History, HistoryView},
@@ -24,8 +26,12 @@ use self::{
     progress::Progress,
     revisions::Revisions,
     tally::Tally,
+    usage::Usage,
 };
 use crate::{config::Group, doors::Caller, json::unix};
+
+/// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
+const EXCHANGES: usize = 100;
 
 /// The plant as its faces see it. Cheap to clone.
 #[derive(Clone)]
@@ -44,6 +50,7 @@ struct Inner {
     words: Words,
     progress: Progress,
     tally: Tally,
+    usage: Usage,
 }
 
 impl Plant {
@@ -60,6 +67,7 @@ impl Plant {
             words: Words::default(),
             progress: Progress::default(),
             tally: Tally::default(),
+            usage: Usage::default(),
         });
         watching::start(&inner);
         history::start(&inner);
@@ -102,6 +110,13 @@ impl Plant {
         self.0.lines()
     }
 
+    /// A line with its last exchanges.
+    pub(crate) fn line(&self, name: &str) -> Option<LineDetailView> {
+        let (name, line) = self.0.fleet.lines().into_iter().find(|(known, _)| **known == *name)?;
+        let last = line.exchanges().iter().map(ExchangeView::of).collect();
+        Some(LineDetailView { line: self.0.line(&name, &line)?, last })
+    }
+
     /// The lines on which no drive has been asked for longer than its periods allow.
     pub(crate) fn standing_lines(&self) -> Vec<String> {
         self.0.progress.standing(&self.0.fleet)
@@ -132,10 +147,20 @@ impl Plant {
 
 impl Inner {
     fn lines(&self) -> Vec<LineView> {
-        let view = |name: &Arc<str>, line| {
-            let plan = self.fleet.plan(name)?;
-            Some(LineView::of(name, line, plan, &self.fleet.drives_on(name)))
-        };
-        self.fleet.lines().iter().filter_map(|(name, line)| view(name, line)).collect()
+        self.fleet.lines().iter().filter_map(|(name, line)| self.line(name, line)).collect()
+    }
+
+    fn line(&self, name: &str, line: &Line) -> Option<LineView> {
+        let plan = self.fleet.plan(name)?;
+        Some(LineView::of(name, line, plan, &self.fleet.drives_on(name), &self.usage))
+    }
+
+    /// Looks at the lines, once a second: those that a reload has brought keep their last exchanges from then on.
+    fn look_at_lines(&self) {
+        let lines = self.fleet.lines();
+        for (_, line) in &lines {
+            line.keep_exchanges(EXCHANGES);
+        }
+        self.usage.look(lines.iter().map(|(name, line)| (name, line.stats())));
     }
 }

@@ -106,6 +106,7 @@ async fn lines(plant: Weak<Inner>) {
         looks.tick().await;
         let Some(plant) = plant.upgrade() else { return };
         plant.progress.look(&plant.fleet);
+        plant.look_at_lines();
         watch(&plant, &mut watched);
         if plant.revisions.readers() > 0 {
             let lines = plant.lines();

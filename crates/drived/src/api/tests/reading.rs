@@ -86,6 +86,38 @@ async fn a_value_behind_a_cut_cable_is_in_no_output_shown_as_live() {
     assert!(parameters.as_array().unwrap().iter().all(|row| row["value"].is_null()), "never read, so none");
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_line_shows_its_last_hundred_exchanges_its_load_now_and_when_who_is_off_line_is_asked_next() {
+    let TestPlant { plant, line, .. } = TestPlant::of(2).await;
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    let (_, north) = get(&plant, "/api/v1/lines/north").await;
+    let last = north["last"].as_array().unwrap();
+    assert_eq!(last.len(), 100);
+    assert!(last.iter().is_sorted_by_key(|exchange| exchange["time_unix_ms"].as_u64()), "the newest is last");
+    for exchange in last {
+        // A read of holding registers, and an answer that begins as the request does (Modbus Application Protocol, 6.3).
+        let (request, answer) = (exchange["request"].as_str().unwrap(), exchange["answer"].as_str().unwrap());
+        assert!(
+            request.starts_with(&format!("{:02X} 03 ", exchange["slave"].as_u64().unwrap())),
+            "{exchange}"
+        );
+        assert_eq!((request.len(), &answer[..5]), (8 * 3 - 1, &request[..5]), "{exchange}");
+        assert_eq!(exchange["result"], "ok");
+        assert!(exchange["took_ms"].as_f64().unwrap() > 8.0, "{exchange}");
+    }
+    assert!(north["utilisation_percent"].as_f64().unwrap() > 1.0, "{north}");
+    assert!(north["slaves"][0]["next_probe_ms"].is_null());
+    line.cut();
+    tokio::time::sleep(Duration::from_secs(30)).await;
+    let (_, north) = get(&plant, "/api/v1/lines/north").await;
+    let newest = north["last"].as_array().unwrap().last().unwrap();
+    assert_eq!((&newest["result"], &newest["answer"]), (&"no_answer".into(), &"".into()), "{newest}");
+    let slave = &north["slaves"][0];
+    assert_eq!(slave["off_line"], true, "{slave}");
+    assert!(slave["next_probe_ms"].as_u64().is_some_and(|next| next <= 10_000), "{slave}");
+    assert!(get(&plant, "/api/v1/lines").await.1[0]["last"].is_null(), "the list is short");
+}
+
 /// Whatever has a quality says that it is old, and how old.
 fn nothing_is_live(told: &Value, path: &str) {
     if let Some(quality) = told.get("quality") {

@@ -3,6 +3,7 @@
 import { address, path } from './api.js';
 import { el, setText, table } from './dom.js';
 import { duration, MISSING, quantity } from './format.js';
+import { lastExchanges } from './line_last.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
@@ -45,11 +46,13 @@ export function line(root, name) {
   const big = ['utilisation', 'worst_stop', 'cycle', 'exchanges', 'errors'].map(text => el('div', {}, el('dt', {}, t(text)), el('dd.number')));
   const kinds = el('p.hint');
   const slaves = el('div.wide');
+  const last = lastExchanges(name);
   root.append(
     el('header.drive-head', {}, el('div', {}, el('h1', { tabindex: -1 }, name), place)),
     el('dl.big', {}, ...big),
     el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('exchange_times')),
-      el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture'))), slaves, kinds));
+      el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture'))), slaves, kinds),
+    last.panel);
   update();
   return { update: names => (names.has('state') || names.has(`line ${name}`)) && update() };
 
@@ -61,6 +64,8 @@ export function line(root, name) {
     const values = [quantity(now.utilisation_percent, 0, '%'), duration(now.worst_case_stop_ms), duration(now.cycle_ms),
       quantity(now.exchanges, 0), quantity(sum(now.errors), 0)];
     values.forEach((value, index) => setText(big[index].lastChild, value));
+    big[0].title = named(t('since_opening'), quantity(now.utilisation_since_opening_percent, 0, '%'));
+    last.update();
     setText(kinds, LINE_ERRORS.filter(kind => now.errors?.[kind] !== undefined).map(kind => named(word(kind), quantity(now.errors[kind], 0))).join(' · '));
     const rows = now.slaves ?? [];
     const longest = Math.max(1, ...rows.map(row => row.answer_ms?.max ?? 0));
@@ -79,7 +84,7 @@ function slaveRow(row, longest) {
     part.style.transform = `scaleX(${(ms / longest).toFixed(3)})`;
     spread.append(part);
   }
-  const answers = row.off_line ? t('only_probed', { count: row.probes ?? 0 }) : row.exchanges ? t('answers') : t('no_answer_yet');
+  const answers = row.off_line ? t('only_probed', { count: row.probes ?? 0, next: duration(row.next_probe_ms) }) : row.exchanges ? t('answers') : t('no_answer_yet');
   return el(row.off_line ? 'tr.in-trouble' : 'tr', {},
     el('td.right', {}, row.slave),
     el('th', { scope: 'row' }, el('a', { href: `#/drive/${encodeURIComponent(row.drive)}` }, row.drive ?? MISSING)),

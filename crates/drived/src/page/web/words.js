@@ -67,6 +67,12 @@ const WORDS = {
   exception: ['exception', 'exception'],
   echo: ['own echo', 'écho propre'],
   ok: ['ok', 'ok'],
+  doubted: ['may be that to an earlier request', 'peut-être celle d’une requête antérieure'],
+  busy: ['slave busy', 'esclave occupé'],
+  broadcast: ['broadcast', 'diffusion'],
+  put_aside: ['slave not ready, goes on later', 'esclave pas prêt, suite plus tard'],
+  given_up: ['made way for a stop', 'a cédé la place à un arrêt'],
+  line_lost: ['line lost', 'ligne perdue'],
   // Access of a parameter.
   read: ['read', 'lecture'],
   read_write: ['read, write', 'lecture, écriture'],

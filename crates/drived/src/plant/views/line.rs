@@ -11,9 +11,10 @@ use serde::Serialize;
 use crate::{
     json::{microseconds, milliseconds},
     line_spec,
+    plant::usage::Usage,
 };
 
-/// A line since it was opened.
+/// A line, and what was counted on it since it was opened.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct LineView {
     pub(crate) name: String,
@@ -21,8 +22,13 @@ pub(crate) struct LineView {
     pub(crate) port: String,
     pub(crate) protocol: String,
     pub(crate) link: LineLink,
-    /// The share of the time in which it was needed.
+    /// Why its port is not there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) error: Option<String>,
+    /// The share of the last seconds in which it was needed.
     pub(crate) utilisation_percent: f64,
+    /// The same since it was opened.
+    pub(crate) utilisation_since_opening_percent: f64,
     /// The longest time from a stop to its first bit on the line, whatever happens.
     pub(crate) worst_case_stop_ms: u64,
     /// One status of every living drive, by the plan.
@@ -77,6 +83,9 @@ pub(crate) struct SlaveView {
     /// Whether it has not answered for so long that it is only probed.
     pub(crate) off_line: bool,
     pub(crate) probes: u64,
+    /// In how long it is asked next whether it is back; absent unless it is off-line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) next_probe_ms: Option<u64>,
     /// How long its answers are waited for now.
     pub(crate) timeout_ms: u64,
 }
@@ -90,7 +99,7 @@ pub(crate) struct AnswerTimes {
 }
 
 impl LineView {
-    pub(crate) fn of(name: &str, line: &Line, plan: LinePlan, drives: &[DriveHandle]) -> Self {
+    pub(crate) fn of(name: &str, line: &Line, plan: LinePlan, drives: &[DriveHandle], usage: &Usage) -> Self {
         let (config, stats) = (line.config(), line.stats());
         let slaves: Vec<SlaveView> =
             stats.slaves.iter().map(|(&slave, of)| SlaveView::of(slave, of, drives)).collect();
@@ -99,7 +108,9 @@ impl LineView {
             port: line_spec::written(&config),
             protocol: config.protocol.to_string(),
             link: if stats.opened > stats.lost { LineLink::Connected } else { LineLink::Away },
-            utilisation_percent: f64::from(stats.utilisation_ppm() / 100) / 100.0,
+            error: stats.away.clone(),
+            utilisation_percent: usage.percent(name, &stats),
+            utilisation_since_opening_percent: f64::from(stats.utilisation_ppm() / 100) / 100.0,
             worst_case_stop_ms: milliseconds(line.worst_case_stop()),
             cycle_ms: milliseconds(plan.sweep),
             exchanges: slaves.iter().map(|slave| slave.exchanges).sum(),
@@ -146,6 +157,7 @@ impl SlaveView {
             errors: LineErrors::of_slave(stats),
             off_line: stats.offline,
             probes: stats.probes,
+            next_probe_ms: stats.next_probe.map(milliseconds),
             timeout_ms: milliseconds(stats.response_timeout),
         }
     }

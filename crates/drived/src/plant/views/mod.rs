@@ -4,6 +4,7 @@
 
 mod command;
 mod drive;
+mod exchange;
 mod line;
 
 use schemars::JsonSchema;
@@ -12,6 +13,7 @@ use serde::Serialize;
 pub(crate) use self::{
     command::{CommandView, SeveralView},
     drive::{DriveView, Gist, Shown},
+    exchange::{ExchangeView, LineDetailView},
     line::LineView,
 };
 use crate::{config::Group, doors::Rights};

@@ -1,0 +1,99 @@
+//! What was on a line lately.
+
+use drive_bus::record::{Ending, Exchange};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::LineView;
+use crate::json::{microseconds, unix};
+
+/// A line with its last exchanges.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct LineDetailView {
+    #[serde(flatten)]
+    pub(crate) line: LineView,
+    /// The last exchanges, the newest last.
+    pub(crate) last: Vec<ExchangeView>,
+}
+
+/// A request and what was heard of its answer.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct ExchangeView {
+    /// When the request was sent.
+    pub(crate) time_unix_ms: u64,
+    /// Whom it was for; 0 is a broadcast.
+    pub(crate) slave: u8,
+    /// What was sent, in hexadecimal, its check included.
+    pub(crate) request: String,
+    /// What was heard until the end, its check included; empty where nothing was.
+    pub(crate) answer: String,
+    /// `ok`, or why there is no answer.
+    pub(crate) result: ResultWord,
+    /// From the beginning of the request to the end.
+    pub(crate) took_ms: f64,
+}
+
+/// How an exchange ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ResultWord {
+    Ok,
+    /// The slave refused it.
+    Exception,
+    NoAnswer,
+    /// The answer failed its check.
+    Damaged,
+    /// The answer does not fit the request.
+    Mismatched,
+    /// The answer may be that to an earlier request.
+    Doubted,
+    /// The slave was busy for as long as it was repeated.
+    Busy,
+    /// Nobody answers it.
+    Broadcast,
+    /// It goes on later: the slave is not ready.
+    PutAside,
+    /// It made way for a stop.
+    GivenUp,
+    /// The port was lost meanwhile.
+    LineLost,
+    /// Otherwise.
+    Other,
+}
+
+impl ExchangeView {
+    pub(crate) fn of(exchange: &Exchange) -> Self {
+        Self {
+            time_unix_ms: unix(exchange.began),
+            slave: exchange.slave,
+            request: hexadecimal(&exchange.request),
+            answer: hexadecimal(&exchange.answer),
+            result: ResultWord::of(exchange.ending),
+            took_ms: microseconds(exchange.took) as f64 / 1_000.0,
+        }
+    }
+}
+
+impl ResultWord {
+    const fn of(ending: Ending) -> Self {
+        match ending {
+            Ending::Answered => Self::Ok,
+            Ending::Exception => Self::Exception,
+            Ending::NoAnswer => Self::NoAnswer,
+            Ending::Damaged => Self::Damaged,
+            Ending::Mismatch => Self::Mismatched,
+            Ending::Doubted => Self::Doubted,
+            Ending::Busy => Self::Busy,
+            Ending::Unanswered => Self::Broadcast,
+            Ending::PutAside => Self::PutAside,
+            Ending::GivenUp => Self::GivenUp,
+            Ending::LineLost => Self::LineLost,
+            _ => Self::Other,
+        }
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+    bytes.join(" ")
+}
