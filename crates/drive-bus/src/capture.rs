@@ -18,7 +18,7 @@ use tokio::{
     time::Instant,
 };
 
-pub use self::pcapng::{ReadError, Writer, read};
+pub use self::pcapng::{ReadError, Recording, Writer, read};
 
 use crate::{config::LineConfig, protocol::Protocol};
 
@@ -66,6 +66,12 @@ impl Dissector {
             #[cfg(any(feature = "ascii", feature = "unitelway"))]
             _ => Self::Data,
         }
+    }
+
+    /// What a name of [`Self::name`] means, behind which there may be padding.
+    fn named(name: &[u8]) -> Option<Self> {
+        let name = name.split(|&byte| byte == 0).next()?;
+        [Self::Rtu, Self::Tcp, Self::Data].into_iter().find(|known| known.name() == name)
     }
 
     const fn name(self) -> &'static [u8] {

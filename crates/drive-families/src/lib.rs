@@ -11,6 +11,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bits;
 mod nowhere;
 mod options;
 
@@ -23,6 +24,7 @@ use drive_atv58::Atv58;
 use drive_atv312::Atv312;
 use drive_core::{Capabilities, Drive, Port, SlaveAddress, WatchdogCapability};
 
+pub use crate::bits::Bit;
 use crate::nowhere::Nowhere;
 pub use crate::options::{OPTIONS, OptionEntry, OptionError, Options};
 

@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, check, demo, families, faults, init, param, plan, poll, release, reload, reset, scan,
-        setpoint, sim, start, status, stop, token, watch,
+        audit, capture, check, demo, explain, families, faults, init, param, plan, poll, release, reload,
+        reset, scan, setpoint, sim, start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -22,6 +22,7 @@ A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; watch, reload
 One line, read:     scan, poll; init writes a configuration from a scan
+What went over it:  capture, explain
 The plant's drives: check, plan, run, token, audit, each with --config FILE
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
@@ -48,6 +49,8 @@ pub(crate) enum Command {
     Scan(scan::Args),
     Init(init::Args),
     Poll(poll::Args),
+    Capture(capture::Args),
+    Explain(explain::Args),
     Status(status::Args),
     Start(start::Args),
     Stop(stop::Args),
@@ -88,6 +91,8 @@ impl Command {
             Self::Scan(args) => scan::run(args).await,
             Self::Init(args) => init::run(args).await,
             Self::Poll(args) => poll::run(args).await,
+            Self::Capture(args) => capture::run(args).await,
+            Self::Explain(args) => explain::run(args).await,
             Self::Status(args) => status::run(args).await,
             Self::Start(args) => start::run(args).await,
             Self::Stop(args) => stop::run(args).await,

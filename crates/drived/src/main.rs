@@ -14,6 +14,7 @@ mod doors;
 mod drive_options;
 mod drive_spec;
 mod duration;
+mod explain;
 mod failure;
 mod journal;
 mod json;

@@ -117,16 +117,25 @@ pub enum ReadError {
     Broken(usize),
 }
 
+/// A capture that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Recording {
+    /// What its line spoke; [`Dissector::Data`] where no frame says.
+    pub dissector: Dissector,
+    /// Its frames, in their order.
+    pub frames: Vec<Captured>,
+}
+
 /// Reads a capture that [`Writer`] wrote. Blocks of other kinds are passed over.
 ///
 /// # Errors
 /// [`ReadError`] when it is none.
-pub fn read(file: &[u8]) -> Result<Vec<Captured>, ReadError> {
+pub fn read(file: &[u8]) -> Result<Recording, ReadError> {
     let word = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?));
     if word(0) != Some(SECTION_HEADER) || word(8) != Some(BYTE_ORDER) {
         return Err(ReadError::NotPcapng);
     }
-    let (mut frames, mut at) = (Vec::new(), 0);
+    let (mut frames, mut dissector, mut at) = (Vec::new(), Dissector::Data, 0);
     while at < file.len() {
         let broken = ReadError::Broken(at);
         let (kind, len) = (word(at).ok_or(broken)?, word(at + 4).ok_or(broken)? as usize);
@@ -135,33 +144,41 @@ pub fn read(file: &[u8]) -> Result<Vec<Captured>, ReadError> {
         }
         let body = file.get(at + 8..at + len - 4).ok_or(broken)?;
         if kind == ENHANCED_PACKET {
-            frames.push(read_packet(body).ok_or(broken)?);
+            let (frame, spoken) = read_packet(body).ok_or(broken)?;
+            frames.push(frame);
+            dissector = spoken.unwrap_or(dissector);
         }
         at += len;
     }
-    Ok(frames)
+    Ok(Recording { dissector, frames })
 }
 
-fn read_packet(body: &[u8]) -> Option<Captured> {
+/// A frame, and what the packet says that it speaks.
+fn read_packet(body: &[u8]) -> Option<(Captured, Option<Dissector>)> {
     let word = |at: usize| Some(u32::from_le_bytes(*body.get(at..)?.first_chunk()?));
     let nanos = u64::from(word(4)?) << 32 | u64::from(word(8)?);
     let len = word(12)? as usize;
     let mut packet = body.get(20..20 + len)?;
+    let mut spoken = None;
     loop {
         let (tag, rest) = packet.split_first_chunk::<2>()?;
         let (len, rest) = rest.split_first_chunk::<2>()?;
-        packet = rest.get(usize::from(u16::from_be_bytes(*len))..)?;
-        if u16::from_be_bytes(*tag) == 0 {
-            break;
+        let (value, rest) = rest.split_at_checked(usize::from(u16::from_be_bytes(*len)))?;
+        packet = rest;
+        match u16::from_be_bytes(*tag) {
+            0 => break,
+            TAG_PROTOCOL => spoken = Dissector::named(value),
+            _ => {}
         }
     }
     let options = 20 + len.next_multiple_of(4);
     let inbound = word(options)? == u32::from(OPTION_FLAGS) | 4 << 16 && word(options + 4)? & 3 == 1;
-    Some(Captured {
+    let frame = Captured {
         at: Duration::from_nanos(nanos),
         direction: if inbound { Direction::Received } else { Direction::Sent },
         bytes: Bytes::copy_from_slice(packet),
-    })
+    };
+    Some((frame, spoken))
 }
 
 #[cfg(test)]
@@ -192,7 +209,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_back() {
-        assert_eq!(read(&file()).unwrap(), frames());
+        let read = read(&file()).unwrap();
+        assert_eq!((read.dissector, read.frames), (Dissector::Rtu, frames()));
     }
 
     #[test]

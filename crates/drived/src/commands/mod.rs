@@ -1,8 +1,10 @@
 //! The subcommands, one module each.
 
 pub(crate) mod audit;
+pub(crate) mod capture;
 pub(crate) mod check;
 pub(crate) mod demo;
+pub(crate) mod explain;
 pub(crate) mod families;
 pub(crate) mod faults;
 pub(crate) mod init;

@@ -212,7 +212,7 @@ async fn a_capture_is_a_file_that_begins_as_pcapng_and_ends_in_time() {
     let response = api(&plant, "reader", ALL).oneshot(request).await.unwrap();
     assert_eq!(response.headers()["content-type"], "application/x-pcapng");
     let file = response.into_body().collect().await.unwrap().to_bytes();
-    let frames = drive_bus::capture::read(&file).unwrap();
+    let frames = drive_bus::capture::read(&file).unwrap().frames;
     assert!(!frames.is_empty());
     assert_eq!(get(&plant, "/api/v1/lines/north/capture?seconds=0").await.0, StatusCode::BAD_REQUEST);
 }
