@@ -7,6 +7,7 @@ use std::{
     time::Duration,
 };
 
+use drive_bus::Line;
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Faults, Row, Setpoint, SlaveAddress, StopMode,
     WatchdogCapability, Written,
@@ -103,6 +104,12 @@ impl DriveHandle {
     #[must_use]
     pub fn slave(&self) -> SlaveAddress {
         self.entry.slave
+    }
+
+    /// The line that it is on, and the name of that.
+    #[must_use]
+    pub fn line(&self) -> (&Arc<str>, &Line) {
+        (&self.entry.line.name, &self.entry.line.line)
     }
 
     /// What its family can do.

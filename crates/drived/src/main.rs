@@ -16,6 +16,7 @@ mod drive_spec;
 mod duration;
 mod explain;
 mod failure;
+mod gateway;
 mod journal;
 mod json;
 mod line_spec;

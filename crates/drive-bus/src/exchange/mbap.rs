@@ -13,7 +13,41 @@ use super::{Answer, Failure, Machine, Step, Stray};
 use crate::{answer, pdu::MAX_PDU};
 
 /// Transaction number, protocol number, length (2 bytes each), unit.
-pub(crate) const HEADER: usize = 7;
+pub const HEADER: usize = 7;
+
+/// What a header says, once it is one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Head {
+    /// The number by which the answer is told.
+    pub transaction: u16,
+    /// The slave behind a gateway.
+    pub unit: u8,
+    /// How many bytes of PDU follow, 1 to 253.
+    pub pdu: usize,
+}
+
+impl Head {
+    /// The header of these bytes; `None` where they are none: another protocol number, or a length that no PDU has.
+    #[must_use]
+    pub fn of(bytes: [u8; HEADER]) -> Option<Self> {
+        let [t1, t0, p1, p0, l1, l0, unit] = bytes;
+        let len = usize::from(u16::from_be_bytes([l1, l0]));
+        let is_head = (p1, p0) == (0, 0) && (2..=MAX_PDU + 1).contains(&len);
+        is_head.then(|| Self { transaction: u16::from_be_bytes([t1, t0]), unit, pdu: len - 1 })
+    }
+}
+
+/// A PDU with its header.
+#[must_use]
+pub fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Bytes {
+    let mut frame = BytesMut::with_capacity(HEADER + pdu.len());
+    frame.put_u16(transaction);
+    frame.put_u16(0);
+    frame.put_u16(pdu.len() as u16 + 1);
+    frame.put_u8(unit);
+    frame.put_slice(pdu);
+    frame.freeze()
+}
 
 /// The machine: one request at a time, because behind a gateway there is one line.
 #[derive(Debug, Default)]
@@ -46,24 +80,21 @@ impl Mbap {
     fn next_frame(&mut self) -> Option<(Option<u16>, u8, Bytes)> {
         let mut noise = 0;
         let frame = loop {
-            let Some(&[t1, t0, p1, p0, l1, l0, unit]) = self.received.first_chunk::<HEADER>() else {
-                break None;
-            };
-            let len = usize::from(u16::from_be_bytes([l1, l0]));
-            if (p1, p0) != (0, 0) || !(2..=MAX_PDU + 1).contains(&len) {
+            let Some(&header) = self.received.first_chunk::<HEADER>() else { break None };
+            let Some(Head { transaction, unit, pdu }) = Head::of(header) else {
                 // No header: go on with the next byte until one fits.
                 self.received.advance(1);
                 self.stale = self.stale.saturating_sub(1);
                 noise += 1;
                 continue;
-            }
-            if self.received.len() < HEADER - 1 + len {
+            };
+            if self.received.len() < HEADER + pdu {
                 break None;
             }
             self.received.advance(HEADER);
-            let transaction = (self.stale == 0).then(|| u16::from_be_bytes([t1, t0]));
-            self.stale = self.stale.saturating_sub(HEADER - 1 + len);
-            break Some((transaction, unit, self.received.split_to(len - 1).freeze()));
+            let transaction = (self.stale == 0).then_some(transaction);
+            self.stale = self.stale.saturating_sub(HEADER + pdu);
+            break Some((transaction, unit, self.received.split_to(pdu).freeze()));
         };
         if noise > 0 {
             self.strays.push(Stray::Noise(noise));
@@ -96,13 +127,7 @@ impl Machine for Mbap {
         self.stale = self.received.len();
         self.transaction = self.transaction.wrapping_add(1);
         self.current = Some(Current { unit: slave, request, answer_by: None, misfit: None });
-        let mut frame = BytesMut::with_capacity(HEADER + pdu.len());
-        frame.put_u16(self.transaction);
-        frame.put_u16(0);
-        frame.put_u16(pdu.len() as u16 + 1);
-        frame.put_u8(slave);
-        frame.put_slice(pdu);
-        frame.freeze()
+        frame(self.transaction, slave, pdu)
     }
 
     fn handle_sent(&mut self, _: Instant, answer_by: Instant) {

@@ -8,7 +8,7 @@ use drive_fleet::{
 };
 
 use crate::{
-    config::{Config, DrivePart, LinePart},
+    config::{Config, DrivePart, GatewayConfig, LinePart, Units},
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
@@ -48,6 +48,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             output::say_table(table)?;
         }
     }
+    for gateway in &config.gateways {
+        output::say(format_args!("gateway {}: Modbus TCP at {}", gateway.name, gateway.listen))?;
+        let mut table = Table::texts();
+        for (label, text) in meaning_of_gateway(gateway) {
+            table.row([format!("    {label}"), text]);
+        }
+        output::say_table(table)?;
+    }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(
         "as a service it needs TimeoutStopSec={}s: shutdown is {:?}, and the lines are closed after it{}",
@@ -63,6 +71,34 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         "{} is a configuration that can work; drived plan --config {0} calculates its lines",
         args.config.display()
     ))
+}
+
+/// What a gateway lets its clients do, each with its label.
+fn meaning_of_gateway(gateway: &GatewayConfig) -> Vec<(&'static str, String)> {
+    let GatewayConfig { clients, idle, patience, share, .. } = gateway;
+    let who = match gateway.allow.iter().map(ToString::to_string).collect::<Vec<_>>() {
+        all if !all.is_empty() => all.join(", "),
+        _ if gateway.listen.ip().is_loopback() => "programs of this machine".to_owned(),
+        _ => "EVERYBODY WHO REACHES IT: Modbus TCP has no login".to_owned(),
+    };
+    let units = match &gateway.units {
+        Units::OfLine(line) => format!("the addresses of the drives of line {line}"),
+        Units::Table(units) => {
+            let units: Vec<String> = units.iter().map(|(unit, drive)| format!("{unit} {drive}")).collect();
+            units.join(", ")
+        }
+    };
+    let reads = format!(
+        "as {}, together with the rest within {share} % of a line, as far as its plan leaves that",
+        gateway.reads
+    );
+    vec![
+        ("clients", format!("{clients} at once, each put out after {idle:?} without a request: {who}")),
+        ("units", units),
+        ("reads", reads),
+        ("patience", format!("{patience:?}: what has not come by then is refused")),
+        ("writes", "none: it only reads".to_owned()),
+    ]
 }
 
 /// Drives with the same settings, and the first of them.

@@ -5,6 +5,7 @@
 
 mod checks;
 mod doors;
+mod gateway;
 mod groups;
 mod place;
 mod raw;
@@ -22,6 +23,7 @@ use drive_fleet::{
 
 pub(crate) use self::{
     doors::{DoorsConfig, Http, HttpConfig, SocketConfig, TlsFiles},
+    gateway::{GatewayConfig, Units},
     groups::Group,
     place::ConfigError,
 };
@@ -58,6 +60,7 @@ pub(crate) struct Config {
     pub(crate) doors: DoorsConfig,
     pub(crate) lines: Vec<LinePart>,
     pub(crate) groups: Vec<Group>,
+    pub(crate) gateways: Vec<GatewayConfig>,
 }
 
 /// A line and its drives.
@@ -129,8 +132,10 @@ impl Config {
         let groups = groups::groups(source, &raw.groups, names)?;
         let (tokens, audit) = (raw.tokens.as_deref(), raw.audit.as_deref());
         let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
+        let gateways = gateway::gateways(source, &raw.gateways, &lines)?;
         Ok(Self {
             doors,
+            gateways,
             snapshots: checks::snapshots(source, raw.snapshots.as_ref())?.unwrap_or(SNAPSHOTS),
             shutdown: raw.shutdown.as_ref().map_or(SHUTDOWN, |time| time.get_ref().0.0),
             lines,

@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use super::{
     doors::{HttpEntry, SocketEntry},
+    gateway::GatewayEntry,
     groups::Entries,
     values::{
         AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy,
@@ -36,6 +37,8 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) groups: Entries,
     pub(super) http: Option<HttpEntry>,
+    #[serde(default)]
+    pub(super) gateways: Vec<Spanned<GatewayEntry>>,
     #[serde(default)]
     pub(super) drives: Vec<Spanned<DriveEntry>>,
 }

@@ -328,3 +328,56 @@ fn others_than_this_machine_are_let_in_by_tokens_and_by_encryption_alone() {
         read(head).unwrap();
     }
 }
+
+#[test]
+fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
+    assert!(read(FULL).unwrap().gateways.is_empty());
+    let with = |entry: &str| read(&format!("{FULL}\n[[gateways]]\n{entry}\n"));
+    let config = with("line = \"north\"").unwrap();
+    let [gateway] = &*config.gateways else { panic!("{:?}", config.gateways) };
+    assert_eq!((gateway.name.as_str(), gateway.listen.to_string()), ("gateway", "127.0.0.1:1502".to_owned()));
+    assert_eq!(gateway.units, Units::OfLine("north".to_owned()));
+    assert_eq!((gateway.share, gateway.clients, gateway.rights.stop), (30, 16, false));
+    for (entry, told) in [
+        ("", "expected line = \"NAME\", or units"),
+        ("line = \"west\"", "line: there is no line \"west\""),
+        ("line = \"north\"\nunits = { 1 = \"fan 1\" }", "expected line or units, not both"),
+        ("units = { 1 = \"fan 99\" }", "there is no drive \"fan 99\""),
+        ("units = { 256 = \"fan 1\" }", "expected a unit number, 0 to 255"),
+        (
+            "line = \"north\"\nlisten = \"0.0.0.0:502\"",
+            "listen: 0.0.0.0:502: others than this machine can reach it",
+        ),
+        ("line = \"north\"\nallow = [\"10.0.0.0/33\"]", "expected an address or a network"),
+        ("line = \"north\"\nshare = 100", "share: 100: expected 1 to 80"),
+        ("line = \"north\"\npatience = \"1ms\"", "patience: 1ms: expected 50ms to 60s"),
+        ("line = \"north\"\nreads = \"stop\"", "expected status or background"),
+        ("line = \"north\"\n[[gateways]]\nline = \"north\"", "two gateways are named \"gateway\""),
+        (
+            "line = \"north\"\n[[gateways]]\nline = \"north\"\nname = \"b\"",
+            "127.0.0.1:1502 is another gateway's too",
+        ),
+    ] {
+        let error = with(entry).expect_err(told);
+        assert!(error.contains(told), "{error}\nexpected {told}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+    with("line = \"north\"\nlisten = \"0.0.0.0:502\"\nplain = true\nallow = [\"10.0.0.0/8\", \"fd00::/8\"]")
+        .unwrap();
+}
+
+#[test]
+fn a_network_has_the_addresses_that_begin_as_it_does() {
+    for (network, inside, outside) in [
+        ("10.0.0.0/24", "10.0.0.255", "10.0.1.0"),
+        ("10.0.0.7", "10.0.0.7", "10.0.0.8"),
+        ("10.0.0.0/24", "::ffff:10.0.0.9", "fd00::1"),
+        ("fd00::/8", "fdff::1", "fe00::1"),
+    ] {
+        let network: gateway::Network = network.parse().unwrap();
+        assert!(network.has(inside.parse().unwrap()), "{network:?} {inside}");
+        assert!(!network.has(outside.parse().unwrap()), "{network:?} {outside}");
+    }
+    let all: gateway::Network = "0.0.0.0/0".parse().unwrap();
+    assert!(all.has("192.168.1.1".parse().unwrap()));
+}

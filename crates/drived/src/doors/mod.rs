@@ -59,7 +59,7 @@ pub(crate) fn usual_places() -> Vec<std::path::PathBuf> {
 }
 
 /// From one try to open a door or to accept a connection to the next, when the system has no room for it.
-const TRIED_AGAIN: Duration = Duration::from_secs(1);
+pub(crate) const TRIED_AGAIN: Duration = Duration::from_secs(1);
 
 /// The open doors.
 pub(crate) struct Doors {
@@ -190,7 +190,7 @@ async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender
 }
 
 /// Listens on an address as soon as it can be had.
-async fn listen(address: SocketAddr) -> TcpListener {
+pub(crate) async fn listen(address: SocketAddr) -> TcpListener {
     let mut told = false;
     loop {
         match TcpListener::bind(address).await {

@@ -25,6 +25,7 @@ use crate::{
         audit::{Audit, Kind, Record},
     },
     failure::Failure,
+    gateway::Gateways,
     journal, metrics, one_drive, page,
     plant::Plant,
     signals::{Ending, Wish, Wishes},
@@ -70,6 +71,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
+    let gateways = Gateways::open(&config.gateways, &plant);
     let shutdown = config.shutdown;
     let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
@@ -82,7 +84,10 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             () = ending.asked() => break,
             wish = wishes.next() => match wish {
                 Wish::Reload => drop(tokio::spawn(told(reloader.clone(), doors.audit()))),
-                Wish::State => tell_state(&fleet),
+                Wish::State => {
+                    tell_state(&fleet);
+                    gateways.tell();
+                }
                 Wish::End => {
                     tracing::warn!("the terminal is closed: the program ends by each drive's policy");
                     break;
@@ -97,6 +102,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     drop(watching);
     let stopping = notify.stopping(fleet.clone());
+    drop(gateways);
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;

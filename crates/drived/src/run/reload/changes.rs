@@ -137,6 +137,7 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         (old.shutdown != new.shutdown, "shutdown"),
         (old.doors != new.doors, "http, socket, tokens, audit"),
         (old.groups != new.groups, "groups"),
+        (old.gateways != new.gateways, "gateways"),
         (
             kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
             "response and segments of lines",

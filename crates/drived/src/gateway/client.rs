@@ -1,0 +1,123 @@
+//! One client: its frames come in, its answers go out. It may be slow, idle or hostile; nobody else notices.
+
+use std::{net::IpAddr, sync::Arc, time::Duration};
+
+use bytes::Bytes;
+use drive_bus::exchange::mbap;
+use drive_core::tokio_modbus::ExceptionCode;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
+    sync::mpsc,
+    time::{Instant, timeout},
+};
+
+use super::{
+    counters::Ended,
+    desk::Desk,
+    framing::{Frame, Frames},
+};
+
+/// Requests that wait behind the one that is carried out; one more is answered by 06h.
+const QUEUED: usize = 8;
+/// Answers that wait until the client takes them; then nothing more is read from it.
+const UNREAD: usize = 16;
+/// How long a frame that has begun may take to end, and a client to take an answer.
+const HALF_OPEN: Duration = Duration::from_secs(5);
+
+/// A request and when it came.
+struct Waiting {
+    frame: Frame,
+    arrived: Instant,
+}
+
+/// Serves a client until it goes, or has to.
+pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAddr, desk: Arc<Desk>) {
+    let (input, output) = tokio::io::split(stream);
+    let (answers, outbox) = mpsc::channel(UNREAD);
+    let (queue, waiting) = mpsc::channel(QUEUED);
+    let mut written = std::pin::pin!(write(output, outbox));
+    let mut carried = std::pin::pin!(carry_out(&desk, peer, waiting, answers.clone()));
+    let read = read(input, &desk, queue, answers);
+    let ended = tokio::select! {
+        ended = read => ended,
+        () = &mut carried => None,
+        ended = &mut written => ended,
+    };
+    if let Some(why) = ended {
+        let count = desk.counters.end(why);
+        if count.is_power_of_two() {
+            let name = &desk.config.name;
+            tracing::warn!("gateway {name}: {peer} was put out ({}), {count} of these in all", why.name());
+        }
+        return;
+    }
+    // Whoever closes his side after the last request gets its answer all the same.
+    let rest = async { tokio::join!(carried, written) };
+    let _ = timeout(desk.config.patience + HALF_OPEN, rest).await;
+}
+
+/// Reads frames until the client's end, or a reason to put it out.
+async fn read(
+    mut input: impl AsyncRead + Unpin,
+    desk: &Desk,
+    queue: mpsc::Sender<Waiting>,
+    answers: mpsc::Sender<Bytes>,
+) -> Option<Ended> {
+    let mut frames = Frames::new();
+    loop {
+        let (patience, why) = match frames.is_inside() {
+            true => (HALF_OPEN, Ended::HalfOpen),
+            false => (desk.config.idle, Ended::Idle),
+        };
+        match timeout(patience, input.read(frames.room())).await {
+            Err(_) => return Some(why),
+            Ok(Ok(0) | Err(_)) => return None,
+            Ok(Ok(bytes)) => frames.filled(bytes),
+        }
+        let arrived = Instant::now();
+        loop {
+            let frame = match frames.next() {
+                Ok(Some(frame)) => frame,
+                Ok(None) => break,
+                Err(_) => return Some(Ended::Malformed),
+            };
+            if let Err(refused) = queue.try_send(Waiting { frame, arrived }) {
+                let Frame { transaction, unit, pdu } = refused.into_inner().frame;
+                let function = pdu.first().copied().unwrap_or_default();
+                let busy = desk.refuse(function, ExceptionCode::ServerDeviceBusy);
+                // A client that is gone is noticed at the next reading.
+                let _ = answers.send(mbap::frame(transaction, unit, &busy)).await;
+            }
+            // So that whoever is free takes it before the next comes.
+            tokio::task::yield_now().await;
+        }
+    }
+}
+
+/// Carries out one request after the other.
+async fn carry_out(
+    desk: &Arc<Desk>,
+    peer: IpAddr,
+    mut waiting: mpsc::Receiver<Waiting>,
+    answers: mpsc::Sender<Bytes>,
+) {
+    while let Some(Waiting { frame: Frame { transaction, unit, pdu }, arrived }) = waiting.recv().await {
+        if let Some(answer) = desk.answer(peer, arrived, unit, &pdu).await
+            && answers.send(mbap::frame(transaction, unit, &answer)).await.is_err()
+        {
+            return;
+        }
+    }
+}
+
+/// Writes answers until nobody has one any more, or the client does not take them.
+async fn write(mut output: impl AsyncWrite + Unpin, mut outbox: mpsc::Receiver<Bytes>) -> Option<Ended> {
+    while let Some(answer) = outbox.recv().await {
+        match timeout(HALF_OPEN, output.write_all(&answer)).await {
+            Err(_) => return Some(Ended::SlowReader),
+            Ok(Err(_)) => return None,
+            Ok(Ok(())) => {}
+        }
+    }
+    None
+}

@@ -1,0 +1,118 @@
+//! Doors for the SCADA that speaks Modbus TCP: it shares the lines by their schedules.
+//!
+//! A gateway answers each request once, under its transaction and unit. Reads go over the line behind what the daemon has to
+//! do, within a [share](share::Share) of it. Nothing that a client does or leaves undone holds up a line or another client.
+
+mod client;
+pub(crate) mod counters;
+mod desk;
+mod framing;
+mod pdu;
+mod share;
+#[cfg(test)]
+mod tests;
+
+use std::{sync::Arc, time::Duration};
+
+use tokio::{
+    net::{TcpListener, TcpStream},
+    sync::{Semaphore, watch},
+    time::sleep,
+};
+
+use self::{counters::Ended, desk::Desk};
+use crate::{
+    config::GatewayConfig,
+    doors::{TRIED_AGAIN, listen},
+    plant::Plant,
+};
+
+/// The gateways of a daemon. Dropped, they are closed: nobody is let in any more, and every connection ends.
+pub(crate) struct Gateways {
+    _end: watch::Sender<()>,
+    desks: Vec<Arc<Desk>>,
+}
+
+impl Gateways {
+    /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
+    pub(crate) fn open(configs: &[GatewayConfig], plant: &Plant) -> Self {
+        let (end, ended) = watch::channel(());
+        let desks: Vec<_> = configs.iter().map(|config| Desk::new(config.clone(), plant.clone())).collect();
+        for desk in desks.iter().cloned() {
+            let mut ended = ended.clone();
+            tokio::spawn(async move {
+                let listener = tokio::select! {
+                    listener = listen(desk.config.listen) => listener,
+                    _ = ended.changed() => return,
+                };
+                tracing::info!("gateway {} is at {}", desk.config.name, desk.config.listen);
+                accept_all(&listener, &desk, ended).await;
+            });
+        }
+        Self { _end: end, desks }
+    }
+
+    /// Says in the log what each has counted.
+    pub(crate) fn tell(&self) {
+        for desk in &self.desks {
+            tracing::info!("gateway {}: {}", desk.config.name, desk.counters.in_words());
+        }
+    }
+}
+
+/// Accepts clients until the end, and serves each on a task of its own. When the system has no room for one more, such as
+/// no file descriptor, it is tried again a little later.
+async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::Receiver<()>) {
+    let places = Arc::new(Semaphore::new(desk.config.clients));
+    let (name, mut failed) = (&desk.config.name, 0_u64);
+    loop {
+        let (stream, peer) = tokio::select! {
+            accepted = listener.accept() => match accepted {
+                Ok((stream, peer)) => (stream, peer.ip().to_canonical()),
+                Err(error) => {
+                    failed += 1;
+                    if failed.is_power_of_two() {
+                        tracing::warn!("gateway {name} cannot accept a connection, {failed} in all: {error}");
+                    }
+                    sleep(TRIED_AGAIN).await;
+                    continue;
+                }
+            },
+            _ = ended.changed() => return,
+        };
+        let allow = &desk.config.allow;
+        let place = match allow.is_empty() || allow.iter().any(|network| network.has(peer)) {
+            true => Arc::clone(&places).try_acquire_owned().map_err(|_| Ended::Full),
+            false => Err(Ended::NotAllowed),
+        };
+        let place = match place {
+            Ok(place) => place,
+            Err(why) => {
+                let count = desk.counters.end(why);
+                if count.is_power_of_two() {
+                    let why = why.name();
+                    tracing::warn!("gateway {name}: {peer} was turned away ({why}), {count} of these in all");
+                }
+                continue;
+            }
+        };
+        hurry(&stream);
+        let (desk, mut ended) = (Arc::clone(desk), ended.clone());
+        tokio::spawn(async move {
+            desk.counters.enter();
+            tokio::select! {
+                () = client::serve(stream, peer, Arc::clone(&desk)) => {}
+                _ = ended.changed() => {}
+            }
+            desk.counters.leave();
+            drop(place);
+        });
+    }
+}
+
+/// An answer is written at once, and a far end that is gone is noticed. A connection that refuses is gone already.
+fn hurry(stream: &TcpStream) {
+    let _ = stream.set_nodelay(true);
+    let alive = socket2::TcpKeepalive::new().with_time(Duration::from_secs(30));
+    let _ = socket2::SockRef::from(stream).set_tcp_keepalive(&alive);
+}

@@ -1,0 +1,285 @@
+//! Clients of a gateway before a simulated plant, in virtual time.
+
+use std::{collections::BTreeMap, net::IpAddr, sync::Arc, time::Duration};
+
+use drive_bus::exchange::mbap;
+use drive_core::Class;
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream},
+    time::{Instant, timeout},
+};
+
+use super::{client, desk::Desk};
+use crate::{
+    config::{GatewayConfig, Units},
+    doors::Role,
+    plant::testing::TestPlant,
+};
+
+/// ETA, ETI and what stands behind them: BBV51701 p. 21.
+const ETA: u16 = 3_201;
+
+fn config() -> GatewayConfig {
+    GatewayConfig {
+        name: "scada".to_owned(),
+        listen: "127.0.0.1:0".parse().unwrap(),
+        allow: Vec::new(),
+        clients: 16,
+        idle: Duration::from_secs(60),
+        units: Units::OfLine("north".to_owned()),
+        patience: Duration::from_millis(900),
+        reads: Class::Status,
+        share: 30,
+        silent: false,
+        mapped_only: false,
+        rights: Role::View.rights(),
+    }
+}
+
+/// A client that checks what every answer has to have.
+struct Peer {
+    stream: DuplexStream,
+    sent: BTreeMap<u16, (u8, u8)>,
+    next: u16,
+}
+
+impl Peer {
+    fn of(desk: &Arc<Desk>) -> Self {
+        Self::at(desk, "127.0.0.1".parse().unwrap())
+    }
+
+    fn at(desk: &Arc<Desk>, address: IpAddr) -> Self {
+        let (stream, theirs) = tokio::io::duplex(4_096);
+        tokio::spawn(client::serve(theirs, address, Arc::clone(desk)));
+        Self { stream, sent: BTreeMap::new(), next: 0x1501 }
+    }
+
+    async fn send(&mut self, unit: u8, pdu: &[u8]) -> u16 {
+        let transaction = self.next;
+        self.next += 1;
+        self.sent.insert(transaction, (unit, pdu[0]));
+        self.stream.write_all(&mbap::frame(transaction, unit, pdu)).await.unwrap();
+        transaction
+    }
+
+    /// The next answer, with the transaction that it answers: one that was sent and not answered yet, by its unit and its
+    /// function.
+    async fn answer(&mut self) -> (u16, Vec<u8>) {
+        let mut header = [0; mbap::HEADER];
+        self.stream.read_exact(&mut header).await.unwrap();
+        let head = mbap::Head::of(header).unwrap();
+        let mut pdu = vec![0; head.pdu];
+        self.stream.read_exact(&mut pdu).await.unwrap();
+        let asked = self.sent.remove(&head.transaction).expect("one answer for each request");
+        assert_eq!((head.unit, pdu[0] & 0x7F), asked, "transaction {:04X}h", head.transaction);
+        (head.transaction, pdu)
+    }
+
+    async fn ask(&mut self, unit: u8, pdu: &[u8]) -> Vec<u8> {
+        let transaction = self.send(unit, pdu).await;
+        let (answered, pdu) = self.answer().await;
+        assert_eq!(answered, transaction);
+        pdu
+    }
+
+    async fn is_ended(&mut self) -> bool {
+        matches!(self.stream.read(&mut [0; 1]).await, Ok(0) | Err(_))
+    }
+}
+
+fn read(address: u16, count: u16) -> Vec<u8> {
+    [&[0x03][..], &address.to_be_bytes(), &count.to_be_bytes()].concat()
+}
+
+async fn plant(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlant, Arc<Desk>) {
+    let plant = TestPlant::of(drives).await;
+    let mut config = config();
+    change(&mut config);
+    let desk = Desk::new(config, plant.plant.clone());
+    (plant, desk)
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_read_is_answered_with_what_the_drive_holds() {
+    let (plant, desk) = plant(2, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    let held = plant.machines[1].peek(ETA).unwrap();
+    let [high, low] = held.to_be_bytes();
+    assert_eq!(peer.ask(2, &read(ETA, 1)).await, [0x03, 2, high, low]);
+    let identification = peer.ask(2, &[0x2B, 0x0E, 0x01, 0x00]).await;
+    assert_eq!(identification[..2], [0x2B, 0x0E], "{identification:02X?}");
+    assert!(identification.windows(12).any(|window| window == b"TELEMECANIQU"), "{identification:02X?}");
+}
+
+/// Each exception in the case that it is for.
+#[tokio::test(start_paused = true)]
+async fn what_cannot_be_answered_is_refused_by_the_code_that_says_why() {
+    let (plant, desk) = plant(2, |config| config.mapped_only = true).await;
+    let mut peer = Peer::of(&desk);
+    assert_eq!(peer.ask(3, &read(ETA, 1)).await, [0x83, 0x0A], "nobody is behind unit 3");
+    assert_eq!(peer.ask(0, &read(ETA, 1)).await, [0x83, 0x0A], "nor behind 0 and 255 unless told");
+    assert_eq!(peer.ask(255, &read(ETA, 1)).await, [0x83, 0x0A]);
+    assert_eq!(peer.ask(1, &[0x01, 0, 0, 0, 1]).await, [0x81, 0x01], "coils");
+    assert_eq!(peer.ask(1, &read(1, 1)).await, [0x83, 0x02], "not in the map");
+    assert_eq!(peer.ask(1, &read(ETA, 126)).await, [0x83, 0x03], "more words than a frame has");
+    assert_eq!(peer.ask(1, &[0x06, 0x21, 0x35, 0, 0]).await, [0x86, 0x01], "a gateway that only reads");
+    plant.machines[1].mute();
+    assert_eq!(peer.ask(2, &read(ETA, 1)).await, [0x83, 0x0B], "the slave does not answer");
+    assert_eq!(peer.ask(1, &read(ETA, 1)).await[..2], [0x03, 2], "and the next is answered as before");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_slave_that_does_not_answer_may_be_told_by_silence() {
+    let (plant, desk) = plant(2, |config| config.silent = true).await;
+    let mut peer = Peer::of(&desk);
+    plant.machines[1].mute();
+    peer.send(2, &read(ETA, 1)).await;
+    let next = peer.send(1, &read(ETA, 1)).await;
+    let (answered, _) = peer.answer().await;
+    assert_eq!(answered, next);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_that_is_gone_is_told_by_0a_and_one_without_room_by_06() {
+    let (plant, desk) = plant(1, |config| config.share = 1).await;
+    let mut peer = Peer::of(&desk);
+    // The share of a second, and no more within the patience of the client.
+    let mut last = Vec::new();
+    for _ in 0..8 {
+        last = peer.ask(1, &read(ETA, 7)).await;
+    }
+    assert_eq!(last, [0x83, 0x06]);
+    let (name, line) = plant.plant.fleet().lines().remove(0);
+    assert_eq!(&*name, "north");
+    line.close().await;
+    tokio::time::sleep(Duration::from_secs(10)).await;
+    assert_eq!(peer.ask(1, &read(ETA, 1)).await, [0x83, 0x0A]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_request_is_carried_out_eight_wait_and_the_next_is_refused_at_once() {
+    let (plant, desk) = plant(1, |_| {}).await;
+    plant.machines[0].mute();
+    let mut peer = Peer::of(&desk);
+    // Until its slave counts as off-line each takes its time.
+    let mut all = Vec::new();
+    for count in 1..=10 {
+        all.push(peer.send(1, &read(ETA, count)).await);
+    }
+    let (refused, pdu) = peer.answer().await;
+    assert_eq!((refused, pdu), (all[9], vec![0x83, 0x06]));
+    for transaction in &all[..9] {
+        let (answered, pdu) = peer.answer().await;
+        assert_eq!(answered, *transaction, "in their order");
+        assert!([0x06, 0x0B].contains(&pdu[1]), "{pdu:02X?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn equal_reads_of_many_clients_are_one_exchange() {
+    let (plant, desk) = plant(1, |_| {}).await;
+    let mut peers: Vec<Peer> = (0..8).map(|_| Peer::of(&desk)).collect();
+    for peer in &mut peers {
+        peer.send(1, &read(ETA, 3)).await;
+    }
+    for peer in &mut peers {
+        assert_eq!(peer.answer().await.1[..2], [0x03, 6]);
+    }
+    assert_eq!(desk.counters.joined(), 7);
+    drop(plant);
+}
+
+/// Eight clients ask without a pause: nobody is served more often than another, the line is used no more than allowed, and
+/// the daemon asks its drives as often as it has planned.
+#[tokio::test(start_paused = true)]
+async fn many_clients_are_served_in_turn_within_the_share_and_the_daemons_polls_are_not_late() {
+    // Eight wait for each other longer than the usual patience.
+    let (plant, desk) = plant(8, |config| config.patience = Duration::from_secs(5)).await;
+    let missed =
+        || plant.plant.fleet().drives().iter().map(|drive| drive.snapshot().counters.missed).sum::<u64>();
+    let before = missed();
+    let mut clients = Vec::new();
+    let end = Instant::now() + Duration::from_secs(60);
+    for unit in 1..=8_u8 {
+        let mut peer = Peer::of(&desk);
+        clients.push(tokio::spawn(async move {
+            let mut answered = 0_u32;
+            while Instant::now() < end {
+                let pdu = peer.ask(unit, &read(ETA, 7)).await;
+                answered += u32::from(pdu[0] == 0x03);
+            }
+            answered
+        }));
+    }
+    let mut answered = Vec::new();
+    for client in clients {
+        answered.push(client.await.unwrap());
+    }
+    let (least, most) = (*answered.iter().min().unwrap(), *answered.iter().max().unwrap());
+    assert!(most - least <= 1, "{answered:?}");
+    // 8 and 19 characters of 11 bits at 19200 bit/s, 3.5 of silence, and 10 ms of the drive: 27.5 ms. So 30 % of a minute
+    // are 655 exchanges, those of the second ahead 11 more, and 8 are under way at its end.
+    let all: u32 = answered.iter().sum();
+    assert!((640..=680).contains(&all), "{answered:?}");
+    assert_eq!(missed(), before);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_dead_drive_holds_up_nobody_for_longer_than_its_timeouts() {
+    let (plant, desk) = plant(3, |_| {}).await;
+    plant.machines[2].mute();
+    let mut dead = Peer::of(&desk);
+    let asks_on = tokio::spawn(async move {
+        loop {
+            assert_eq!(dead.ask(3, &read(ETA, 1)).await, [0x83, 0x0B]);
+        }
+    });
+    let mut peer = Peer::of(&desk);
+    for _ in 0..100 {
+        let asked = Instant::now();
+        assert_eq!(peer.ask(1, &read(ETA, 1)).await[..2], [0x03, 2]);
+        assert!(asked.elapsed() < Duration::from_millis(900), "{:?}", asked.elapsed());
+        tokio::time::sleep(Duration::from_millis(300)).await;
+    }
+    asks_on.abort();
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_sends_nothing_half_a_frame_or_garbage_or_reads_nothing_is_put_out() {
+    let (_plant, desk) = plant(1, |_| {}).await;
+    let ended_after = async |bytes: &[u8]| {
+        let mut peer = Peer::of(&desk);
+        peer.stream.write_all(bytes).await.unwrap();
+        let begun = Instant::now();
+        assert!(peer.is_ended().await);
+        begun.elapsed().as_secs()
+    };
+    assert_eq!(ended_after(&[]).await, 60, "idle");
+    assert_eq!(ended_after(&[0, 1, 0, 0, 0]).await, 5, "half a header");
+    assert_eq!(ended_after(&[0, 1, 0, 0, 0, 6, 1, 3]).await, 5, "half a frame");
+    assert_eq!(ended_after(&[0, 1, 0, 1, 0, 6, 1]).await, 0, "another protocol");
+    assert_eq!(ended_after(&[0xFF; 2_048]).await, 0, "garbage");
+    // It asks on and on and takes no answer.
+    let mut peer = Peer::of(&desk);
+    let flood = async {
+        loop {
+            if peer.stream.write_all(&mbap::frame(1, 1, &read(ETA, 1))).await.is_err() {
+                return;
+            }
+        }
+    };
+    timeout(Duration::from_secs(60), flood).await.expect("it is put out");
+    let ended: Vec<(&str, u64)> =
+        desk.counters.counts().ended.into_iter().map(|(why, count)| (why.name(), count)).collect();
+    assert_eq!(ended, [("idle", 1), ("half_open", 2), ("malformed", 2), ("slow_reader", 1)]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_closes_his_side_after_his_request_gets_its_answer() {
+    let (_plant, desk) = plant(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    peer.send(1, &read(ETA, 1)).await;
+    peer.stream.shutdown().await.unwrap();
+    assert_eq!(peer.answer().await.1[..2], [0x03, 2]);
+    assert!(peer.is_ended().await);
+}
