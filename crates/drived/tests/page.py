@@ -72,7 +72,12 @@ def stop_all(page, url):
     counts = [int(count) for count in account.locator("[data-count]").all_text_contents()]
     assert sum(counts) == 10, counts
     page.locator("nav a").last.click()
-    expect(page.locator("table.events")).to_contain_text("anonymous")
+    commands = page.locator("table.events tbody tr", has_text="anonymous")
+    expect(commands).to_have_count(1)
+    # Who opens the page afterwards is told of it too.
+    page.reload()
+    expect(commands).to_have_count(1)
+    expect(page.locator("#alarms")).to_be_empty()
 
 
 def phone(page, url):

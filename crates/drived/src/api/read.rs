@@ -53,6 +53,10 @@ pub(super) async fn line(
         .ok_or_else(|| Problem::not_found(format!("there is no line {name:?}")))
 }
 
+pub(super) async fn recent(State(plant): State<Plant>, _: Viewer) -> Response {
+    fresh(&plant.recent())
+}
+
 pub(super) fn no_drive(name: &str) -> Problem {
     Problem::not_found(format!("there is no drive {name:?}"))
 }

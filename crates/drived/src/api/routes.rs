@@ -19,6 +19,7 @@ use crate::plant::{
     Plant,
     history::HistoryView,
     parameters::{ParameterView, WrittenView},
+    recent::RecentView,
     views::{CommandView, DriveView, LineDetailView, LineView, StateView},
 };
 
@@ -215,6 +216,8 @@ fn reads() -> Vec<Route> {
         Route::get("/api/v1/events", stream::events, "What happens, as it happens")
             .with_query(SINCE)
             .answer(events),
+        Route::get("/api/v1/events/recent", read::recent, "What has happened lately")
+            .answers::<Vec<RecentView>>(200, "the last 500 commands and events, the newest last"),
         Route::get("/healthz", health::lives, "Whether the program lives")
             .answers::<health::Health>(200, "it does"),
         Route::get("/readyz", health::ready, "Whether every line makes progress")

@@ -4,6 +4,7 @@ pub(crate) mod commands;
 pub(crate) mod history;
 pub(crate) mod parameters;
 mod progress;
+pub(crate) mod recent;
 pub(crate) mod revisions;
 pub(crate) mod tally;
 #[cfg(test)]
@@ -16,7 +17,10 @@ use std::sync::Arc;
 
 use drive_bus::Line;
 use drive_fleet::{DriveHandle, Fleet};
-use tokio::{sync::Mutex, time::Instant};
+use tokio::{
+    sync::{Mutex, watch},
+    time::Instant,
+};
 
 use self::views::{DaemonView, DriveView, ExchangeView, LineDetailView, LineView, StateView};
 use self::{
@@ -24,6 +28,7 @@ use self::{
     history::{History, HistoryView},
     parameters::Words,
     progress::Progress,
+    recent::{Recent, RecentView},
     revisions::Revisions,
     tally::Tally,
     usage::Usage,
@@ -49,6 +54,7 @@ struct Inner {
     history: History,
     words: Words,
     progress: Progress,
+    recent: Recent,
     tally: Tally,
     usage: Usage,
 }
@@ -66,6 +72,7 @@ impl Plant {
             history: History::default(),
             words: Words::default(),
             progress: Progress::default(),
+            recent: Recent::default(),
             tally: Tally::default(),
             usage: Usage::default(),
         });
@@ -104,6 +111,16 @@ impl Plant {
     /// How many commands ended how.
     pub(crate) fn tally(&self) -> &Tally {
         &self.0.tally
+    }
+
+    /// Tells in the event stream whether the audit log can be written.
+    pub(crate) fn follow_audit(&self, failing: watch::Receiver<bool>) {
+        watching::follow_audit(&self.0, failing);
+    }
+
+    /// What happened lately, the newest last.
+    pub(crate) fn recent(&self) -> Vec<RecentView> {
+        self.0.recent.all()
     }
 
     pub(crate) fn lines(&self) -> Vec<LineView> {

@@ -87,8 +87,8 @@ impl Revisions {
         self.last.receiver_count()
     }
 
-    /// Adds a revision.
-    pub(crate) fn push(&self, subject: Subject, data: &impl Serialize) {
+    /// Adds a revision, and gives its number.
+    pub(crate) fn push(&self, subject: Subject, data: &impl Serialize) -> u64 {
         let data = line(data);
         let mut ring = self.ring();
         ring.last += 1;
@@ -102,6 +102,7 @@ impl Revisions {
         let last = ring.last;
         // Still under the lock, so that readers see the numbers rise.
         self.last.send_replace(last);
+        last
     }
 
     /// A reader of what comes after revision `since`; `None`: from now on.

@@ -10,6 +10,7 @@ use drive_fleet::{DriveHandle, Events, Received};
 use schemars::JsonSchema;
 use serde::Serialize;
 use tokio::{
+    sync::watch,
     task::AbortHandle,
     time::{Instant, MissedTickBehavior, interval, sleep_until, timeout},
 };
@@ -17,7 +18,7 @@ use tokio::{
 use super::{
     Inner,
     revisions::Subject,
-    views::{DriveView, Gist, LineView},
+    views::{DriveView, Gist, LineView, NoticeView},
 };
 use crate::json::unix;
 
@@ -43,6 +44,32 @@ pub(super) fn start(plant: &Arc<Inner>) {
     tokio::spawn(lines(Arc::downgrade(plant)));
 }
 
+/// Tells as an alarm that the audit log cannot be written, and when it can again.
+pub(super) fn follow_audit(plant: &Arc<Inner>, mut failing: watch::Receiver<bool>) {
+    let plant = Arc::downgrade(plant);
+    tokio::spawn(async move {
+        let mut told = false;
+        loop {
+            let is_failing = *failing.borrow_and_update();
+            if is_failing != told {
+                let Some(plant) = plant.upgrade() else { return };
+                plant.tell_notice(NoticeView::new(
+                    "audit_log",
+                    is_failing,
+                    match is_failing {
+                        true => "the audit log cannot be written: only stops are carried out",
+                        false => "the audit log is written again",
+                    },
+                ));
+                told = is_failing;
+            }
+            if failing.changed().await.is_err() {
+                return;
+            }
+        }
+    });
+}
+
 /// Watches the drives that are not watched yet: those that a reload has brought, too.
 fn watch(plant: &Arc<Inner>, watched: &mut BTreeMap<Arc<str>, AbortHandle>) {
     for (line, _) in plant.fleet.lines() {
@@ -61,7 +88,7 @@ async fn events(plant: Weak<Inner>, mut events: Events) {
         let received = events.recv().await;
         let Some(plant) = plant.upgrade() else { return };
         match received {
-            Received::Event(event) => plant.revisions.push(Subject::Event, &event),
+            Received::Event(event) => plant.tell_event(event),
             Received::Missed(_) => {}
             Received::End => return,
         }

@@ -75,7 +75,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let shutdown = config.shutdown;
     let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
-    let doors = doors.open(metrics::serve(router, plant, vec![Arc::new(reloader.clone())]));
+    let doors = doors.open(metrics::serve(router, plant.clone(), vec![Arc::new(reloader.clone())]));
+    plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let mut read = None;

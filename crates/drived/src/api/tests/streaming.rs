@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use drive_core::StopMode;
 use serde_json::json;
 
 use super::*;
@@ -135,4 +136,68 @@ async fn a_drive_of_which_nothing_changes_is_told_now_and_then_so_that_its_ages_
     }
     let took = began.elapsed();
     assert!((Duration::from_secs(15)..Duration::from_secs(30)).contains(&took), "{took:?}");
+}
+
+async fn recent(plant: &Plant) -> Vec<Value> {
+    let (status, recent) = get(plant, "/api/v1/events/recent").await;
+    assert_eq!(status, StatusCode::OK);
+    recent.as_array().unwrap().clone()
+}
+
+#[tokio::test(start_paused = true)]
+async fn whoever_comes_later_is_told_what_happened_before_the_newest_last() {
+    let plant = TestPlant::of(2).await;
+    let body = json!({"id": "run", "setpoint": {"frequency_hz": 30.0}});
+    assert_eq!(command(&plant.plant, "/api/v1/drives/pump%201/start", &body).await.0, StatusCode::OK);
+    plant.machines[1].trip(9);
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let told = recent(&plant.plant).await;
+    let at = |is_it: &dyn Fn(&Value) -> bool| told.iter().position(is_it).expect("it is told");
+    let run = at(&|told| told["kind"] == "command" && told["id"] == "run");
+    let tripped = at(&|told| told["kind"] == "event" && told["event"] == "tripped");
+    assert_eq!((&told[run]["outcome"], &told[run]["caller"]), (&"confirmed".into(), &"operator".into()));
+    assert_eq!((&told[tripped]["drive"], &told[tripped]["alarm"]), (&"pump 2".into(), &true.into()));
+    assert!(run < tripped);
+    let revision = get(&plant.plant, "/api/v1/state").await.1["revision"].as_u64().unwrap();
+    assert!(told.iter().all(|told| told["revision"].as_u64().is_some_and(|its| its <= revision)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_stands_once_among_the_events_with_its_outcome() {
+    let plant = TestPlant::of(2).await;
+    let mut stream = Stream::open(&plant.plant, "/api/v1/events", None).await;
+    let body = json!({"id": "run", "setpoint": {"frequency_hz": 30.0}});
+    assert_eq!(command(&plant.plant, "/api/v1/drives/pump%201/start", &body).await.0, StatusCode::OK);
+    assert_eq!(command(&plant.plant, "/api/v1/stop", &json!({"id": "all"})).await.0, StatusCode::OK);
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    // What somebody else in the program commands has no other way to be told.
+    let _ = plant.plant.fleet().drive("pump 2").unwrap().commanded_by("the demo").stop(StopMode::Ramp).await;
+    let (_, told) = stream.find("event", |told| told["event"] == "command").await;
+    assert_eq!(
+        told["command"]["commander"], "the demo",
+        "nothing of the operator's is told a second time: {told}"
+    );
+    let commands: Vec<Value> =
+        recent(&plant.plant).await.into_iter().filter(|told| !told["command"].is_null()).collect();
+    let known: Vec<_> = commands.iter().map(|told| (&told["kind"], told["id"].as_str())).collect();
+    let (command, event) = (Value::from("command"), Value::from("event"));
+    assert_eq!(known, [(&command, Some("run")), (&command, Some("all")), (&event, None)]);
+    assert_eq!((&commands[1]["outcome"], &commands[1]["confirmed"]), (&"confirmed".into(), &2.into()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_audit_log_that_cannot_be_written_is_an_alarm_among_the_events() {
+    let plant = TestPlant::of(1).await;
+    let mut stream = Stream::open(&plant.plant, "/api/v1/events", None).await;
+    let failing = tokio::sync::watch::Sender::new(false);
+    plant.plant.follow_audit(failing.subscribe());
+    for is_failing in [true, false] {
+        failing.send_replace(is_failing);
+        let (_, told) = stream.find("event", |told| told["event"] == "audit_log").await;
+        assert_eq!(told["alarm"], is_failing, "{told}");
+        assert!(
+            told["drive"].is_null() && told["text"].as_str().is_some_and(|text| text.contains("audit log"))
+        );
+    }
+    assert_eq!(recent(&plant.plant).await.last().unwrap()["event"], "audit_log");
 }

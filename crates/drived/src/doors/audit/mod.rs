@@ -8,7 +8,6 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, SyncSender, sync_channel},
     },
     time::SystemTime,
@@ -16,7 +15,7 @@ use std::{
 
 use drive_fleet::{Event, EventKind, Events, Received};
 use serde::Serialize;
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 
 use self::file::File;
 pub(crate) use self::verify::{Verdict, verify};
@@ -116,7 +115,7 @@ type Waiting = (Record, oneshot::Sender<Result<(), NotWritten>>);
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Audit {
     waiting: Option<SyncSender<Waiting>>,
-    failing: Arc<AtomicBool>,
+    failing: Arc<watch::Sender<bool>>,
 }
 
 impl Audit {
@@ -130,11 +129,16 @@ impl Audit {
             |error: std::io::Error| format!("the audit log {} cannot be written: {error}", path.display());
         let file = File::open(path).map_err(failed)?;
         let (waiting, records) = sync_channel(WAITING);
-        let failing = Arc::new(AtomicBool::new(false));
+        let failing = Arc::new(watch::Sender::new(false));
         let told = Arc::clone(&failing);
         // A disk may take as long as it likes: no thread of the runtime waits for it.
         std::thread::spawn(move || write_all(file, &records, &told));
         Ok(Self { waiting: Some(waiting), failing })
+    }
+
+    /// Whether it cannot be written now.
+    pub(crate) fn failing(&self) -> watch::Receiver<bool> {
+        self.failing.subscribe()
     }
 
     /// Hands a record to the disk at once. What it gives need not be waited for.
@@ -142,7 +146,7 @@ impl Audit {
         let Some(waiting) = &self.waiting else { return Written(None) };
         let (done, written) = oneshot::channel();
         // A record that finds no room drops its sender: not written.
-        if waiting.try_send((record, done)).is_err() && !self.failing.swap(true, Ordering::Relaxed) {
+        if waiting.try_send((record, done)).is_err() && !self.failing.send_replace(true) {
             tracing::error!("the audit log is not written in time: only stops are carried out");
         }
         Written(Some(written))
@@ -188,17 +192,17 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
     }
 }
 
-fn write_all(mut file: File, records: &Receiver<Waiting>, failing: &AtomicBool) {
+fn write_all(mut file: File, records: &Receiver<Waiting>, failing: &watch::Sender<bool>) {
     for (record, done) in records {
         let written = file.append(&record);
         match &written {
             Ok(()) => {
-                if failing.swap(false, Ordering::Relaxed) {
+                if failing.send_replace(false) {
                     tracing::warn!("the audit log is written again");
                 }
             }
             Err(error) => {
-                if !failing.swap(true, Ordering::Relaxed) {
+                if !failing.send_replace(true) {
                     tracing::error!(%error, "the audit log cannot be written: only stops are carried out");
                 }
             }

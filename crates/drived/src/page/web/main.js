@@ -89,8 +89,9 @@ function isKnown() {
 
 /** Says a new alarm to whoever does not see the page. */
 function tellAlarm() {
-  const newest = plant.events.find(event => event.kind === 'event' && event.alarm);
+  const newest = plant.events.find(event => event.kind === 'event' && event.alarm && event.live);
   if (!newest || newest === told) return;
   told = newest;
-  setText(place('alarms'), named(newest.drive, [word(newest.event), eventText(newest)].filter(Boolean).join(' ')));
+  const text = [word(newest.event), eventText(newest)].filter(Boolean).join(' ');
+  setText(place('alarms'), newest.drive ? named(newest.drive, text) : text);
 }

@@ -37,6 +37,7 @@ export async function start() {
     if (!problem.lacksRight) setTimeout(start, 2_000);
     return;
   }
+  readEarlier();
   endStream = follow(plant.revision, {
     news: take,
     reset: start,
@@ -106,7 +107,22 @@ function take(kind, data) {
   }
 }
 
+/** Reads what happened before the state; the stream tells what comes after it. */
+async function readEarlier() {
+  const { revision, events: known } = plant;
+  for (const event of known) event.live = false;
+  plant.events = [];
+  const recent = await read('events/recent').catch(() => []);
+  if (revision !== plant.revision) return;
+  const told = new Set(plant.events.map(event => event.id).filter(Boolean));
+  const earlier = recent.filter(event => event.revision <= revision && !told.has(event.id)).reverse();
+  const oldest = earlier.at(-1)?.time_unix_ms ?? Infinity;
+  plant.events = [...plant.events, ...earlier, ...known.filter(event => event.time_unix_ms < oldest)].slice(0, EVENTS_KEPT);
+  tell('state');
+}
+
 function keep(event) {
+  event.live = true;
   plant.events.unshift(event);
   if (plant.events.length > EVENTS_KEPT) plant.events.length = EVENTS_KEPT;
 }

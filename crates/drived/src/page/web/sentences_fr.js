@@ -34,6 +34,10 @@ export const SENTENCES_FR = {
   'the limits are in hertz, give the setpoint in hertz': 'les limites sont en hertz : donner la consigne en hertz',
   'the drive has limits: give the setpoint with the start': 'le variateur a des limites : donner la consigne avec le démarrage',
 
+  // What happens to the daemon itself.
+  'the audit log cannot be written: only stops are carried out': 'le journal d’audit ne peut pas être écrit : seuls les arrêts sont exécutés',
+  'the audit log is written again': 'le journal d’audit est de nouveau écrit',
+
   // What to do about a state of the drive.
   'switch on the supply of its power part and wait until it is ready': 'mettre sous tension sa partie puissance et attendre qu’il soit prêt',
   'wait until the motor stands': 'attendre l’arrêt du moteur',

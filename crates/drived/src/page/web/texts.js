@@ -214,7 +214,7 @@ const TABLE = {
   unknown_line: ['There is no line of that name.', 'Aucune ligne de ce nom.'],
 
   // Events.
-  events_since: ['Since this page was opened, newest first.', 'Depuis l’ouverture de cette page, les plus récents en tête.'],
+  events_since: ['Commands with their outcome and what happened to the drives, newest first.', 'Les ordres avec leur issue et ce qui est arrivé aux variateurs, les plus récents en tête.'],
   no_events: ['Nothing has happened yet.', 'Rien ne s’est encore passé.'],
   kind: ['Kind', 'Type'],
   kind_all: ['Everything', 'Tout'],

@@ -99,6 +99,7 @@ const WORDS = {
   stop_confirmed: ['Stop confirmed', 'Arrêt confirmé'],
   command: ['Command', 'Commande'],
   exit: ['Exit', 'Fin du service'],
+  audit_log: ['Audit log', 'Journal d’audit'],
 };
 
 const COMMANDS = [

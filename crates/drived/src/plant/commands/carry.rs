@@ -26,7 +26,6 @@ use crate::{
     json::{milliseconds, unix},
     plant::{
         Plant,
-        revisions::Subject,
         views::{CommandView, SeveralView, Shown},
     },
 };
@@ -139,7 +138,7 @@ impl Work {
 
     fn tell(&self, command: &Command) {
         let view = Arc::new(self.view());
-        self.0.plant.0.revisions.push(Subject::Command, &*view);
+        self.0.plant.0.tell_command(&view);
         command.send_replace(view);
     }
 

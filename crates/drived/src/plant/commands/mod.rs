@@ -135,6 +135,7 @@ impl Plant {
         if !has_right {
             return Err(Rejected::NoRight { caller: caller.name.clone(), right });
         }
+        self.0.note_commander(&caller.name);
         let fleet = self.fleet();
         let may_be_less =
             matches!(request.action, Action::Stop(_)) && !matches!(request.target, Target::Drive(_));

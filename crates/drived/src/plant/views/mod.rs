@@ -6,6 +6,7 @@ mod command;
 mod drive;
 mod exchange;
 mod line;
+mod notice;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,6 +16,7 @@ pub(crate) use self::{
     drive::{DriveView, Gist, Shown},
     exchange::{ExchangeView, LineDetailView},
     line::LineView,
+    notice::NoticeView,
 };
 use crate::{config::Group, doors::Rights};
 

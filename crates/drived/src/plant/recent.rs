@@ -1,0 +1,124 @@
+//! What happened lately, for whoever opens a page afterwards: commands with what became of them, and events.
+
+use std::{
+    collections::{BTreeSet, VecDeque},
+    sync::{Mutex, PoisonError},
+};
+
+use drive_core::Command;
+use drive_fleet::{Event, EventKind};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{
+    Inner,
+    revisions::Subject,
+    views::{CommandView, NoticeView, SeveralView},
+};
+
+/// How many are kept.
+const KEPT: usize = 500;
+
+/// The last events of a plant.
+#[derive(Default)]
+pub(super) struct Recent {
+    entries: Mutex<VecDeque<RecentView>>,
+    /// Those whose commands are told as such.
+    commanders: Mutex<BTreeSet<String>>,
+}
+
+/// Something that happened, as the event stream told it last.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(crate) struct RecentView {
+    /// By which revision.
+    pub(crate) revision: u64,
+    #[serde(flatten)]
+    pub(crate) what: Happened,
+}
+
+/// What it was.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(crate) enum Happened {
+    /// A command, without its drives where it was for several, and without what they showed: its own address has them.
+    Command(CommandView),
+    /// What happened to a drive.
+    Event(Event),
+    /// What happened to the program itself; the event stream names it `event` too.
+    Notice(NoticeView),
+}
+
+impl Recent {
+    /// The newest last.
+    pub(super) fn all(&self) -> Vec<RecentView> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    fn keep(&self, entry: RecentView) {
+        let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = entries.iter_mut().rev().find(|known| known.what.is_same_command(&entry.what));
+        if let Some(known) = known {
+            *known = entry;
+            return;
+        }
+        if entries.len() >= KEPT {
+            entries.pop_front();
+        }
+        entries.push_back(entry);
+    }
+}
+
+impl Happened {
+    fn is_same_command(&self, other: &Self) -> bool {
+        matches!((self, other), (Self::Command(one), Self::Command(two))
+            if (&one.id, one.time_unix_ms) == (&two.id, two.time_unix_ms))
+    }
+}
+
+impl Inner {
+    /// Somebody begins to command, whose commands are told by [`tell_command`](Self::tell_command).
+    pub(super) fn note_commander(&self, name: &str) {
+        let mut commanders = self.recent.commanders.lock().unwrap_or_else(PoisonError::into_inner);
+        if !commanders.contains(name) {
+            commanders.insert(name.to_owned());
+        }
+    }
+
+    /// Tells a command as it is now.
+    pub(super) fn tell_command(&self, command: &CommandView) {
+        let revision = self.revisions.push(Subject::Command, command);
+        let several = command.several.as_ref();
+        let several = several.map(|several| SeveralView { drives: Vec::new(), ..several.clone() });
+        let brief = CommandView { status: None, several, ..command.clone() };
+        self.recent.keep(RecentView { revision, what: Happened::Command(brief) });
+    }
+
+    /// Tells what happened to a drive. What came of a command that has been told as such is not told twice.
+    pub(super) fn tell_event(&self, event: Event) {
+        if !self.is_told_as_a_command(&event.kind) {
+            let revision = self.revisions.push(Subject::Event, &event);
+            self.recent.keep(RecentView { revision, what: Happened::Event(event) });
+        }
+    }
+
+    /// Tells what happened to the program itself.
+    pub(super) fn tell_notice(&self, notice: NoticeView) {
+        let revision = self.revisions.push(Subject::Event, &notice);
+        self.recent.keep(RecentView { revision, what: Happened::Notice(notice) });
+    }
+
+    fn is_told_as_a_command(&self, kind: &EventKind) -> bool {
+        let EventKind::Command { command, commander, .. } = kind else { return false };
+        let is_asked_for = matches!(
+            command,
+            Command::Start(_)
+                | Command::Stop(_)
+                | Command::Setpoint(_)
+                | Command::ResetFaults
+                | Command::Release
+                | Command::Persist
+        );
+        let commanders = self.recent.commanders.lock().unwrap_or_else(PoisonError::into_inner);
+        is_asked_for && commanders.contains(&**commander)
+    }
+}
