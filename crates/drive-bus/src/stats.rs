@@ -19,34 +19,30 @@ const OCTAVES: usize = 26;
 #[derive(Clone, PartialEq, Eq)]
 pub struct Histogram {
     first: usize,
-    buckets: Vec<u32>,
+    /// As many as there are: a line has a thousand neighbours.
+    buckets: Box<[u32]>,
     count: u64,
-    sum: Duration,
-    min: Duration,
-    max: Duration,
+    /// Nanoseconds, as the two below.
+    sum: u64,
+    min: u64,
+    max: u64,
 }
 
 impl Histogram {
     /// An empty histogram.
     #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            first: 0,
-            buckets: Vec::new(),
-            count: 0,
-            sum: Duration::ZERO,
-            min: Duration::MAX,
-            max: Duration::ZERO,
-        }
+    pub fn new() -> Self {
+        Self { first: 0, buckets: Box::default(), count: 0, sum: 0, min: u64::MAX, max: 0 }
     }
 
     /// Counts one duration.
     pub fn record(&mut self, duration: Duration) {
         self.count_in(bucket_of(duration), 1);
+        let nanos = nanos(duration);
         self.count += 1;
-        self.sum = self.sum.saturating_add(duration);
-        self.min = self.min.min(duration);
-        self.max = self.max.max(duration);
+        self.sum = self.sum.saturating_add(nanos);
+        self.min = self.min.min(nanos);
+        self.max = self.max.max(nanos);
     }
 
     /// How many were counted.
@@ -58,20 +54,19 @@ impl Histogram {
     /// The shortest, exactly; zero when nothing was counted.
     #[must_use]
     pub const fn min(&self) -> Duration {
-        if self.count == 0 { Duration::ZERO } else { self.min }
+        if self.count == 0 { Duration::ZERO } else { Duration::from_nanos(self.min) }
     }
 
     /// The longest, exactly.
     #[must_use]
     pub const fn max(&self) -> Duration {
-        self.max
+        Duration::from_nanos(self.max)
     }
 
     /// The mean; zero when nothing was counted.
     #[must_use]
     pub fn mean(&self) -> Duration {
-        let nanos = self.sum.as_nanos().checked_div(u128::from(self.count)).unwrap_or_default();
-        Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+        Duration::from_nanos(self.sum.checked_div(self.count).unwrap_or_default())
     }
 
     /// The duration that `per_mille` of 1000 do not exceed: 500 is the median, 990 is p99, 999 is p99.9. Rounded up to
@@ -83,10 +78,10 @@ impl Histogram {
         for (index, &bucket) in self.buckets.iter().enumerate() {
             seen += u64::from(bucket);
             if seen >= rank {
-                return end_of(self.first + index).min(self.max);
+                return end_of(self.first + index).min(self.max());
             }
         }
-        self.max
+        self.max()
     }
 
     /// Adds what another one counted.
@@ -106,15 +101,26 @@ impl Histogram {
         }
         let missing = self.first.saturating_sub(bucket);
         if missing > 0 {
-            self.buckets.splice(0..0, std::iter::repeat_n(0, missing));
+            self.buckets = std::iter::repeat_n(0, missing).chain(self.buckets.iter().copied()).collect();
             self.first = bucket;
         }
-        let at = bucket - self.first;
-        self.buckets.resize(self.buckets.len().max(at + 1), 0);
-        if let Some(counted) = self.buckets.get_mut(at) {
-            *counted = counted.saturating_add(times);
-        }
+        count_at(&mut self.buckets, bucket - self.first, times);
     }
+}
+
+/// Adds to a count, and makes room for it where there is none.
+fn count_at(counts: &mut Box<[u32]>, at: usize, times: u32) {
+    if at >= counts.len() {
+        let room = std::iter::repeat_n(0, at + 1 - counts.len());
+        *counts = counts.iter().copied().chain(room).collect();
+    }
+    if let Some(count) = counts.get_mut(at) {
+        *count = count.saturating_add(times);
+    }
+}
+
+fn nanos(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl Default for Histogram {
@@ -163,19 +169,16 @@ pub const BOUNDS: [Duration; 14] = {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Spread {
     /// One for each bound and one for what is longer, up to the last that is not zero: most drives need few.
-    counts: Vec<u32>,
-    sum: Duration,
+    counts: Box<[u32]>,
+    /// Nanoseconds.
+    sum: u64,
 }
 
 impl Spread {
     /// Counts one duration.
     pub fn record(&mut self, duration: Duration) {
-        let at = BOUNDS.partition_point(|bound| *bound < duration);
-        self.counts.resize(self.counts.len().max(at + 1), 0);
-        if let Some(count) = self.counts.get_mut(at) {
-            *count = count.saturating_add(1);
-        }
-        self.sum = self.sum.saturating_add(duration);
+        count_at(&mut self.counts, BOUNDS.partition_point(|bound| *bound < duration), 1);
+        self.sum = self.sum.saturating_add(nanos(duration));
     }
 
     /// How many were not longer than each of the [`BOUNDS`], and at last how many there were.
@@ -190,7 +193,7 @@ impl Spread {
     /// All of them together.
     #[must_use]
     pub const fn sum(&self) -> Duration {
-        self.sum
+        Duration::from_nanos(self.sum)
     }
 }
 
