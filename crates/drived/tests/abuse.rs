@@ -5,20 +5,10 @@ mod support;
 
 use std::{
     io::{ErrorKind, Read as _, Write as _},
-    net::{TcpListener, TcpStream},
+    net::TcpStream,
 };
 
-use support::{File, Running, Sim, path, run};
-
-/// Sends the text of a request on a connection of its own, and gives what is answered.
-fn ask(port: u16, request: &str) -> String {
-    let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
-    stream.write_all(request.as_bytes()).expect("it reads");
-    let mut answer = String::new();
-    // It may end the connection before it has read everything.
-    let _ = stream.read_to_string(&mut answer);
-    answer
-}
+use support::{File, Running, Sim, ask, free_port, path, run};
 
 /// A command as a program sends it.
 fn post(port: u16, target: &str, headers: &str, body: &str) -> String {
@@ -35,11 +25,6 @@ fn post(port: u16, target: &str, headers: &str, body: &str) -> String {
 #[track_caller]
 fn assert_status(answer: &str, status: u16) {
     assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "expected {status}: {answer}");
-}
-
-/// A port of this machine that nobody uses.
-fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("there is one").port()
 }
 
 /// 100 MB in pieces, as long as they are taken; then what is answered.

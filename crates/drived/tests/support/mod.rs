@@ -4,7 +4,8 @@
 #![allow(dead_code)]
 
 use std::{
-    io::{BufRead, BufReader, Write},
+    io::{BufRead, BufReader, Read as _, Write},
+    net::{TcpListener, TcpStream},
     path::PathBuf,
     process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio},
     sync::atomic::{AtomicU32, Ordering},
@@ -67,6 +68,42 @@ pub(crate) fn run(arguments: &[&str]) -> Ended {
 /// A path of this test alone.
 pub(crate) fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("drived-test-{}-{name}", std::process::id()))
+}
+
+/// Sends the text of a request on a connection of its own, and gives what is answered.
+pub(crate) fn ask(port: u16, request: &str) -> String {
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    stream.write_all(request.as_bytes()).expect("it reads");
+    let mut answer = String::new();
+    // It may end the connection before it has read everything.
+    let _ = stream.read_to_string(&mut answer);
+    answer
+}
+
+/// A port of this machine that nobody uses.
+pub(crate) fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("there is one").port()
+}
+
+/// Whether a program that was not written here is there, by a run of it that ends well. Where it is not the reason is
+/// printed; where `CI` is set that fails, because `.ci/run` installs them all.
+pub(crate) fn is_there(program: &str, arguments: &[&str]) -> bool {
+    let mut command = Command::new(program);
+    let status =
+        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let found = status.is_ok_and(|status| status.success());
+    let what = format!("{program} {}", arguments.join(" "));
+    assert!(found || std::env::var_os("CI").is_none(), "{what} does not work, and CI must have it");
+    if !found {
+        eprintln!("skipped: {what} does not work");
+    }
+    found
+}
+
+/// A Python that has a module, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.
+pub(crate) fn python_with(module: &str) -> Option<String> {
+    let python = std::env::var("DRIVED_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    is_there(&python, &["-c", &format!("import {module}")]).then_some(python)
 }
 
 /// A configuration of this test alone; removed when dropped.

@@ -1,0 +1,139 @@
+//! `/metrics` of a real daemon with simulated drives of all families, read by programs that were not written here.
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Write as _,
+    process::{Command, Output, Stdio},
+};
+
+use support::{File, Running, Sim, ask, free_port, is_there, python_with};
+
+/// The table that a test in the crate holds against the code.
+const DOCUMENT: &str = include_str!("../METRICS.md");
+
+/// Five families on one line, the first tripped and the second without power.
+struct Plant {
+    port: u16,
+    _daemon: Running,
+    _sim: Sim,
+    _file: File,
+}
+
+impl Plant {
+    fn start(name: &str) -> Self {
+        let drives = ["atv312@1", "atv28@2", "atv58@3", "atv21@4", "3g3ev@5"];
+        let (mut sim, port) =
+            (Sim::serve_with(name, &drives, &["--baud", "19200", "--format", "8N1"]), free_port());
+        let mut text = format!(
+            "[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.bench]\nport = \"{},19200,8N1\"\n",
+            sim.link()
+        );
+        for drive in drives {
+            text += &format!(
+                "[[drives]]\nline = \"bench\"\ndrive = \"{drive}\"\ncontrol = true\nname = '{drive} \\ \"north\"'\n"
+            );
+        }
+        let file = File::new(name, &text);
+        let mut daemon = Running::start(&["run", "--config", file.path()]);
+        for _ in drives {
+            daemon.wait_for(r#""event":"connected""#);
+        }
+        sim.say("atv312@1 trip OCF", "done");
+        daemon.wait_for(r#""event":"trip_explained""#);
+        sim.say("atv28@2 power off", "done");
+        daemon.wait_for(r#""event":"lost""#);
+        Self { port, _daemon: daemon, _sim: sim, _file: file }
+    }
+
+    fn scrape(&self, accept: &str) -> String {
+        let request = format!(
+            "GET /metrics HTTP/1.1\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n"
+        );
+        let answer = ask(self.port, &request);
+        let (head, body) = answer.split_once("\r\n\r\n").expect("an answer has a head");
+        assert!(head.starts_with("HTTP/1.1 200 "), "{answer}");
+        body.to_owned()
+    }
+}
+
+/// What a program says to a text on its stdin.
+fn said(command: &mut Command, text: &str) -> Output {
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it was there a moment ago");
+    let mut input = child.stdin.take().expect("it is piped");
+    let text = text.to_owned();
+    let writing = std::thread::spawn(move || input.write_all(text.as_bytes()));
+    let output = child.wait_with_output().expect("it ends");
+    writing.join().expect("it ends").expect("it reads its stdin");
+    output
+}
+
+/// The metrics of the document with the names of their labels.
+fn documented() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    let rows = DOCUMENT.lines().filter_map(|line| {
+        let mut cells = line.strip_prefix("| `")?.split(" | ");
+        let name = cells.next()?.trim_end_matches('`');
+        Some((name, cells.nth(1)?.split('`').skip(1).step_by(2).collect()))
+    });
+    rows.collect()
+}
+
+/// The metrics of a scrape with the names of their labels, without what belongs to a histogram.
+fn scraped(text: &str) -> BTreeMap<&str, BTreeSet<&str>> {
+    let mut all = BTreeMap::new();
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let (series, _) = line.rsplit_once(' ').expect("a sample has a value");
+        let (name, labels) = series.split_once('{').unwrap_or((series, ""));
+        let is_histogram = |name: &&str| text.contains(&format!("# TYPE {name} histogram"));
+        let name = ["_bucket", "_sum", "_count"]
+            .into_iter()
+            .find_map(|end| name.strip_suffix(end).filter(is_histogram))
+            .unwrap_or(name);
+        let labels = labels.split("=\"").filter_map(|part| part.rsplit(['{', ',', '"']).next());
+        let labels = labels.filter(|label| !label.is_empty() && *label != "le" && *label != "}");
+        all.entry(name).or_insert_with(BTreeSet::new).extend(labels);
+    }
+    all
+}
+
+#[test]
+fn programs_of_others_read_the_metrics_of_five_families() {
+    let plant = Plant::start("metrics");
+    let text = plant.scrape("text/plain");
+    let documented = documented();
+    for (name, labels) in scraped(&text) {
+        assert_eq!(documented.get(name), Some(&labels), "{name}: {text}");
+    }
+    assert!(text.contains(r#"drive="atv312@1 \\ \"north\"",code="9",mnemonic="OCF"} 1"#), "{text}");
+    assert!(text.contains(r#"drived_drive_up{line="bench",drive="atv28@2 \\ \"north\""} 0"#), "{text}");
+    if is_there("promtool", &["--version"]) {
+        let checked = said(Command::new("promtool").args(["check", "metrics"]), &text);
+        assert!(checked.status.success() && checked.stderr.is_empty(), "{checked:?}");
+    }
+    if let Some(python) = python_with("prometheus_client.openmetrics.parser") {
+        const READ: &str = "import sys\n\
+            from prometheus_client.openmetrics.parser import text_string_to_metric_families as read\n\
+            for family in read(sys.stdin.read()):\n    \
+                print(family.type, family.name, len(family.samples))\n    \
+                for sample in family.samples:\n        \
+                    if sample.name == 'drived_drive_fault': print(sample.labels, sample.value)\n";
+        let open = plant.scrape("application/openmetrics-text;version=1.0.0,text/plain;q=0.5");
+        let read = said(Command::new(python).args(["-c", READ]), &open);
+        assert!(read.status.success(), "{read:?}");
+        let read = String::from_utf8(read.stdout).expect("it is text");
+        assert!(
+            read.contains("info drived_drive 5\n") && read.contains("counter drived_drive_trips 5\n"),
+            "{read}"
+        );
+        let fault = r#"{'line': 'bench', 'drive': 'atv312@1 \\ "north"', 'code': '9', 'mnemonic': 'OCF'} 1"#;
+        assert!(read.contains(fault), "{read}");
+        assert!(read.contains("histogram drived_line_exchange_duration_seconds 85\n"), "{read}");
+    }
+}
