@@ -338,3 +338,31 @@ fn registers_and_faults_of_a_drive_are_read_and_written_through_the_daemon() {
     let reset = daemon.ask(&["reset", "pump 1"]);
     assert!(reset.assert_done().starts_with("pump 1 has no fault: the drive shows"), "{reset:?}");
 }
+
+#[test]
+fn after_a_reload_a_group_is_who_the_file_says_and_never_more() {
+    let daemon = Daemon::start("regroup", "");
+    let text = std::fs::read_to_string(daemon.file.path()).expect("it is there");
+    let other = text
+        .replace("[\"pump 1\", \"pump 2\"]", "[\"pump 1\"]")
+        .replace("[http]", "[socket]\nmode = \"600\"\n[http]");
+    std::fs::write(daemon.file.path(), other).expect("it can be written");
+    let dry = daemon.ask(&["reload", "--dry-run"]);
+    let told = dry.assert_done();
+    assert!(told.contains("groups changed") && told.contains("[socket]: from the next start on"), "{told}");
+    let reloaded = daemon.ask(&["reload"]);
+    let told = reloaded.assert_done();
+    assert!(told.contains("groups changed") && told.contains("[socket]: from the next start on"), "{told}");
+    let started = daemon.ask(&["start", "pumps", "--setpoint", "20Hz"]);
+    let told = started.assert_done();
+    assert!(told.contains("pump 1 started forward") && !told.contains("pump 2"), "{told}");
+    let other = json(&daemon.ask(&["status", "pump 2", "--json"]));
+    assert_ne!(other["status"]["state"], "running", "{other}");
+    let dry = daemon.ask(&["reload", "--dry-run"]);
+    let told = dry.assert_done();
+    assert!(
+        !told.contains("groups") && told.contains("[socket]"),
+        "what does not hold yet is said again: {told}"
+    );
+    daemon.ask(&["stop", "--all"]).assert_done();
+}

@@ -13,7 +13,7 @@ mod usage;
 pub(crate) mod views;
 mod watching;
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 
 use drive_bus::Line;
 use drive_fleet::{DriveHandle, Fleet};
@@ -44,7 +44,7 @@ pub(crate) struct Plant(Arc<Inner>);
 
 struct Inner {
     fleet: Fleet,
-    groups: Vec<Group>,
+    groups: RwLock<Vec<Group>>,
     started_unix_ms: u64,
     demo: bool,
     commands: Log,
@@ -63,7 +63,7 @@ impl Plant {
     pub(crate) fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
         let inner = Arc::new(Inner {
             fleet,
-            groups,
+            groups: RwLock::new(groups),
             started_unix_ms: unix(Instant::now()),
             demo,
             commands: Log::default(),
@@ -99,7 +99,7 @@ impl Plant {
             },
             lines: self.lines(),
             drives: self.drives(),
-            groups: self.0.groups.clone(),
+            groups: self.0.groups.read().unwrap_or_else(PoisonError::into_inner).clone(),
         }
     }
 
@@ -116,6 +116,11 @@ impl Plant {
     /// Tells in the event stream whether the audit log can be written.
     pub(crate) fn follow_audit(&self, failing: watch::Receiver<bool>) {
         watching::follow_audit(&self.0, failing);
+    }
+
+    /// The groups are these from now on.
+    pub(crate) fn set_groups(&self, groups: Vec<Group>) {
+        *self.0.groups.write().unwrap_or_else(PoisonError::into_inner) = groups;
     }
 
     /// What happened lately, the newest last.

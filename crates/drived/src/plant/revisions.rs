@@ -105,6 +105,16 @@ impl Revisions {
         last
     }
 
+    /// Lines, drives or groups are others: every reader is told to read the state again.
+    pub(crate) fn begin_anew(&self) {
+        let mut ring = self.ring();
+        ring.frames.clear();
+        ring.bytes = 0;
+        ring.last += 1;
+        let last = ring.last;
+        self.last.send_replace(last);
+    }
+
     /// A reader of what comes after revision `since`; `None`: from now on.
     pub(crate) fn reader(&self, since: Option<u64>) -> Reader {
         let last = self.last.subscribe();

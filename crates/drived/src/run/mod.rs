@@ -73,7 +73,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let gateways = Gateways::open(&config.gateways, &plant);
     let shutdown = config.shutdown;
-    let reloader = Reloader::new(fleet.clone(), notify.clone(), args.config, config);
+    let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
     let doors = doors.open(metrics::serve(router, plant.clone(), vec![Arc::new(reloader.clone())]));
     plant.follow_audit(doors.audit().failing());

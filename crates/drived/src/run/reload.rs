@@ -5,11 +5,10 @@ mod changes;
 use std::{
     path::PathBuf,
     sync::{Arc, PoisonError},
-    time::Duration,
 };
 
 use drive_bus::Line;
-use drive_fleet::{Fleet, FleetBuilder};
+use drive_fleet::{Fleet, FleetBuilder, FleetError, LineBudget};
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
@@ -20,6 +19,7 @@ use crate::{
     json::unix,
     metrics::{Id, Samples, Source},
     one_drive,
+    plant::Plant,
 };
 
 /// Reads the configuration again. Cheap to clone; one reload at a time.
@@ -27,7 +27,7 @@ use crate::{
 pub(crate) struct Reloader(Arc<Inner>);
 
 struct Inner {
-    fleet: Fleet,
+    plant: Plant,
     notify: Notify,
     file: PathBuf,
     /// What holds now.
@@ -37,9 +37,9 @@ struct Inner {
 }
 
 impl Reloader {
-    pub(super) fn new(fleet: Fleet, notify: Notify, file: PathBuf, config: Config) -> Self {
+    pub(super) fn new(plant: Plant, notify: Notify, file: PathBuf, config: Config) -> Self {
         let last = std::sync::Mutex::new((true, unix(Instant::now())));
-        Self(Arc::new(Inner { fleet, notify, file, config: Mutex::new(config), last }))
+        Self(Arc::new(Inner { plant, notify, file, config: Mutex::new(config), last }))
     }
 
     /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
@@ -50,85 +50,153 @@ impl Reloader {
     ///
     /// # Errors
     /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
-    /// whose drive was removed may turn.
+    /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
     pub(crate) async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
-        let reloaded = self.read_again(dry_run).await;
-        if !dry_run {
-            let mut last = self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
-            *last = match &reloaded {
-                Ok(_) | Err(Failure::Drive(_)) => (true, unix(Instant::now())),
-                Err(_) => (false, last.1),
-            };
-        }
-        reloaded
-    }
-
-    async fn read_again(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
         let mut config = self.0.config.lock().await;
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
         let read = tokio::task::spawn_blocking(move || Config::load_workable(&file)).await;
-        let new = read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())))?;
-        let changes = changes(&config, &new);
+        let read = read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())));
         if dry_run {
-            return Ok(changes.iter().map(|change| change.would_be(&self.0.fleet)).collect());
+            let changes = changes(&config, &read?);
+            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
         }
-        self.0.notify.reloading();
-        let done = self.carry_out(&changes, &new, config.shutdown).await;
-        self.0.notify.reloaded();
-        let alarms = done?;
-        *config = new;
-        match alarms.is_empty() {
+        let reloaded = match read {
+            Ok(new) => {
+                self.0.notify.reloading();
+                let done = self.carry_out(&mut config, new).await;
+                self.0.notify.reloaded();
+                done
+            }
+            Err(wrong) => Err(wrong),
+        };
+        let mut last = self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = match &reloaded {
+            Ok(_) => (true, unix(Instant::now())),
+            Err(_) => (false, last.1),
+        };
+        let Done { changes, turning } = reloaded?;
+        match turning.is_empty() {
             true => Ok(changes.iter().map(ToString::to_string).collect()),
-            false => Err(Failure::Drive(format!("THE MOTOR MAY TURN: {}", alarms.join("; ")))),
+            false => Err(Failure::Drive(may_turn(&turning))),
         }
     }
 
-    /// Gives who was removed and may turn.
-    async fn carry_out(
-        &self,
-        changes: &[Change],
-        new: &Config,
-        limit: Duration,
-    ) -> Result<Vec<String>, Failure> {
+    /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
+    async fn carry_out(&self, config: &mut Config, mut new: Config) -> Result<Done, Failure> {
         let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
-        let fleet = &self.0.fleet;
-        // What can fail comes first.
+        let (plant, changes) = (&self.0.plant, changes(config, &new));
+        let fleet = plant.fleet();
+        // What can fail without anything being done comes first.
         let mut lines = Vec::new();
         for part in new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name))) {
-            lines.push((part, Line::start(part.config.clone()).map_err(|error| input(&error))?));
+            let line = Line::start(part.config.clone()).map_err(|error| input(&error))?;
+            lines.push((part.name.clone(), part.budget, line));
         }
         let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
-        let actions = fleet.remove(&leaving, limit).await;
+        let actions = fleet.remove(&leaving, config.shutdown).await;
+        let turning = actions.iter().filter(|(_, action)| action.is_alarm());
+        let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
         for name in changes.iter().filter_map(Change::closed_line) {
             if let Some(line) = fleet.remove_line(name) {
                 one_drive::close(&line).await;
             }
         }
-        let added = fleet.extend(|mut builder| {
-            for (part, line) in &lines {
-                builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-            }
-            for part in &new.lines {
-                let is_added = |drive: &&DrivePart| {
-                    changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
-                };
-                builder = part
-                    .drives
-                    .iter()
-                    .filter(is_added)
-                    .fold(builder, |builder, drive| add(builder, part, drive));
-            }
-            // The file was planned as a whole.
-            builder.whatever_the_plan()
-        });
-        added.map_err(|error| input(&error))?;
-        for settings in changes.iter().filter_map(Change::settings) {
-            fleet.reconfigure(settings.clone()).map_err(|error| input(&error))?;
+        for line in &mut config.lines {
+            line.drives.retain(|drive| !leaving.contains(&&*drive.settings.name));
         }
-        let alarms = actions.iter().filter(|(_, action)| action.is_alarm());
-        Ok(alarms.map(|(name, action)| format!("{name}: {action}")).collect())
+        config.lines.retain(|line| !changes.iter().any(|change| change.closed_line() == Some(&line.name)));
+        // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
+        config.groups = std::mem::take(&mut new.groups);
+        plant.set_groups(config.groups.clone());
+        let made =
+            add_all(&fleet, &changes, &new, &lines).map(|()| settle(&fleet, config, &mut new, &changes));
+        if !changes.is_empty() {
+            plant.revisions().begin_anew();
+        }
+        let made = made.map_err(|error| (error.to_string(), halves(&changes)));
+        match made.and_then(|refused| refused.map_or(Ok(()), Err)) {
+            Ok(()) => Ok(Done { changes, turning }),
+            Err((why, half)) => {
+                let told = format!("ONLY IN PART ({why}): {}", half.join("; "));
+                let parts = (!turning.is_empty()).then(|| may_turn(&turning)).into_iter().chain([told]);
+                Err(Failure::Drive(parts.collect::<Vec<_>>().join("; ")))
+            }
+        }
     }
+}
+
+/// What a reload has done.
+struct Done {
+    changes: Vec<Change>,
+    /// Who was removed and may turn.
+    turning: Vec<String>,
+}
+
+fn may_turn(turning: &[String]) -> String {
+    format!("THE MOTOR MAY TURN: {}", turning.join("; "))
+}
+
+/// Adds lines and drives, all of them or none.
+fn add_all(
+    fleet: &Fleet,
+    changes: &[Change],
+    new: &Config,
+    lines: &[(String, LineBudget, Line)],
+) -> Result<(), FleetError> {
+    fleet.extend(|mut builder| {
+        for (name, budget, line) in lines {
+            builder = builder.line_with(&**name, line.clone(), |_| *budget);
+        }
+        for part in &new.lines {
+            let is_added = |drive: &&DrivePart| {
+                changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
+            };
+            builder =
+                part.drives.iter().filter(is_added).fold(builder, |builder, drive| add(builder, part, drive));
+        }
+        // The file was planned as a whole.
+        builder.whatever_the_plan()
+    })
+}
+
+/// Gives the drives their new settings, and makes the lines of `config` those that there are now. What holds from the next
+/// start on stays in it as it was. Gives why settings were not taken, and by whom.
+fn settle(
+    fleet: &Fleet,
+    config: &mut Config,
+    new: &mut Config,
+    changes: &[Change],
+) -> Option<(String, Vec<String>)> {
+    let mut refused: Vec<(String, FleetError)> = Vec::new();
+    for settings in changes.iter().filter_map(Change::settings) {
+        if let Err(error) = fleet.reconfigure(settings.clone()) {
+            refused.push((settings.name.clone(), error));
+        }
+    }
+    let mut before = std::mem::replace(&mut config.lines, std::mem::take(&mut new.lines));
+    for line in &mut config.lines {
+        let Some(old) = before.iter_mut().find(|old| old.name == line.name) else { continue };
+        line.budget = old.budget;
+        for drive in &mut line.drives {
+            if refused.iter().any(|(name, _)| *name == drive.settings.name)
+                && let Some(old) = old.drives.iter().find(|old| old.settings.name == drive.settings.name)
+            {
+                drive.settings = old.settings.clone();
+            }
+        }
+    }
+    let (_, why) = refused.first()?;
+    let half = |change: &Change| match change.settings() {
+        Some(settings) if refused.iter().any(|(name, _)| *name == settings.name) => change.half(),
+        _ => Some(change.to_string()),
+    };
+    Some((why.to_string(), changes.iter().filter_map(half).collect()))
+}
+
+/// What holds when lines and drives could not be added.
+fn halves(changes: &[Change]) -> Vec<String> {
+    changes.iter().filter_map(Change::half).collect()
 }
 
 impl Source for Reloader {
@@ -146,3 +214,6 @@ pub(super) fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart) -> 
         name.family.open_with(port, slave, &options.values)
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,7 +7,10 @@ mod log;
 mod outcome;
 mod settle;
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{Arc, PoisonError},
+    time::Duration,
+};
 
 use drive_core::{Direction, Setpoint, StopMode};
 use drive_fleet::Until;
@@ -17,7 +20,7 @@ pub(super) use self::log::Log;
 pub(crate) use self::outcome::OutcomeWord;
 use self::{carry::Work, log::Found};
 use super::{Plant, views::CommandView};
-use crate::doors::Caller;
+use crate::{config::Group, doors::Caller};
 
 /// How long a command may wait until it is sent, unless it says so itself, and at the longest.
 pub(crate) const LIFETIME: Duration = Duration::from_secs(1);
@@ -140,7 +143,9 @@ impl Plant {
         let may_be_less =
             matches!(request.action, Action::Stop(_)) && !matches!(request.target, Target::Drive(_));
         let mut members = Vec::new();
-        for name in self.named(&request.target)? {
+        // A reload gives no name to another drive meanwhile.
+        let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
+        for name in self.named(&groups, &request.target)? {
             match fleet.drive(&name) {
                 Some(drive) => members.push(drive.commanded_by(&caller.name)),
                 // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
@@ -148,6 +153,7 @@ impl Plant {
                 None => return Err(Rejected::NoDrive(name)),
             }
         }
+        drop(groups);
         let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
@@ -160,11 +166,11 @@ impl Plant {
     }
 
     /// The names of the drives that are meant.
-    fn named(&self, target: &Target) -> Result<Vec<String>, Rejected> {
+    fn named(&self, groups: &[Group], target: &Target) -> Result<Vec<String>, Rejected> {
         match target {
             Target::Drive(name) => Ok(vec![name.clone()]),
             Target::Group(name) => {
-                let group = self.0.groups.iter().find(|group| group.name == *name);
+                let group = groups.iter().find(|group| group.name == *name);
                 group.map(|group| group.drives.clone()).ok_or_else(|| Rejected::NoGroup(name.clone()))
             }
             Target::All => Ok(self.fleet().drives().iter().map(|drive| drive.name().to_string()).collect()),

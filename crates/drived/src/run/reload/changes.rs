@@ -21,6 +21,7 @@ pub(super) enum Change {
     DriveExchanged(String, &'static str),
     /// Its settings are others.
     DriveChanged(Box<DriveSettings>),
+    Groups,
     /// It holds from the next start on.
     Later(&'static str),
 }
@@ -59,6 +60,21 @@ impl Change {
         }
     }
 
+    /// What has become of it where nothing could be added: lines and drives that had to go are gone.
+    pub(super) fn half(&self) -> Option<String> {
+        Some(match self {
+            Self::LineAdded(name) => format!("line {name} NOT added"),
+            Self::LineChanged(name) => format!("line {name} closed and NOT opened anew"),
+            Self::DriveAdded(name) => format!("{name} NOT added"),
+            Self::DriveExchanged(name, _) => {
+                format!("{name} ended by its policy of the exit and NOT begun anew")
+            }
+            Self::DriveChanged(settings) => format!("{} goes on with its OLD settings", settings.name),
+            Self::LineRemoved(_) | Self::DriveRemoved(_) | Self::Groups => self.to_string(),
+            Self::Later(_) => return None,
+        })
+    }
+
     /// What it would be, with what the drive does now where it ends by its policy.
     pub(super) fn would_be(&self, fleet: &Fleet) -> String {
         let drive = self.removed_drive().and_then(|name| fleet.drive(name));
@@ -82,6 +98,7 @@ impl fmt::Display for Change {
                 write!(f, "{name} ended by its policy of the exit and begun anew, because {why}")
             }
             Self::DriveChanged(settings) => write!(f, "{} has other settings and goes on", settings.name),
+            Self::Groups => write!(f, "groups changed"),
             Self::Later(what) => write!(f, "{what}: from the next start on"),
         }
     }
@@ -132,11 +149,14 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         config.lines.iter().map(|line| (line.name.clone(), line.budget)).collect()
     };
     let (planned, kept) = (budgets(new), budgets(old));
+    changes.extend((old.groups != new.groups).then_some(Change::Groups));
     for (is_other, what) in [
         (old.snapshots != new.snapshots, "snapshots"),
         (old.shutdown != new.shutdown, "shutdown"),
-        (old.doors != new.doors, "http, socket, tokens, audit"),
-        (old.groups != new.groups, "groups"),
+        (old.doors.http != new.doors.http, "[http]"),
+        (old.doors.socket != new.doors.socket, "[socket]"),
+        (old.doors.tokens != new.doors.tokens, "another file of tokens"),
+        (old.doors.audit != new.doors.audit, "another audit log"),
         (old.gateways != new.gateways, "gateways"),
         (
             kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
