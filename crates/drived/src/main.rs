@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod api;
-#[allow(dead_code, unused_imports)]
+#[allow(dead_code, reason = "a Sparkplug node stands on the rest of it")]
 mod broker;
 mod cli;
 mod client;
@@ -22,6 +22,7 @@ mod json;
 mod line_spec;
 mod logging;
 mod metrics;
+mod mqtt;
 mod one_drive;
 mod output;
 mod page;

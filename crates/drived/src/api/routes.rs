@@ -9,14 +9,13 @@ use drive_core::Faults;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::{
-    capture,
-    command::{self, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
-    demo, health,
+    capture, command, demo, health,
     parameter::{self, NewValue},
     read, stream,
 };
 use crate::plant::{
     Plant,
+    commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
     history::HistoryView,
     parameters::{ParameterView, WrittenView},
     recent::RecentView,

@@ -57,6 +57,8 @@ pub(crate) struct Properties {
 pub(crate) struct Arrived {
     pub(crate) topic: String,
     pub(crate) payload: Bytes,
+    /// As it was published, and at the most as it is subscribed.
+    pub(crate) qos: Qos,
     /// It was published to be retained, whether it was kept or has come straight.
     pub(crate) retain: bool,
     /// It may have arrived before.

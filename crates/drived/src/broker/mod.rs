@@ -28,7 +28,7 @@ use tokio::{
 
 pub(crate) use self::{
     message::{Arrived, Message, Properties, Qos},
-    queue::{Counts, Kept, Lost},
+    queue::{Counts, Kept},
     tls::Secured,
 };
 use self::{queue::Queue, session::Ended};

@@ -345,6 +345,7 @@ fn arrived(publish: Publish) -> Option<Arrived> {
     Some(Arrived {
         topic: String::from_utf8(publish.topic.to_vec()).ok()?,
         payload: publish.payload,
+        qos: if publish.qos == QoS::AtMostOnce { Qos::AtMostOnce } else { Qos::AtLeastOnce },
         retain: publish.retain,
         repeated: publish.dup,
         at: Instant::now(),

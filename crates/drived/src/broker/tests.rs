@@ -114,7 +114,7 @@ async fn of_each_topic_of_state_only_the_newest_waits() {
     assert_eq!(broker.counts().waiting, 2);
     far.message("b").await;
     assert_eq!(far.published(), [("a".into(), "999".into()), ("b".into(), "999".into())]);
-    assert_eq!(broker.counts().lost, Lost::default());
+    assert_eq!(broker.counts().lost, queue::Lost::default());
 }
 
 #[tokio::test(start_paused = true)]

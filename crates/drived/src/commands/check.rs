@@ -12,6 +12,7 @@ use crate::{
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
+    mqtt::Mqtt,
     output::{self, Table},
 };
 
@@ -55,6 +56,20 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             table.row([format!("    {label}"), text]);
         }
         output::say_table(table)?;
+    }
+    if let Some(mqtt) = &config.mqtt {
+        // What it needs is read as the daemon would.
+        Mqtt::prepare(mqtt.clone())?;
+        let servers: Vec<String> = mqtt.servers.iter().map(ToString::to_string).collect();
+        let commands = match (mqtt.commands, mqtt.commanders.is_empty()) {
+            (false, _) => "nobody commands there".to_owned(),
+            (true, true) => "WHOEVER MAY PUBLISH THERE OPERATES".to_owned(),
+            (true, false) => {
+                let each = mqtt.commanders.iter().map(|(name, role)| format!("{name} ({})", role.name()));
+                format!("commands by {}", each.collect::<Vec<_>>().join(", "))
+            }
+        };
+        output::say(format_args!("mqtt: {} at {}: {commands}", mqtt.base, servers.join(", ")))?;
     }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(

@@ -7,6 +7,7 @@ mod checks;
 mod doors;
 mod gateway;
 mod groups;
+mod mqtt;
 mod place;
 mod raw;
 mod values;
@@ -25,6 +26,7 @@ pub(crate) use self::{
     doors::{DoorsConfig, Http, HttpConfig, SocketConfig, TlsFiles},
     gateway::{GatewayConfig, Units},
     groups::Group,
+    mqtt::{Address, Discovery, MqttConfig},
     place::ConfigError,
 };
 use self::{
@@ -61,6 +63,8 @@ pub(crate) struct Config {
     pub(crate) lines: Vec<LinePart>,
     pub(crate) groups: Vec<Group>,
     pub(crate) gateways: Vec<GatewayConfig>,
+    /// The broker to which everything is told; `None`: nothing is.
+    pub(crate) mqtt: Option<MqttConfig>,
 }
 
 /// A line and its drives.
@@ -130,6 +134,16 @@ impl Config {
         let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups::groups(source, &raw.groups, names)?;
+        let mqtt = raw.mqtt.as_ref().map(|entry| {
+            let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
+            let drives = drives.map(|drive| drive.settings.name.as_str()).collect();
+            let names = [
+                ("lines", lines.iter().map(|line| line.name.as_str()).collect()),
+                ("drives", drives),
+                ("groups", groups.iter().map(|group| group.name.as_str()).collect()),
+            ];
+            MqttConfig::read(source, entry, names)
+        });
         let (tokens, audit) = (raw.tokens.as_deref(), raw.audit.as_deref());
         let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
         let gateways = gateway::gateways(source, &raw.gateways, &lines)?;
@@ -140,6 +154,7 @@ impl Config {
             shutdown: raw.shutdown.as_ref().map_or(SHUTDOWN, |time| time.get_ref().0.0),
             lines,
             groups,
+            mqtt: mqtt.transpose()?,
         })
     }
 

@@ -10,6 +10,7 @@ use super::{
     doors::{HttpEntry, SocketEntry},
     gateway::GatewayEntry,
     groups::Entries,
+    mqtt::MqttEntry,
     values::{
         AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy,
         OptionValue, Parsed, PercentValue, ReactionValue, TakenPolicy, WatchdogPolicy,
@@ -37,6 +38,7 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) groups: Entries,
     pub(super) http: Option<HttpEntry>,
+    pub(super) mqtt: Option<MqttEntry>,
     #[serde(default)]
     pub(super) gateways: Vec<Spanned<GatewayEntry>>,
     #[serde(default)]

@@ -381,3 +381,57 @@ fn a_network_has_the_addresses_that_begin_as_it_does() {
     let all: gateway::Network = "0.0.0.0/0".parse().unwrap();
     assert!(all.has("192.168.1.1".parse().unwrap()));
 }
+
+const BROKER: &str = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1-2\"\nname = \"pump {}\"\n";
+
+fn with_broker(section: &str) -> Result<MqttConfig, String> {
+    read(&format!("{section}\n{BROKER}")).map(|config| config.mqtt.expect("there is a broker"))
+}
+
+#[test]
+fn without_a_section_nothing_is_told_to_a_broker_and_nobody_commands_unless_it_is_said() {
+    assert_eq!(read(BROKER).unwrap().mqtt, None);
+    let mqtt =
+        with_broker("[mqtt]\nservers = [\"mqtts://broker\", \"mqtt://[::1]:1884\"]\nbase = \"plant/north\"")
+            .unwrap();
+    let address = |host: &str, port, tls| Address { host: host.to_owned(), port, tls };
+    assert_eq!(mqtt.servers, [address("broker", 8883, true), address("::1", 1884, false)]);
+    assert_eq!((mqtt.commands, mqtt.discovery, &*mqtt.client_id), (false, Discovery::Off, "plant-north"));
+    assert_eq!((mqtt.heartbeat, mqtt.interval), (Duration::from_secs(30), Duration::from_secs(1)));
+}
+
+#[test]
+fn what_is_wrong_with_a_broker_is_told_with_its_place() {
+    let tls = "[mqtt]\nservers = [\"mqtts://broker\"]\n";
+    for (section, problem) in [
+        ("[mqtt]\nservers = []".to_owned(), "expected one at least"),
+        ("[mqtt]\nservers = [\"broker\"]".to_owned(), "expected mqtts://HOST"),
+        ("[mqtt]\nservers = [\"mqtt://broker:0\"]".to_owned(), "expected mqtts://HOST"),
+        ("[mqtt]\nservers = [\"mqtt://broker\"]".to_owned(), "would cross the network in clear"),
+        (format!("{tls}base = \"plant/+\""), "expected levels"),
+        (format!("{tls}base = \"$SYS\""), "expected levels"),
+        (format!("{tls}base = \"plant//north\""), "expected levels"),
+        (format!("{tls}client_id = \"a b\""), "expected a name"),
+        (format!("{tls}heartbeat = \"500ms\""), "expected 1s or more"),
+        (format!("{tls}password = \"file\""), "a password of nobody"),
+        (format!("{tls}discovery = \"on\""), "expected device, component or off"),
+        (format!("{tls}[mqtt.commanders]\nhmi = \"operate\""), "expected commands = true"),
+        (format!("{tls}commands = true\n[mqtt.commanders]\n\"h/i\" = \"operate\""), "a level of a topic"),
+        (format!("{tls}commands = true\n[mqtt.commanders]\nhmi = \"root\""), "unknown variant"),
+        (format!("{tls}insecure = true"), "unknown field"),
+    ] {
+        let told = with_broker(&section).expect_err(&section);
+        assert!(told.starts_with("drives.toml:") && told.contains(problem), "{section}: {told}");
+    }
+    let plain = "[mqtt]\nservers = [\"mqtt://broker\"]\nplain = true";
+    assert_eq!(with_broker(plain).unwrap().servers[0].port, 1883);
+}
+
+#[test]
+fn names_that_would_have_one_topic_are_refused() {
+    let text = format!(
+        "[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}[[drives]]\nline = \"a\"\ndrive = \"atv312@3\"\nname = \"pump/1\"\n"
+    );
+    let told = read(&text).expect_err("two names");
+    assert!(told.contains("\"pump 1\" and \"pump/1\" would have one topic"), "{told}");
+}

@@ -45,7 +45,7 @@ use self::{
 };
 pub(crate) use self::{
     rights::{Caller, Rights, Role},
-    tls::identity,
+    tls::{identity, private},
 };
 use crate::{
     config::{DoorsConfig, HttpConfig, SocketConfig},
@@ -117,6 +117,11 @@ impl Doors {
 }
 
 impl Prepared {
+    /// The audit log, which whoever else takes commands writes too.
+    pub(crate) fn audit(&self) -> Audit {
+        self.audit.clone()
+    }
+
     /// Opens the doors before a router. An address of the HTTP server that is taken, or not there yet, is tried again and
     /// again, and told once.
     pub(crate) fn open(self, router: Router) -> Doors {

@@ -65,7 +65,7 @@ pub(crate) fn identity(
 }
 
 /// Refuses a secret that everybody on this machine can read.
-fn private(file: &Path) -> Result<(), String> {
+pub(crate) fn private(file: &Path) -> Result<(), String> {
     #[cfg(unix)]
     if std::fs::metadata(file)
         .is_ok_and(|known| std::os::unix::fs::PermissionsExt::mode(&known.permissions()) & 0o007 != 0)

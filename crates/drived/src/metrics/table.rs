@@ -145,6 +145,13 @@ metrics! {
     HttpRequests: Counter, "drived_http_requests_total", ["route", "method", "code"],
         "Answers of the HTTP server and the control socket; route is the template of the path.";
 
+    MqttConnected: Gauge, "drived_mqtt_connected", [], "Whether the MQTT broker is connected; absent without one.";
+    MqttWaiting: Gauge, "drived_mqtt_queue_messages", [], "Messages that wait to be sent to the MQTT broker.";
+    MqttSent: Counter, "drived_mqtt_sent_messages_total", [], "Messages that the MQTT broker has taken.";
+    MqttArrived: Counter, "drived_mqtt_arrived_messages_total", [], "Messages of the MQTT broker that were looked at.";
+    MqttLost: Counter, "drived_mqtt_dropped_messages_total", ["reason"],
+        "Messages that were lost: no_room, expired, not_taken by the broker, or a flood of arriving ones.";
+
     ProcessCpu: Counter, "process_cpu_seconds_total", [], "User and system processor time.";
     ProcessFds: Gauge, "process_open_fds", [], "Open file descriptors.";
     ProcessMaxFds: Gauge, "process_max_fds", [], "How many file descriptors may be open.";

@@ -85,6 +85,10 @@ impl Plant {
         self.0.fleet.clone()
     }
 
+    pub(crate) fn groups(&self) -> Vec<Group> {
+        self.0.groups.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     pub(crate) fn state(&self, caller: &Caller) -> StateView {
         let now = Instant::now();
         StateView {
@@ -99,7 +103,7 @@ impl Plant {
             },
             lines: self.lines(),
             drives: self.drives(),
-            groups: self.0.groups.read().unwrap_or_else(PoisonError::into_inner).clone(),
+            groups: self.groups(),
         }
     }
 

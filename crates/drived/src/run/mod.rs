@@ -26,7 +26,9 @@ use crate::{
     },
     failure::Failure,
     gateway::Gateways,
-    journal, metrics, one_drive, page,
+    journal, metrics,
+    mqtt::Mqtt,
+    one_drive, page,
     plant::Plant,
     signals::{Ending, Wish, Wishes},
 };
@@ -61,6 +63,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
+    let mqtt = config.mqtt.clone().map(Mqtt::prepare).transpose()?;
     let mut ending = Ending::listen()?;
     let notify = Notify::start();
     let mut wishes = Wishes::listen()?;
@@ -75,7 +78,10 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let shutdown = config.shutdown;
     let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
-    let doors = doors.open(metrics::serve(router, plant.clone(), vec![Arc::new(reloader.clone())]));
+    let mut sources: Vec<Arc<dyn metrics::Source>> = vec![Arc::new(reloader.clone())];
+    let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
+    sources.extend(mqtt.iter().map(Mqtt::source));
+    let doors = doors.open(metrics::serve(router, plant.clone(), sources));
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
@@ -104,6 +110,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     drop(watching);
     let stopping = notify.stopping(fleet.clone());
     drop(gateways);
+    if let Some(mqtt) = &mqtt {
+        mqtt.closing();
+    }
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
@@ -115,6 +124,10 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         report.finish().await;
     }
     let _ = closed.await;
+    // Whoever reads along sees the motors stop first.
+    if let Some(mqtt) = mqtt {
+        mqtt.close().await;
+    }
     for (_, line) in fleet.lines() {
         one_drive::close(&line).await;
     }

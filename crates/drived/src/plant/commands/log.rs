@@ -18,7 +18,7 @@ const KEPT_FOR: Duration = Duration::from_secs(600);
 /// A command as it is told, now and later.
 pub(super) type Command = Arc<watch::Sender<Arc<CommandView>>>;
 /// The ear of somebody who waits for it.
-pub(super) type Told = watch::Receiver<Arc<CommandView>>;
+pub(crate) type Told = watch::Receiver<Arc<CommandView>>;
 
 /// The last commands.
 #[derive(Default)]

@@ -2,6 +2,7 @@
 //!
 //! A command goes on when whoever asked for it has gone. A stop never expires, and is carried out each time it arrives.
 
+mod body;
 mod carry;
 mod log;
 mod outcome;
@@ -17,7 +18,11 @@ use drive_fleet::Until;
 use tokio::time::{Instant, timeout};
 
 pub(super) use self::log::Log;
-pub(crate) use self::outcome::OutcomeWord;
+pub(crate) use self::{
+    body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    log::Told,
+    outcome::OutcomeWord,
+};
 use self::{carry::Work, log::Found};
 use super::{Plant, views::CommandView};
 use crate::{config::Group, doors::Caller};
@@ -129,7 +134,12 @@ impl Plant {
         Some(settled(told, wait).await)
     }
 
-    fn begin(&self, caller: &Caller, request: Request) -> Result<log::Told, Rejected> {
+    /// Begins a command: what the drives are asked is on its way to them when this returns. Its outcome is told, and told
+    /// anew for as long as it may still be settled.
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    pub(crate) fn begin(&self, caller: &Caller, request: Request) -> Result<Told, Rejected> {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
             Action::Save => (caller.rights.engineer, "save parameters"),
@@ -178,7 +188,7 @@ impl Plant {
     }
 }
 
-async fn settled(mut told: log::Told, wait: Duration) -> Arc<CommandView> {
+async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
     // What is not known in time is told as it is.
     let _ = timeout(wait, told.wait_for(|view| view.outcome != OutcomeWord::Pending)).await;
     Arc::clone(&told.borrow())

@@ -1,0 +1,179 @@
+//! The topics: `<base>/status`, `<base>/line/<id>`, `<base>/drive/<id>/…`, `<base>/group/<id>/…`, `<base>/all/…`.
+
+use crate::config::MqttConfig;
+
+/// What asks for something: the last levels before the commander.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verb {
+    /// JSON, as the API has it, with `action`.
+    Command,
+    /// Any payload stops; one that names a mode, by that.
+    Stop,
+    /// `forward`, `reverse` or `stop`.
+    Run,
+    /// Hertz.
+    Frequency,
+    /// Revolutions per minute.
+    Speed,
+    Reset,
+    Release,
+}
+
+impl Verb {
+    const ALL: [(Self, &'static str); 7] = [
+        (Self::Command, "command"),
+        (Self::Stop, "stop"),
+        (Self::Run, "set/run"),
+        (Self::Frequency, "set/frequency"),
+        (Self::Speed, "set/speed"),
+        (Self::Reset, "reset"),
+        (Self::Release, "release"),
+    ];
+
+    const fn levels(self) -> &'static str {
+        let mut at = 0;
+        while at < Self::ALL.len() {
+            if Self::ALL[at].0 as u8 == self as u8 {
+                return Self::ALL[at].1;
+            }
+            at += 1;
+        }
+        ""
+    }
+}
+
+/// Whom a topic means, by the id that stands in it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Meant {
+    Drive(String),
+    Group(String),
+    All,
+}
+
+/// A topic that asks for something.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Asking {
+    pub(super) meant: Meant,
+    pub(super) verb: Verb,
+    /// The last level, where it names who asks.
+    pub(super) commander: Option<String>,
+}
+
+/// The topics of a daemon.
+#[derive(Debug, Clone)]
+pub(super) struct Topics {
+    base: String,
+    prefix: String,
+}
+
+impl Topics {
+    pub(super) fn new(config: &MqttConfig) -> Self {
+        Self { base: config.base.clone(), prefix: config.discovery_prefix.clone() }
+    }
+
+    /// Whether the daemon is there.
+    pub(super) fn status(&self) -> String {
+        format!("{}/status", self.base)
+    }
+
+    pub(super) fn daemon(&self) -> String {
+        format!("{}/daemon", self.base)
+    }
+
+    pub(super) fn line(&self, name: &str) -> String {
+        format!("{}/line/{}", self.base, topic_id(name))
+    }
+
+    /// Something of a drive.
+    pub(super) fn drive(&self, name: &str, what: &str) -> String {
+        format!("{}/drive/{}/{what}", self.base, topic_id(name))
+    }
+
+    /// Where it is told what became of commands.
+    pub(super) fn outcome(&self, meant: &Meant) -> String {
+        match meant {
+            Meant::Drive(id) => format!("{}/drive/{id}/outcome", self.base),
+            Meant::Group(id) => format!("{}/group/{id}/outcome", self.base),
+            Meant::All => format!("{}/all/outcome", self.base),
+        }
+    }
+
+    /// Where somebody of this name asks for something.
+    pub(super) fn asking(&self, meant: &Meant, verb: Verb, commander: Option<&str>) -> String {
+        let base = &self.base;
+        let whom = match meant {
+            Meant::Drive(id) => format!("drive/{id}"),
+            Meant::Group(id) => format!("group/{id}"),
+            Meant::All => "all".to_owned(),
+        };
+        let commander = commander.map(|name| format!("/{name}")).unwrap_or_default();
+        format!("{base}/{whom}/{}{commander}", verb.levels())
+    }
+
+    /// What a topic asks for, and of whom; `None` where it asks for nothing.
+    pub(super) fn asked(&self, topic: &str) -> Option<Asking> {
+        let rest = topic.strip_prefix(&self.base)?.strip_prefix('/')?;
+        let (kind, rest) = rest.split_once('/')?;
+        let (meant, rest) = match kind {
+            "all" => (Meant::All, rest),
+            "drive" | "group" => {
+                let (id, rest) = rest.split_once('/')?;
+                let id = Some(id.to_owned()).filter(|id| !id.is_empty() && topic_id(id) == *id)?;
+                (if kind == "drive" { Meant::Drive(id) } else { Meant::Group(id) }, rest)
+            }
+            _ => return None,
+        };
+        Verb::ALL.into_iter().find_map(|(verb, levels)| {
+            let commander = match rest.strip_prefix(levels)? {
+                "" => None,
+                commander => Some(commander.strip_prefix('/')?.to_owned()),
+            };
+            let is_name = |name: &str| !name.is_empty() && topic_id(name) == name;
+            let named = commander.as_deref().is_none_or(is_name);
+            named.then(|| Asking { meant: meant.clone(), verb, commander })
+        })
+    }
+
+    /// The filters for every topic that may ask for something.
+    pub(super) fn command_filters(&self) -> Vec<String> {
+        let whom = ["drive/+", "group/+", "all"];
+        let what = ["command", "stop", "set", "reset", "release"];
+        let filter = |whom| what.into_iter().map(move |what| format!("{}/{whom}/{what}/#", self.base));
+        whom.into_iter().flat_map(filter).collect()
+    }
+
+    /// Where Home Assistant says that it has begun.
+    pub(super) fn birth(&self) -> String {
+        format!("{}/status", self.prefix)
+    }
+
+    /// Where Home Assistant looks for something.
+    pub(super) fn discovery(&self, levels: &str) -> String {
+        format!("{}/{levels}/config", self.prefix)
+    }
+
+    /// The id of this daemon at Home Assistant.
+    pub(super) fn node(&self) -> String {
+        topic_id(&self.base)
+    }
+
+    /// Whether an answer may go to this topic: not where it would be taken for something that this daemon tells or is
+    /// asked.
+    pub(super) fn is_foreign(&self, topic: &str) -> bool {
+        let below = |levels: &str| topic.strip_prefix(levels).is_some_and(|rest| rest.starts_with('/'));
+        let is_topic = !topic.is_empty() && topic.len() <= 1_024 && !topic.contains(['+', '#', '\0']);
+        is_topic && !topic.starts_with('$') && !below(&self.base) && !below(&self.prefix) && !below("spBv1.0")
+    }
+}
+
+/// Whether a message to this topic is a stop, whatever it says.
+pub(super) fn is_stop(topic: &str) -> bool {
+    let last = topic.rsplit('/').take(2);
+    last.into_iter().any(|level| level == "stop")
+}
+
+/// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.
+pub(crate) fn topic_id(name: &str) -> String {
+    let allowed = |character: char| character.is_ascii_alphanumeric() || character == '-' || character == '_';
+    name.chars().map(|character| if allowed(character) { character } else { '_' }).collect()
+}
