@@ -9,7 +9,7 @@ use std::{
     process::{Command, Output, Stdio},
 };
 
-use support::{File, Running, Sim, ask, free_port, is_there, python_with};
+use support::{File, Running, Sim, ask, free_port, is_there, path, python_with, run};
 
 /// The table that a test in the crate holds against the code.
 const DOCUMENT: &str = include_str!("../METRICS.md");
@@ -33,14 +33,18 @@ impl Plant {
         );
         for drive in drives {
             text += &format!(
-                "[[drives]]\nline = \"bench\"\ndrive = \"{drive}\"\ncontrol = true\nname = '{drive} \\ \"north\"'\n"
+                "[[drives]]\nline = \"bench\"\ndrive = \"{drive}\"\ncontrol = true\nalarms = {{ current = 50 }}\nname = '{drive} \\ \"north\"'\n"
             );
         }
         let file = File::new(name, &text);
-        let mut daemon = Running::start(&["run", "--config", file.path()]);
+        let socket = path(&format!("{name}.sock"));
+        let socket = socket.to_str().expect("the path is text");
+        let mut daemon = Running::start(&["run", "--config", file.path(), "--socket", socket]);
         for _ in drives {
             daemon.wait_for(r#""event":"connected""#);
         }
+        let moving = "atv58@3 \\ \"north\"";
+        run(&["start", moving, "--setpoint", "20Hz", "--socket", socket]).assert_done();
         sim.say("atv312@1 trip OCF", "done");
         daemon.wait_for(r#""event":"trip_explained""#);
         sim.say("atv28@2 power off", "done");
@@ -49,14 +53,18 @@ impl Plant {
     }
 
     fn scrape(&self, accept: &str) -> String {
-        let request = format!(
-            "GET /metrics HTTP/1.1\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n"
-        );
-        let answer = ask(self.port, &request);
-        let (head, body) = answer.split_once("\r\n\r\n").expect("an answer has a head");
-        assert!(head.starts_with("HTTP/1.1 200 "), "{answer}");
-        body.to_owned()
+        get(self.port, "/metrics", accept)
     }
+}
+
+/// What is answered to somebody who asks a server of this machine, and ends the connection.
+fn get(port: u16, path: &str, accept: &str) -> String {
+    let request =
+        format!("GET {path} HTTP/1.0\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n");
+    let answer = ask(port, &request);
+    let (head, body) = answer.split_once("\r\n\r\n").expect("an answer has a head");
+    assert!(head.lines().next().is_some_and(|first| first.ends_with("200 OK")), "{answer}");
+    body.to_owned()
 }
 
 /// What a program says to a text on its stdin.
@@ -107,6 +115,20 @@ fn scraped(text: &str) -> BTreeMap<&str, BTreeSet<&str>> {
 fn programs_of_others_read_the_metrics_of_five_families() {
     let plant = Plant::start("metrics");
     let text = plant.scrape("text/plain");
+    for (what, path) in [("alerts", "/alerts.yml"), ("dashboard", "/grafana.json")] {
+        let exported = run(&["export", what]);
+        let exported = exported.assert_done();
+        let words = exported.split(|letter: char| !letter.is_ascii_lowercase() && letter != '_');
+        // What is recorded of other metrics has a colon behind `drived`.
+        for name in words.filter(|word| word.starts_with("drived_") && !word.ends_with('_')) {
+            assert!(text.contains(&format!("\n{name}")), "nobody scrapes {name} of {what}: {text}");
+        }
+        let served = get(plant.port, path, "*/*");
+        assert_eq!(
+            exported.split_whitespace().collect::<String>(),
+            served.split_whitespace().collect::<String>()
+        );
+    }
     let documented = documented();
     for (name, labels) in scraped(&text) {
         assert_eq!(documented.get(name), Some(&labels), "{name}: {text}");
@@ -135,5 +157,26 @@ fn programs_of_others_read_the_metrics_of_five_families() {
         let fault = r#"{'line': 'bench', 'drive': 'atv312@1 \\ "north"', 'code': '9', 'mnemonic': 'OCF'} 1"#;
         assert!(read.contains(fault), "{read}");
         assert!(read.contains("histogram drived_line_exchange_duration_seconds 85\n"), "{read}");
+    }
+}
+
+#[test]
+fn every_alert_fires_where_it_should_and_nowhere_else() {
+    const RULES: &str = include_str!("../src/metrics/alerts.yml");
+    const TESTS: &str = include_str!("alerts.test.yml");
+    let alerts: Vec<&str> = RULES.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")).collect();
+    assert!(alerts.len() > 10, "{alerts:?}");
+    for alert in alerts {
+        assert!(
+            TESTS.contains(&format!("alertname: {alert}, exp_alerts: []")),
+            "{alert} is never seen silent"
+        );
+        let fires = format!("alertname: {alert}\n        exp_alerts:\n");
+        assert!(TESTS.contains(&fires), "{alert} is never seen to fire");
+    }
+    if is_there("promtool", &["--version"]) {
+        let tested = Command::new("promtool").args(["test", "rules", "tests/alerts.test.yml"]).output();
+        let tested = tested.expect("it was there a moment ago");
+        assert!(tested.status.success(), "{}", String::from_utf8_lossy(&tested.stdout));
     }
 }

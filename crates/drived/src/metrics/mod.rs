@@ -4,8 +4,11 @@
 //! already, so that a registry beside it would only have to be cleared of drives and values that are gone. A value that is
 //! not known or too old is absent. No task of a line waits for a scrape.
 
+mod dashboard;
 mod drives;
 mod lines;
+#[cfg(test)]
+mod named;
 mod negotiation;
 mod process;
 mod requests;
@@ -17,7 +20,7 @@ mod tests;
 use std::sync::Arc;
 
 use axum::{
-    Router,
+    Json, Router,
     extract::State,
     http::{
         HeaderMap, StatusCode,
@@ -29,20 +32,28 @@ use axum::{
 };
 use tokio::{sync::Mutex, time::Instant};
 
-use self::{negotiation::wanted, requests::Requests};
 pub(crate) use self::{
+    dashboard::dashboard,
     samples::{Samples, Source},
     table::Id,
 };
+use self::{negotiation::wanted, requests::Requests};
 use crate::{api::Viewer, json::unix, plant::Plant};
 
-/// A router with `/metrics` of a plant and of `sources`, and with every answer of it counted.
+/// The alert rules for Prometheus; `tests/alerts.test.yml` has each fire and not fire.
+pub(crate) const ALERTS: &str = include_str!("alerts.yml");
+
+/// A router with `/metrics`, the alert rules and the board of a plant and of `sources`, and with every answer of it counted.
 pub(crate) fn serve(router: Router, plant: Plant, sources: Vec<Arc<dyn Source>>) -> Router {
     let requests = Requests::default();
     let sources = sources.into_iter().chain([Arc::new(requests.clone()) as Arc<dyn Source>]).collect();
     let began = (unix(Instant::now()), Instant::now());
     let metrics = Arc::new(Metrics { plant, sources, began, turn: Mutex::default() });
-    let metrics = Router::new().route("/metrics", get(scrape)).with_state(metrics);
+    let metrics = Router::new()
+        .route("/metrics", get(scrape))
+        .route("/alerts.yml", get(async |_: Viewer| ([(CONTENT_TYPE, "application/yaml")], ALERTS)))
+        .route("/grafana.json", get(async |_: Viewer| Json(dashboard())))
+        .with_state(metrics);
     router.merge(metrics).layer(from_fn_with_state(requests, requests::count))
 }
 
