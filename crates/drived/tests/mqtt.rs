@@ -1,0 +1,433 @@
+//! The daemon on a real broker, mosquitto, asked and read by clients that were not written here: mosquitto's own, and
+//! Eclipse Paho. Where they are not installed the tests print why they are skipped; where `CI` is set they fail instead.
+
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    fs,
+    io::{BufRead as _, BufReader},
+    os::unix::fs::PermissionsExt as _,
+    path::{Path, PathBuf},
+    process::{Child, ChildStdout, Command, Stdio},
+};
+
+use serde_json::{Value, json};
+use support::{File, Running, Sim, free_port, is_there, path, python_with};
+
+/// Longer than anything here takes: what hangs fails.
+const PATIENCE_S: &str = "60";
+
+/// A mosquitto; killed when dropped.
+struct Mosquitto {
+    child: Child,
+    port: u16,
+    config: PathBuf,
+}
+
+impl Mosquitto {
+    /// `None` where it is not installed.
+    fn start(name: &str) -> Option<Self> {
+        Self::with(name, "allow_anonymous true")
+    }
+
+    /// The same with these lines of its configuration.
+    fn with(name: &str, more: &str) -> Option<Self> {
+        if !is_there("sh", &["-c", "command -v mosquitto mosquitto_pub mosquitto_sub"]) {
+            return None;
+        }
+        let (port, config) = (free_port(), path(&format!("{name}.mosquitto")));
+        // As whoever runs the test: its files are in a folder of his.
+        fs::write(&config, format!("user root\nlistener {port} 127.0.0.1\n{more}\n"))
+            .expect("it can be written");
+        let mut broker = Self { child: spawn(&config), port, config };
+        broker.wait();
+        Some(broker)
+    }
+
+    /// Kills it as a power cut does.
+    fn kill(&mut self) {
+        self.child.kill().expect("it runs");
+        self.child.wait().expect("it ends");
+    }
+
+    fn start_again(&mut self) {
+        self.child = spawn(&self.config);
+        self.wait();
+    }
+
+    /// Waits until it takes connections.
+    fn wait(&mut self) {
+        while std::net::TcpStream::connect(("127.0.0.1", self.port)).is_err() {
+            assert!(self.child.try_wait().expect("it can be waited for").is_none(), "mosquitto has ended");
+            std::thread::yield_now();
+        }
+    }
+
+    /// Publishes as a client of mosquitto does, over MQTT v5.
+    fn publish(&self, topic: &str, payload: &str, more: &[&str]) {
+        let port = self.port.to_string();
+        let mut command = Command::new("mosquitto_pub");
+        command.args(["-V", "5", "-p", &port, "-t", topic, "-m", payload]).args(more);
+        let output = command.output().expect("mosquitto_pub runs");
+        assert!(output.status.success(), "{output:?}");
+    }
+
+    /// Hears these topics from now on.
+    fn hear(&self, topics: &[&str]) -> Ear {
+        self.hear_as(topics, &[])
+    }
+
+    fn hear_as(&self, topics: &[&str], more: &[&str]) -> Ear {
+        let port = self.port.to_string();
+        let mut command = Command::new("mosquitto_sub");
+        command.args(["-V", "5", "-p", &port, "-q", "1", "-W", PATIENCE_S, "-F", "%r %t %p"]).args(more);
+        // It hears itself before anything else: it is subscribed then.
+        let own = format!("heard/{}", path("ear").display().to_string().replace('/', ""));
+        for topic in topics.iter().chain(&[own.as_str()]) {
+            command.args(["-t", topic]);
+        }
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("mosquitto_sub runs");
+        let lines = BufReader::new(child.stdout.take().expect("stdout is read"));
+        Ear { child, lines }
+    }
+}
+
+fn spawn(config: &Path) -> Child {
+    let mut command = Command::new("mosquitto");
+    command.args(["-c", config.to_str().expect("the path is text")]);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("mosquitto runs")
+}
+
+impl Drop for Mosquitto {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = fs::remove_file(&self.config);
+    }
+}
+
+/// A mosquitto_sub.
+struct Ear {
+    child: Child,
+    lines: BufReader<ChildStdout>,
+}
+
+impl Ear {
+    /// The next message that is as it should be: its topic, its payload as JSON or as text, and whether it was retained.
+    #[track_caller]
+    fn until(&mut self, is_it: impl Fn(&str, &Value) -> bool) -> (String, Value, bool) {
+        let mut heard = Vec::new();
+        loop {
+            let mut line = String::new();
+            self.lines.read_line(&mut line).expect("it is text");
+            assert!(!line.is_empty(), "the message did not come; heard: {heard:#?}");
+            let mut parts = line.trim_end_matches('\n').splitn(3, ' ');
+            let mut part = || parts.next().unwrap_or_default();
+            let (retained, topic, payload) = (part() == "1", part().to_owned(), part());
+            let payload = serde_json::from_str(payload).unwrap_or_else(|_| Value::from(payload));
+            if is_it(&topic, &payload) {
+                return (topic, payload, retained);
+            }
+            heard.push(line);
+        }
+    }
+
+    /// The next final outcome of the command of this id.
+    #[track_caller]
+    fn outcome(&mut self, id: &str) -> Value {
+        self.until(|_, said| {
+            said["id"] == id && said["outcome"] != "accepted" && said.get("outcome").is_some()
+        })
+        .1
+    }
+}
+
+impl Drop for Ear {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A daemon over two simulated pumps on a broker.
+struct Daemon {
+    running: Option<Running>,
+    sim: Sim,
+    file: File,
+    socket: PathBuf,
+}
+
+impl Daemon {
+    fn start(name: &str, mqtt: &str) -> Self {
+        let sim = Sim::serve(name, &["atv312@1-2"]);
+        let text = format!(
+            "[http]\nlisten = \"off\"\n[mqtt]\ncommands = true\n{mqtt}\n[defaults]\ncontrol = true\n\
+             watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\nfrequency = {{ forbidden = [[20, 22]] }}\n\
+             [lines.bench]\nport = \"{},19200,8E1\"\n\
+             [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n",
+            sim.link()
+        );
+        let mut daemon =
+            Self { running: None, sim, file: File::new(name, &text), socket: path(&format!("{name}.sock")) };
+        daemon.start_again();
+        daemon
+    }
+
+    fn on(name: &str, broker: &Mosquitto) -> Self {
+        Self::start(name, &format!("servers = [\"mqtt://127.0.0.1:{}\"]\nheartbeat = \"1s\"", broker.port))
+    }
+
+    fn start_again(&mut self) {
+        let socket = self.socket.to_str().expect("the path is text");
+        self.running = Some(Running::start(&["run", "--config", self.file.path(), "--socket", socket]));
+    }
+
+    fn log_until(&mut self, text: &str) {
+        self.running.as_mut().expect("it runs").wait_for_log(text);
+    }
+
+    /// Whether the motor of the first pump turns, as somebody sees who stands beside it.
+    fn turns(&mut self) -> bool {
+        let seen = self.sim.say("atv312@1 show", "shaft");
+        !seen.contains("shaft 0.00 Hz")
+    }
+
+    fn kill(&mut self) {
+        let mut running = self.running.take().expect("it runs");
+        running.signal("-KILL");
+        let _ = running.end();
+    }
+}
+
+/// Waits until a drive can be started.
+fn ready(ear: &mut Ear, number: u8) {
+    let topic = format!("drived/drive/pump_{number}/state");
+    ear.until(|to, said| to == topic && said["link"] == "connected" && said.get("start_refused").is_none());
+}
+
+fn start(id: &str) -> String {
+    json!({ "id": id, "action": "start", "setpoint": { "frequency_hz": 30.0 }, "expires_in_ms": 10_000 })
+        .to_string()
+}
+
+const COMMAND: &str = "drived/drive/pump_1/command";
+const STOP: &str = "drived/drive/pump_1/stop";
+
+#[test]
+fn state_is_retained_and_each_command_is_answered_with_its_outcome() {
+    let Some(broker) = Mosquitto::start("mqtt-outcomes") else { return };
+    let mut ear = broker.hear(&["drived/#", "reply/#"]);
+    let mut daemon = Daemon::on("mqtt-outcomes", &broker);
+    ready(&mut ear, 1);
+    // Who comes late is told at once.
+    let mut late = broker.hear(&["drived/status", "drived/drive/pump_1/availability"]);
+    for topic in ["drived/status", "drived/drive/pump_1/availability"] {
+        let (_, said, retained) = late.until(|to, _| to == topic);
+        assert_eq!((said, retained), ("online".into(), true), "{topic}");
+    }
+
+    let reply =
+        ["-q", "1", "-D", "publish", "response-topic", "reply/me", "-D", "publish", "correlation-data", "x"];
+    broker.publish(COMMAND, &start("a"), &reply);
+    for outcome in ["accepted", "confirmed"] {
+        let (_, said, _) = ear.until(|to, _| to == "reply/me");
+        assert_eq!((&said["id"], &said["outcome"]), (&"a".into(), &outcome.into()), "{said}");
+    }
+    assert!(daemon.turns());
+    // Refused: by a rule of motion, and because nobody can read it.
+    let forbidden = json!({ "id": "b", "action": "setpoint", "setpoint": { "frequency_hz": 21.0 } });
+    broker.publish(COMMAND, &forbidden.to_string(), &[]);
+    assert_eq!(ear.outcome("b")["reason"], "forbidden_band");
+    broker.publish(COMMAND, "garbage", &[]);
+    assert_eq!(ear.until(|_, said| said["outcome"] == "refused").1["reason"], "malformed");
+    // Superseded: the newest of three wins.
+    for (id, hertz) in [("c", 35.0), ("d", 36.0), ("e", 37.0)] {
+        let body =
+            json!({ "id": id, "action": "setpoint", "setpoint": { "frequency_hz": hertz } }).to_string();
+        broker.publish(COMMAND, &body, &[]);
+    }
+    assert_eq!(ear.outcome("e")["outcome"], "confirmed");
+    // Unknown: nobody can say whether a motor stands behind a cable that is cut, and it is settled when it is joined.
+    daemon.sim.say("atv312@1 cable cut", "done");
+    broker.publish(STOP, r#"{"id": "f"}"#, &["-q", "1"]);
+    assert_eq!(ear.outcome("f")["outcome"], "unknown");
+    // Expired: its second is over before anybody could send it.
+    let body = json!({ "id": "g", "action": "reset" }).to_string();
+    broker.publish(COMMAND, &body, &["-D", "publish", "message-expiry-interval", "1"]);
+    let told = ear.outcome("g");
+    assert!(["expired", "refused"].contains(&told["outcome"].as_str().expect("a word")), "{told}");
+    ear.until(|to, said| to == "drived/drive/pump_1/availability" && said == "offline");
+    daemon.sim.say("atv312@1 cable join", "done");
+    assert_eq!(ear.outcome("f")["outcome"], "confirmed");
+    let running = daemon.running.take().expect("it runs");
+    let (code, _) = running.interrupt();
+    assert_eq!(code, Some(0));
+    ear.until(|to, said| to == "drived/status" && said == "offline");
+}
+
+#[test]
+fn a_retained_command_is_refused_and_moves_nothing_at_the_next_start_either() {
+    let Some(broker) = Mosquitto::start("mqtt-retained") else { return };
+    let mut ear = broker.hear(&["drived/#"]);
+    let mut daemon = Daemon::on("mqtt-retained", &broker);
+    ready(&mut ear, 1);
+    broker.publish(COMMAND, &start("kept"), &["-q", "1", "-r"]);
+    let told = ear.outcome("kept");
+    assert_eq!((&told["outcome"], &told["reason"]), (&"refused".into(), &"retained".into()));
+    daemon.kill();
+    // The last will.
+    ear.until(|to, said| to == "drived/status" && said == "offline");
+    daemon.start_again();
+    ready(&mut ear, 1);
+    // What comes after the daemon has subscribed is answered; the retained one is not even sent.
+    broker.publish("drived/drive/pump_1/set/frequency", "25", &[]);
+    let told = ear.until(|to, said| to == "drived/drive/pump_1/outcome" && said["outcome"] == "confirmed").1;
+    assert_eq!(told["action"], "setpoint");
+    assert!(!daemon.turns());
+}
+
+#[test]
+fn a_broker_that_dies_in_the_middle_of_a_command_changes_nothing_but_when_its_outcome_is_heard() {
+    let Some(mut broker) = Mosquitto::start("mqtt-killed") else { return };
+    let mut ear = broker.hear(&["drived/#"]);
+    let mut daemon = Daemon::on("mqtt-killed", &broker);
+    ready(&mut ear, 1);
+    broker.publish(COMMAND, &start("a"), &["-q", "1"]);
+    assert_eq!(ear.outcome("a")["outcome"], "confirmed");
+    ear.until(|to, said| to.ends_with("pump_1/state") && said["reached"] == true);
+    broker.publish(STOP, r#"{"id": "s"}"#, &["-q", "1"]);
+    ear.until(|_, said| said["id"] == "s" && said["outcome"] == "accepted");
+    broker.kill();
+    broker.start_again();
+    let mut ear = broker.hear(&["drived/#"]);
+    assert_eq!(ear.outcome("s")["outcome"], "confirmed");
+    ear.until(|to, said| to == "drived/drive/pump_1/state" && said["status"]["state"] == "ready");
+    assert!(!daemon.turns());
+    // Replayed after the reconnect: answered, not repeated.
+    for more in [&["-q", "1"][..], &["-q", "2"]] {
+        broker.publish(COMMAND, &start("a"), more);
+        assert_eq!(ear.outcome("a")["outcome"], "confirmed");
+    }
+    assert!(!daemon.turns());
+}
+
+#[test]
+fn nothing_waits_at_the_broker_for_a_daemon_that_is_away() {
+    let Some(mut broker) =
+        Mosquitto::with("mqtt-away", "allow_anonymous true\npersistence false\nqueue_qos0_messages true")
+    else {
+        return;
+    };
+    let mut ear = broker.hear(&["drived/#"]);
+    let mut daemon = Daemon::on("mqtt-away", &broker);
+    ready(&mut ear, 1);
+    daemon.kill();
+    ear.until(|to, said| to == "drived/status" && said == "offline");
+    broker.publish(COMMAND, &start("late"), &["-q", "1"]);
+    daemon.start_again();
+    ready(&mut ear, 1);
+    broker.publish(COMMAND, r#"{"id": "now", "action": "reset"}"#, &[]);
+    let told = ear.until(|to, said| to.ends_with("/outcome") && said.get("id").is_some()).1;
+    assert_eq!(told["id"], "now", "the first that it hears of");
+    assert!(!daemon.turns());
+    // Nor does a daemon wait for its broker.
+    broker.kill();
+    let (code, _) = daemon.running.take().expect("it runs").interrupt();
+    assert_eq!(code, Some(0));
+}
+
+#[test]
+fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commanders_apart() {
+    let tls = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tls");
+    let folder = path("mqtt-tls-files");
+    fs::create_dir_all(&folder).expect("it can be made");
+    let place = |name: &str| folder.join(name).display().to_string();
+    for name in ["certificate.pem", "key.pem"] {
+        fs::copy(tls.join(name), folder.join(name)).expect("it can be copied");
+    }
+    let readme = include_str!("../README.md");
+    let list =
+        readme.split_once("```text\n# the daemon").expect("the list").1.split_once("```").expect("its end").0;
+    fs::write(place("acl"), format!("# the daemon{list}")).expect("it can be written");
+    fs::write(place("password"), "drived-secret\n").expect("it can be written");
+    fs::set_permissions(place("password"), fs::Permissions::from_mode(0o600)).expect("it is ours");
+    let mut users = Command::new("sh");
+    let (port, file) = (free_port(), place("users"));
+    let add = format!(
+        "touch {file}; for user in drived hmi panel; do mosquitto_passwd -b {file} $user $user-secret; done"
+    );
+    if !users.args(["-c", &add]).status().is_ok_and(|status| status.success()) {
+        assert!(std::env::var_os("CI").is_none(), "mosquitto_passwd works");
+        return;
+    }
+    let Some(broker) = Mosquitto::with(
+        "mqtt-tls",
+        &format!(
+            "allow_anonymous false\npassword_file {file}\nacl_file {}\nlistener {port} 127.0.0.1\ncertfile {}\nkeyfile {}",
+            place("acl"),
+            place("certificate.pem"),
+            place("key.pem")
+        ),
+    ) else {
+        return;
+    };
+    let section = |authorities: &str| {
+        format!(
+            "servers = [\"mqtts://localhost:{port}\"]\n{authorities}user = \"drived\"\npassword = \"{}\"\nheartbeat = \"1s\"\n\
+             [mqtt.commanders]\nhmi = \"operate\"\npanel = \"stop\"",
+            place("password")
+        )
+    };
+    // A broker that nobody vouches for is none.
+    let mut strange = Daemon::start("mqtt-tls-strange", &section(""));
+    strange.log_until("it is tried again");
+    drop(strange);
+
+    let mut daemon =
+        Daemon::start("mqtt-tls", &section(&format!("authorities = \"{}\"\n", place("certificate.pem"))));
+    daemon.log_until("MQTT: connected to localhost");
+    let as_hmi = ["-u", "hmi", "-P", "hmi-secret"];
+    let as_panel = ["-u", "panel", "-P", "panel-secret"];
+    let mut ear = broker.hear_as(&["drived/#"], &as_hmi);
+    ready(&mut ear, 1);
+    // The panel cannot speak for another, and by its own name it may only stop.
+    broker.publish("drived/drive/pump_1/command/hmi", &start("forged"), &as_panel);
+    broker.publish("drived/drive/pump_1/command/panel", &start("own"), &as_panel);
+    let told = ear.until(|to, _| to.ends_with("/outcome")).1;
+    assert_eq!((&told["id"], &told["reason"]), (&"own".into(), &"no_right".into()), "{told}");
+    broker.publish("drived/drive/pump_1/command/hmi", &start("right"), &as_hmi);
+    assert_eq!(ear.outcome("right")["outcome"], "confirmed");
+    assert!(daemon.turns());
+    broker.publish("drived/all/stop/panel", "", &as_panel);
+    let told = ear.until(|to, said| to == "drived/all/outcome" && said["outcome"] == "confirmed").1;
+    assert_eq!(told["caller"], "panel");
+    assert!(!daemon.turns());
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn a_paho_client_asks_and_is_answered_and_a_validator_that_is_not_ours_takes_the_documents() {
+    let (Some(python), Some(_)) = (python_with("paho.mqtt.client"), python_with("ha_mqtt_models_pydantic"))
+    else {
+        return;
+    };
+    let Some(broker) = Mosquitto::start("mqtt-paho") else { return };
+    let mut ear = broker.hear(&["drived/#"]);
+    let section = format!(
+        "servers = [\"mqtt://127.0.0.1:{}\"]\nheartbeat = \"1s\"\ndiscovery = \"device\"",
+        broker.port
+    );
+    let mut daemon = Daemon::start("mqtt-paho", &section);
+    for number in [1, 2] {
+        ready(&mut ear, number);
+    }
+    ear.until(|to, said| to == "drived/drive/pump_2/measurements" && said["quality"] == "good");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mqtt/client.py");
+    let output = Command::new(python).arg(script).arg(broker.port.to_string()).output().expect("python runs");
+    let said =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(!daemon.turns());
+}
