@@ -11,6 +11,7 @@ mod frequency;
 mod reading;
 pub mod registers;
 mod reset;
+mod restoring;
 mod setpoint;
 mod settings;
 mod status;
@@ -40,6 +41,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 8,
     rows: ROWS,
     reads_across: true,
+    restoring: restoring::RESTORING,
     write_words: 8,
     highest_address: 31,
     speeds: &[2_400, 4_800, 9_600, 19_200],

@@ -28,6 +28,7 @@ mod model;
 mod reading;
 pub mod registers;
 mod release;
+mod restoring;
 mod setpoint;
 mod settings;
 mod status;
@@ -57,6 +58,7 @@ pub use crate::{
 /// What an Altivar 21 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
     rows: ROWS,
+    restoring: restoring::RESTORING,
     functions: &[0x03, 0x06, 0x10, 0x2B],
     read_words: 5,
     write_words: 2,

@@ -8,6 +8,7 @@ mod lists;
 mod parameters;
 mod reading;
 pub mod registers;
+mod restoring;
 mod setpoint;
 pub mod words;
 
@@ -25,6 +26,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 7,
     rows: ROWS,
     reads_across: true,
+    restoring: restoring::RESTORING,
     write_words: 7,
     highest_address: 31,
     stations: 18,

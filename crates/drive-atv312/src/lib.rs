@@ -10,6 +10,7 @@ mod parameters;
 mod reading;
 mod reference;
 pub mod registers;
+mod restoring;
 mod setpoint;
 mod settings;
 pub mod words;
@@ -32,6 +33,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 29,
     rows: ROWS,
     reads_across: true,
+    scaled: restoring::SCALED,
+    restoring: restoring::RESTORING,
     write_words: 27,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[CharacterFormat::F8O1, CharacterFormat::F8E1, CharacterFormat::F8N1, CharacterFormat::F8N2],

@@ -4,7 +4,7 @@ use std::{fmt, time::Duration};
 
 use crate::{
     error::SlaveAddress,
-    registers::Row,
+    registers::{Restoring, Row, Scaled},
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,
 };
@@ -29,6 +29,10 @@ pub struct Capabilities {
     /// Where an answer must differ from one that may still come, a read takes some more of them along. Not where each read
     /// has its own fixed form, or where what stands behind it is not known.
     pub reads_across: bool,
+    /// Registers whose unit another register chooses.
+    pub scaled: &'static [Scaled],
+    /// What of its registers a backup keeps, and the order in which a restore writes it.
+    pub restoring: Restoring,
     /// Words that one write (function 16) may carry.
     pub write_words: u16,
     /// The highest slave address it can have; the lowest is 1.
@@ -102,6 +106,8 @@ impl Capabilities {
             read_words: 1,
             rows: &[],
             reads_across: false,
+            scaled: &[],
+            restoring: Restoring::NONE,
             write_words: 1,
             highest_address: 247,
             stations: 31,
@@ -123,6 +129,25 @@ impl Capabilities {
             status_exchanges: 1,
             measurement_exchanges: 1,
         }
+    }
+
+    /// The register that chooses the unit of this one, if one does.
+    #[must_use]
+    pub fn scaled_by(&self, address: u16) -> Option<&'static Row> {
+        let scaled = self.scaled.iter().find(|scaled| scaled.registers.contains(&address))?;
+        self.rows.iter().find(|row| row.address == scaled.by)
+    }
+
+    /// A row with the unit that it has where the register that chooses it holds what `held` says; as it stands in the map
+    /// where no other register chooses, or what that holds is not known.
+    #[must_use]
+    pub fn in_units(&self, row: &Row, held: impl Fn(u16) -> Option<u16>) -> Row {
+        let scaled = self.scaled.iter().find(|scaled| scaled.registers.contains(&row.address));
+        let unit = scaled.and_then(|scaled| {
+            let word = held(scaled.by)?;
+            scaled.units.iter().find(|(of, _)| *of == word).map(|(_, unit)| *unit)
+        });
+        Row { unit: unit.unwrap_or(row.unit), ..*row }
     }
 
     /// How many words a read of `count` words from `first` on may take along at its end.

@@ -82,11 +82,8 @@ impl OneDriveArgs {
 
     /// Opens the line, for reading and for parameters. Nothing is sent by it.
     pub(crate) async fn open(&self) -> Result<OneDrive, Failure> {
-        let (name, options, config) = self.parts()?;
-        let line = open_line_of(Some(name), config.clone()).await?;
-        let mut drive = open_drive(&line, name, &options);
-        wait_at_most(&mut *drive);
-        Ok(OneDrive { name, drive, config, line })
+        let line = self.line.as_ref().ok_or_else(unnamed)?;
+        OneDrive::open(line, &self.options, self.name()?).await
     }
 
     /// Opens the line, for a command: see [`Commanded::over`].
@@ -123,13 +120,20 @@ impl OneDriveArgs {
     }
 
     fn parts(&self) -> Result<(DriveName, Options, LineConfig), Failure> {
-        let name = self.name()?;
-        let options = self.options.of(&[name])?;
-        let line = self.line.as_ref().ok_or_else(unnamed)?;
-        let config = line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
-        // No other drive waits behind a mute one here, so each request is really sent.
-        Ok((name, options, LineConfig { offline_after: 0, ..config }))
+        parts(self.line.as_ref().ok_or_else(unnamed)?, &self.options, self.name()?)
     }
+}
+
+/// One drive on a line, what its owner says of it, and how the line is opened for it.
+fn parts(
+    line: &LineSpec,
+    options: &OptionArgs,
+    name: DriveName,
+) -> Result<(DriveName, Options, LineConfig), Failure> {
+    let options = options.of(&[name])?;
+    let config = line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+    // No other drive waits behind a mute one here, so each request is really sent.
+    Ok((name, options, LineConfig { offline_after: 0, ..config }))
 }
 
 /// Lets no request to a drive wait without end for a line that is never quiet.
@@ -164,6 +168,16 @@ pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> Stri
         }
         (_, ErrorKind::Unsupported) => format!("{name}: {error}{}", drive_options::hint(name.family)),
         _ => format!("{name}: {error}"),
+    }
+}
+
+/// Whether a parameter that could not be written, or not be read back, may hold the new value.
+pub(crate) fn may_have_written(error: &Error) -> bool {
+    match (error, error.kind()) {
+        (_, ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed) => true,
+        (Error::Port { exchange, .. }, ErrorKind::NoAnswer) => matches!(exchange.function, 0x06 | 0x10),
+        (Error::Answer { exchange, .. }, _) => matches!(exchange.function, 0x06 | 0x10),
+        _ => false,
     }
 }
 
@@ -222,6 +236,29 @@ pub(crate) struct OneDrive {
 }
 
 impl OneDrive {
+    /// Opens a line for one drive, for reading and for parameters. Nothing is sent by it.
+    pub(crate) async fn open(
+        line: &LineSpec,
+        options: &OptionArgs,
+        name: DriveName,
+    ) -> Result<Self, Failure> {
+        let (name, options, config) = parts(line, options, name)?;
+        let line = open_line_of(Some(name), config.clone()).await?;
+        Ok(Self::over(name, line, config, &options))
+    }
+
+    /// The same on a line that is open.
+    pub(crate) fn over(name: DriveName, line: Line, config: LineConfig, options: &Options) -> Self {
+        let mut drive = open_drive(&line, name, options);
+        wait_at_most(&mut *drive);
+        Self { name, drive, config, line }
+    }
+
+    /// How the line is set.
+    pub(crate) const fn config(&self) -> &LineConfig {
+        &self.config
+    }
+
     /// What a person reads when the drive did not do it.
     pub(crate) fn failure(&self, error: &Error) -> Failure {
         Failure::Drive(words(self.name, &self.config, error))

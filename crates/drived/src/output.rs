@@ -28,7 +28,7 @@ pub(crate) fn say_as_it_is(line: impl fmt::Display) -> Result<(), Failure> {
 
 /// Prints a table, on a terminal no wider than that.
 pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
-    say_as_it_is(Table { available: terminal_width(&io::stdout()), ..table })
+    say_as_it_is(table.on_terminal())
 }
 
 /// Says on stderr why the program ends, if anybody reads that.
@@ -41,6 +41,22 @@ pub(crate) fn complain(why: impl fmt::Display) {
     for line in lines {
         // The exit code says it too.
         let _ = writeln!(io::stderr(), "{line}");
+    }
+}
+
+/// Puts a text in the place of the last one on stderr, which has to be a terminal; an empty one takes it away.
+pub(crate) fn progress(text: &str) {
+    let width = terminal_width(&io::stderr()).unwrap_or(usize::MAX).saturating_sub(1);
+    let text: String = text.chars().take(width).collect();
+    let mut stderr = io::stderr().lock();
+    // Nobody's work ends because this cannot be shown.
+    let _ = write!(stderr, "\r\x1b[K{text}").and_then(|()| stderr.flush());
+}
+
+impl Table {
+    /// The same, on a terminal no wider than that.
+    pub(crate) fn on_terminal(self) -> Self {
+        Self { available: terminal_width(&io::stdout()), ..self }
     }
 }
 

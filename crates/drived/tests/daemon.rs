@@ -366,3 +366,37 @@ fn after_a_reload_a_group_is_who_the_file_says_and_never_more() {
     );
     daemon.ask(&["stop", "--all"]).assert_done();
 }
+
+#[test]
+fn parameters_are_kept_compared_and_restored_through_the_daemon() {
+    let daemon = Daemon::start("restore", "");
+    let folder = path("restore.kept");
+    let folder = folder.to_str().expect("the path is text");
+    let kept = daemon.ask(&["param", "backup", "bench", "--to", folder]);
+    assert!(kept.assert_done().contains("pump 1: ") && kept.out.contains("pump 2: "), "{kept:?}");
+    let (one, two) = (format!("{folder}/pump 1.toml"), format!("{folder}/pump 2.toml"));
+    daemon.ask(&["param", "set", "pump 1", "ACC", "4.5"]).assert_done();
+    let differs = daemon.ask(&["param", "diff", &one, "--json"]);
+    assert_eq!(differs.code, Some(1), "{differs:?}");
+    let differs = json(&differs);
+    assert_eq!(differs["differences"][0]["mnemonic"], "ACC");
+    assert_eq!(differs["differences"][0]["left"]["value"], "3.0 s");
+    assert_eq!(differs["differences"][0]["right"]["value"], "4.5 s");
+
+    daemon.ask(&["start", "pump 1", "--setpoint", "20Hz"]).assert_done();
+    let running = daemon.ask(&["param", "restore", &one, "--write"]);
+    running.assert_refused(1, "stopped at ACC");
+    assert!(running.err.contains("not written: ACC"), "{running:?}");
+    daemon.ask(&["stop", "pump 1"]).assert_done();
+    let done = json(&daemon.ask(&["param", "restore", folder, "--write", "--save", "--json"]));
+    assert_eq!(done["restored"][0]["written"], serde_json::json!(["ACC"]), "{done}");
+    assert_eq!(done["restored"][0]["saved"], true, "{done}");
+    assert_eq!(done["restored"][1]["written"], serde_json::json!([]), "{done}");
+    daemon.ask(&["param", "diff", &one]).assert_done();
+
+    daemon.ask(&["param", "backup", "pump 1", "--to", daemon.file.path()]).assert_refused(2, "is no backup");
+    daemon.ask(&["param", "restore", daemon.file.path()]).assert_refused(2, "");
+    daemon.ask(&["param", "diff", "nowhere.toml"]).assert_refused(2, "nowhere.toml");
+    daemon.ask(&["param", "diff", &one, &two]).assert_done();
+    std::fs::remove_dir_all(folder).expect("it is there");
+}

@@ -132,11 +132,11 @@ fn polling_for_programs_prints_objects() {
 fn a_parameter_is_read_written_and_read_back_and_it_is_said_where_it_is_kept() {
     let sim = Sim::serve("param", &["atv312@1"]);
     let read = sim.on("atv312@1", &["param", "get", "ACC"]);
-    assert!(read.assert_done().contains("30 × Inr"), "{read:?}");
-    let written = sim.on("atv312@1", &["param", "set", "ACC", "45"]);
-    assert!(written.assert_done().starts_with("atv312@1 ACC is now 45 × Inr (kept in RAM"), "{written:?}");
-    let again = sim.on("atv312@1", &["param", "set", "ACC", "45"]);
-    assert!(again.assert_done().contains("was already 45 × Inr"), "{again:?}");
+    assert!(read.assert_done().contains("3.0 s"), "{read:?}");
+    let written = sim.on("atv312@1", &["param", "set", "ACC", "4.5"]);
+    assert!(written.assert_done().starts_with("atv312@1 ACC is now 4.5 s (kept in RAM"), "{written:?}");
+    let again = sim.on("atv312@1", &["param", "set", "ACC", "4.5 s"]);
+    assert!(again.assert_done().contains("was already 4.5 s"), "{again:?}");
     sim.on("atv312@1", &["param", "set", "ACC", "50000"]).assert_refused(2, "ACC (9001)");
 }
 

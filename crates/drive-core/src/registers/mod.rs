@@ -51,6 +51,7 @@
 
 pub mod access;
 mod guard;
+mod restoring;
 mod row;
 mod unit;
 
@@ -58,6 +59,7 @@ use std::{fmt, marker::PhantomData};
 
 pub use access::Access;
 pub use guard::refuse_commands;
+pub use restoring::{Change, Part, Restoring, Scaled, Step, in_order};
 pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};
 pub use unit::{Form, Unit};
 

@@ -8,11 +8,11 @@ use axum::{
     http::StatusCode,
     response::Response,
 };
-use drive_core::{Row, registers::Storage};
-use drive_fleet::{DriveHandle, Order, Outcome, Refused};
+use drive_core::{Refusal, Row, registers::Storage};
+use drive_fleet::{DriveHandle, Order, Outcome, Refused, Snapshot};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout};
 
 use super::{
     ask::{By, Named, Patience, Sent, Viewer},
@@ -21,6 +21,7 @@ use super::{
 };
 use crate::{
     commands::param::wanted,
+    one_drive::may_have_written,
     plant::{Plant, parameters::WrittenView},
 };
 
@@ -35,6 +36,9 @@ pub(super) struct NewValue {
     /// Then save the drive's parameters to its EEPROM, where this one is only kept in RAM.
     #[serde(default)]
     save: bool,
+    /// Write only if a status that is read from now on shows standstill.
+    #[serde(default)]
+    only_at_standstill: bool,
 }
 
 /// In its unit, as a hexadecimal word such as `0627h`, or the mnemonic of a listed value.
@@ -79,7 +83,7 @@ pub(super) async fn write(
     State(plant): State<Plant>,
     By(caller): By,
     path: Result<Path<(String, String)>, axum::extract::rejection::PathRejection>,
-    Sent(NewValue { value, save }): Sent<NewValue>,
+    Sent(NewValue { value, save, only_at_standstill }): Sent<NewValue>,
 ) -> Result<Json<WrittenView>, Problem> {
     let Path((name, register)) = path?;
     if !caller.rights.engineer {
@@ -91,7 +95,11 @@ pub(super) async fn write(
         Value::Number(number) => number.to_string(),
         Value::Text(text) => text,
     };
-    let word = wanted(row, &text).map_err(|failure| Problem::unprocessable(failure.to_string()))?;
+    let shown = answered(plant.in_units(&drive, row)).await?;
+    let word = wanted(&shown, &text).map_err(|failure| Problem::unprocessable(failure.to_string()))?;
+    if only_at_standstill {
+        standing(&drive).await?;
+    }
     // Nobody who goes away leaves it half done.
     let writing = tokio::spawn(async move {
         let written = plant.write_parameter(&drive, row, word).await?;
@@ -103,12 +111,35 @@ pub(super) async fn write(
         }
         Ok((written, None))
     });
-    match answered(async { writing.await.unwrap_or(Err(Refused::ShutDown)) }).await? {
+    let written = answered(async {
+        match writing.await.unwrap_or(Err(Refused::ShutDown)) {
+            // It was sent: to call that refused would be wrong.
+            Err(Refused::Drive(error)) if may_have_written(&error) => Ok(Err(error)),
+            written => written.map(Ok),
+        }
+    });
+    let written = written.await?.map_err(|error| {
+        Problem::new(StatusCode::GATEWAY_TIMEOUT, format!("{}: {error}: read it back", row.code))
+    })?;
+    match written {
         (written, None | Some(Outcome::Confirmed)) => Ok(Json(written)),
         (_, Some(outcome)) => {
             let detail = format!("{} is written, and not saved: {outcome}", row.code);
             Err(Problem::new(StatusCode::GATEWAY_TIMEOUT, detail))
         }
+    }
+}
+
+/// Waits for a status of the drive that is read from now on, and refuses unless it shows standstill.
+async fn standing(drive: &DriveHandle) -> Result<(), Problem> {
+    let asked = Instant::now();
+    let is_newer = |snapshot: &Snapshot| snapshot.status.as_ref().is_some_and(|status| status.at >= asked);
+    let Ok(snapshot) = timeout(ANSWERED_WITHIN, drive.wait_until(is_newer)).await else {
+        return Err(Problem::refused(&Refused::Stale));
+    };
+    match &snapshot.status {
+        Some(status) if status.value.is_standstill() => Ok(()),
+        _ => Err(Problem::refused(&Refused::Because(Refusal::MotorRunning))),
     }
 }
 

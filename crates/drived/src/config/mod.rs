@@ -27,7 +27,7 @@ pub(crate) use self::{
     gateway::{GatewayConfig, Units},
     groups::Group,
     mqtt::{Address, Discovery, MqttConfig},
-    place::ConfigError,
+    place::{ConfigError, Source as Place},
 };
 use self::{
     place::Source,

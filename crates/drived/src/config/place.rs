@@ -32,14 +32,14 @@ impl std::error::Error for ConfigError {}
 
 /// The text of the file, for finding places in it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Source<'a> {
-    pub(super) file: &'a Path,
-    pub(super) text: &'a str,
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) text: &'a str,
 }
 
 impl Source<'_> {
     /// Something is wrong here.
-    pub(super) fn error(&self, at: Range<usize>, problem: impl fmt::Display) -> ConfigError {
+    pub(crate) fn error(&self, at: Range<usize>, problem: impl fmt::Display) -> ConfigError {
         ConfigError {
             file: self.file.to_owned(),
             line: Some(self.line(at.start)),
@@ -49,7 +49,7 @@ impl Source<'_> {
     }
 
     /// Something is wrong with the file as a whole.
-    pub(super) fn error_of_file(&self, problem: impl fmt::Display) -> ConfigError {
+    pub(crate) fn error_of_file(&self, problem: impl fmt::Display) -> ConfigError {
         ConfigError { file: self.file.to_owned(), line: None, field: None, problem: problem.to_string() }
     }
 

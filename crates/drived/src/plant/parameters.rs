@@ -7,7 +7,7 @@ use std::{
 };
 
 use drive_core::{
-    Row, Written,
+    Capabilities, Row, Written,
     registers::{Access, Form, Storage},
 };
 use drive_fleet::{DriveHandle, Refused};
@@ -79,7 +79,12 @@ pub(crate) struct WrittenView {
 }
 
 impl ParameterView {
-    fn of(row: &Row, word: Option<(u16, Instant)>, error: Option<String>) -> Self {
+    fn of(
+        capabilities: &Capabilities,
+        row: &Row,
+        word: Option<(u16, Instant)>,
+        error: Option<String>,
+    ) -> Self {
         let raw = word.map(|(raw, _)| raw);
         Self {
             mnemonic: row.code,
@@ -99,7 +104,7 @@ impl ParameterView {
             },
             storage: row.storage.to_string(),
             range: range(row),
-            factory: factory(row),
+            factory: factory(capabilities, row),
         }
     }
 }
@@ -121,6 +126,13 @@ impl Words {
     fn of(&self, drive: &DriveHandle, row: &Row) -> Option<(u16, Instant)> {
         let words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         words.get(&(drive.name().to_string(), row.address)).copied()
+    }
+
+    /// A row in the unit that it has, as far as what chooses that has been read.
+    fn in_units(&self, drive: &DriveHandle, row: &Row) -> Row {
+        let capabilities = drive.capabilities();
+        let by = capabilities.scaled_by(row.address).and_then(|by| self.of(drive, by));
+        capabilities.in_units(row, |_| by.map(|(word, _)| word))
     }
 
     fn keep(&self, drive: &DriveHandle, row: &Row, word: Option<u16>) -> Option<(u16, Instant)> {
@@ -152,7 +164,8 @@ impl Plant {
                     Err(_) => {}
                 }
             }
-            views.push(ParameterView::of(row, word, error));
+            let shown = self.0.words.in_units(drive, row);
+            views.push(ParameterView::of(drive.capabilities(), &shown, word, error));
         }
         views
     }
@@ -167,7 +180,21 @@ impl Plant {
         row: &'static Row,
     ) -> Result<ParameterView, Refused> {
         let raw = drive.read_parameter(row).await?;
-        Ok(ParameterView::of(row, self.0.words.keep(drive, row, Some(raw)), None))
+        let shown = self.in_units(drive, row).await?;
+        let word = self.0.words.keep(drive, row, Some(raw));
+        Ok(ParameterView::of(drive.capabilities(), &shown, word, None))
+    }
+
+    /// A row in the unit that it has in this drive now, which another register may choose: read only where one does.
+    ///
+    /// # Errors
+    /// Why that one cannot be read.
+    pub(crate) async fn in_units(&self, drive: &DriveHandle, row: &'static Row) -> Result<Row, Refused> {
+        if let Some(by) = drive.capabilities().scaled_by(row.address) {
+            let word = drive.read_parameter(by).await?;
+            self.0.words.keep(drive, by, Some(word));
+        }
+        Ok(self.0.words.in_units(drive, row))
     }
 
     /// Writes one register of a drive, unless it holds the word already, and reads it back. It goes on when nobody waits.
@@ -182,7 +209,9 @@ impl Plant {
     ) -> Result<WrittenView, Refused> {
         self.0.words.keep(drive, row, None);
         let Written { changed, storage } = drive.write_parameter(row, word).await?;
-        let parameter = ParameterView::of(row, self.0.words.keep(drive, row, Some(word)), None);
+        let held = self.0.words.keep(drive, row, Some(word));
+        let shown = self.0.words.in_units(drive, row);
+        let parameter = ParameterView::of(drive.capabilities(), &shown, held, None);
         let how = if changed { "is now" } else { "was already" };
         let kept = match storage {
             Storage::Volatile => "lost at power-off",
@@ -190,7 +219,7 @@ impl Plant {
             Storage::Eeprom => "kept in EEPROM",
             Storage::Unknown => "the manual does not say whether it is kept",
         };
-        let text = Some(format!("{} {how} {} ({kept})", row.code, row.show(word)));
+        let text = Some(format!("{} {how} {} ({kept})", row.code, shown.show(word)));
         Ok(WrittenView { parameter: ParameterView { text, ..parameter }, changed })
     }
 }

@@ -171,17 +171,17 @@ async fn a_parameter_is_read_and_written_by_an_engineer_and_kept_from_everybody_
     .await;
     let path = "/api/v1/drives/pump%201/parameters/ACC";
     let (status, row) = get(&plant.plant, path).await;
-    // BBV51701: ACC, 9001, in steps of Inr, factory setting 3.0 s with Inr 0.1.
+    // BBV51701 p. 38, 39: ACC, 9001, factory setting 3.0 s, counted in 0.1 s as Inr is 1.
     assert_eq!(
         (status, &row["value"], &row["address"]),
-        (StatusCode::OK, &30.0.into(), &9001.into()),
+        (StatusCode::OK, &3.0.into(), &9001.into()),
         "{row}"
     );
-    assert_eq!((&row["unit"], &row["access"]), (&"× Inr".into(), &"read_write".into()), "{row}");
+    assert_eq!((&row["unit"], &row["access"]), (&"s".into(), &"read_write".into()), "{row}");
     let operator = Rights { engineer: false, ..ALL };
     let (status, _) = send(api(&plant.plant, "operator", operator), put(path, &json!({"value": "50"}))).await;
     assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::FORBIDDEN, Some(30)));
-    for value in [json!("50"), json!(50.0)] {
+    for value in [json!("5.0 s"), json!(5.0)] {
         let (status, told) = send(api(&plant.plant, "chief", ALL), put(path, &json!({"value": value}))).await;
         assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::OK, Some(50)), "{told}");
     }

@@ -1,9 +1,14 @@
 //! `drived param`: the registers of a family, and their content in one drive.
 
+mod backup;
+mod diff;
+mod file;
 mod remote;
+mod restore;
+mod source;
 
 use drive_core::{
-    ErrorKind, Row,
+    Capabilities, Drive, ErrorKind, Row,
     registers::{Factory, Range, Storage},
 };
 use drive_families::{Family, UnknownFamily};
@@ -69,6 +74,9 @@ pub(crate) enum Command {
         #[command(flatten)]
         one: OneDriveArgs,
     },
+    Backup(backup::Args),
+    Diff(diff::Args),
+    Restore(restore::Args),
 }
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
@@ -90,6 +98,9 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
         Command::Save { one, name } => remote::save(&one, name.as_deref()).await,
         Command::Dump { one, .. } if one.is_on_line() => dump(&one).await,
         Command::Dump { one, name } => remote::dump(&one, name.as_deref()).await,
+        Command::Backup(args) => backup::run(args).await,
+        Command::Diff(args) => diff::run(args).await,
+        Command::Restore(args) => restore::run(args).await,
     }
 }
 
@@ -112,13 +123,14 @@ async fn family(of: &str, daemon: &DaemonArgs) -> Result<Family, Failure> {
 fn list(family: Family) -> Table {
     let mut table =
         Table::new(["register", "mnemonic", "name and range", "access, kept in", "factory", "source"]);
-    for row in family.capabilities().rows {
+    let capabilities = family.capabilities();
+    for row in capabilities.rows {
         table.row([
             row.address.to_string(),
             row.code.to_owned(),
             with_range(row),
             format!("{} {}", row.access, row.storage),
-            factory(row),
+            factory(capabilities, row),
             row.source.to_owned(),
         ]);
     }
@@ -135,7 +147,8 @@ async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
     let mut table = value_table();
     for row in rows {
         let word = one.drive.read_parameter(row).await.map_err(|error| one.failure(&error))?;
-        table.row(value_cells(row, row.show(word)));
+        let row = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
+        table.row(value_cells(one.drive.capabilities(), &row, row.show(word)));
     }
     output::say_table(table)?;
     one.close().await;
@@ -154,8 +167,13 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
             )));
         }
     }
-    let word = wanted(row, value)?;
+    let is_scaled = name.family.capabilities().scaled_by(row.address).is_some();
+    if !is_scaled {
+        wanted(row, value)?;
+    }
     let mut one = args.open().await?;
+    let shown = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
+    let word = wanted(&shown, value)?;
     let written = told(name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
     let written = written.map_err(|error| one.failure(&error))?;
     let what = if written.changed { "is now" } else { "was already" };
@@ -168,7 +186,7 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
         Storage::Eeprom => "kept in EEPROM",
         Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
     };
-    output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, row.show(word)))?;
+    output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word)))?;
     match written.storage {
         Storage::Eeprom if save => output::say("the write itself has stored it: nothing else was saved")?,
         _ if save => persist(&mut one).await?,
@@ -212,18 +230,32 @@ async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
     let mut one = args.open().await?;
     let mut table = value_table();
-    for row in one.drive.capabilities().rows.iter().filter(|row| row.access.is_readable()) {
-        let shown = match one.drive.read_parameter(row).await {
-            Ok(word) => row.show(word),
+    let capabilities = one.drive.capabilities();
+    for row in capabilities.rows.iter().filter(|row| row.access.is_readable()) {
+        let (row, shown) = match one.drive.read_parameter(row).await {
+            Ok(word) => {
+                let row = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
+                (row, row.show(word))
+            }
             // A drive refuses what its model or its settings do not have; the rest is still worth reading.
-            Err(error) if error.kind() == ErrorKind::Exception => "refused by the drive".to_owned(),
+            Err(error) if error.kind() == ErrorKind::Exception => (*row, "refused by the drive".to_owned()),
             Err(error) => return Err(one.failure(&error)),
         };
-        table.row(value_cells(row, shown));
+        table.row(value_cells(capabilities, &row, shown));
     }
     output::say_table(table)?;
     one.close().await;
     Ok(())
+}
+
+/// A row in the unit that it has in this drive now, which another register may choose: read only where one does.
+async fn in_units(drive: &mut dyn Drive, row: &'static Row) -> drive_core::Result<Row> {
+    let capabilities = drive.capabilities();
+    let word = match capabilities.scaled_by(row.address) {
+        Some(by) => Some(drive.read_parameter(by).await?),
+        None => None,
+    };
+    Ok(capabilities.in_units(row, |_| word))
 }
 
 /// The word for a person's text, refused here when access or range forbid it: nothing is sent then.
@@ -254,14 +286,14 @@ fn value_table() -> Table {
     Table::new(["register", "mnemonic", "value", "name and range", "access", "factory"])
 }
 
-fn value_cells(row: &Row, value: String) -> [String; 6] {
+fn value_cells(capabilities: &Capabilities, row: &Row, value: String) -> [String; 6] {
     [
         row.address.to_string(),
         row.code.to_owned(),
         value,
         with_range(row),
         row.access.to_string(),
-        factory(row),
+        factory(capabilities, row),
     ]
 }
 
@@ -272,14 +304,21 @@ fn with_range(row: &Row) -> String {
     }
 }
 
-pub(crate) fn factory(row: &Row) -> String {
+/// The factory setting of a row, in the unit that it has with the factory setting of what chooses that.
+pub(crate) fn factory(capabilities: &Capabilities, row: &Row) -> String {
+    let by = capabilities.scaled_by(row.address).map(|by| by.factory);
+    let of_factory =
+        |_| by.and_then(|factory| if let Factory::Value(word) = factory { Some(word) } else { None });
     match row.factory {
         Factory::None => String::new(),
-        Factory::Value(word) => {
-            row.choice(word).map_or_else(|| row.unit.show(word), |choice| choice.code.to_owned())
-        }
+        Factory::Value(word) => brief(&capabilities.in_units(row, of_factory), word),
         Factory::Described(rule) => rule.to_owned(),
     }
+}
+
+/// A word in its unit, or the mnemonic of a listed value.
+pub(crate) fn brief(row: &Row, word: u16) -> String {
+    row.choice(word).map_or_else(|| row.unit.show(word), |choice| choice.code.to_owned())
 }
 
 pub(crate) fn range(row: &Row) -> String {
@@ -335,8 +374,12 @@ mod tests {
 
     #[test]
     fn a_row_shows_its_factory_setting_and_its_range() {
-        assert_eq!((factory(&RAMP), range(&RAMP)), ("3.0 s".to_owned(), "0.1 s to 999.9 s".to_owned()));
+        let family = &Capabilities::least("test", "Test");
+        assert_eq!(
+            (factory(family, &RAMP), range(&RAMP)),
+            ("3.0 s".to_owned(), "0.1 s to 999.9 s".to_owned())
+        );
         let list = Row { range: Range::OneOf(YES_NO), factory: Factory::Value(1), ..RAMP };
-        assert_eq!((factory(&list), range(&list)), ("YES".to_owned(), "nO, YES".to_owned()));
+        assert_eq!((factory(family, &list), range(&list)), ("YES".to_owned(), "nO, YES".to_owned()));
     }
 }

@@ -1,0 +1,18 @@
+//! What a backup keeps of a 3G3EV and in which order a restore writes it: so that none of the alarms OP2, OP4 and OP5 of §5.3
+//! comes on the way. n02, n39, n40 and n63 to n67 act after the next power-up (§2.1, note 3).
+
+use drive_core::registers::{Restoring, Step};
+
+use crate::registers::address::*;
+
+/// See [`Restoring`].
+pub(crate) const RESTORING: Restoring = Restoring {
+    first: &[
+        Step { registers: &[N42, N41], why: "n42 ≤ n41 at every moment, else OP4 (§5.3)" },
+        Step { registers: &[N58, N57, N56], why: "n58 ≤ n57 ≤ n56 at every moment, else OP5 (§5.3)" },
+        Step { registers: &[N29, N27, N26, N24], why: "the V/f curve in one go, else OP2 (§5.3)" },
+    ],
+    // §2.1.
+    communication: &[N63, N64, N65, N66, N67],
+    ..Restoring::NONE
+};

@@ -1,0 +1,30 @@
+//! What a backup keeps of an Altivar 28 and in which order a restore writes it: the rules of the twins on the Altivar 312
+//! (BBV51701), as far as the Altivar 28 has the registers.
+
+use drive_core::registers::{Restoring, Step};
+
+use crate::registers::address::*;
+
+/// See [`Restoring`].
+pub(crate) const RESTORING: Restoring = Restoring {
+    first: &[
+        Step {
+            registers: &[TCC],
+            why: "it puts the functions of the inputs back on the twin (BBV51701 p. 33)",
+        },
+        Step { registers: &[BFR], why: "it changes HSP, Ftd, FrS and tFr on the twin (BBV51701 p. 28)" },
+        Step { registers: &[LSP, HSP, TFR], why: "LSP ≤ HSP ≤ tFr at every moment (BBV51701 p. 27)" },
+        Step { registers: &[CRL3, CRH3], why: "the loss of 4-20 mA depends on them (BBV51701 p. 54)" },
+    ],
+    last: &[Step {
+        registers: &[UNS, FRS],
+        why: "a rating of the motor takes back an auto-tuning on the twin (BBV51701 p. 30)",
+    }],
+    communication: &[ADD],
+    ratings: &[INV],
+    // LSP, HSP and the ramps in rpm (BBV51701 p. 18, 57), and the code of whoever locked the terminal (p. 56, 57).
+    unkept: &[
+        SMIL_LOW, SMIL_HIGH, SMAL_LOW, SMAL_HIGH, SPAL_LOW, SPAL_HIGH, SPAT, SPDL_LOW, SPDL_HIGH, SPDT, COD,
+    ],
+    left: &[],
+};
