@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Measurements, Port, Reaction, Result, Row, Setpoint,
-    Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Faults, Intent, Measurements, Port, Reaction, Result, Row,
+    Setpoint, Status, StopMode, Stopped, Watchdog, Written,
 };
 
 use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
@@ -106,6 +106,10 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// Also [`Refused`](drive_core::Error::Refused) when n40 is set otherwise, with the way to change it.
     async fn arm_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
         self.check_watchdog(timeout, reaction).await
+    }
+
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        self.asked_by_another(register, word).await
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

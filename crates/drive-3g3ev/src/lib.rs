@@ -8,6 +8,7 @@ mod drive;
 mod eeprom;
 mod faults;
 mod frequency;
+mod intent;
 mod reading;
 pub mod registers;
 mod reset;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Measurements, Port, Reaction, Result,
-    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Measurements, Port, Reaction,
+    Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
 };
 
 use crate::{Atv21, CommandWord, registers};
@@ -115,6 +115,10 @@ impl<P: Port> Drive for Atv21<P> {
     /// and the time does not matter.
     async fn arm_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
         self.write_watchdog(timeout, reaction).await
+    }
+
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        self.asked_by_another(register, word).await
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

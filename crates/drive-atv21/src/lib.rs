@@ -24,6 +24,7 @@ mod control;
 mod drive;
 mod faults;
 mod in_effect;
+mod intent;
 mod model;
 mod reading;
 pub mod registers;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Measurements, Percent, Port, RawWord,
-    Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
+    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Intent, Measurements, Percent, Port,
+    RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
     drivecom::{self, StatusWords},
     registers::{Register, access::Readable},
 };
@@ -116,6 +116,10 @@ impl<P: Port> Drive for Atv28<P> {
 
     async fn keep_alive(&mut self) -> Result<()> {
         self.registers.at(Class::KeepAlive).read(ETA).await.map(drop)
+    }
+
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        self.asked_by_another(register, word).await
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

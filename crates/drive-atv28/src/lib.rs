@@ -4,6 +4,7 @@
 mod command;
 mod drive;
 mod faults;
+mod intent;
 mod lists;
 mod parameters;
 mod reading;

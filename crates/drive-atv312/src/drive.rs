@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Measurements, Port, Reaction, Result, Row,
-    SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
+    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Measurements, Port, Reaction, Result,
+    Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
 };
 
 use crate::{
@@ -104,6 +104,10 @@ impl<P: Port> Drive for Atv312<P> {
     /// As it was found; one that was switched off by the NTO bit of `CMI` is so again, and `SLL` stays what it was.
     async fn restore_watchdog(&mut self, found: Watchdog) -> Result<Watchdog> {
         self.put_back_watchdog(found).await
+    }
+
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        self.asked_by_another(register, word).await
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

@@ -6,6 +6,7 @@ mod command;
 mod diagnosis;
 mod drive;
 mod faults;
+mod intent;
 mod parameters;
 mod reading;
 mod reference;

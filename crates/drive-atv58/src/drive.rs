@@ -2,8 +2,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Measurements, Port, Result, Row,
-    Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Measurements, Port,
+    Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     drivecom::{self, ChartState, Drivecom},
     registers::refuse_commands,
 };
@@ -115,6 +115,10 @@ impl<P: Port> Drive for Atv58<P> {
     /// when it runs out is not said.
     async fn watchdog(&mut self) -> Result<Watchdog> {
         Ok(Watchdog { timeout: Some(self.message_watch()), reaction: None })
+    }
+
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        self.asked_by_another(register, word).await
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

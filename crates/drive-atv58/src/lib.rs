@@ -4,6 +4,7 @@
 mod command;
 mod diagnostics;
 mod drive;
+mod intent;
 mod reading;
 pub mod registers;
 mod setpoint;

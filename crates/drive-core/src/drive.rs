@@ -10,6 +10,7 @@ use crate::{
     error::{Error, Result, SelfRestart, SlaveAddress},
     faults::Faults,
     identity::Identity,
+    intent::Intent,
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
@@ -222,6 +223,18 @@ pub trait Drive: Send {
                 self.arm_watchdog(least, Reaction::Ignore).await
             }
         }
+    }
+
+    /// What a word asks that another master would write to a register: `None` where that register is no command. It is for
+    /// who carries it out by the methods of this trait instead, under their rules; nothing is written. **What stops is told
+    /// without an exchange**; for a setpoint the unit of its register may have to be read.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for words that the family does not understand, and for registers that act on the motor in ways
+    /// that no method stands for. A family that does not say which registers command its motor refuses all.
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        let _ = (register, word);
+        Intent::kept()
     }
 
     /// Reads the register of a row.

@@ -23,6 +23,7 @@ pub mod drivecom;
 mod error;
 mod faults;
 mod identity;
+mod intent;
 mod named;
 pub mod port;
 mod reconnecting;
@@ -48,6 +49,7 @@ pub use error::{
 };
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
+pub use intent::Intent;
 pub use named::{NameError, is_name};
 pub use port::{Class, Effect, Port, PortError, Terms};
 pub use reconnecting::Reconnecting;

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     error::Refusal,
+    intent::Intent,
     setpoint::{Direction, StopMode},
     status::{Control, State, Status},
     units::Frequency,
@@ -69,6 +70,36 @@ impl ControlWord {
     #[must_use]
     pub const fn is_run(self) -> bool {
         self.contains(Self::run(Direction::Forward)) && !self.is_stop()
+    }
+
+    /// What it asks, by the table of commands on p. 12 and the bits on p. 16 and 19. `None` for a run command with bits
+    /// that are reserved, or that act as they were assigned.
+    #[must_use]
+    pub fn intent(self) -> Option<Intent> {
+        const RUN: ControlWord = ControlWord::run(Direction::Reverse);
+        let enabled = self.contains(Self::run(Direction::Forward));
+        Some(if self.contains(Self::FAULT_RESET) {
+            return (!enabled).then_some(Intent::ResetFaults(StopMode::Freewheel));
+        } else if !self.contains(Self::ENABLE_VOLTAGE) {
+            Intent::Stop(StopMode::Freewheel)
+        } else if !self.contains(Self::NO_QUICK_STOP) {
+            Intent::Stop(StopMode::Fast)
+        } else if !self.contains(Self::SWITCH_ON) {
+            Intent::Prepare(StopMode::Freewheel)
+        } else if !enabled {
+            Intent::Prepare(StopMode::Ramp)
+        } else if self.contains(Self::DC_INJECTION) {
+            Intent::Stop(StopMode::DcInjection)
+        } else if self.contains(Self::FAST_STOP) {
+            Intent::Stop(StopMode::Fast)
+        } else if self.contains(Self::STOP) {
+            Intent::Stop(StopMode::Ramp)
+        } else if RUN.contains(self) {
+            let reverse = self.contains(Self::REVERSE);
+            Intent::Start(if reverse { Direction::Reverse } else { Direction::Forward })
+        } else {
+            return None;
+        })
     }
 
     /// Whether it holds one of the stops that keep operation enabled.

@@ -9,6 +9,7 @@ use drive_fleet::{
 
 use crate::{
     config::{Config, DrivePart, GatewayConfig, LinePart, Units},
+    doors::Rights,
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
@@ -107,13 +108,35 @@ fn meaning_of_gateway(gateway: &GatewayConfig) -> Vec<(&'static str, String)> {
         "as {}, together with the rest within {share} % of a line, as far as its plan leaves that",
         gateway.reads
     );
-    vec![
+    let writes = match gateway.rights {
+        Rights { operate: true, .. } => "commands, by the rules of motion, and stops ahead of everything",
+        Rights { stop: true, .. } => "stops only",
+        _ => "none: it only reads",
+    };
+    let parameters = match (gateway.raw_writes, gateway.eeprom_writes) {
+        (true, true) => "also parameters, WITH THOSE THAT WEAR OUT AN EEPROM",
+        (true, false) => "also parameters, but none that goes to an EEPROM",
+        _ => "no parameters",
+    };
+    let silence = gateway.client_timeout.map(|limit| {
+        let then = if gateway.stops_when_silent { "its motors are stopped" } else { "that is an alarm" };
+        ("silence", format!("of a client that has started a motor, for {limit:?}: {then}"))
+    });
+    let mut lines = vec![
         ("clients", format!("{clients} at once, each put out after {idle:?} without a request: {who}")),
         ("units", units),
         ("reads", reads),
         ("patience", format!("{patience:?}: what has not come by then is refused")),
-        ("writes", "none: it only reads".to_owned()),
-    ]
+        ("writes", writes.to_owned()),
+    ];
+    if gateway.rights.operate {
+        lines.push(("parameters", parameters.to_owned()));
+    }
+    if gateway.broadcast {
+        lines.push(("unit 0", "a stop for it stops all of these drives".to_owned()));
+    }
+    lines.extend(silence);
+    lines
 }
 
 /// Drives with the same settings, and the first of them.

@@ -48,6 +48,16 @@ pub(crate) struct GatewayConfig {
     pub(crate) mapped_only: bool,
     /// What its clients may do.
     pub(crate) rights: Rights,
+    /// Whether parameters may be written,
+    pub(crate) raw_writes: bool,
+    /// also those that may go to an EEPROM.
+    pub(crate) eeprom_writes: bool,
+    /// Whether a stop for unit 0 stops all of its drives.
+    pub(crate) broadcast: bool,
+    /// How long a client that has started a motor may be silent; `None`: for ever.
+    pub(crate) client_timeout: Option<Duration>,
+    /// Whether the motor is stopped then.
+    pub(crate) stops_when_silent: bool,
 }
 
 /// Who is behind a unit number.
@@ -152,6 +162,41 @@ impl FromStr for Registers {
     }
 }
 
+/// What clients may write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Writes(Role);
+
+impl FromStr for Writes {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "nothing" => Ok(Self(Role::View)),
+            "stop" => Ok(Self(Role::Stop)),
+            "operate" => Ok(Self(Role::Operate)),
+            _ => Err("expected nothing, stop or operate"),
+        }
+    }
+}
+
+/// What happens to a motor whose client is silent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct OnSilence {
+    stops: bool,
+}
+
+impl FromStr for OnSilence {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "report" => Ok(Self { stops: false }),
+            "stop" => Ok(Self { stops: true }),
+            _ => Err("expected report or stop"),
+        }
+    }
+}
+
 /// One entry as it is written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -171,6 +216,15 @@ pub(super) struct GatewayEntry {
     share: Option<Spanned<u8>>,
     no_answer: Option<Parsed<NoAnswer>>,
     registers: Option<Parsed<Registers>>,
+    writes: Option<Spanned<Parsed<Writes>>>,
+    #[serde(default)]
+    raw_writes: bool,
+    #[serde(default)]
+    eeprom_writes: bool,
+    #[serde(default)]
+    broadcast: bool,
+    client_timeout: Option<Spanned<Parsed<Time>>>,
+    on_client_silence: Option<Spanned<Parsed<OnSilence>>>,
 }
 
 /// Where a gateway listens unless the file says otherwise: 502 is for root.
@@ -236,19 +290,40 @@ impl GatewayEntry {
             within(source, said.as_ref(), usual, range)
         };
         let seconds = Duration::from_secs;
+        let writes = self.writes.as_ref().map_or(Role::View, |writes| writes.get_ref().0.0);
+        let missing = [
+            (self.raw_writes && writes < Role::Operate, "raw_writes = true needs writes = \"operate\""),
+            (self.eeprom_writes && !self.raw_writes, "eeprom_writes = true needs raw_writes = true"),
+            (
+                self.broadcast && writes < Role::Stop,
+                "broadcast = true needs writes = \"stop\" or \"operate\"",
+            ),
+        ];
+        if let Some((_, problem)) = missing.iter().find(|(is_so, _)| *is_so) {
+            return Err(source.error(whole.clone(), problem));
+        }
+        if let (None, Some(said)) = (&self.client_timeout, &self.on_client_silence) {
+            return Err(source.error(said.span(), "expected client_timeout with it, such as \"10s\""));
+        }
+        let client_timeout = times(&self.client_timeout, Duration::ZERO, seconds(1)..=seconds(86_400))?;
         Ok(GatewayConfig {
             name: name.to_owned(),
             listen,
             allow: self.allow.iter().map(|network| network.0).collect(),
             clients,
             idle: times(&self.idle, IDLE, seconds(1)..=seconds(86_400))?,
-            units: self.units_of(source, whole, lines)?,
+            units: self.units_of(source, whole.clone(), lines)?,
             patience: times(&self.patience, PATIENCE, Duration::from_millis(50)..=seconds(60))?,
             reads: self.reads.map_or(Class::Status, |reads| reads.0.0),
             share,
             silent: self.no_answer.is_some_and(|said| said.0.silent),
             mapped_only: self.registers.is_some_and(|said| said.0.mapped_only),
-            rights: Role::View.rights(),
+            rights: writes.rights(),
+            raw_writes: self.raw_writes,
+            eeprom_writes: self.eeprom_writes,
+            broadcast: self.broadcast,
+            client_timeout: (!client_timeout.is_zero()).then_some(client_timeout),
+            stops_when_silent: self.on_client_silence.as_ref().is_some_and(|said| said.get_ref().0.stops),
         })
     }
 

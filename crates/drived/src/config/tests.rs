@@ -352,6 +352,10 @@ fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
         ("line = \"north\"\nshare = 100", "share: 100: expected 1 to 80"),
         ("line = \"north\"\npatience = \"1ms\"", "patience: 1ms: expected 50ms to 60s"),
         ("line = \"north\"\nreads = \"stop\"", "expected status or background"),
+        ("line = \"north\"\nraw_writes = true", "raw_writes = true needs writes = \"operate\""),
+        ("line = \"north\"\nwrites = \"operate\"\neeprom_writes = true", "needs raw_writes = true"),
+        ("line = \"north\"\nbroadcast = true", "broadcast = true needs writes"),
+        ("line = \"north\"\non_client_silence = \"stop\"", "expected client_timeout with it"),
         ("line = \"north\"\n[[gateways]]\nline = \"north\"", "two gateways are named \"gateway\""),
         (
             "line = \"north\"\n[[gateways]]\nline = \"north\"\nname = \"b\"",

@@ -7,13 +7,13 @@ use drive_bus::exchange::mbap;
 use drive_core::tokio_modbus::ExceptionCode;
 use tokio::{
     io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
-    sync::mpsc,
+    sync::{Semaphore, mpsc},
     time::{Instant, timeout},
 };
 
 use super::{
     counters::Ended,
-    desk::Desk,
+    desk::{Asked, Desk},
     framing::{Frame, Frames},
 };
 
@@ -24,10 +24,14 @@ const UNREAD: usize = 16;
 /// How long a frame that has begun may take to end, and a client to take an answer.
 const HALF_OPEN: Duration = Duration::from_secs(5);
 
-/// A request and when it came.
+/// Stops of one client that are not answered yet; behind so many nothing more is read from it.
+const STOPS: usize = 64;
+
+/// A request, and how its answer is told.
 struct Waiting {
-    frame: Frame,
-    arrived: Instant,
+    transaction: u16,
+    unit: u8,
+    asked: Asked,
 }
 
 /// Serves a client until it goes, or has to.
@@ -37,7 +41,7 @@ pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAd
     let (queue, waiting) = mpsc::channel(QUEUED);
     let mut written = std::pin::pin!(write(output, outbox));
     let mut carried = std::pin::pin!(carry_out(&desk, peer, waiting, answers.clone()));
-    let read = read(input, &desk, queue, answers);
+    let read = read(input, &desk, peer, queue, answers);
     let ended = tokio::select! {
         ended = read => ended,
         () = &mut carried => None,
@@ -59,11 +63,13 @@ pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAd
 /// Reads frames until the client's end, or a reason to put it out.
 async fn read(
     mut input: impl AsyncRead + Unpin,
-    desk: &Desk,
+    desk: &Arc<Desk>,
+    peer: IpAddr,
     queue: mpsc::Sender<Waiting>,
     answers: mpsc::Sender<Bytes>,
 ) -> Option<Ended> {
     let mut frames = Frames::new();
+    let stops = Arc::new(Semaphore::new(STOPS));
     loop {
         let (patience, why) = match frames.is_inside() {
             true => (HALF_OPEN, Ended::HalfOpen),
@@ -81,9 +87,20 @@ async fn read(
                 Ok(None) => break,
                 Err(_) => return Some(Ended::Malformed),
             };
-            if let Err(refused) = queue.try_send(Waiting { frame, arrived }) {
-                let Frame { transaction, unit, pdu } = refused.into_inner().frame;
-                let function = pdu.first().copied().unwrap_or_default();
+            desk.clients.hear(peer, arrived);
+            let Frame { transaction, unit, .. } = frame;
+            let asked = desk.look_at(arrived, &frame);
+            if asked.stop.is_some() {
+                let (desk, answers) = (Arc::clone(desk), answers.clone());
+                // It is closed by nobody.
+                let place = Arc::clone(&stops).acquire_owned().await;
+                let stopped = async move {
+                    answer(&desk, peer, Waiting { transaction, unit, asked }, &answers).await;
+                    drop(place);
+                };
+                tokio::spawn(stopped);
+            } else if queue.try_send(Waiting { transaction, unit, asked }).is_err() {
+                let function = frame.pdu.first().copied().unwrap_or_default();
                 let busy = desk.refuse(function, ExceptionCode::ServerDeviceBusy);
                 // A client that is gone is noticed at the next reading.
                 let _ = answers.send(mbap::frame(transaction, unit, &busy)).await;
@@ -101,12 +118,16 @@ async fn carry_out(
     mut waiting: mpsc::Receiver<Waiting>,
     answers: mpsc::Sender<Bytes>,
 ) {
-    while let Some(Waiting { frame: Frame { transaction, unit, pdu }, arrived }) = waiting.recv().await {
-        if let Some(answer) = desk.answer(peer, arrived, unit, &pdu).await
-            && answers.send(mbap::frame(transaction, unit, &answer)).await.is_err()
-        {
-            return;
-        }
+    while let Some(next) = waiting.recv().await {
+        answer(desk, peer, next, &answers).await;
+    }
+}
+
+async fn answer(desk: &Arc<Desk>, peer: IpAddr, waiting: Waiting, answers: &mpsc::Sender<Bytes>) {
+    let Waiting { transaction, unit, asked } = waiting;
+    if let Some(pdu) = desk.answer(peer, asked).await {
+        // Nobody waits for the answer of a client that is gone.
+        let _ = answers.send(mbap::frame(transaction, unit, &pdu)).await;
     }
 }
 

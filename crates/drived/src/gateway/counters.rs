@@ -65,6 +65,8 @@ pub(crate) struct Counts {
     pub(crate) ended: BTreeMap<Ended, u64>,
     /// By function code and result: how many, and how long they took together.
     pub(crate) requests: BTreeMap<(u8, Result), (u64, Duration)>,
+    /// Writes that were refused, by exception.
+    pub(crate) refused_writes: BTreeMap<u8, u64>,
 }
 
 impl Counters {
@@ -83,7 +85,7 @@ impl Counters {
 
     /// Everything in a sentence.
     pub(crate) fn in_words(&self) -> String {
-        let Counts { ended, requests } = self.counts();
+        let Counts { ended, requests, .. } = self.counts();
         let mut words = vec![format!("{} connected", self.clients())];
         let mut results: BTreeMap<Result, u64> = BTreeMap::new();
         for ((_, result), (count, _)) in requests {
@@ -120,6 +122,14 @@ impl Counters {
         let (count, together) = counts.requests.entry((function, result)).or_default();
         *count += 1;
         *together += took;
+    }
+
+    /// Counts a write that is refused, and says how many were refused so.
+    pub(super) fn refuse(&self, code: u8) -> u64 {
+        let mut counts = self.lock();
+        let count = counts.refused_writes.entry(code).or_default();
+        *count += 1;
+        *count
     }
 
     /// What was counted by kind so far.

@@ -1,7 +1,7 @@
 //! What becomes of a request: to whom it goes, whether it may, and what answers it.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap},
     net::IpAddr,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
@@ -11,6 +11,7 @@ use drive_core::{
     PortError, Terms,
     tokio_modbus::{ExceptionCode, client::Client as _},
 };
+use drive_families::Options;
 use drive_fleet::{DriveHandle, LineBudget};
 use futures_util::{
     FutureExt as _,
@@ -19,17 +20,31 @@ use futures_util::{
 use tokio::time::{Instant, sleep_until, timeout_at};
 
 use super::{
+    clients::Clients,
     counters::{Counters, Result as Counted},
+    framing::Frame,
     pdu::{self, Ask},
     share::Share,
+    writes::Stop,
 };
 use crate::{
     config::{GatewayConfig, Units},
+    doors::audit::Audit,
     plant::Plant,
 };
 
 /// What the daemon keeps of a line for itself, besides what it has planned, in percent.
 const RESERVE: u32 = 5;
+
+/// What a client wants.
+pub(super) struct Asked {
+    arrived: Instant,
+    unit: u8,
+    function: u8,
+    ask: Result<Ask, ExceptionCode>,
+    /// It goes ahead of everything.
+    pub(super) stop: Option<Stop>,
+}
 
 /// The PDU of an answer, or the exception instead.
 pub(super) type Answer = Result<Vec<u8>, ExceptionCode>;
@@ -75,6 +90,10 @@ pub(super) struct Desk {
     pub(super) config: GatewayConfig,
     pub(super) counters: Arc<Counters>,
     pub(super) plant: Plant,
+    pub(super) audit: Audit,
+    pub(super) clients: Clients,
+    /// What the configuration says of each drive that the bus cannot tell.
+    pub(super) options: HashMap<String, Options>,
     /// By the name of the line.
     turns: Mutex<BTreeMap<Arc<str>, Arc<Turns>>>,
     /// Reads that are not answered yet.
@@ -82,22 +101,24 @@ pub(super) struct Desk {
 }
 
 impl Desk {
-    pub(super) fn new(config: GatewayConfig, plant: Plant) -> Arc<Self> {
-        let (counters, turns, under_way) = Default::default();
-        Arc::new(Self { config, counters, plant, turns, under_way })
+    pub(super) fn new(
+        config: GatewayConfig,
+        plant: Plant,
+        audit: Audit,
+        options: HashMap<String, Options>,
+    ) -> Arc<Self> {
+        let (counters, clients, turns, under_way) = Default::default();
+        Arc::new(Self { config, counters, plant, audit, clients, options, turns, under_way })
     }
 
     /// The PDU that answers a request; `None`: silence.
-    pub(super) async fn answer(
-        self: &Arc<Self>,
-        peer: IpAddr,
-        arrived: Instant,
-        unit: u8,
-        request: &[u8],
-    ) -> Option<Vec<u8>> {
-        let _ = peer;
-        let function = request.first().copied().unwrap_or_default();
-        let answer = self.judge(arrived, unit, request).await;
+    pub(super) async fn answer(self: &Arc<Self>, peer: IpAddr, asked: Asked) -> Option<Vec<u8>> {
+        let Asked { arrived, unit, function, ask, stop } = asked;
+        let answer = match ask {
+            Err(code) => self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable).and(Err(code)),
+            Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop).await,
+            Ok(ask) => self.look_up(arrived, unit, ask).await,
+        };
         let (counted, pdu) = match answer {
             Ok(pdu) => (Counted::Answered, Some(pdu)),
             Err(ExceptionCode::GatewayTargetDevice) if self.config.silent => (Counted::Silence, None),
@@ -107,21 +128,24 @@ impl Desk {
         pdu
     }
 
+    /// What a frame asks, and whether it may not wait.
+    pub(super) fn look_at(&self, arrived: Instant, frame: &Frame) -> Asked {
+        let Frame { unit, ref pdu, .. } = *frame;
+        let ask = Ask::of(pdu);
+        let stop = ask.as_ref().ok().and_then(|ask| self.stop_in(unit, ask));
+        Asked { arrived, unit, function: pdu.first().copied().unwrap_or_default(), ask, stop }
+    }
+
     /// The PDU of a refusal that needs no look at the plant.
     pub(super) fn refuse(&self, function: u8, code: ExceptionCode) -> Vec<u8> {
         self.counters.answer(function, Counted::Exception(code.into()), Duration::ZERO);
         pdu::exception(function, code)
     }
 
-    async fn judge(self: &Arc<Self>, arrived: Instant, unit: u8, request: &[u8]) -> Answer {
-        let ask = Ask::of(request);
+    async fn look_up(self: &Arc<Self>, arrived: Instant, unit: u8, ask: Ask) -> Answer {
         let drive = self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable)?;
-        let ask = ask?;
         let capabilities = drive.capabilities();
         if !capabilities.functions.contains(&ask.function()) {
-            return Err(ExceptionCode::IllegalFunction);
-        }
-        if matches!(ask, Ask::Write { .. }) {
             return Err(ExceptionCode::IllegalFunction);
         }
         let mut unmapped = ask.registers().filter(|address| {
@@ -133,8 +157,20 @@ impl Desk {
         self.read(&drive, ask, arrived).await
     }
 
+    /// All drives behind its units.
+    pub(super) fn drives(&self) -> Vec<DriveHandle> {
+        let fleet = self.plant.fleet();
+        match &self.config.units {
+            Units::OfLine(line) => fleet.drives_on(line),
+            Units::Table(units) => {
+                let names: BTreeSet<&String> = units.values().collect();
+                names.into_iter().filter_map(|name| fleet.drive(name)).collect()
+            }
+        }
+    }
+
     /// The drive behind a unit.
-    fn drive(&self, unit: u8) -> Option<DriveHandle> {
+    pub(super) fn drive(&self, unit: u8) -> Option<DriveHandle> {
         let fleet = self.plant.fleet();
         match &self.config.units {
             Units::Table(units) => fleet.drive(units.get(&unit)?),

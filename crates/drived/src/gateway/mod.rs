@@ -4,6 +4,7 @@
 //! do, within a [share](share::Share) of it. Nothing that a client does or leaves undone holds up a line or another client.
 
 mod client;
+mod clients;
 pub(crate) mod counters;
 mod desk;
 mod framing;
@@ -11,8 +12,9 @@ mod pdu;
 mod share;
 #[cfg(test)]
 mod tests;
+mod writes;
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use tokio::{
     net::{TcpListener, TcpStream},
@@ -22,8 +24,8 @@ use tokio::{
 
 use self::{counters::Ended, desk::Desk};
 use crate::{
-    config::GatewayConfig,
-    doors::{TRIED_AGAIN, listen},
+    config::{Config, GatewayConfig},
+    doors::{TRIED_AGAIN, audit::Audit, listen},
     plant::Plant,
 };
 
@@ -35,9 +37,14 @@ pub(crate) struct Gateways {
 
 impl Gateways {
     /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
-    pub(crate) fn open(configs: &[GatewayConfig], plant: &Plant) -> Self {
+    pub(crate) fn open(config: &Config, plant: &Plant, audit: &Audit) -> Self {
         let (end, ended) = watch::channel(());
-        let desks: Vec<_> = configs.iter().map(|config| Desk::new(config.clone(), plant.clone())).collect();
+        let drives = config.lines.iter().flat_map(|line| &line.drives);
+        let options: HashMap<_, _> =
+            drives.map(|drive| (drive.settings.name.clone(), drive.options.values)).collect();
+        let desk =
+            |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), options.clone());
+        let desks: Vec<_> = config.gateways.iter().map(desk).collect();
         for desk in desks.iter().cloned() {
             let mut ended = ended.clone();
             tokio::spawn(async move {
@@ -46,7 +53,7 @@ impl Gateways {
                     _ = ended.changed() => return,
                 };
                 tracing::info!("gateway {} is at {}", desk.config.name, desk.config.listen);
-                accept_all(&listener, &desk, ended).await;
+                tokio::join!(accept_all(&listener, &desk, ended.clone()), until(desk.watch_silence(), ended));
             });
         }
         Self { _end: end, desks }
@@ -57,6 +64,13 @@ impl Gateways {
         for desk in &self.desks {
             tracing::info!("gateway {}: {}", desk.config.name, desk.counters.in_words());
         }
+    }
+}
+
+async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<()>) {
+    tokio::select! {
+        () = work => {}
+        _ = ended.changed() => {}
     }
 }
 

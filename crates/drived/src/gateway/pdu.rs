@@ -81,6 +81,12 @@ impl Ask {
         (0..count).map(move |number| address.wrapping_add(number))
     }
 
+    /// The registers that it writes, and what.
+    pub(super) fn writes(&self) -> impl Iterator<Item = (u16, u16)> + use<'_> {
+        let words: &[u16] = if let Self::Write { words, .. } = self { words } else { &[] };
+        self.registers().zip(words.iter().copied())
+    }
+
     /// As the line takes it.
     pub(super) fn request(&self) -> Request<'static> {
         match self {

@@ -220,6 +220,7 @@ impl Judge {
                 let reason = match rejected {
                     Rejected::NoRight { .. } => "no_right",
                     Rejected::NoDrive(_) | Rejected::NoGroup(_) => "not_found",
+                    Rejected::Stopped(_) => "stop",
                     Rejected::IdReused(_) => "id_reused",
                 };
                 return self.answered(caller, record, answers, refusal(caller, named, reason, &rejected));

@@ -24,7 +24,7 @@ use tokio::{
 
 use self::views::{DaemonView, DriveView, ExchangeView, LineDetailView, LineView, StateView};
 use self::{
-    commands::Log,
+    commands::{Log, Stopped},
     history::{History, HistoryView},
     parameters::Words,
     progress::Progress,
@@ -48,6 +48,8 @@ struct Inner {
     started_unix_ms: u64,
     demo: bool,
     commands: Log,
+    /// When a stop was last asked of each drive.
+    stopped: Stopped,
     /// One group starts at a time.
     group_starts: Mutex<()>,
     revisions: Revisions,
@@ -67,6 +69,7 @@ impl Plant {
             started_unix_ms: unix(Instant::now()),
             demo,
             commands: Log::default(),
+            stopped: Stopped::default(),
             group_starts: Mutex::default(),
             revisions: Revisions::new(),
             history: History::default(),

@@ -74,7 +74,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
-    let gateways = Gateways::open(&config.gateways, &plant);
+    let gateways = Gateways::open(&config, &plant, &doors.audit());
     let shutdown = config.shutdown;
     let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());

@@ -9,12 +9,13 @@ mod outcome;
 mod settle;
 
 use std::{
-    sync::{Arc, PoisonError},
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 
 use drive_core::{Direction, Setpoint, StopMode};
-use drive_fleet::Until;
+use drive_fleet::{DriveHandle, Until};
 use tokio::time::{Instant, timeout};
 
 pub(super) use self::log::Log;
@@ -79,6 +80,8 @@ pub(crate) enum Rejected {
     NoDrive(String),
     #[error("there is no group {0:?}")]
     NoGroup(String),
+    #[error("a stop of {0} came after it")]
+    Stopped(String),
     #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
     IdReused(String),
 }
@@ -95,7 +98,7 @@ impl Action {
         }
     }
 
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Start { direction, setpoint: Some(setpoint), .. } => {
                 format!("start {direction} at {setpoint}")
@@ -164,6 +167,7 @@ impl Plant {
             }
         }
         drop(groups);
+        self.0.stopped.pass(&request, &members)?;
         let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
@@ -185,6 +189,26 @@ impl Plant {
             }
             Target::All => Ok(self.fleet().drives().iter().map(|drive| drive.name().to_string()).collect()),
         }
+    }
+}
+
+/// When a stop was last asked of each drive, by whichever face: what arrived before it is not begun after it.
+#[derive(Default)]
+pub(super) struct Stopped(Mutex<HashMap<String, Instant>>);
+
+impl Stopped {
+    fn pass(&self, request: &Request, members: &[DriveHandle]) -> Result<(), Rejected> {
+        let mut stopped = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_stop = matches!(request.action, Action::Stop(_));
+        for member in members {
+            let name = member.name().to_string();
+            if is_stop {
+                stopped.insert(name, Instant::now());
+            } else if stopped.get(&name).is_some_and(|at| *at > request.arrived) {
+                return Err(Rejected::Stopped(name));
+            }
+        }
+        Ok(())
     }
 }
 
