@@ -9,7 +9,7 @@ use std::{
     process::{Command, Output, Stdio},
 };
 
-use support::{File, Running, Sim, ask, free_port, is_there, path, python_with, run};
+use support::{File, Running, Sim, free_port, get, is_there, path, python_with, run};
 
 /// The table that a test in the crate holds against the code.
 const DOCUMENT: &str = include_str!("../METRICS.md");
@@ -55,16 +55,6 @@ impl Plant {
     fn scrape(&self, accept: &str) -> String {
         get(self.port, "/metrics", accept)
     }
-}
-
-/// What is answered to somebody who asks a server of this machine, and ends the connection.
-fn get(port: u16, path: &str, accept: &str) -> String {
-    let request =
-        format!("GET {path} HTTP/1.0\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n");
-    let answer = ask(port, &request);
-    let (head, body) = answer.split_once("\r\n\r\n").expect("an answer has a head");
-    assert!(head.lines().next().is_some_and(|first| first.ends_with("200 OK")), "{answer}");
-    body.to_owned()
 }
 
 /// What a program says to a text on its stdin.

@@ -3,11 +3,16 @@
 use std::{collections::BTreeSet, fs, path::Path, time::Duration};
 
 use axum::{Extension, body::Body, http::Request};
+use drive_bus::{Line, LineConfig};
+use drive_families::Family;
+use drive_fleet::{DriveSettings, Fleet};
+use drive_sim::{SimLine, Wiring};
 use http_body_util::BodyExt as _;
 use tokio::time::sleep;
 use tower::ServiceExt as _;
 
 use super::{
+    samples::Format,
     table::{Kind, TABLE},
     *,
 };
@@ -15,6 +20,7 @@ use crate::{
     api,
     doors::{Caller, Rights},
     plant::testing::TestPlant,
+    simulated::{self, SetUp},
 };
 
 /// Where the table of the metrics is written down.
@@ -290,4 +296,55 @@ fn the_document_has_the_table_of_the_code() {
         return;
     }
     assert_eq!(document, wanted, "DRIVED_WRITE=1 writes the table anew");
+}
+
+/// What three thousand drives cost in one process, for the section on many hosts:
+/// `cargo test --release -p drived --bin drived three_thousand -- --ignored --nocapture`.
+#[tokio::test(start_paused = true)]
+#[ignore = "measures, and asserts nothing that a test should"]
+async fn three_thousand_drives_are_scraped_and_what_that_costs_is_printed() {
+    const LINES: usize = 97;
+    const LOOKS: u32 = 5;
+    let mut builder = Fleet::builder().whatever_the_plan();
+    for number in 0..LINES {
+        let family = Family::ALL[number % Family::ALL.len()];
+        let settings = family.capabilities().factory;
+        let (line, name) = (SimLine::new(Wiring::rtu(settings)), format!("line {number}"));
+        for slave in 1..=31 {
+            line.add_boxed(slave, simulated::model(family, SetUp::ForTheBus)).unwrap();
+        }
+        builder = builder.line(&*name, Line::over(line.in_memory(), LineConfig::stream(settings)));
+        for slave in 1..=31 {
+            let drive = DriveSettings::watched(format!("drive {number}.{slave}"));
+            builder = builder.drive(&name, slave, drive, |port, slave| {
+                family.open_with(port, slave, &simulated::options())
+            });
+        }
+    }
+    let plant = Plant::start(builder.start().unwrap(), Vec::new(), false);
+    sleep(Duration::from_secs(10)).await;
+    let (revision, time) = (plant.revisions().last(), Duration::from_secs(10));
+    sleep(time).await;
+    let drives = plant.drives().len();
+    let told = plant.revisions().last() - revision;
+    let metrics = Metrics { plant, sources: Vec::new(), began: (0, Instant::now()), turn: Mutex::default() };
+    let began = std::time::Instant::now();
+    let texts = [(); LOOKS as usize].map(|()| metrics.samples().text(Format::Text));
+    let took = began.elapsed() / LOOKS;
+    let text = &texts[0];
+    let series = text.lines().filter(|line| !line.starts_with('#')).count();
+    let up = text.lines().filter(|line| line.starts_with("drived_drive_up{") && line.ends_with(" 1")).count();
+    println!(
+        "{LINES} lines, {drives} drives, {up} of them answer: {series} series, {:.1} a drive; {} KiB, {} bytes a series;\n\
+         a scrape takes {:.1} ms, which each 15 s is {:.5} of a processor, {:.1} µs a drive;\n\
+         {:.1} revisions a second while nothing moves, {:.2} a drive",
+        series as f64 / drives as f64,
+        text.len() >> 10,
+        text.len() / series,
+        took.as_secs_f64() * 1e3,
+        took.as_secs_f64() / 15.0,
+        took.as_secs_f64() * 1e6 / drives as f64,
+        told as f64 / time.as_secs_f64(),
+        told as f64 / time.as_secs_f64() / drives as f64,
+    );
 }

@@ -1,0 +1,186 @@
+//! Several daemons and what joins them: one Prometheus that scrapes them all, as it is installed, with the rules and the names
+//! that the program gives out.
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Child, Command, Stdio},
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::Duration,
+};
+
+use support::{File, Running, Sim, free_port, get, is_there, path, run};
+
+/// A daemon with two pumps of its own.
+struct Host {
+    port: u16,
+    daemon: Running,
+    sim: Sim,
+    _file: File,
+}
+
+impl Host {
+    fn start(name: &str) -> Self {
+        let (sim, port) = (Sim::serve(name, &["atv312@1-2"]), free_port());
+        let text = format!(
+            "snapshots = \"500ms\"\n[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.{name}]\nport = \"{},19200,8E1\"\n\
+             [[drives]]\nline = \"{name}\"\ndrive = \"atv312@1-2\"\nname = \"{name} pump {{}}\"\ncontrol = true\n",
+            sim.link()
+        );
+        let file = File::new(name, &text);
+        let mut daemon = Running::start(&["run", "--config", file.path()]);
+        daemon.wait_for_log("the page is at http://127.0.0.1");
+        for _ in 0..2 {
+            daemon.wait_for(r#""event":"connected""#);
+        }
+        Self { port, daemon, sim, _file: file }
+    }
+}
+
+/// A Prometheus of this test alone; killed when dropped.
+struct Prometheus {
+    child: Child,
+    port: u16,
+    folder: PathBuf,
+}
+
+impl Prometheus {
+    /// It scrapes these hosts each second, and judges the rules that the program gives out.
+    fn start(hosts: &[Host]) -> Self {
+        let (folder, port) = (path("prometheus"), free_port());
+        fs::create_dir_all(&folder).expect("it can be made");
+        let rules = run(&["export", "alerts"]);
+        fs::write(folder.join("rules.yml"), rules.assert_done()).expect("it can be written");
+        let targets: Vec<String> = hosts.iter().map(|host| format!("\"127.0.0.1:{}\"", host.port)).collect();
+        let config = format!(
+            "global: {{ scrape_interval: 1s, evaluation_interval: 1s }}\nrule_files: [rules.yml]\nscrape_configs:\n\
+             \x20 - {{ job_name: drived, static_configs: [{{ targets: [{}] }}] }}\n",
+            targets.join(", ")
+        );
+        fs::write(folder.join("prometheus.yml"), config).expect("it can be written");
+        let child = Command::new("prometheus")
+            .arg(format!("--config.file={}", folder.join("prometheus.yml").display()))
+            .arg(format!("--storage.tsdb.path={}", folder.join("data").display()))
+            .arg(format!("--web.listen-address=127.0.0.1:{port}"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it was there a moment ago");
+        let mut prometheus = Self { child, port, folder };
+        prometheus.wait(|prometheus| {
+            let ready = std::net::TcpStream::connect(("127.0.0.1", prometheus.port));
+            ready.is_ok().then_some(())
+        });
+        prometheus
+    }
+
+    /// Asks again and again until something is so.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "no runtime is here, and Prometheus tells nobody when it has scraped"
+    )]
+    fn wait<T>(&mut self, mut is_so: impl FnMut(&Self) -> Option<T>) -> T {
+        loop {
+            assert!(self.child.try_wait().expect("it is a child").is_none(), "Prometheus has ended");
+            if let Some(so) = is_so(self) {
+                return so;
+            }
+            thread::sleep(Duration::from_millis(200));
+        }
+    }
+
+    /// The answer to a query; `None` while it is still starting.
+    fn query(&self, query: &str) -> Option<String> {
+        let encoded: String = query.bytes().map(|byte| format!("%{byte:02X}")).collect();
+        let answer = support::ask(
+            self.port,
+            &format!("GET /api/v1/query?query={encoded} HTTP/1.0\r\nHost: localhost\r\n\r\n"),
+        );
+        answer.contains("200 OK").then_some(answer)
+    }
+
+    /// The alerts that fire.
+    fn firing(&self) -> Option<String> {
+        self.query(r#"ALERTS{alertstate="firing"}"#)
+    }
+}
+
+impl Drop for Prometheus {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[test]
+fn one_prometheus_sees_three_daemons_and_fires_when_a_drive_of_one_trips() {
+    if !is_there("prometheus", &["--version"]) {
+        return;
+    }
+    let mut hosts = ["north", "east", "south"].map(Host::start);
+    let mut prometheus = Prometheus::start(&hosts);
+    prometheus.wait(|prometheus| {
+        let up = prometheus.query(r#"sum(up{job="drived"}) == 3 and sum(drived_drive_up) == 6"#)?;
+        up.contains("\"value\"").then_some(())
+    });
+    let quiet = prometheus.firing().expect("it answers");
+    assert!(!quiet.contains("alertname"), "{quiet}");
+
+    let [_, east, _] = &mut hosts;
+    east.sim.say("atv312@2 trip OCF", "done");
+    let alerts =
+        prometheus.wait(|prometheus| prometheus.firing().filter(|alerts| alerts.contains("alertname")));
+    assert!(alerts.contains(r#""alertname":"DrivedDriveTripped""#), "{alerts}");
+    assert!(
+        alerts.contains(r#""drive":"east pump 2""#) && alerts.contains(r#""mnemonic":"OCF""#),
+        "{alerts}"
+    );
+    assert!(!alerts.contains("north pump") && !alerts.contains("south pump"), "{alerts}");
+
+    // The metric store is an output: a daemon goes on, and ends, whether it is there or not.
+    drop(prometheus);
+    for host in hosts {
+        let Host { mut daemon, .. } = host;
+        daemon.wait_for(r#""quality":"good""#);
+        assert_eq!(daemon.interrupt().0, Some(0));
+    }
+}
+
+#[test]
+fn whoever_scrapes_without_end_holds_up_no_line() {
+    let Host { port, mut daemon, sim: _sim, _file } = Host::start("scraped");
+    let ends = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let scrapers: Vec<_> = (0..8)
+            .map(|_| {
+                scope.spawn(|| {
+                    let mut scrapes = 0;
+                    while !ends.load(Ordering::Relaxed) {
+                        assert!(get(port, "/metrics", "*/*").contains("drived_drive_up"));
+                        scrapes += 1;
+                    }
+                    scrapes
+                })
+            })
+            .collect();
+        for _ in 0..6 {
+            let snapshot = daemon.wait_for(r#""kind":"snapshot""#);
+            assert!(
+                snapshot.contains(r#""quality":"good""#) && snapshot.contains(r#""lost":0"#),
+                "{snapshot}"
+            );
+        }
+        ends.store(true, Ordering::Relaxed);
+        for scraper in scrapers {
+            let scrapes: u32 = scraper.join().expect("every scrape is answered");
+            assert!(scrapes > 0);
+        }
+    });
+    assert_eq!(daemon.interrupt().0, Some(0));
+}
