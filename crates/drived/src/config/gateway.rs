@@ -21,6 +21,7 @@ use super::{
 use crate::{
     doors::{Rights, Role},
     duration::Time,
+    gateway::virtual_unit::MOST_DRIVES,
 };
 
 /// A gateway.
@@ -46,6 +47,10 @@ pub(crate) struct GatewayConfig {
     pub(crate) silent: bool,
     /// Whether only registers of the family's map are read.
     pub(crate) mapped_only: bool,
+    /// The unit that shows all drives of the daemon.
+    pub(crate) virtual_unit: Option<u8>,
+    /// How old an answer may be that is told again; zero: every read is an exchange.
+    pub(crate) max_age: Duration,
     /// What its clients may do.
     pub(crate) rights: Rights,
     /// Whether parameters may be written,
@@ -216,6 +221,8 @@ pub(super) struct GatewayEntry {
     share: Option<Spanned<u8>>,
     no_answer: Option<Parsed<NoAnswer>>,
     registers: Option<Parsed<Registers>>,
+    virtual_unit: Option<Spanned<u8>>,
+    max_age: Option<Spanned<Parsed<Time>>>,
     writes: Option<Spanned<Parsed<Writes>>>,
     #[serde(default)]
     raw_writes: bool,
@@ -318,6 +325,8 @@ impl GatewayEntry {
             share,
             silent: self.no_answer.is_some_and(|said| said.0.silent),
             mapped_only: self.registers.is_some_and(|said| said.0.mapped_only),
+            virtual_unit: self.virtual_unit(source, whole, lines)?,
+            max_age: times(&self.max_age, Duration::ZERO, Duration::ZERO..=seconds(10))?,
             rights: writes.rights(),
             raw_writes: self.raw_writes,
             eeprom_writes: self.eeprom_writes,
@@ -325,6 +334,35 @@ impl GatewayEntry {
             client_timeout: (!client_timeout.is_zero()).then_some(client_timeout),
             stops_when_silent: self.on_client_silence.as_ref().is_some_and(|said| said.get_ref().0.stops),
         })
+    }
+
+    /// The unit of all drives: none of its drives has it.
+    fn virtual_unit(
+        &self,
+        source: Source<'_>,
+        whole: Range<usize>,
+        lines: &[LinePart],
+    ) -> Result<Option<u8>, ConfigError> {
+        let Some(said) = &self.virtual_unit else { return Ok(None) };
+        let unit = *said.get_ref();
+        let taken = match self.units_of(source, whole, lines)? {
+            Units::Table(units) => units.contains_key(&unit),
+            Units::OfLine(name) => lines
+                .iter()
+                .filter(|line| line.name == name)
+                .flat_map(|line| &line.drives)
+                .any(|drive| drive.name.slave.number() == unit),
+        };
+        if unit == 0 || taken {
+            let problem = format_args!("{unit}: expected a number from 1 on that none of its drives has");
+            return Err(source.error(said.span(), problem));
+        }
+        let drives: usize = lines.iter().map(|line| line.drives.len()).sum();
+        if drives > MOST_DRIVES {
+            let problem = format_args!("{drives} drives: it has room for {MOST_DRIVES}");
+            return Err(source.error(said.span(), problem));
+        }
+        Ok(Some(unit))
     }
 
     /// Who is behind its unit numbers: the drives of its line, or of the only one.

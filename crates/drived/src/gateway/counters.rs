@@ -9,6 +9,10 @@ use std::{
     time::Duration,
 };
 
+use drive_bus::stats::Spread;
+
+use crate::metrics::{Id, Samples, Source};
+
 /// Why a connection was turned away or ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Ended {
@@ -50,12 +54,19 @@ pub(crate) enum Result {
     Silence,
 }
 
+/// A function that clients make up is none of ours: 0.
+fn named(function: u8) -> u8 {
+    if [0x03, 0x04, 0x06, 0x08, 0x10, 0x2B].contains(&function) { function } else { 0 }
+}
+
 /// The counters of one gateway.
 #[derive(Debug, Default)]
 pub(crate) struct Counters {
     clients: AtomicU64,
     /// Reads that were answered by the exchange of an equal one.
     joined: AtomicU64,
+    /// Reads that were answered by what was kept.
+    kept: AtomicU64,
     counts: Mutex<Counts>,
 }
 
@@ -63,8 +74,10 @@ pub(crate) struct Counters {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Counts {
     pub(crate) ended: BTreeMap<Ended, u64>,
-    /// By function code and result: how many, and how long they took together.
-    pub(crate) requests: BTreeMap<(u8, Result), (u64, Duration)>,
+    /// By function code and result.
+    pub(crate) requests: BTreeMap<(u8, Result), u64>,
+    /// How long they took.
+    pub(crate) took: Spread,
     /// Writes that were refused, by exception.
     pub(crate) refused_writes: BTreeMap<u8, u64>,
 }
@@ -88,7 +101,7 @@ impl Counters {
         let Counts { ended, requests, .. } = self.counts();
         let mut words = vec![format!("{} connected", self.clients())];
         let mut results: BTreeMap<Result, u64> = BTreeMap::new();
-        for ((_, result), (count, _)) in requests {
+        for ((_, result), count) in requests {
             *results.entry(result).or_default() += count;
         }
         words.extend(results.into_iter().map(|(result, count)| match result {
@@ -96,13 +109,25 @@ impl Counters {
             Result::Exception(code) => format!("{count} refused by {code:02X}h"),
             Result::Silence => format!("{count} not answered"),
         }));
-        words.push(format!("{} by the exchange of another", self.joined()));
+        words.push(format!(
+            "{} by the exchange of another, {} from what was kept",
+            self.joined(),
+            self.kept()
+        ));
         words.extend(ended.into_iter().map(|(why, count)| format!("{count} put out ({})", why.name())));
         words.join(", ")
     }
 
     pub(super) fn join(&self) {
         self.joined.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn keep(&self) {
+        self.kept.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn kept(&self) -> u64 {
+        self.kept.load(Ordering::Relaxed)
     }
 
     pub(crate) fn joined(&self) -> u64 {
@@ -119,9 +144,8 @@ impl Counters {
 
     pub(super) fn answer(&self, function: u8, result: Result, took: Duration) {
         let mut counts = self.lock();
-        let (count, together) = counts.requests.entry((function, result)).or_default();
-        *count += 1;
-        *together += took;
+        *counts.requests.entry((named(function), result)).or_default() += 1;
+        counts.took.record(took);
     }
 
     /// Counts a write that is refused, and says how many were refused so.
@@ -139,5 +163,37 @@ impl Counters {
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Counts> {
         self.counts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The counters of a gateway and its name.
+pub(super) struct Counted {
+    pub(super) name: String,
+    pub(super) counters: std::sync::Arc<Counters>,
+}
+
+impl Source for Counted {
+    fn collect(&self, samples: &mut Samples) {
+        let (name, counters) = (self.name.as_str(), &self.counters);
+        samples.count(Id::GatewayClients, &[name], counters.clients());
+        samples.count(Id::GatewaySaved, &[name, "joined"], counters.joined());
+        samples.count(Id::GatewaySaved, &[name, "kept"], counters.kept());
+        let Counts { ended, requests, took, refused_writes } = counters.counts();
+        for ((function, result), count) in requests {
+            let function = if function == 0 { "other".to_owned() } else { format!("{function:02X}h") };
+            let result = match result {
+                Result::Answered => "answered".to_owned(),
+                Result::Exception(code) => format!("exception_{code:02X}h"),
+                Result::Silence => "silence".to_owned(),
+            };
+            samples.count(Id::GatewayRequests, &[name, &function, &result], count);
+        }
+        samples.add_histogram(Id::GatewayDuration, &[name], took.up_to(), took.sum().as_secs_f64());
+        for (code, count) in refused_writes {
+            samples.count(Id::GatewayRefused, &[name, &format!("{code:02X}h")], count);
+        }
+        for (why, count) in ended {
+            samples.count(Id::GatewayEnded, &[name, why.name()], count);
+        }
     }
 }

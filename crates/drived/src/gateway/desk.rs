@@ -8,8 +8,8 @@ use std::{
 };
 
 use drive_core::{
-    PortError, Terms,
-    tokio_modbus::{ExceptionCode, client::Client as _},
+    Port as _, PortError, Terms,
+    tokio_modbus::{ExceptionCode, Response, client::Client as _},
 };
 use drive_families::Options;
 use drive_fleet::{DriveHandle, LineBudget};
@@ -23,8 +23,10 @@ use super::{
     clients::Clients,
     counters::{Counters, Result as Counted},
     framing::Frame,
+    kept::Kept,
     pdu::{self, Ask},
     share::Share,
+    virtual_unit::{self, Outcomes},
     writes::Stop,
 };
 use crate::{
@@ -92,6 +94,9 @@ pub(super) struct Desk {
     pub(super) plant: Plant,
     pub(super) audit: Audit,
     pub(super) clients: Clients,
+    pub(super) kept: Kept,
+    /// What the virtual unit tells of the last commands.
+    pub(super) outcomes: Outcomes,
     /// What the configuration says of each drive that the bus cannot tell.
     pub(super) options: HashMap<String, Options>,
     /// By the name of the line.
@@ -107,14 +112,15 @@ impl Desk {
         audit: Audit,
         options: HashMap<String, Options>,
     ) -> Arc<Self> {
-        let (counters, clients, turns, under_way) = Default::default();
-        Arc::new(Self { config, counters, plant, audit, clients, options, turns, under_way })
+        let (counters, clients, kept, outcomes, turns, under_way) = Default::default();
+        Arc::new(Self { config, counters, plant, audit, clients, kept, outcomes, options, turns, under_way })
     }
 
     /// The PDU that answers a request; `None`: silence.
     pub(super) async fn answer(self: &Arc<Self>, peer: IpAddr, asked: Asked) -> Option<Vec<u8>> {
         let Asked { arrived, unit, function, ask, stop } = asked;
         let answer = match ask {
+            Err(code) if self.config.virtual_unit == Some(unit) => Err(code),
             Err(code) => self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable).and(Err(code)),
             Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop).await,
             Ok(ask) => self.look_up(arrived, unit, ask).await,
@@ -143,6 +149,15 @@ impl Desk {
     }
 
     async fn look_up(self: &Arc<Self>, arrived: Instant, unit: u8, ask: Ask) -> Answer {
+        if self.config.virtual_unit == Some(unit) {
+            let Ask::Read { function, address, count } = ask else {
+                return Err(ExceptionCode::IllegalFunction);
+            };
+            let drives = self.plant.fleet().drives();
+            let words = virtual_unit::read(&drives, &self.outcomes, address, count);
+            let words = words.ok_or(ExceptionCode::IllegalDataAddress)?;
+            return Ok(pdu::words(function, &words));
+        }
         let drive = self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable)?;
         let capabilities = drive.capabilities();
         if !capabilities.functions.contains(&ask.function()) {
@@ -153,6 +168,10 @@ impl Desk {
         });
         if self.config.mapped_only && unmapped.next().is_some() {
             return Err(ExceptionCode::IllegalDataAddress);
+        }
+        if let Some(words) = self.kept.of(drive.name(), &ask, Instant::now(), self.config.max_age) {
+            self.counters.keep();
+            return Ok(pdu::words(ask.function(), &words));
         }
         self.read(&drive, ask, arrived).await
     }
@@ -246,7 +265,14 @@ impl Desk {
         let mut slave = line.slave(drive.slave().number()).with_terms(terms.within(lifetime));
         let outcome = timeout_at(deadline, slave.call(ask.request())).await;
         let (code, was_lost) = match outcome {
-            Ok(Ok(Ok(response))) => return Ok(pdu::answer(ask, response)),
+            Ok(Ok(Ok(response))) => {
+                if let Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) = &response
+                {
+                    let at = slave.answered_at().unwrap_or_else(Instant::now);
+                    self.kept.keep(drive.name(), ask, words, at, self.config.max_age);
+                }
+                return Ok(pdu::answer(ask, response));
+            }
             Ok(Ok(Err(exception))) => return Err(exception),
             Ok(Err(error)) => code_of(&PortError::from_modbus(error)),
             Err(_) => (ExceptionCode::GatewayTargetDevice, true),

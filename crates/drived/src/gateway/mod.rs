@@ -8,10 +8,12 @@ mod clients;
 pub(crate) mod counters;
 mod desk;
 mod framing;
+mod kept;
 mod pdu;
 mod share;
 #[cfg(test)]
 mod tests;
+pub(crate) mod virtual_unit;
 mod writes;
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
@@ -22,10 +24,14 @@ use tokio::{
     time::sleep,
 };
 
-use self::{counters::Ended, desk::Desk};
+use self::{
+    counters::{Counted, Ended},
+    desk::Desk,
+};
 use crate::{
     config::{Config, GatewayConfig},
     doors::{TRIED_AGAIN, audit::Audit, listen},
+    metrics::Source,
     plant::Plant,
 };
 
@@ -47,6 +53,9 @@ impl Gateways {
         let desks: Vec<_> = config.gateways.iter().map(desk).collect();
         for desk in desks.iter().cloned() {
             let mut ended = ended.clone();
+            if desk.config.virtual_unit.is_some() {
+                tokio::spawn(desk.outcomes.clone().follow(plant.fleet().events()));
+            }
             tokio::spawn(async move {
                 let listener = tokio::select! {
                     listener = listen(desk.config.listen) => listener,
@@ -57,6 +66,14 @@ impl Gateways {
             });
         }
         Self { _end: end, desks }
+    }
+
+    /// What each counts, for a metrics store.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = Arc<dyn Source>> + '_ {
+        self.desks.iter().map(|desk| {
+            let counted = Counted { name: desk.config.name.clone(), counters: Arc::clone(&desk.counters) };
+            Arc::new(counted) as Arc<dyn Source>
+        })
     }
 
     /// Says in the log what each has counted.

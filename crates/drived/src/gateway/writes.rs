@@ -83,7 +83,7 @@ impl Desk {
         ask: &Ask,
         stop: Option<Stop>,
     ) -> Answer {
-        if !self.config.rights.stop {
+        if !self.config.rights.stop || self.config.virtual_unit == Some(unit) {
             return Err(ExceptionCode::IllegalFunction);
         }
         let drives = match self.drive(unit) {
@@ -92,6 +92,7 @@ impl Desk {
             Some(drive) => vec![drive],
         };
         let caller = self.caller(peer);
+        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
         let written = match (stop, &drives[..]) {
             (Some(stop), [drive]) => {
                 self.clients.write(peer, drive.name(), Word::WithoutRun);
@@ -113,6 +114,7 @@ impl Desk {
             }
             (None, _) => Err(Refusal::rule("to all units at once only a stop is carried out")),
         };
+        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
         written.map(|()| ask.confirmation()).map_err(|refusal| {
             self.tell_refusal(&caller, unit, ask, &refusal);
             refusal.code

@@ -152,6 +152,18 @@ metrics! {
     MqttLost: Counter, "drived_mqtt_dropped_messages_total", ["reason"],
         "Messages that were lost: no_room, expired, not_taken by the broker, or a flood of arriving ones.";
 
+    GatewayClients: Gauge, "drived_gateway_clients", ["gateway"], "Modbus TCP clients that are connected.";
+    GatewayRequests: Counter, "drived_gateway_requests_total", ["gateway", "function", "result"],
+        "Requests of Modbus TCP clients: answered, exception_ and its code, or silence.";
+    GatewayDuration: Histogram(&drive_bus::stats::BOUNDS), "drived_gateway_request_duration_seconds", ["gateway"],
+        "From the arrival of a request to its answer.";
+    GatewayRefused: Counter, "drived_gateway_refused_writes_total", ["gateway", "reason"],
+        "Writes that were refused, by the exception.";
+    GatewaySaved: Counter, "drived_gateway_saved_exchanges_total", ["gateway", "by"],
+        "Reads that were answered without an exchange of their own: joined to an equal one, or kept from a block read before.";
+    GatewayEnded: Counter, "drived_gateway_ended_connections_total", ["gateway", "reason"],
+        "Clients that were turned away or put out: full, not_allowed, idle, half_open, malformed or slow_reader.";
+
     ProcessCpu: Counter, "process_cpu_seconds_total", [], "User and system processor time.";
     ProcessFds: Gauge, "process_open_fds", [], "Open file descriptors.";
     ProcessMaxFds: Gauge, "process_max_fds", [], "How many file descriptors may be open.";

@@ -81,6 +81,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut sources: Vec<Arc<dyn metrics::Source>> = vec![Arc::new(reloader.clone())];
     let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
     sources.extend(mqtt.iter().map(Mqtt::source));
+    sources.extend(gateways.sources());
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());

@@ -38,6 +38,8 @@ fn config() -> GatewayConfig {
         silent: false,
         mapped_only: false,
         rights: Role::View.rights(),
+        virtual_unit: None,
+        max_age: Duration::ZERO,
         raw_writes: false,
         eeprom_writes: false,
         broadcast: false,

@@ -194,3 +194,73 @@ async fn who_closes_his_side_after_his_request_gets_its_answer() {
     assert_eq!(peer.answer().await.1[..2], [0x03, 2]);
     assert!(peer.is_ended().await);
 }
+
+#[tokio::test(start_paused = true)]
+async fn what_was_read_lately_is_told_again_where_allowed_and_never_after_a_write() {
+    let (plant, desk) = plant(1, |config| {
+        config.max_age = Duration::from_millis(500);
+        config.rights = crate::doors::Role::Operate.rights();
+    })
+    .await;
+    let mut peer = Peer::of(&desk);
+    let first = peer.ask(1, &read(ETA, 4)).await;
+    assert_eq!(peer.ask(1, &read(ETA, 4)).await, first);
+    assert_eq!(peer.ask(1, &read(ETA + 1, 2)).await[2..], first[4..8], "a part of it");
+    assert_eq!(desk.counters.kept(), 2);
+    assert_eq!(peer.ask(1, &[0x06, 0x21, 0x35, 0, 0]).await[0], 0x06);
+    peer.ask(1, &read(ETA, 4)).await;
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    peer.ask(1, &read(ETA, 4)).await;
+    assert_eq!(desk.counters.kept(), 2);
+    drop(plant);
+}
+
+/// Read as a SCADA reads it that knows nothing but the head.
+#[tokio::test(start_paused = true)]
+async fn the_virtual_unit_has_all_drives_in_one_read_and_marks_what_is_old() {
+    let (plant, desk) = plant(31, |config| {
+        config.virtual_unit = Some(247);
+        config.rights = crate::doors::Role::Operate.rights();
+        config.patience = Duration::from_secs(3);
+    })
+    .await;
+    tokio::spawn(desk.outcomes.clone().follow(plant.plant.fleet().events()));
+    let mut peer = Peer::of(&desk);
+    let ask = async |peer: &mut Peer, address: u16, count: u16| -> Vec<u16> {
+        let pdu = peer.ask(247, &read(address, count)).await;
+        assert_eq!(usize::from(pdu[1]), pdu.len() - 2, "{pdu:02X?}");
+        pdu[2..].chunks(2).map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
+    };
+    let head = ask(&mut peer, 0, 16).await;
+    assert_eq!(head[..4], [0x4452, 0x4956, 1, 31]);
+    let [overview, stride, details, detail] = head[4..8] else { panic!("{head:?}") };
+    for word in [0x0000, 0x0006, 0x0007] {
+        let [high, low] = u16::to_be_bytes(word);
+        assert_eq!(peer.ask(2, &[0x06, 0x21, 0x35, high, low]).await[0], 0x06);
+    }
+    // CMD = Fh and LFr = 300 in one write: 30 Hz.
+    let run = [0x10, 0x21, 0x35, 0, 2, 4, 0, 0x0F, 1, 44];
+    assert_eq!(peer.ask(2, &run).await[0], 0x10);
+    plant.machines[4].mute();
+    tokio::time::sleep(Duration::from_secs(20)).await;
+    let exchanges = plant.machines[1].all_requests();
+    let all = ask(&mut peer, overview, 31 * stride).await;
+    assert_eq!(plant.machines[1].all_requests(), exchanges, "without the line");
+    let of = |drive: usize| &all[drive * usize::from(stride)..(drive + 1) * usize::from(stride)];
+    let [flags, frequency, current, age] = *of(1) else { panic!("{all:?}") };
+    assert_eq!(flags & 0x000F, 4, "running");
+    assert_eq!(flags >> 4 & 0x0007, 0b101, "forward, connected");
+    assert_eq!(flags >> 8 & 0x0003, 2, "good");
+    assert_eq!(flags >> 13 & 1, 1, "started by the daemon");
+    assert_eq!(frequency, 3_000);
+    assert!(current < 1_000 && age < 30, "{current} {age}");
+    assert_eq!(of(4)[0] >> 8 & 0x0003, 1, "the mute one is old");
+    assert_eq!(of(4)[1..3], [0xFFFF; 2]);
+    assert!(of(4)[3] > 100, "{:?}", of(4));
+    let second = ask(&mut peer, details + detail, detail).await;
+    assert_eq!(second[9], 3_000, "the setpoint");
+    assert_eq!(second[10..12], [1, 1], "the last command: a start, confirmed");
+    assert_eq!(second[15], 2, "its slave");
+    assert_eq!(peer.ask(247, &read(overview + 31 * stride, 1)).await, [0x83, 0x02]);
+    assert_eq!(peer.ask(247, &[0x06, 0, 0, 0, 0]).await, [0x86, 0x01], "nothing is written there");
+}
