@@ -13,7 +13,7 @@ mod reload;
 mod routes;
 mod stream;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use axum::{
     Extension, Router,
@@ -27,7 +27,7 @@ pub(crate) use self::{ask::Viewer, reload::reload_router};
 use self::{
     demo::Stage,
     problem::Problem,
-    routes::{Route, demo_routes, routes},
+    routes::{Route, demo_routes, door_routes, reload_routes, routes},
 };
 use crate::plant::Plant;
 
@@ -37,7 +37,9 @@ const LARGEST_BODY: usize = 64 << 10;
 /// Everything under `/api/v1`, `/healthz` and `/readyz`. Who asks is a [`Caller`](crate::doors::Caller) in the extensions
 /// of each request.
 pub(crate) fn router(plant: Plant) -> Router {
-    of(routes(), plant)
+    let mut all = routes();
+    all.extend(reload_routes());
+    of(all, plant)
 }
 
 /// The same with what a demonstration has besides.
@@ -47,13 +49,21 @@ pub(crate) fn demo_router(plant: Plant, stage: Stage) -> Router {
     of(all, plant).layer(Extension(stage))
 }
 
-fn of(routes: Vec<Route>, plant: Plant) -> Router {
+/// The description of a daemon's API.
+#[cfg(test)]
+pub(crate) fn described() -> serde_json::Value {
+    document::of(&[routes(), reload_routes(), door_routes()].into_iter().flatten().collect::<Vec<_>>())
+}
+
+fn of(mut routes: Vec<Route>, plant: Plant) -> Router {
+    routes.extend(door_routes());
     let document = Bytes::from(document::of(&routes).to_string());
     let headers = [(CONTENT_TYPE, "application/json"), (CACHE_CONTROL, "no-store")];
     let router = Router::new().route(document::PATH, get(move || async move { (headers, document) }));
     routes
         .into_iter()
-        .fold(router, |router, route| router.route(route.path, route.handler))
+        .filter_map(|route| Some((route.path, route.handler?)))
+        .fold(router, |router, (path, handler)| router.route(path, handler))
         .route("/api/{*rest}", any(|| async { Problem::not_found("there is nothing at this address") }))
         .method_not_allowed_fallback(async || Problem::method_not_allowed())
         .layer(DefaultBodyLimit::max(LARGEST_BODY))

@@ -6,6 +6,7 @@ use axum::{
     http::StatusCode,
     routing::post,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ask::By, problem::Problem};
@@ -18,16 +19,20 @@ struct Asked {
     dry_run: bool,
 }
 
-#[derive(Debug, Serialize)]
-struct Changes {
+/// What a reload does.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Changes {
     dry_run: bool,
     /// What was done, or would be, a sentence each.
     changes: Vec<String>,
 }
 
-/// `POST /api/v1/reload`, for a program that has a configuration.
+/// Where it is served.
+pub(super) const PATH: &str = "/api/v1/reload";
+
+/// The [route](PATH) for a program that has a configuration.
 pub(crate) fn reload_router(reloader: Reloader) -> Router {
-    Router::new().route("/api/v1/reload", post(reload)).with_state(reloader)
+    Router::new().route(PATH, post(reload)).with_state(reloader)
 }
 
 async fn reload(

@@ -11,8 +11,9 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use super::{
     capture, command, demo, health,
     parameter::{self, NewValue},
-    read, stream,
+    read, reload, stream,
 };
+use crate::doors::{LOGIN, LOGOUT, LoginBody, SessionView};
 use crate::plant::{
     Plant,
     commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
@@ -29,7 +30,8 @@ pub(super) type Describe = fn(&mut SchemaGenerator) -> Schema;
 pub(super) struct Route {
     pub(super) path: &'static str,
     pub(super) method: Method,
-    pub(super) handler: MethodRouter<Plant>,
+    /// `None`: it is served by somebody else, at the doors or beside the plant.
+    pub(super) handler: Option<MethodRouter<Plant>>,
     /// What it is for.
     pub(super) about: &'static str,
     /// What may stand behind a question mark.
@@ -64,6 +66,8 @@ const WAIT: Parameter = Parameter {
 };
 const SECONDS: Parameter =
     Parameter { name: "seconds", about: "how long: 1 to 600, 10 unless it is said", kind: "integer" };
+const DRY_RUN: Parameter =
+    Parameter { name: "dry_run", about: "only say what would change", kind: "boolean" };
 const SINCE: Parameter =
     Parameter { name: "since", about: "the revision that the reader has", kind: "integer" };
 
@@ -74,9 +78,13 @@ impl Route {
         T: 'static,
     {
         let filter = MethodFilter::try_from(method.clone()).unwrap_or(MethodFilter::GET);
-        let handler = on(filter, handler);
+        Self { handler: Some(on(filter, handler)), ..Self::elsewhere(method, path, about) }
+    }
+
+    /// One that is described here and served elsewhere.
+    fn elsewhere(method: Method, path: &'static str, about: &'static str) -> Self {
         let (query, answers) = (Vec::new(), Vec::new());
-        Self { path, method, handler, about, query, body: None, answers, problems: vec![400, 401, 403] }
+        Self { path, method, handler: None, about, query, body: None, answers, problems: vec![400, 401, 403] }
     }
 
     fn get<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
@@ -159,6 +167,31 @@ pub(super) fn demo_routes() -> Vec<Route> {
         Route::deed::<_, _, demo::Trip>("/api/v1/demo/trip", demo::trip, "Trips a simulated drive"),
         Route::deed::<_, _, demo::Cable>("/api/v1/demo/cable", demo::cable, "Pulls or plugs in a cable"),
     ]
+}
+
+/// What the doors serve themselves.
+pub(super) fn door_routes() -> Vec<Route> {
+    let post = |path, about| {
+        let mut route =
+            Route::elsewhere(Method::POST, path, about).answers::<SessionView>(200, "who the caller is now");
+        route.problems.extend([413, 415]);
+        route
+    };
+    let mut login = post(LOGIN, "Begins a session by a token; the answer sets its cookie")
+        .or_problem(429)
+        .or_problem(503);
+    login.body = Some(SchemaGenerator::subschema_for::<LoginBody>);
+    vec![login, post(LOGOUT, "Ends the session of the cookie")]
+}
+
+/// What a program with a configuration has besides.
+pub(super) fn reload_routes() -> Vec<Route> {
+    let mut route =
+        Route::elsewhere(Method::POST, reload::PATH, "Reads the configuration again, for engineers")
+            .answers::<reload::Changes>(200, "what was done, or would be")
+            .with_query(DRY_RUN);
+    route.problems.extend([413, 415, 422, 500]);
+    vec![route]
 }
 
 /// All of them.

@@ -17,7 +17,8 @@ use axum::{
     response::Response,
 };
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use tokio::{
     sync::watch,
     time::{Instant, timeout},
@@ -35,6 +36,7 @@ use super::{
     sessions::{self, Sessions},
     tokens::{self, Token, TokenError, Tokens},
 };
+use crate::json::line;
 
 /// The most that a request may say.
 const BODY: usize = 64 * 1024;
@@ -44,8 +46,21 @@ const BODY_WITHIN: Duration = Duration::from_secs(10);
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 
 const API: &str = "/api/";
-const LOGIN: &str = "/api/v1/login";
-const LOGOUT: &str = "/api/v1/logout";
+pub(crate) const LOGIN: &str = "/api/v1/login";
+pub(crate) const LOGOUT: &str = "/api/v1/logout";
+
+/// By which a session begins.
+#[derive(Deserialize, JsonSchema)]
+pub(crate) struct LoginBody {
+    token: String,
+}
+
+/// Who somebody is.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct SessionView {
+    caller: String,
+    rights: Rights,
+}
 
 /// What holds for one door.
 #[derive(Debug, Clone)]
@@ -258,12 +273,8 @@ impl Gate {
     }
 
     fn log_in(&self, door: &Door, peer: Peer, caller: Caller, body: &[u8]) -> Result<Response, Refusal> {
-        #[derive(Deserialize)]
-        struct Login {
-            token: String,
-        }
         self.wait(peer)?;
-        let Login { token: secret } = serde_json::from_slice(body)
+        let LoginBody { token: secret } = serde_json::from_slice(body)
             .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
         let Some(token) = self.token(secret.trim()).map_err(unreadable)? else {
             return Err(self.failed(peer, caller));
@@ -372,8 +383,8 @@ where
 
 /// Who the caller is now, and his cookie.
 fn told(caller: &Caller, session: Option<&str>, encrypted: bool) -> Response {
-    let body = serde_json::json!({ "caller": caller.name, "rights": caller.rights });
-    let mut answer = Response::new(Body::from(body.to_string()));
+    let known = SessionView { caller: caller.name.clone(), rights: caller.rights };
+    let mut answer = Response::new(Body::from(line(&known)));
     let headers = answer.headers_mut();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
     if let Ok(cookie) = sessions::set_cookie(session, encrypted).parse() {

@@ -31,8 +31,9 @@ use tokio::{
 };
 
 #[cfg(unix)]
-use self::socket::Unbound;
+pub(crate) use self::gate::{LOGIN, LOGOUT, LoginBody, SessionView};
 #[cfg(unix)]
+use self::socket::Unbound;
 pub(crate) use self::socket::usual_places;
 use self::{
     audit::{Audit, Kind, Record},

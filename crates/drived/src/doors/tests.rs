@@ -426,3 +426,33 @@ async fn one_address_has_eight_event_streams() {
     stream.read_exact(&mut status).await.unwrap();
     assert_eq!(&status, b"HTTP/1.1 200");
 }
+
+#[tokio::test]
+async fn login_and_logout_are_answered_as_the_document_says() {
+    let rig = Rig::new("described");
+    let token = rig.token("panel", Role::Operate);
+    let document = crate::api::described();
+    let right = format!("{{\"token\": \"{token}\"}}");
+    for (path, body, status) in [
+        ("/api/v1/login", right.as_str(), 200),
+        ("/api/v1/login", "{\"token\": \"drv_wrong\"}", 401),
+        ("/api/v1/login", "nonsense", 400),
+        ("/api/v1/logout", "{}", 200),
+    ] {
+        let answer = rig.ask(&Asked { method: "POST", path, body, headers: &[] }).await;
+        assert_eq!(answer.status.as_u16(), status, "{path} {body}");
+        let kind = answer.headers["content-type"].to_str().unwrap();
+        let described = &document["paths"][path]["post"]["responses"][status.to_string()]["content"][kind];
+        let told = serde_json::from_str(&answer.body).unwrap();
+        assert!(described.is_object(), "{path} {status} {kind} is not described");
+        crate::api::tests::described::validate(&document, &described["schema"], &told, path);
+    }
+    let schema =
+        &document["paths"]["/api/v1/login"]["post"]["requestBody"]["content"]["application/json"]["schema"];
+    crate::api::tests::described::validate(
+        &document,
+        schema,
+        &serde_json::from_str(&right).unwrap(),
+        "the body",
+    );
+}

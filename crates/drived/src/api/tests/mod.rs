@@ -1,7 +1,7 @@
 //! The API over a simulated plant in virtual time, asked as a client asks it.
 
 mod commanding;
-mod described;
+pub(crate) mod described;
 mod reading;
 mod streaming;
 

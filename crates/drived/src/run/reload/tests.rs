@@ -4,9 +4,15 @@ use std::{fs, time::Duration};
 
 use drive_families::Family;
 use drive_fleet::DriveSettings;
+use http_body_util::BodyExt as _;
+use tower::ServiceExt as _;
 
 use super::*;
-use crate::simulated;
+use crate::{
+    api::tests::described::validate,
+    doors::{Caller, Rights},
+    simulated,
+};
 
 /// Lines whose port is nowhere, with watched drives by line, address and name.
 fn text(drives: &[(&str, u8, &str)]) -> String {
@@ -16,6 +22,31 @@ fn text(drives: &[(&str, u8, &str)]) -> String {
         format!("[[drives]]\nline = \"{line}\"\ndrive = \"atv312@{address}\"\nname = \"{name}\"\n")
     };
     drives.iter().map(drive).fold(lines.to_owned(), |text, drive| text + &drive)
+}
+
+/// The route answers what the document of the API says.
+async fn answers_as_described(reloader: Reloader) {
+    let rights = Rights { engineer: true, ..Rights::NONE };
+    let caller = Caller { name: "chief".to_owned(), origin: "test".to_owned(), rights };
+    let router = crate::api::reload_router(reloader).layer(axum::Extension(caller));
+    let document = crate::api::described();
+    for (path, status, kind) in [
+        ("/api/v1/reload?dry_run=true", 200, "application/json"),
+        ("/api/v1/reload", 200, "application/json"),
+        ("/api/v1/reload?dry_run=perhaps", 400, "application/problem+json"),
+    ] {
+        let request = axum::http::Request::post(path).body(axum::body::Body::empty()).unwrap();
+        let answer = router.clone().oneshot(request).await.unwrap();
+        assert_eq!(
+            (answer.status().as_u16(), answer.headers()["content-type"].to_str().unwrap()),
+            (status, kind)
+        );
+        let body = answer.into_body().collect().await.unwrap().to_bytes();
+        let described = &document["paths"]["/api/v1/reload"]["post"]["responses"][status.to_string()];
+        let schema = &described["content"][kind]["schema"];
+        assert!(schema.is_object(), "{path} {status} is not described");
+        validate(&document, schema, &serde_json::from_slice(&body).unwrap(), path);
+    }
 }
 
 #[tokio::test]
@@ -58,5 +89,6 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
     let _ = fleet.remove(&["four"], Duration::from_secs(1)).await;
     assert_eq!(reloader.reload(false).await.unwrap(), ["four added", "two added"]);
     assert_eq!(reloader.reload(true).await.unwrap(), Vec::<String>::new());
+    answers_as_described(reloader).await;
     fs::remove_file(&file).unwrap();
 }
