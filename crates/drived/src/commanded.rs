@@ -3,7 +3,7 @@
 use std::{fmt, time::Duration};
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{ErrorKind, Status, StopMode};
+use drive_core::{Error, ErrorKind, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
     DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
@@ -39,6 +39,8 @@ pub(crate) struct Commanded {
     config: LineConfig,
     line: Line,
     ending: Ending,
+    /// Nobody is told on stdout how it goes, because that is for an object.
+    pub(crate) is_quiet: bool,
 }
 
 impl Commanded {
@@ -71,7 +73,7 @@ impl Commanded {
             .start()
             .map_err(|error| input(&error))?;
         let Some(handle) = fleet.drives().pop() else { return Err(input(&"the fleet has no drive")) };
-        Ok(Self { name, handle, events: fleet.events(), config, line, ending })
+        Ok(Self { name, handle, events: fleet.events(), config, line, ending, is_quiet: false })
     }
 
     /// What is known of the drive now.
@@ -83,21 +85,21 @@ impl Commanded {
     /// Waits until the drive has answered, and then for what becomes of a command.
     pub(crate) async fn command(
         &mut self,
-        command: impl AsyncFnOnce(DriveHandle) -> Outcome,
+        command: impl AsyncFn(DriveHandle) -> Outcome,
     ) -> Result<Outcome, Failure> {
         self.connected().await?;
-        one_drive::told(self.name, &mut self.ending, command(self.handle.clone())).await
+        one_drive::told(self.name, &mut self.ending, undisturbed(&self.handle, command)).await
     }
 
     /// The same for a start: whoever asks the program to end before it is confirmed wants a motor that stands.
     pub(crate) async fn start(
         &mut self,
-        command: impl AsyncFnOnce(DriveHandle) -> Outcome,
+        command: impl AsyncFn(DriveHandle) -> Outcome,
     ) -> Result<Status, Failure> {
         self.connected().await?;
         let outcome = tokio::select! {
             biased;
-            outcome = command(self.handle.clone()) => Some(outcome),
+            outcome = undisturbed(&self.handle, command) => Some(outcome),
             () = self.ending.asked() => None,
         };
         let why = match outcome {
@@ -142,9 +144,9 @@ impl Commanded {
                     let Some(pending) = watch.borrow_and_update().stop else { continue };
                     let first = pending.taken && !std::mem::replace(&mut taken, pending.taken);
                     if first {
-                        tell_what_it_took(name, &mut self.events).await;
+                        self.tell_what_it_took().await;
                         // A reader who went away ends no stop.
-                        let _ = output::say(format_args!(
+                        let _ = self.say(format_args!(
                             "{name} is stopping ({} stop): the drive shows {}", pending.mode, self.status()
                         ));
                     }
@@ -156,13 +158,13 @@ impl Commanded {
                         1 => "sent 1 time".to_owned(),
                         times => format!("sent {times} times"),
                     };
-                    let _ = output::say(format_args!(
+                    let _ = self.say(format_args!(
                         "{name} has not confirmed the stop after {waited} s, {sent}: it goes on"
                     ));
                 }
             }
         };
-        tell_what_it_took(name, &mut self.events).await;
+        self.tell_what_it_took().await;
         match outcome {
             Outcome::Confirmed => Ok(self.status()),
             outcome @ Outcome::NotConfirmed(_) if taken => {
@@ -172,10 +174,31 @@ impl Commanded {
         }
     }
 
+    /// Tells what a stop has taken besides: another mode's place, or the command from somebody else.
+    async fn tell_what_it_took(&mut self) {
+        while let Ok(Received::Event(Event { kind, .. })) = timeout(Duration::ZERO, self.events.recv()).await
+        {
+            if matches!(kind, EventKind::StopModeReplaced { .. } | EventKind::StopTookCommand(_)) {
+                let _ = self.say(format_args!("{}: {kind}", self.name));
+            }
+        }
+    }
+
+    fn say(&self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
+        match self.is_quiet {
+            true => output::complain(text),
+            false => output::say(text)?,
+        }
+        Ok(())
+    }
+
     async fn connected(&mut self) -> Result<(), Failure> {
         let answered = self.handle.wait_until(|snapshot| {
             snapshot.link == Link::Connected
-                || snapshot.error.as_ref().is_some_and(|error| error.kind() != ErrorKind::NotSent)
+                || snapshot
+                    .error
+                    .as_ref()
+                    .is_some_and(|error| error.kind() != ErrorKind::NotSent && !is_disturbed(error))
         });
         let snapshot = tokio::select! {
             snapshot = timeout(CONNECTED_WITHIN, answered) => snapshot.unwrap_or_else(|_| self.handle.snapshot()),
@@ -210,13 +233,21 @@ impl Commanded {
     }
 }
 
-/// Tells what a stop has taken besides: another mode's place, or the command from somebody else.
-async fn tell_what_it_took(name: DriveName, events: &mut Events) {
-    while let Ok(Received::Event(Event { kind, .. })) = timeout(Duration::ZERO, events.recv()).await {
-        if matches!(kind, EventKind::StopModeReplaced { .. } | EventKind::StopTookCommand(_)) {
-            let _ = output::say(format_args!("{name}: {kind}"));
+/// What becomes of a command. One that is refused because an answer was damaged, or in doubt because this host was away for a
+/// moment, is given again for as long as a drive has to answer: nothing was sent.
+async fn undisturbed(handle: &DriveHandle, command: impl AsyncFn(DriveHandle) -> Outcome) -> Outcome {
+    let until = Instant::now() + CONNECTED_WITHIN;
+    loop {
+        match command(handle.clone()).await {
+            Outcome::Refused(Refused::Drive(error)) if is_disturbed(&error) && Instant::now() < until => {}
+            outcome => return outcome,
         }
     }
+}
+
+/// Whether somebody answered, and not so that it can be believed.
+const fn is_disturbed(error: &Error) -> bool {
+    matches!(error, Error::Port { problem: PortError::Damaged(_) | PortError::Mismatch(_), .. })
 }
 
 fn seen(last: Option<&LastSeen>) -> String {

@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use drive_bus::{Endpoint, Line, LineConfig, OpenError};
-use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError};
+use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError, Status};
 use drive_families::Options;
 use drive_fleet::Order;
+use serde_json::json;
 use tokio::time::timeout;
 
 use crate::{
@@ -33,7 +34,7 @@ const CLOSED_WITHIN: Duration = Duration::from_secs(1);
 #[derive(Debug, clap::Args)]
 pub(crate) struct OneDriveArgs {
     // The text has brackets that a doc comment would take for links.
-    #[arg(long, value_name = "LINE", requires = "drive", conflicts_with_all = ["socket", "token_file", "json"], help = line_spec::HELP)]
+    #[arg(long, value_name = "LINE", requires = "drive", conflicts_with_all = ["socket", "token_file"], help = line_spec::HELP)]
     line: Option<LineSpec>,
     /// The drive, such as atv312@1
     #[arg(long, value_name = "FAMILY@ADDRESS", requires = "line")]
@@ -90,7 +91,7 @@ impl OneDriveArgs {
     pub(crate) async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
         let line = open_line_of(Some(name), config.clone()).await?;
-        Commanded::over(name, line, config, &options, accepted)
+        Ok(self.telling(Commanded::over(name, line, config, &options, accepted)?))
     }
 
     /// Gives the drive an order and says what it has done when that is confirmed.
@@ -100,16 +101,36 @@ impl OneDriveArgs {
         if !outcome.is_confirmed() {
             return Err(one.failure(&outcome));
         }
-        output::say(format_args!("{} {done}: the drive shows {}", one.name, one.status()))?;
+        self.say_done(&one, order.command().action(), &one.status(), done)?;
         one.close().await;
         Ok(())
+    }
+
+    /// Says what a command has done that is confirmed.
+    pub(crate) fn say_done(
+        &self,
+        one: &Commanded,
+        action: &str,
+        status: &Status,
+        done: &str,
+    ) -> Result<(), Failure> {
+        let name = one.name;
+        let body =
+            json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
+        self.daemon.say(&body, |_| output::say(format_args!("{name} {done}: the drive shows {status}")))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.
     pub(crate) fn stop(&self) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
         let line = Line::start(config.clone()).map_err(|error| Failure::Input(error.to_string()))?;
-        Commanded::over(name, line, config, &options, Vec::new())
+        Ok(self.telling(Commanded::over(name, line, config, &options, Vec::new())?))
+    }
+
+    /// On the way a person is told how it goes; a program gets one object at the end.
+    fn telling(&self, mut one: Commanded) -> Commanded {
+        one.is_quiet = self.daemon.is_json();
+        one
     }
 
     /// Whose the port is, where a stop could not be sent because somebody else has it.

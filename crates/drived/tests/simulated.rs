@@ -359,3 +359,33 @@ fn a_stop_that_takes_the_place_of_another_says_why_and_control_is_given_back() {
         "{released:?}"
     );
 }
+
+#[test]
+fn a_program_gets_one_object_of_every_subcommand_on_a_line() {
+    let sim = Sim::serve("objects", &["atv312@1"]);
+    let json = |subcommand: &[&str]| {
+        let ended = sim.on("atv312@1", &[subcommand, &["--json"]].concat());
+        assert_eq!(ended.code, Some(0), "{ended:?}");
+        let said: serde_json::Value =
+            serde_json::from_str(&ended.out).unwrap_or_else(|error| panic!("{error}: {ended:?}"));
+        said
+    };
+    assert_eq!(json(&["status", "--all"])["status"]["state"], "disabled");
+    for (subcommand, action) in [
+        (&["setpoint", "20Hz"][..], "setpoint"),
+        (&["start"], "start"),
+        (&["stop"], "stop"),
+        (&["reset"], "reset"),
+        (&["param", "save"], "save"),
+    ] {
+        let said = json(subcommand);
+        assert_eq!((&said["drive"], &said["action"]), (&"atv312@1".into(), &action.into()), "{said}");
+        assert_eq!(said["outcome"], "confirmed", "{said}");
+    }
+    assert!(json(&["faults"])["history"].is_array());
+    // BBV51701: ACC is 9001; its factory setting is 3.0 s.
+    assert_eq!(json(&["param", "get", "ACC"])[0]["address"], 9001);
+    let written = json(&["param", "set", "ACC", "5s"]);
+    assert_eq!((&written["raw"], &written["changed"]), (&50.into(), &true.into()), "{written}");
+    assert!(json(&["param", "dump"]).as_array().is_some_and(|rows| rows.len() > 100));
+}

@@ -2,7 +2,7 @@
 
 use drive_core::Fault;
 
-use crate::{client, failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{client, failure::Failure, json, one_drive::OneDriveArgs, output};
 
 /// Read the present faults of one drive, its alarms and its fault history
 #[derive(Debug, clap::Args)]
@@ -24,6 +24,11 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     let mut one = args.one.open().await?;
     let faults = one.drive.faults().await.map_err(|error| one.failure(&error))?;
+    if args.one.daemon.is_json() {
+        output::say_as_it_is(json::line(&faults))?;
+        one.close().await;
+        return Ok(());
+    }
     if faults.present.is_empty() {
         output::say(format_args!("{} has no fault", one.name))?;
     }

@@ -4,7 +4,7 @@ use drive_core::{Direction, Setpoint};
 use drive_fleet::{Order, Until};
 use serde_json::json;
 
-use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, output};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
 
 /// Start the motor of a drive at the setpoint that it holds, or of all drives of a group
 ///
@@ -44,7 +44,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mut one = args.one.command(args.accept_self_restart).await?;
     let order = Order::Start { direction, setpoint, until: Until::InForce };
     let status = one.start(async |drive| drive.order(order).await).await?;
-    output::say(format_args!("{} started {direction}: the drive shows {status}", one.name))?;
+    args.one.say_done(&one, "start", &status, &format!("started {direction}"))?;
     one.close().await;
     Ok(())
 }

@@ -1,10 +1,12 @@
 //! `drived status`: what one drive says of itself.
 
 use drive_core::{Measurements, Status};
+use serde::Serialize;
 
 use crate::{
     client::{self, Target},
     failure::Failure,
+    json,
     one_drive::OneDriveArgs,
     output::{self, Table},
 };
@@ -35,6 +37,18 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         true => Some(one.drive.measurements().await.map_err(|error| one.failure(&error))?),
         false => None,
     };
+    if args.one.daemon.is_json() {
+        let read = Read {
+            name: one.name.to_string(),
+            family: one.drive.capabilities().key,
+            status: &status,
+            measurements: measurements.as_ref(),
+            starts_by_itself: restarts.ok().map(|all| all.iter().map(|one| one.code).collect()),
+        };
+        output::say_as_it_is(json::line(&read))?;
+        one.close().await;
+        return Ok(());
+    }
     output::say(format_args!("{} {}", one.name, one.drive.capabilities().name))?;
     let mut table = Table::texts();
     let restarts = match restarts {
@@ -50,6 +64,19 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     output::say_table(table)?;
     one.close().await;
     Ok(())
+}
+
+/// What one drive on a line has said of itself, as the API says it of those of the daemon.
+#[derive(Serialize)]
+struct Read<'a> {
+    name: String,
+    family: &'static str,
+    status: &'a Status,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measurements: Option<&'a Measurements>,
+    /// Absent where the drive did not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    starts_by_itself: Option<Vec<&'static str>>,
 }
 
 async fn through_daemon(args: &Args) -> Result<(), Failure> {

@@ -8,7 +8,6 @@ use crate::{
     commanded::UNCONFIRMED,
     failure::Failure,
     one_drive::{OneDriveArgs, unnamed},
-    output,
 };
 
 /// Stop the motor of a drive, of a group or of all, again and again until each drive confirms it
@@ -37,7 +36,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     let mut one = args.one.stop()?;
     match one.stop(args.mode).await {
-        Ok(status) => output::say(format_args!("{} stands still: the drive shows {status}", one.name))?,
+        Ok(status) => args.one.say_done(&one, "stop", &status, "stands still")?,
         Err(failure) => {
             return Err(match args.one.whose().await {
                 Some(whose) => Failure::Drive(format!("{failure}; {whose}")),

@@ -79,6 +79,16 @@ pub(crate) struct WrittenView {
 }
 
 impl ParameterView {
+    /// What was read a moment ago.
+    pub(crate) fn read(capabilities: &Capabilities, row: &Row, raw: u16) -> Self {
+        Self::of(capabilities, row, Some((raw, Instant::now())), None)
+    }
+
+    /// What could not be read, and why.
+    pub(crate) fn unread(capabilities: &Capabilities, row: &Row, why: String) -> Self {
+        Self::of(capabilities, row, None, Some(why))
+    }
+
     fn of(
         capabilities: &Capabilities,
         row: &Row,

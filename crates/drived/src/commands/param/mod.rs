@@ -12,6 +12,7 @@ use drive_core::{
     registers::{Factory, Range, Storage},
 };
 use drive_families::{Family, UnknownFamily};
+use serde_json::json;
 
 use crate::{
     client::{DaemonArgs, Target},
@@ -19,6 +20,7 @@ use crate::{
     failure::Failure,
     one_drive::{OneDrive, OneDriveArgs, told},
     output::{self, Table},
+    plant::parameters::{ParameterView, WrittenView},
     signals::Ending,
 };
 
@@ -144,13 +146,13 @@ async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{} ({}) can only be written", row.code, row.address)));
     }
     let mut one = args.open().await?;
-    let mut table = value_table();
+    let mut read = Vec::new();
     for row in rows {
         let word = one.drive.read_parameter(row).await.map_err(|error| one.failure(&error))?;
         let row = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
-        table.row(value_cells(one.drive.capabilities(), &row, row.show(word)));
+        read.push((row, Ok(word)));
     }
-    output::say_table(table)?;
+    say_values(args, one.drive.capabilities(), &read)?;
     one.close().await;
     Ok(())
 }
@@ -186,10 +188,22 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
         Storage::Eeprom => "kept in EEPROM",
         Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
     };
-    output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word)))?;
+    let view = WrittenView {
+        parameter: ParameterView::read(one.drive.capabilities(), &shown, word),
+        changed: written.changed,
+    };
+    args.daemon.say(&json!(view), |_| {
+        output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word)))
+    })?;
     match written.storage {
-        Storage::Eeprom if save => output::say("the write itself has stored it: nothing else was saved")?,
-        _ if save => persist(&mut one).await?,
+        Storage::Eeprom if save => {
+            let stored = "the write itself has stored it: nothing else was saved";
+            args.daemon
+                .say(&json!({ "drive": name.to_string(), "action": "save", "text": stored }), |_| {
+                    output::say(stored)
+                })?;
+        }
+        _ if save => persist(args, &mut one).await?,
         _ => {}
     }
     one.close().await;
@@ -199,7 +213,7 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
 async fn save_all(args: &OneDriveArgs) -> Result<(), Failure> {
     saving(args.name()?, "each write says where its register is kept")?;
     let mut one = args.open().await?;
-    persist(&mut one).await?;
+    persist(args, &mut one).await?;
     one.close().await;
     Ok(())
 }
@@ -215,35 +229,39 @@ fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
 
 /// Saves whatever the drive keeps in RAM. What an earlier run of this program, another one, or a hand at the panel has
 /// changed cannot be known here, and who asks for a save wants that kept too.
-async fn persist(one: &mut OneDrive) -> Result<(), Failure> {
+async fn persist(args: &OneDriveArgs, one: &mut OneDrive) -> Result<(), Failure> {
     let by = saving(one.name, "")?;
     one.drive.assume_changed();
     let saves = told(one.name, &mut Ending::listen()?, one.drive.persist())
         .await?
         .map_err(|error| one.failure(&error))?;
-    output::say(format_args!(
-        "{} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}",
-        one.name
-    ))
+    let name = one.name;
+    let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
+    args.daemon.say(&body, |_| {
+        output::say(format_args!(
+            "{name} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}"
+        ))
+    })
 }
 
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
     let mut one = args.open().await?;
-    let mut table = value_table();
     let capabilities = one.drive.capabilities();
+    let mut read = Vec::new();
     for row in capabilities.rows.iter().filter(|row| row.access.is_readable()) {
-        let (row, shown) = match one.drive.read_parameter(row).await {
+        read.push(match one.drive.read_parameter(row).await {
             Ok(word) => {
                 let row = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
-                (row, row.show(word))
+                (row, Ok(word))
             }
             // A drive refuses what its model or its settings do not have; the rest is still worth reading.
-            Err(error) if error.kind() == ErrorKind::Exception => (*row, "refused by the drive".to_owned()),
+            Err(error) if error.kind() == ErrorKind::Exception => {
+                (*row, Err("refused by the drive".to_owned()))
+            }
             Err(error) => return Err(one.failure(&error)),
-        };
-        table.row(value_cells(capabilities, &row, shown));
+        });
     }
-    output::say_table(table)?;
+    say_values(args, capabilities, &read)?;
     one.close().await;
     Ok(())
 }
@@ -256,6 +274,26 @@ async fn in_units(drive: &mut dyn Drive, row: &'static Row) -> drive_core::Resul
         None => None,
     };
     Ok(capabilities.in_units(row, |_| word))
+}
+
+/// Prints registers with what was read of each, or why nothing was.
+fn say_values(
+    args: &OneDriveArgs,
+    capabilities: &Capabilities,
+    read: &[(Row, Result<u16, String>)],
+) -> Result<(), Failure> {
+    let view = |(row, word): &(Row, Result<u16, String>)| match word {
+        Ok(word) => ParameterView::read(capabilities, row, *word),
+        Err(why) => ParameterView::unread(capabilities, row, why.clone()),
+    };
+    args.daemon.say(&json!(read.iter().map(view).collect::<Vec<_>>()), |_| {
+        let mut table = value_table();
+        for (row, word) in read {
+            let shown = word.as_ref().map_or_else(Clone::clone, |word| row.show(*word));
+            table.row(value_cells(capabilities, row, shown));
+        }
+        output::say_table(table)
+    })
 }
 
 /// The word for a person's text, refused here when access or range forbid it: nothing is sent then.
