@@ -388,11 +388,9 @@ fn parameters_are_kept_compared_and_restored_through_the_daemon() {
     running.assert_refused(1, "stopped at ACC");
     assert!(running.err.contains("not written: ACC"), "{running:?}");
     daemon.ask(&["stop", "pump 1"]).assert_done();
-    let done = json(&daemon.ask(&["param", "restore", folder, "--write", "--save", "--json"]));
+    let done = json(&daemon.ask(&["param", "restore", &one, "--write", "--save", "--json"]));
     assert_eq!(done["restored"][0]["written"], serde_json::json!(["ACC"]), "{done}");
     assert_eq!(done["restored"][0]["saved"], true, "{done}");
-    assert_eq!(done["restored"][1]["written"], serde_json::json!([]), "{done}");
-    daemon.ask(&["param", "diff", &one]).assert_done();
 
     daemon.ask(&["param", "backup", "pump 1", "--to", daemon.file.path()]).assert_refused(2, "is no backup");
     daemon.ask(&["param", "restore", daemon.file.path()]).assert_refused(2, "");

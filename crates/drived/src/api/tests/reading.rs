@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use drive_core::{Direction, Frequency, StopMode};
 use drive_fleet::DriveSettings;
 use serde_json::json;
 
@@ -229,4 +230,34 @@ async fn the_program_is_ready_while_its_lines_are_asked_whether_or_not_anybody_a
     tokio::time::sleep(Duration::from_secs(60)).await;
     let (status, problem) = get(&plant, "/readyz").await;
     assert_eq!(status, StatusCode::SERVICE_UNAVAILABLE, "{problem}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_register_is_written_only_at_standstill_where_that_is_asked_for() {
+    let plant = TestPlant::of(1).await;
+    let path = "/api/v1/drives/pump%201/parameters/ACC";
+    let drive = plant.plant.fleet().drive("pump 1").unwrap();
+    assert!(drive.start_at(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+    let body = json!({ "value": "5.0 s", "only_at_standstill": true });
+    let (status, told) = send(api(&plant.plant, "chief", ALL), put(path, &body)).await;
+    assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::CONFLICT, Some(30)), "{told}");
+    assert!(drive.stop(StopMode::Ramp).await.is_confirmed());
+    let (status, told) = send(api(&plant.plant, "chief", ALL), put(path, &body)).await;
+    assert_eq!((status, plant.machines[0].peek(9001)), (StatusCode::OK, Some(50)), "{told}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_whose_answer_is_lost_is_unknown_and_not_called_refused() {
+    let plant = TestPlant::of(1).await;
+    let machine = plant.machines[0].clone();
+    let written = machine.requests(0x06);
+    let losing = tokio::spawn(async move {
+        machine.wait_until(|_| machine.requests(0x06) > written).await;
+        machine.mute();
+    });
+    let path = "/api/v1/drives/pump%201/parameters/ACC";
+    let (status, told) = send(api(&plant.plant, "chief", ALL), put(path, &json!({ "value": 5.0 }))).await;
+    losing.await.unwrap();
+    assert_eq!(status, StatusCode::GATEWAY_TIMEOUT, "{told}");
+    assert!(told["detail"].as_str().unwrap().contains("read it back"), "{told}");
 }

@@ -6,6 +6,8 @@ mod file;
 mod remote;
 mod restore;
 mod source;
+#[cfg(test)]
+mod testing;
 
 use drive_core::{
     Capabilities, Drive, ErrorKind, Row,

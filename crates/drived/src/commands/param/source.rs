@@ -379,3 +379,52 @@ impl Drop for Progress {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drive_sim::Exception;
+
+    use super::*;
+    use crate::{commands::param::testing::Bench, simulated::SetUp};
+
+    /// What is kept of a drive to which something happens after so many requests.
+    async fn kept(after: u64, happens: impl Fn(&drive_sim::SimSlave) + Send + 'static) -> Backup {
+        let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+        let machine = bench.machine.clone();
+        let happening = tokio::spawn(async move {
+            machine.wait_for_requests(after).await;
+            happens(&machine);
+        });
+        let backup = bench.source.keep().await.unwrap();
+        happening.await.unwrap();
+        let kept = Family::Atv312.capabilities().rows.iter().filter(|row| is_kept(Family::Atv312, row));
+        assert!(kept.eq(backup.entries.iter().map(|entry| entry.row)), "nothing is left out");
+        backup
+    }
+
+    fn unread(backup: &Backup) -> Vec<&Entry> {
+        backup.entries.iter().filter(|entry| entry.held.is_err()).collect()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_a_drive_refuses_to_tell_stands_in_its_file_with_the_reason() {
+        let backup = kept(60, |machine| machine.refuse_next(Exception::ILLEGAL_ADDRESS)).await;
+        let [entry] = *unread(&backup) else { panic!("{:?}", unread(&backup)) };
+        assert!(entry.held.as_ref().is_err_and(|why| why.contains("exception")), "{entry:?}");
+        let line = format!("{} = {{ error = \"", entry.row.code);
+        assert!(backup.to_string().lines().any(|text| text.starts_with(&line)), "{backup}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_drive_that_falls_silent_is_kept_as_far_as_it_has_answered_and_not_asked_without_end() {
+        let begun = tokio::time::Instant::now();
+        let backup = kept(60, drive_sim::SimSlave::mute).await;
+        let unread = unread(&backup);
+        assert!((80..130).contains(&unread.len()), "{}", unread.len());
+        assert!(unread.last().unwrap().held.as_ref().is_err_and(|why| why.starts_with("not asked")));
+        // Nobody waits for each of a hundred time-outs.
+        assert!(begun.elapsed() < std::time::Duration::from_secs(30), "{:?}", begun.elapsed());
+        let ramps = ["ACC", "dEC", "AC2", "dE2"];
+        assert!(ramps.iter().all(|code| unread.iter().any(|entry| entry.row.code == *code)));
+    }
+}

@@ -3,39 +3,15 @@
 use std::time::Duration;
 
 use clap::Parser;
-use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Direction, Frequency, SlaveAddress};
+use drive_core::{Direction, Frequency};
 use drive_families::Family;
-use drive_sim::{SimLine, SimSlave, Wiring};
+use drive_sim::SimSlave;
 use tokio::time::sleep;
 
 use super::*;
-use crate::{
-    drive_spec::DriveName,
-    one_drive::OneDrive,
-    simulated::{self, SetUp},
-};
-
-/// A drive of a family on its own line.
-struct Bench {
-    source: Source,
-    machine: SimSlave,
-}
+use crate::{commands::param::testing::Bench, simulated::SetUp};
 
 impl Bench {
-    fn of(family: Family, set_up: SetUp) -> Self {
-        let settings = family.capabilities().factory;
-        let simulated = SimLine::new(Wiring::rtu(settings));
-        let machine = simulated.add_boxed(1, simulated::model(family, set_up)).unwrap();
-        let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
-        let line = Line::over(simulated.in_memory(), config.clone());
-        let turnaround = family.capabilities().turnaround;
-        line.configure_slave(1, SlaveSettings { turnaround, ..SlaveSettings::default() });
-        let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
-        let one = OneDrive::over(name, line, config, &simulated::options());
-        Self { source: Source::OnLine(Box::new(one)), machine }
-    }
-
     /// The drive that is kept, as somebody has set it up.
     async fn kept(family: Family) -> Backup {
         let mut bench = Self::of(family, SetUp::ForTheBus);
@@ -290,7 +266,7 @@ async fn say(bench: &mut Bench, file: &Backup, more: &[&str]) -> Result<Told, Fa
         #[command(flatten)]
         args: Args,
     }
-    let line = Line::parse_from(["restore", "kept.toml"].iter().chain(more));
+    let line = Line::parse_from(["restore", "kept.toml", "--json"].iter().chain(more));
     let mut ending = Ending::listen().unwrap();
     restore(&line.args, Path::new("kept.toml"), file, &mut bench.source, &mut ending).await
 }
