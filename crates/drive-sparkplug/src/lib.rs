@@ -20,14 +20,15 @@
 //!     rebirth_pause: Duration::from_secs(5),
 //!     commands: true,
 //! };
-//! let mut node = EdgeNode::new(settings, Vec::new(), now)?;
-//! node.add_device("pump 1", vec![Definition::new("Speed", DataType::Double)], now)?;
 //!
 //! // The number after the one that was kept, and kept again before it is used.
-//! let connect = node.connect(BdSeq::default(), now);
-//! assert_eq!(connect.will.topic, "spBv1.0/plant/NDEATH/hall 1");
+//! let bd_seq = BdSeq::default();
+//! let will = EdgeNode::will(&settings.name, bd_seq, now);
+//! assert_eq!(will.topic, "spBv1.0/plant/NDEATH/hall 1");
+//! let mut node = EdgeNode::new(settings, Vec::new(), now)?;
+//! node.add_device("pump 1", vec![Definition::new("Speed", DataType::Double)], now)?;
 //! assert_eq!(node.subscriptions()[1].filter, "spBv1.0/plant/DCMD/hall 1/+");
-//! node.handle_connected();
+//! node.handle_connected(bd_seq);
 //!
 //! let reading = Reading { value: Some(Value::Double(890.0)), quality: Quality::Good, unix_ms: now.unix_ms };
 //! node.set_device("pump 1", "Speed", reading)?;
@@ -87,8 +88,8 @@ pub use self::{
     bd_seq::BdSeq,
     metrics::{Definition, MetricError, Reading},
     node::{
-        Action, Command, Connect, DeviceError, EdgeNode, Event, Ignored, Now, Publication, Settings,
-        Subscription, Write, WriteError,
+        Action, Command, DeviceError, EdgeNode, Event, Ignored, Now, Publication, Settings, Subscription,
+        Write, WriteError,
     },
     payload::{LONGEST_PAYLOAD, MOST_METRICS, Malformed, Metric, Payload},
     topic::{Id, IdError, NodeName},

@@ -168,6 +168,21 @@ fn a_device_that_is_removed_dies_and_one_that_is_added_is_born() {
 }
 
 #[test]
+fn other_metrics_of_the_node_are_told_by_births_of_everything() {
+    let mut rig = alive();
+    let mark = rig.mark();
+    let metrics = vec![Definition::new("Lines/south/Errors", drive_sparkplug::DataType::UInt64)];
+    rig.node.define(metrics, rig.now).unwrap();
+    rig.carry_out();
+    assert_eq!(rig.topics(mark), ["NBIRTH", "DBIRTH pump 1"]);
+    let reading = Reading { value: Some(Value::UInt64(1)), quality: Quality::Good, unix_ms: rig.now.unix_ms };
+    assert!(rig.node.set_node("Lines/north/Errors", reading.clone()).is_err());
+    rig.node.set_node("Lines/south/Errors", reading).unwrap();
+    rig.carry_out();
+    assert_eq!(rig.topics(mark), ["NBIRTH", "DBIRTH pump 1", "NDATA"]);
+}
+
+#[test]
 fn a_device_that_is_replaced_unseen_dies_before_it_is_born_again() {
     let mut rig = alive();
     let mark = rig.mark();

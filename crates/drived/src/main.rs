@@ -30,6 +30,7 @@ mod plant;
 mod run;
 mod signals;
 mod simulated;
+mod sparkplug;
 
 use std::process::ExitCode;
 

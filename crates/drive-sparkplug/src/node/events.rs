@@ -28,13 +28,6 @@ pub struct Settings {
     pub commands: bool,
 }
 
-/// A session to begin: MQTT 5 with Clean Start and a Session Expiry of 0, or MQTT 3.1.1 with Clean Session.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Connect {
-    /// The will: the death of the node.
-    pub will: Publication,
-}
-
 /// A message to publish. None is ever retained.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Publication {

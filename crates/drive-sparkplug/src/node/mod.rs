@@ -6,11 +6,10 @@ mod hearing;
 use std::time::Instant;
 
 pub use self::events::{
-    Action, Command, Connect, DeviceError, Event, Ignored, Now, Publication, Settings, Subscription, Write,
-    WriteError,
+    Action, Command, DeviceError, Event, Ignored, Now, Publication, Settings, Subscription, Write, WriteError,
 };
 use crate::{
-    BdSeq, Definition, Id, Metric, MetricError, Payload, Reading, Value,
+    BdSeq, Definition, Id, Metric, MetricError, NodeName, Payload, Reading, Value,
     host::Host,
     metrics::{Metrics, in_order, own},
     topic::{Verb, state_topic},
@@ -119,6 +118,18 @@ impl EdgeNode {
         }
     }
 
+    /// Gives the node other metrics of its own, without values. They are told by births of everything.
+    ///
+    /// # Errors
+    /// [`MetricError::Taken`]; the old ones stay.
+    pub fn define(&mut self, metrics: Vec<Definition>, now: Now) -> Result<(), MetricError> {
+        self.metrics = Metrics::new(metrics, &[BD_SEQ, REBIRTH], &mut self.next_alias, now.unix_ms)?;
+        if self.is_alive() {
+            self.session = Session::Birth;
+        }
+        Ok(())
+    }
+
     /// The names of the devices.
     pub fn devices(&self) -> impl Iterator<Item = &str> {
         self.devices.iter().filter(|device| !device.is_removed).map(|device| device.id.as_str())
@@ -150,12 +161,13 @@ impl EdgeNode {
         }
     }
 
-    /// A session to begin. `bd_seq` is the one after that of the connection before, and has been kept.
-    pub fn connect(&mut self, bd_seq: BdSeq, now: Now) -> Connect {
-        self.handle_disconnected();
-        self.bd_seq = bd_seq;
-        self.host = Host::default();
-        Connect { will: self.death(now) }
+    /// The will of a connection that is to be made: the death of the node. The connection begins a session of its own: MQTT 5
+    /// with Clean Start and a Session Expiry of 0, or MQTT 3.1.1 with Clean Session. `bd_seq` is the one after that of the
+    /// connection before, and has been kept.
+    pub fn will(name: &NodeName, bd_seq: BdSeq, now: Now) -> Publication {
+        let bd_seq = own(BD_SEQ, &Value::Int64(bd_seq.number().into()), now.unix_ms);
+        let payload = Payload { timestamp: Some(now.unix_ms), seq: None, metrics: vec![bd_seq] };
+        Publication { topic: name.topic(Verb::Death, None), payload: payload.encode(), qos: 1 }
     }
 
     /// What every connection has to subscribe, before anything is said in it.
@@ -173,9 +185,12 @@ impl EdgeNode {
         all
     }
 
-    /// The session that [`Self::connect`] has asked for is there, and what it hears is subscribed.
-    pub fn handle_connected(&mut self) {
-        let must_wait = self.settings.primary_host.is_some() && !self.host.is_online();
+    /// A session with the [will](Self::will) of this number is there, and what it hears is subscribed.
+    pub fn handle_connected(&mut self, bd_seq: BdSeq) {
+        self.handle_disconnected();
+        self.bd_seq = bd_seq;
+        self.host = Host::default();
+        let must_wait = self.settings.primary_host.is_some();
         self.session = if must_wait { Session::Waiting } else { Session::Birth };
     }
 
@@ -213,7 +228,7 @@ impl EdgeNode {
             Session::Alive => self.poll_alive(now),
             Session::Leaving { reconnect } => {
                 self.session = Session::Left { reconnect };
-                Some(Action::Publish(self.death(now)))
+                Some(Action::Publish(Self::will(&self.settings.name, self.bd_seq, now)))
             }
             Session::Left { reconnect } => {
                 self.handle_disconnected();
@@ -280,13 +295,6 @@ impl EdgeNode {
         self.seq = self.seq.wrapping_add(1);
         let payload = Payload { timestamp: Some(now.unix_ms), seq: Some(self.seq.into()), metrics };
         Publication { topic: self.settings.name.topic(verb, device), payload: payload.encode(), qos: 0 }
-    }
-
-    /// The death of the node, which has no number.
-    fn death(&self, now: Now) -> Publication {
-        let bd_seq = own(BD_SEQ, &Value::Int64(self.bd_seq.number().into()), now.unix_ms);
-        let payload = Payload { timestamp: Some(now.unix_ms), seq: None, metrics: vec![bd_seq] };
-        Publication { topic: self.settings.name.topic(Verb::Death, None), payload: payload.encode(), qos: 1 }
     }
 
     /// Ends the session. The death of the node is told even where its birth was not.

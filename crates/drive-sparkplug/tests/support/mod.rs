@@ -63,13 +63,13 @@ impl Rig {
     /// Connects with the next number, and subscribes.
     pub(crate) fn connect(&mut self) {
         self.bd_seq = self.bd_seq.next();
-        let will = self.node.connect(self.bd_seq, self.now).will;
+        let will = EdgeNode::will(&settings().name, self.bd_seq, self.now);
         let will = Some(Message { topic: will.topic, payload: will.payload, qos: will.qos, retain: false });
         self.packets.push(Packet::Connect { clean_start: true, session_expiry: 0, will });
         for subscription in self.node.subscriptions() {
             self.packets.push(Packet::Subscribe { filter: subscription.filter, qos: 1 });
         }
-        self.node.handle_connected();
+        self.node.handle_connected(self.bd_seq);
         self.carry_out();
     }
 

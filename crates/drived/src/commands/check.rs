@@ -6,10 +6,11 @@ use drive_fleet::{
     Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted,
     OnExitWatchdog, OnFault, OnLoss, Periods,
 };
+use drive_sparkplug::NodeName;
 
 use crate::{
     config::{Config, DrivePart, GatewayConfig, LinePart, Units},
-    doors::Rights,
+    doors::{Rights, Role},
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
@@ -71,6 +72,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             }
         };
         output::say(format_args!("mqtt: {} at {}: {commands}", mqtt.base, servers.join(", ")))?;
+    }
+    if let Some(sparkplug) = &config.sparkplug {
+        let NodeName { group, edge_node } = &sparkplug.name;
+        let host = sparkplug.primary_host.as_ref().map(|host| format!(", for the primary host {host}"));
+        let may = sparkplug.commands.map_or("nobody commands there", |role| match role {
+            Role::Stop => "WHOEVER MAY PUBLISH THERE STOPS",
+            _ => "WHOEVER MAY PUBLISH THERE OPERATES",
+        });
+        output::say(format_args!("sparkplug: {group}/{edge_node}{}: {may}", host.unwrap_or_default()))?;
     }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(

@@ -10,6 +10,7 @@ mod groups;
 mod mqtt;
 mod place;
 mod raw;
+mod sparkplug;
 mod values;
 
 use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
@@ -28,6 +29,7 @@ pub(crate) use self::{
     groups::Group,
     mqtt::{Address, Discovery, MqttConfig},
     place::{ConfigError, Source as Place},
+    sparkplug::SparkplugConfig,
 };
 use self::{
     place::Source,
@@ -65,6 +67,8 @@ pub(crate) struct Config {
     pub(crate) gateways: Vec<GatewayConfig>,
     /// The broker to which everything is told; `None`: nothing is.
     pub(crate) mqtt: Option<MqttConfig>,
+    /// The edge node that the daemon is on the same brokers.
+    pub(crate) sparkplug: Option<SparkplugConfig>,
 }
 
 /// A line and its drives.
@@ -144,6 +148,11 @@ impl Config {
             ];
             MqttConfig::read(source, entry, names)
         });
+        let sparkplug = raw.mqtt.as_ref().and_then(|entry| entry.sparkplug.as_ref()).map(|entry| {
+            let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
+            let drives = drives.map(|drive| drive.settings.name.as_str());
+            SparkplugConfig::read(source, entry, drives, lines.iter().map(|line| line.name.as_str()))
+        });
         let (tokens, audit) = (raw.tokens.as_deref(), raw.audit.as_deref());
         let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
         let gateways = gateway::gateways(source, &raw.gateways, &lines)?;
@@ -155,6 +164,7 @@ impl Config {
             lines,
             groups,
             mqtt: mqtt.transpose()?,
+            sparkplug: sparkplug.transpose()?,
         })
     }
 

@@ -15,6 +15,7 @@ use toml::Spanned;
 use super::{
     doors::TlsFiles,
     place::{ConfigError, Source},
+    sparkplug::SparkplugEntry,
     values::Parsed,
 };
 use crate::{doors::Role, duration::Time, mqtt::topic_id};
@@ -152,6 +153,7 @@ pub(super) struct MqttEntry {
     commanders: BTreeMap<Spanned<String>, Role>,
     discovery: Option<Parsed<Discovery>>,
     discovery_prefix: Option<Spanned<String>>,
+    pub(super) sparkplug: Option<SparkplugEntry>,
 }
 
 impl MqttConfig {

@@ -5,6 +5,7 @@ use std::path::Path;
 use drive_core::{Frequency, Reaction};
 
 use super::*;
+use crate::doors::Role;
 
 const FULL: &str = r#"
 snapshots = "1s"
@@ -438,4 +439,48 @@ fn names_that_would_have_one_topic_are_refused() {
     );
     let told = read(&text).expect_err("two names");
     assert!(told.contains("\"pump 1\" and \"pump/1\" would have one topic"), "{told}");
+}
+
+fn with_edge_node(section: &str) -> Result<SparkplugConfig, String> {
+    let mqtt = "[mqtt]\nservers = [\"mqtts://broker\"]\n[mqtt.sparkplug]\n";
+    read(&format!("{mqtt}{section}\n{BROKER}")).map(|config| config.sparkplug.expect("there is an edge node"))
+}
+
+#[test]
+fn without_a_section_the_daemon_is_no_edge_node_and_hosts_command_nothing_unless_it_is_said() {
+    assert_eq!(read(&format!("[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}")).unwrap().sparkplug, None);
+    let least = with_edge_node("group = \"plant\"\nedge_node = \"hall 1\"\nstate = \"bd-seq\"").unwrap();
+    assert_eq!((least.name.group.as_str(), least.name.edge_node.as_str()), ("plant", "hall 1"));
+    assert_eq!((least.primary_host, least.commands), (None, None));
+    assert_eq!((least.lifetime, least.rebirth_pause), (Duration::from_secs(1), Duration::from_secs(5)));
+    let more = "group = \"plant\"\nedge_node = \"x\"\nstate = \"/var/bd-seq\"\nprimary_host = \"scada\"\n\
+                commands = \"stop\"\nlifetime = \"5s\"";
+    let more = with_edge_node(more).unwrap();
+    assert_eq!(more.primary_host.map(|host| host.to_string()), Some("scada".to_owned()));
+    assert_eq!((more.commands, more.lifetime), (Some(Role::Stop), Duration::from_secs(5)));
+    assert_eq!(more.state, Path::new("/var/bd-seq"));
+}
+
+#[test]
+fn what_is_wrong_with_an_edge_node_is_told_with_its_place() {
+    let least = "group = \"plant\"\nedge_node = \"hall 1\"\nstate = \"bd-seq\"\n";
+    for (section, problem) in [
+        ("edge_node = \"x\"".to_owned(), "missing field"),
+        ("group = \"a/b\"\nstate = \"x\"".to_owned(), "expected a name without + / #"),
+        (format!("{least}primary_host = \"#\""), "expected a name without + / #"),
+        (format!("{least}commands = \"engineer\""), "expected off, stop or operate"),
+        (format!("{least}lifetime = \"11s\""), "expected up to 10s"),
+        (format!("{least}retain = true"), "unknown field"),
+    ] {
+        let told = with_edge_node(&section).expect_err(&section);
+        assert!(told.starts_with("drives.toml:") && told.contains(problem), "{section}: {told}");
+    }
+    for (name, problem) in
+        [("a/b", "expected a name without + / #"), ("PUMP 1", "differ in nothing but case")]
+    {
+        let more = format!("[[drives]]\nline = \"a\"\ndrive = \"atv312@3\"\nname = \"{name}\"\n");
+        let text = format!("[mqtt]\nservers = [\"mqtts://broker\"]\n[mqtt.sparkplug]\n{least}{BROKER}{more}");
+        let told = read(&text).expect_err(name);
+        assert!(told.contains(problem), "{told}");
+    }
 }

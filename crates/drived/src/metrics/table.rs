@@ -163,6 +163,12 @@ metrics! {
         "Reads that were answered without an exchange of their own: joined to an equal one, or kept from a block read before.";
     GatewayEnded: Counter, "drived_gateway_ended_connections_total", ["gateway", "reason"],
         "Clients that were turned away or put out: full, not_allowed, idle, half_open, malformed or slow_reader.";
+    SparkplugConnected: Gauge, "drived_sparkplug_connected", [],
+        "Whether the edge node of Sparkplug is connected to its broker; absent without one.";
+    SparkplugSent: Counter, "drived_sparkplug_sent_messages_total", [], "Messages of the edge node that the broker has taken.";
+    SparkplugArrived: Counter, "drived_sparkplug_arrived_messages_total", [], "Messages for the edge node that were looked at.";
+    SparkplugLost: Counter, "drived_sparkplug_dropped_messages_total", ["reason"],
+        "Messages of the edge node, or for it, that were lost; reasons as for MQTT.";
 
     ProcessCpu: Counter, "process_cpu_seconds_total", [], "User and system processor time.";
     ProcessFds: Gauge, "process_open_fds", [], "Open file descriptors.";

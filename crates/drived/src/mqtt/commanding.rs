@@ -30,10 +30,7 @@ use crate::{
     },
     json::unix,
     plant::{
-        commands::{
-            Action, Asked, Asks, LIFETIME, LONGEST_LIFETIME, NewSetpoint, OutcomeWord, Rejected, Release,
-            Request, Reset, Save, Start, Stop, Target, Told,
-        },
+        commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target, Told},
         views::CommandView,
     },
 };
@@ -47,7 +44,7 @@ const FOLLOWED: usize = 256;
 /// For how long an outcome may still be settled, and an answer waits for a broker that is away.
 const SETTLES_FOR: Duration = Duration::from_secs(600);
 /// In a flood, a stop that comes so soon after the same one has nothing to add.
-const SAME_STOP: Duration = Duration::from_millis(50);
+pub(crate) const SAME_STOP: Duration = Duration::from_millis(50);
 
 /// Where the answers to a message go.
 #[derive(Debug, Clone)]
@@ -361,20 +358,7 @@ fn setpoint(read: serde_json::Result<Setpoint>, unit: &str) -> Result<Action, St
 
 /// What an object asks for, by the types of the API.
 fn object(action: &str, members: Map<String, Value>, issued: Option<&Value>) -> Result<Asked, String> {
-    fn read<T: Asks>(members: Map<String, Value>) -> Result<Asked, String> {
-        serde_json::from_value::<T>(Value::Object(members)).map(T::asked).map_err(|error| error.to_string())
-    }
-    let mut asked = match action {
-        "start" => read::<Start>(members),
-        "stop" => read::<Stop>(members),
-        "setpoint" => read::<NewSetpoint>(members),
-        "reset" => read::<Reset>(members),
-        "release" => read::<Release>(members),
-        "save" => read::<Save>(members),
-        _ => {
-            Err(format!("action: expected start, stop, setpoint, reset, release or save, and not {action:?}"))
-        }
-    }?;
+    let mut asked = Asked::named(action, members)?;
     if let Some(issued) = issued {
         asked.expires_in_ms = Some(left(issued, asked.expires_in_ms)?);
     }
@@ -424,7 +408,7 @@ fn id_of(correlation: &[u8]) -> String {
     }
 }
 
-fn is_id(text: &str) -> bool {
+pub(crate) fn is_id(text: &str) -> bool {
     (1..=64).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
@@ -455,7 +439,7 @@ fn target(face: &Face, meant: &Meant) -> Option<Target> {
 }
 
 /// Whether more will be told of it.
-fn is_open(view: &CommandView) -> bool {
+pub(crate) fn is_open(view: &CommandView) -> bool {
     match view.outcome {
         OutcomeWord::Pending | OutcomeWord::Unknown => true,
         OutcomeWord::NotConfirmed => view.action == "stop",

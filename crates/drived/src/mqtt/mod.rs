@@ -21,8 +21,12 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-pub(crate) use self::topics::topic_id;
 use self::{commanding::Commanding, discovery::Discovered, telling::Teller, topics::Topics};
+pub(crate) use self::{
+    commanding::{SAME_STOP, is_id, is_open},
+    pace::Pace,
+    topics::topic_id,
+};
 use crate::{
     broker::{
         Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,
@@ -90,25 +94,11 @@ impl Mqtt {
     /// # Errors
     /// A certificate, a key or a password cannot be read.
     pub(crate) fn prepare(config: MqttConfig) -> Result<Prepared, Failure> {
-        let encrypted = config.servers.iter().any(|server| server.tls);
-        let secured = || Secured::open(config.authorities.as_deref(), config.identity.as_ref());
-        let secured =
-            encrypted.then(secured).transpose().map_err(|error| Failure::Input(format!("mqtt: {error}")))?;
-        let server = |address: &crate::config::Address| Server {
-            host: address.host.clone(),
-            port: address.port,
-            tls: secured.clone().filter(|_| address.tls),
-        };
         let options = Options {
-            servers: config.servers.iter().map(server).collect(),
-            client_id: config.client_id.clone(),
-            login: login(&config)?,
-            keep_alive: KEEP_ALIVE,
             subscriptions: subscriptions(&config),
             queue: NEWS,
             is_urgent: topics::is_stop,
-            #[cfg(test)]
-            dial: None,
+            ..options(&config)?
         };
         Ok(Prepared { config, options })
     }
@@ -132,6 +122,33 @@ impl Mqtt {
     pub(crate) fn source(&self) -> Arc<dyn Source> {
         Arc::new(self.face.broker.clone())
     }
+}
+
+/// What a connection to the brokers of a configuration begins with, whatever it is for.
+///
+/// # Errors
+/// A certificate, a key or a password cannot be read.
+pub(crate) fn options(config: &MqttConfig) -> Result<Options, Failure> {
+    let encrypted = config.servers.iter().any(|server| server.tls);
+    let secured = || Secured::open(config.authorities.as_deref(), config.identity.as_ref());
+    let secured =
+        encrypted.then(secured).transpose().map_err(|error| Failure::Input(format!("mqtt: {error}")))?;
+    let server = |address: &crate::config::Address| Server {
+        host: address.host.clone(),
+        port: address.port,
+        tls: secured.clone().filter(|_| address.tls),
+    };
+    Ok(Options {
+        servers: config.servers.iter().map(server).collect(),
+        client_id: config.client_id.clone(),
+        login: login(config)?,
+        keep_alive: KEEP_ALIVE,
+        subscriptions: Vec::new(),
+        queue: 0,
+        is_urgent: |_| false,
+        #[cfg(test)]
+        dial: None,
+    })
 }
 
 fn login(config: &MqttConfig) -> Result<Option<Login>, Failure> {

@@ -11,6 +11,7 @@ use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
+use futures_util::future::OptionFuture;
 
 use self::{
     notify::Notify,
@@ -31,6 +32,7 @@ use crate::{
     one_drive, page,
     plant::Plant,
     signals::{Ending, Wish, Wishes},
+    sparkplug::Sparkplug,
 };
 
 /// How long the disk has for the last records of the audit log.
@@ -63,6 +65,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
+    let sparkplug = Sparkplug::prepared(&config)?;
     let mqtt = config.mqtt.clone().map(Mqtt::prepare).transpose()?;
     let mut ending = Ending::listen()?;
     let notify = Notify::start();
@@ -82,6 +85,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
     sources.extend(mqtt.iter().map(Mqtt::source));
     sources.extend(gateways.sources());
+    let sparkplug = sparkplug.map(|sparkplug| sparkplug.open(plant.clone(), doors.audit()));
+    sources.extend(sparkplug.iter().map(Sparkplug::source));
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
@@ -114,6 +119,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     if let Some(mqtt) = &mqtt {
         mqtt.closing();
     }
+    if let Some(sparkplug) = &sparkplug {
+        sparkplug.closing();
+    }
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
@@ -126,9 +134,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     let _ = closed.await;
     // Whoever reads along sees the motors stop first.
-    if let Some(mqtt) = mqtt {
-        mqtt.close().await;
-    }
+    let told = OptionFuture::from(mqtt.map(Mqtt::close));
+    tokio::join!(told, OptionFuture::from(sparkplug.map(Sparkplug::close)));
     for (_, line) in fleet.lines() {
         one_drive::close(&line).await;
     }

@@ -6,6 +6,7 @@ use drive_core::{Direction, Setpoint, StopMode};
 use drive_fleet::Until;
 use schemars::JsonSchema;
 use serde::{Deserialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
 use tokio::time::Instant;
 
 use super::{Action, LIFETIME, LONGEST_LIFETIME, Request, Target};
@@ -28,6 +29,29 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
+    /// What a body says that belongs to an action of this name.
+    ///
+    /// # Errors
+    /// There is no such action, or its body is another one, in words.
+    pub(crate) fn named(action: &str, members: Map<String, Value>) -> Result<Self, String> {
+        fn read<T: Asks>(members: Map<String, Value>) -> Result<Asked, String> {
+            serde_json::from_value::<T>(Value::Object(members))
+                .map(T::asked)
+                .map_err(|error| error.to_string())
+        }
+        match action {
+            "start" => read::<Start>(members),
+            "stop" => read::<Stop>(members),
+            "setpoint" => read::<NewSetpoint>(members),
+            "reset" => read::<Reset>(members),
+            "release" => read::<Release>(members),
+            "save" => read::<Save>(members),
+            _ => Err(format!(
+                "action: expected start, stop, setpoint, reset, release or save, and not {action:?}"
+            )),
+        }
+    }
+
     /// The request that it is.
     ///
     /// # Errors

@@ -158,7 +158,7 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         (old.doors.tokens != new.doors.tokens, "another file of tokens"),
         (old.doors.audit != new.doors.audit, "another audit log"),
         (old.gateways != new.gateways, "gateways"),
-        (old.mqtt != new.mqtt, "mqtt"),
+        (old.mqtt != new.mqtt || old.sparkplug != new.sparkplug, "mqtt"),
         (
             kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
             "response and segments of lines",

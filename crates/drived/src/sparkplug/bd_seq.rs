@@ -1,0 +1,83 @@
+//! The number of the connections, which outlives the program.
+
+use std::{
+    fs,
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+use drive_sparkplug::BdSeq;
+
+/// The number that is kept in a file.
+#[derive(Debug)]
+pub(super) struct Kept {
+    file: PathBuf,
+    /// Of the last connection that may have been made.
+    last: Option<BdSeq>,
+    is_failing: bool,
+}
+
+impl Kept {
+    /// Reads the file; a file that is not there yet is made.
+    ///
+    /// # Errors
+    /// It is none of this, or cannot be written.
+    pub(super) fn open(file: &Path) -> Result<Self, String> {
+        let failed = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
+        let last = match fs::read_to_string(file) {
+            Ok(text) => Some(text.parse().map_err(|_| failed(&"expected a number from 0 to 255"))?),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            Err(error) => return Err(failed(&error)),
+        };
+        if let Some(last) = last {
+            write(file, last).map_err(|error| failed(&error))?;
+        } else if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+        }
+        Ok(Self { file: file.to_owned(), last, is_failing: false })
+    }
+
+    /// The number of the next connection, which stands in the file when this returns. A disk that is full ends no connection.
+    pub(super) fn next(&mut self) -> BdSeq {
+        let next = self.last.map_or(BdSeq::default(), BdSeq::next);
+        self.last = Some(next);
+        let written = write(&self.file, next);
+        if let Err(error) = &written
+            && !self.is_failing
+        {
+            tracing::error!("Sparkplug: {}: {error}: bdSeq is not kept", self.file.display());
+        }
+        self.is_failing = written.is_err();
+        next
+    }
+}
+
+/// All or nothing, also when the power fails.
+fn write(file: &Path, number: BdSeq) -> io::Result<()> {
+    let beside = file.with_extension("new");
+    let mut new = fs::File::create(&beside)?;
+    writeln!(new, "{number}")?;
+    new.sync_all()?;
+    fs::rename(&beside, file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_goes_on_over_restarts_and_begins_with_0() {
+        let folder = std::env::temp_dir().join(format!("drived-bd-seq-{}", std::process::id()));
+        let file = folder.join("sparkplug").join("bd-seq");
+        let mut kept = Kept::open(&file).unwrap();
+        assert_eq!([kept.next(), kept.next()].map(BdSeq::number), [0, 1]);
+        // The program was killed.
+        let mut kept = Kept::open(&file).unwrap();
+        assert_eq!(kept.next().number(), 2);
+        fs::write(&file, "255\n").unwrap();
+        assert_eq!(Kept::open(&file).unwrap().next().number(), 0);
+        fs::write(&file, "none").unwrap();
+        assert!(Kept::open(&file).unwrap_err().ends_with("expected a number from 0 to 255"));
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,168 @@
+//! Which metrics there are, and where in the objects of the API their values stand.
+
+use drive_sparkplug::{DataType, Definition, Quality, Reading, Value};
+use serde_json::Value as Json;
+
+/// A metric: its name, its type, and the pointer to its value.
+type Row = (&'static str, DataType, &'static str);
+
+/// The metrics that a host may write.
+pub(super) const SETPOINT: &str = "Control/Setpoint";
+pub(super) const SPEED_SETPOINT: &str = "Control/Speed Setpoint";
+pub(super) const COMMAND: &str = "Control/Command";
+
+/// What the daemon has.
+#[rustfmt::skip]
+const DAEMON: &[Row] = &[
+    ("Daemon/Version", DataType::String, "/version"),
+];
+
+/// What each of its lines has, below its name.
+#[rustfmt::skip]
+const LINE: &[Row] = &[
+    ("Link", DataType::String, "/link"),
+    ("Utilisation", DataType::Double, "/utilisation_percent"),
+    ("Worst Case Stop", DataType::UInt64, "/worst_case_stop_ms"),
+    ("Cycle", DataType::UInt64, "/cycle_ms"),
+    ("Exchanges", DataType::UInt64, "/exchanges"),
+    ("Errors/No Answer", DataType::UInt64, "/errors/no_answer"),
+    ("Errors/Damaged", DataType::UInt64, "/errors/damaged"),
+    ("Errors/Late", DataType::UInt64, "/errors/late"),
+    ("Errors/Mismatched", DataType::UInt64, "/errors/mismatched"),
+    ("Errors/Exception", DataType::UInt64, "/errors/exception"),
+    ("Errors/Foreign", DataType::UInt64, "/errors/foreign"),
+];
+
+/// What each drive has. A value that its family does not have is null.
+#[rustfmt::skip]
+const DRIVE: &[Row] = &[
+    ("Status/State", DataType::String, "/status/state"),
+    ("Status/Direction", DataType::String, "/status/direction"),
+    ("Status/Output Frequency", DataType::Double, "/status/output_frequency_hz"),
+    ("Status/Current", DataType::Double, "/status/current_a"),
+    ("Status/Current Share", DataType::Double, "/status/current_percent"),
+    ("Status/At Reference", DataType::Boolean, "/status/at_reference"),
+    ("Status/Reached", DataType::Boolean, "/reached"),
+    ("Status/Warning", DataType::Boolean, "/status/warning"),
+    ("Status/Control", DataType::String, "/status/control"),
+    ("Fault/Present", DataType::Boolean, "/fault/present"),
+    ("Fault/Code", DataType::Int32, "/fault/code"),
+    ("Fault/Mnemonic", DataType::String, "/fault/mnemonic"),
+    ("Fault/Meaning", DataType::String, "/fault/meaning"),
+    ("Fault/Remedy", DataType::String, "/fault/remedy"),
+    ("Fault/Time", DataType::DateTime, "/fault/time_unix_ms"),
+    ("Measurements/Reference Frequency", DataType::Double, "/measurements/reference/frequency_hz"),
+    ("Measurements/Reference Speed", DataType::Double, "/measurements/reference/speed_rpm"),
+    ("Measurements/Speed", DataType::Double, "/measurements/speed_rpm"),
+    ("Measurements/Output Voltage", DataType::Double, "/measurements/output_voltage_v"),
+    ("Measurements/Output Voltage Share", DataType::Double, "/measurements/output_voltage_percent"),
+    ("Measurements/Line Voltage", DataType::Double, "/measurements/line_voltage_v"),
+    ("Measurements/DC Bus Voltage", DataType::Double, "/measurements/dc_bus_voltage_v"),
+    ("Measurements/DC Bus Voltage Share", DataType::Double, "/measurements/dc_bus_voltage_percent"),
+    ("Measurements/Torque", DataType::Double, "/measurements/torque_percent"),
+    ("Measurements/Power", DataType::Double, "/measurements/power_percent"),
+    ("Measurements/Input Power", DataType::Double, "/measurements/input_power_kw"),
+    ("Measurements/Output Power", DataType::Double, "/measurements/output_power_kw"),
+    ("Measurements/Drive Thermal State", DataType::Double, "/measurements/drive_thermal_percent"),
+    ("Measurements/Motor Thermal State", DataType::Double, "/measurements/motor_thermal_percent"),
+    ("Measurements/Drive Load", DataType::Double, "/measurements/drive_load_percent"),
+    ("Measurements/Motor Load", DataType::Double, "/measurements/motor_load_percent"),
+    ("Measurements/Input Energy", DataType::UInt64, "/measurements/input_energy_counts"),
+    ("Measurements/Output Energy", DataType::UInt64, "/measurements/output_energy_counts"),
+    ("Measurements/Running Time", DataType::Double, "/measurements/running_time_h"),
+    ("Measurements/Powered Time", DataType::Double, "/measurements/powered_time_h"),
+    ("Measurements/Inputs", DataType::UInt32, "/measurements/inputs"),
+    ("Measurements/Outputs", DataType::UInt32, "/measurements/outputs"),
+    (SETPOINT, DataType::Double, "/setpoint/frequency_hz"),
+    (SPEED_SETPOINT, DataType::Double, "/setpoint/speed_rpm"),
+    (COMMAND, DataType::String, ""),
+    ("Control/Allowed", DataType::Boolean, "/control"),
+    ("Control/Start Refused", DataType::String, "/start_refused"),
+    ("Control/Low Limit", DataType::Double, "/limits/low_hz"),
+    ("Control/High Limit", DataType::Double, "/limits/high_hz"),
+    ("Control/LastCommand/Id", DataType::String, "/last/id"),
+    ("Control/LastCommand/Outcome", DataType::String, "/last/outcome"),
+    ("Control/LastCommand/Reason", DataType::String, "/last/reason"),
+    ("Control/LastCommand/Text", DataType::String, "/last/text"),
+    ("Control/LastCommand/Time", DataType::DateTime, "/last/time_unix_ms"),
+    ("Properties/Line", DataType::String, "/line"),
+    ("Properties/Slave", DataType::Int32, "/slave"),
+    ("Properties/Family", DataType::String, "/family"),
+    ("Properties/Model", DataType::String, "/identity/model"),
+    ("Properties/Firmware", DataType::String, "/identity/firmware"),
+];
+
+/// The metrics of a drive.
+pub(super) fn of_a_drive() -> Vec<Definition> {
+    DRIVE.iter().map(|&(name, data_type, _)| Definition::new(name, data_type)).collect()
+}
+
+/// The metrics of the daemon and of lines of these names.
+pub(super) fn of_the_node(lines: &[String]) -> Vec<Definition> {
+    let own = DAEMON.iter().map(|&(name, data_type, _)| Definition::new(name, data_type));
+    let lines = lines.iter().flat_map(|line| {
+        LINE.iter().map(move |&(name, data_type, _)| Definition::new(below(line, name), data_type))
+    });
+    own.chain(lines).collect()
+}
+
+/// The name of a metric of a line.
+fn below(line: &str, name: &str) -> String {
+    format!("Lines/{line}/{name}")
+}
+
+/// What the daemon's object says.
+pub(super) fn read_daemon(daemon: &Json, now_unix_ms: u64) -> impl Iterator<Item = (&'static str, Reading)> {
+    DAEMON
+        .iter()
+        .map(move |&(name, data_type, pointer)| (name, good(value(daemon, data_type, pointer), now_unix_ms)))
+}
+
+/// What a line's object says.
+pub(super) fn read_line(line: &Json, now_unix_ms: u64) -> impl Iterator<Item = (String, Reading)> {
+    let name = line["name"].as_str().unwrap_or_default();
+    LINE.iter().map(move |&(metric, data_type, pointer)| {
+        (below(name, metric), good(value(line, data_type, pointer), now_unix_ms))
+    })
+}
+
+/// What a drive's object says, each value by the age and the quality of the part that it stands in.
+pub(super) fn read_drive(drive: &Json, now_unix_ms: u64) -> impl Iterator<Item = (&'static str, Reading)> {
+    let judge = |part: &str| {
+        let age = drive[part]["age_ms"].as_u64().unwrap_or_default();
+        match drive[part]["quality"].as_str() {
+            Some("good") => (Quality::Good, now_unix_ms.saturating_sub(age)),
+            // Since when it is so is now: whoever reads it learns it here.
+            Some("stale") => (Quality::Stale, now_unix_ms),
+            _ => (Quality::Bad, now_unix_ms),
+        }
+    };
+    let (status, measurements) = (judge("status"), judge("measurements"));
+    DRIVE.iter().map(move |&(name, data_type, pointer)| {
+        let (quality, unix_ms) = match name.split('/').next() {
+            Some("Status" | "Fault") => status,
+            Some("Measurements") => measurements,
+            _ => (Quality::Good, now_unix_ms),
+        };
+        (name, Reading { value: value(drive, data_type, pointer), quality, unix_ms })
+    })
+}
+
+fn good(value: Option<Value>, unix_ms: u64) -> Reading {
+    Reading { value, quality: Quality::Good, unix_ms }
+}
+
+/// A value of an object by its pointer; the whole object is none.
+fn value(object: &Json, data_type: DataType, pointer: &str) -> Option<Value> {
+    let found = object.pointer(pointer)?;
+    Some(match data_type {
+        DataType::Double => Value::Double(found.as_f64()?),
+        DataType::Boolean => Value::Boolean(found.as_bool()?),
+        DataType::String => Value::String(found.as_str()?.to_owned()),
+        DataType::DateTime => Value::DateTime(found.as_u64()?),
+        DataType::UInt64 => Value::UInt64(found.as_u64()?),
+        DataType::UInt32 => Value::UInt32(found.as_u64()?.try_into().ok()?),
+        DataType::Int32 => Value::Int32(found.as_i64()?.try_into().ok()?),
+        _ => return None,
+    })
+}

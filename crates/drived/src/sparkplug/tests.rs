@@ -1,0 +1,217 @@
+//! The face in virtual time, on a simulated plant and a broker in memory.
+
+use drive_fleet::DriveSettings;
+use drive_sparkplug::{Definition, Id, Metric, NodeName, Payload, Quality, Raw};
+use tokio::time::sleep;
+
+use super::*;
+use crate::{
+    broker::testing::{TestBroker, publish},
+    doors::Role,
+    plant::testing::TestPlant,
+};
+
+/// A plant, its face, and the broker that it is on.
+struct Bench {
+    plant: TestPlant,
+    broker: TestBroker,
+    face: Sparkplug,
+}
+
+fn config(name: &str) -> SparkplugConfig {
+    let state = std::env::temp_dir().join(format!("drived-sparkplug-{}-{name}", std::process::id()));
+    let _ = std::fs::remove_file(&state);
+    SparkplugConfig {
+        name: NodeName { group: Id::new("plant").unwrap(), edge_node: Id::new("hall 1").unwrap() },
+        primary_host: None,
+        commands: Some(Role::Operate),
+        lifetime: Duration::from_secs(1),
+        rebirth_pause: Duration::from_secs(5),
+        state,
+    }
+}
+
+impl Bench {
+    async fn of(drives: u8, config: SparkplugConfig) -> Self {
+        let (plant, broker) = (TestPlant::of(drives).await, TestBroker::default());
+        let prepared = Sparkplug::prepare(config, broker.options(), Duration::from_secs(1));
+        let face = prepared
+            .unwrap_or_else(|failure| panic!("{failure}"))
+            .open(plant.plant.clone(), Audit::default());
+        sleep(Duration::from_secs(2)).await;
+        Self { plant, broker, face }
+    }
+
+    /// The topics behind the group that were published since then, with their payloads.
+    fn said(&self, since: usize) -> Vec<(String, Payload)> {
+        let read = |publish: rumqttc::Publish| {
+            let topic = String::from_utf8(publish.topic.to_vec()).unwrap();
+            let topic = topic.replace("spBv1.0/plant/", "").replace("/hall 1", "");
+            (topic, Payload::decode(&publish.payload).unwrap())
+        };
+        self.broker.publishes().into_iter().skip(since).map(read).collect()
+    }
+
+    fn topics(&self, since: usize) -> Vec<String> {
+        self.said(since).into_iter().map(|(topic, _)| topic).collect()
+    }
+
+    fn mark(&self) -> usize {
+        self.broker.publishes().len()
+    }
+
+    /// Writes a metric of a drive, as it is sent now.
+    fn write(&self, drive: &str, name: &str, value: Raw) {
+        let metric = Metric { name: Some(name.to_owned()), value: Some(value), ..Metric::default() };
+        let payload = Payload { timestamp: Some(now().unix_ms), seq: None, metrics: vec![metric] };
+        let mut message = publish(&format!("spBv1.0/plant/DCMD/hall 1/{drive}"), "", Qos::AtMostOnce);
+        message.payload = payload.encode().into();
+        self.broker.deliver(message);
+    }
+
+    /// The metrics of a drive by their names, as its births and data have told them.
+    fn metrics(&self, drive: &str) -> HashMap<String, Metric> {
+        let mut names: HashMap<Option<u64>, String> = HashMap::new();
+        let mut metrics: HashMap<String, Metric> = HashMap::new();
+        for (topic, payload) in self.said(0) {
+            if topic != format!("DBIRTH/{drive}") && topic != format!("DDATA/{drive}") {
+                continue;
+            }
+            for metric in payload.metrics {
+                let name = metric.name.clone().unwrap_or_else(|| names[&metric.alias].clone());
+                names.insert(metric.alias, name.clone());
+                let quality = metric.quality.or_else(|| metrics.get(&name).and_then(|known| known.quality));
+                metrics.insert(name, Metric { quality, ..metric });
+            }
+        }
+        metrics
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn births_tell_every_drive_that_answers_and_every_line() {
+    let bench = Bench::of(2, config("births")).await;
+    assert_eq!(bench.topics(0)[..3], ["NBIRTH", "DBIRTH/pump 1", "DBIRTH/pump 2"]);
+    let node = &bench.said(0)[0].1;
+    let names: Vec<_> = node.metrics.iter().filter_map(|metric| metric.name.as_deref()).collect();
+    for name in ["Daemon/Version", "Lines/north/Utilisation", "bdSeq", "Node Control/Rebirth"] {
+        assert!(names.contains(&name), "{name}: {names:?}");
+    }
+    let pump = bench.metrics("pump 1");
+    assert_eq!(pump["Properties/Family"].value, Some(Raw::String("atv312".to_owned())));
+    assert_eq!(pump["Status/State"].value, Some(Raw::String("disabled".to_owned())));
+    assert_eq!(pump["Status/State"].quality, Some(Quality::Good));
+    // What this family does not have.
+    assert!(pump["Measurements/Input Power"].is_null);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_value_that_grows_old_is_told_as_stale_before_its_drive_dies() {
+    let bench = Bench::of(1, config("stale")).await;
+    let mark = bench.mark();
+    bench.plant.machines[0].mute();
+    sleep(Duration::from_secs(30)).await;
+    let said = bench.said(mark);
+    let dead = said.iter().position(|(topic, _)| topic == "DDEATH/pump 1").unwrap();
+    assert!(!said[dead..].iter().any(|(topic, _)| topic == "DDATA/pump 1"));
+    let mark = bench.mark();
+    bench.plant.machines[0].unmute();
+    sleep(Duration::from_secs(30)).await;
+    assert!(bench.topics(mark).contains(&"DBIRTH/pump 1".to_owned()));
+    assert_eq!(bench.metrics("pump 1")["Status/State"].quality, Some(Quality::Good));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_is_told_under_its_id_from_pending_to_confirmed() {
+    let bench = Bench::of(1, config("command")).await;
+    let mark = bench.mark();
+    let command = r#"{"id": "4711", "action": "start", "setpoint": {"frequency_hz": 20}}"#;
+    bench.write("pump 1", "Control/Command", Raw::String(command.to_owned()));
+    sleep(Duration::from_secs(10)).await;
+    let outcomes: Vec<_> = bench
+        .said(mark)
+        .into_iter()
+        .flat_map(|(_, payload)| payload.metrics)
+        .filter_map(|metric| match metric.value {
+            Some(Raw::String(text)) if text == "pending" || text == "confirmed" => Some(text),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(outcomes, ["pending", "confirmed"]);
+    let pump = bench.metrics("pump 1");
+    assert_eq!(pump["Control/LastCommand/Id"].value, Some(Raw::String("4711".to_owned())));
+    assert_eq!(pump["Status/State"].value, Some(Raw::String("running".to_owned())));
+    assert_eq!(pump["Control/Setpoint"].value, Some(Raw::Double(20.0)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn before_the_births_a_start_is_refused_and_a_stop_is_not() {
+    let waiting = SparkplugConfig { primary_host: Some(Id::new("scada").unwrap()), ..config("waiting") };
+    let bench = Bench::of(1, waiting).await;
+    assert!(bench.topics(0).is_empty());
+    let drive = bench.plant.plant.fleet().drive("pump 1").unwrap();
+    assert!(drive.start(drive_core::Direction::Forward).await.is_confirmed());
+    sleep(Duration::from_secs(1)).await;
+    let state = || drive.snapshot().status.as_ref().map(|status| status.value.state);
+    assert_eq!(state(), Some(drive_core::State::Running));
+    bench.write("pump 1", "Control/Command", Raw::String(r#"{"id": "a", "action": "stop"}"#.to_owned()));
+    sleep(Duration::from_secs(30)).await;
+    assert_eq!(state(), Some(drive_core::State::Ready));
+    bench.write("pump 1", "Control/Command", Raw::String(r#"{"id": "b", "action": "start"}"#.to_owned()));
+    sleep(Duration::from_secs(10)).await;
+    assert_eq!(state(), Some(drive_core::State::Ready));
+    let mut state = publish("spBv1.0/STATE/scada", r#"{"online":true,"timestamp":1}"#, Qos::AtMostOnce);
+    state.retain = true;
+    bench.broker.deliver(state);
+    sleep(Duration::from_secs(2)).await;
+    let pump = bench.metrics("pump 1");
+    assert_eq!(pump["Control/LastCommand/Id"].value, Some(Raw::String("b".to_owned())));
+    assert_eq!(pump["Control/LastCommand/Reason"].value, Some(Raw::String("not_born".to_owned())));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_only_read_is_not_moved_and_says_so() {
+    let plant = TestPlant::with(1, DriveSettings::watched).await;
+    let broker = TestBroker::default();
+    let prepared = Sparkplug::prepare(config("read"), broker.options(), Duration::from_secs(1));
+    let face =
+        prepared.unwrap_or_else(|failure| panic!("{failure}")).open(plant.plant.clone(), Audit::default());
+    sleep(Duration::from_secs(2)).await;
+    let bench = Bench { plant, broker, face };
+    bench.write("pump 1", "Control/Setpoint", Raw::Double(30.0));
+    sleep(Duration::from_secs(2)).await;
+    let pump = bench.metrics("pump 1");
+    assert_eq!(pump["Control/Allowed"].value, Some(Raw::Boolean(false)));
+    assert_eq!(pump["Control/LastCommand/Outcome"].value, Some(Raw::String("refused".to_owned())));
+    assert_eq!(pump["Control/LastCommand/Reason"].value, Some(Raw::String("read_only".to_owned())));
+}
+
+#[tokio::test(start_paused = true)]
+async fn while_the_daemon_ends_only_stops_are_taken_and_the_node_dies_last() {
+    let bench = Bench::of(1, config("closing")).await;
+    bench.face.closing();
+    bench.write("pump 1", "Control/Setpoint", Raw::Double(30.0));
+    sleep(Duration::from_secs(2)).await;
+    let pump = bench.metrics("pump 1");
+    assert_eq!(pump["Control/LastCommand/Reason"].value, Some(Raw::String("closing".to_owned())));
+    let Bench { broker, face, .. } = bench;
+    face.close().await;
+    let last = broker.publishes().pop().unwrap();
+    assert!(last.topic.starts_with(b"spBv1.0/plant/NDEATH/"), "{last:?}");
+    let packets = broker.packets();
+    let goodbye = packets.iter().find_map(|packet| match packet {
+        rumqttc::Packet::Disconnect(goodbye) => Some(goodbye.reason_code),
+        _ => None,
+    });
+    assert_eq!(goodbye, Some(rumqttc::DisconnectReasonCode::DisconnectWithWillMessage));
+}
+
+#[test]
+fn the_readme_lists_every_metric_with_its_type() {
+    let manual = include_str!("../../README.md");
+    let node = metrics::of_the_node(&["<line>".to_owned()]);
+    for Definition { name, data_type } in node.into_iter().chain(metrics::of_a_drive()) {
+        let row = format!("| `{name}` | {data_type:?} | ");
+        assert!(manual.contains(&row), "{row}");
+    }
+}
