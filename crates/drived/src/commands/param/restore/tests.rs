@@ -247,6 +247,28 @@ async fn functions_that_exclude_each_other_are_taken_away_before_others_are_give
 }
 
 #[tokio::test(start_paused = true)]
+async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_written() {
+    let file = Bench::kept(Family::Atv312).await;
+    // BBV51701 p. 32: CFG loads a configuration at once, which the family leaves to the keypad; p. 35: from L3 back to L1 only
+    // by a factory setting.
+    for (code, word, set_up) in [("CFG", 0, SetUp::Factory), ("LAC", 0, SetUp::ForTheBus)] {
+        let mut file = file.clone();
+        file.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
+        let mut new = Bench::of(Family::Atv312, set_up);
+        let plan = new.plan(&file).await;
+        let carried = new.carry(&plan).await;
+        let stopped = carried.stopped.as_ref().unwrap_or_else(|| panic!("{code} was written"));
+        assert_eq!((stopped.at.code, stopped.is_unknown), (code, false), "{}", stopped.why);
+        assert_eq!((carried.written.len(), carried.left.len()), (0, plan.changes.len()));
+        let told = stopped.in_words("pump 1", &carried);
+        assert!(
+            told.contains("written: none; not written: ") && told.contains("goes on from here"),
+            "{told}"
+        );
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn the_line_itself_is_changed_only_if_that_is_asked_for_and_last() {
     let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
     let now = bench.source.keep().await.unwrap();
