@@ -98,3 +98,22 @@ fn a_service_whose_motors_come_down_asks_for_the_time_that_they_need() {
     // The motor is stopped, and the service ends well.
     assert_eq!(daemon.end().0, Some(0));
 }
+
+#[test]
+fn a_service_that_reads_its_configuration_again_says_when_it_began_and_when_it_is_ready() {
+    let sim = Sim::serve("reloading", &["atv312@1"]);
+    let file = File::new("reloading", &line("north", sim.link(), ""));
+    let manager = Manager::new("reloading");
+    let mut daemon = manager.start(&file);
+    manager.wait_for("READY=1");
+    daemon.signal("-HUP");
+    // sd_notify(3): the monotonic clock in microseconds, in the same message.
+    let (words, before) = manager.wait_for("RELOADING=1");
+    let clock = words.iter().find_map(|word| word.strip_prefix("MONOTONIC_USEC="));
+    assert!(clock.is_some_and(|clock| clock.parse::<u64>().is_ok_and(|clock| clock > 0)), "{words:?}");
+    assert!(!before.contains(&"READY=1".to_owned()), "{before:?}");
+    manager.wait_for("READY=1");
+    let told = std::thread::spawn(move || daemon.interrupt().0);
+    manager.wait_for("STOPPING=1");
+    assert_eq!(told.join().expect("it ends"), Some(0));
+}

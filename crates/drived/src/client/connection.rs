@@ -185,3 +185,23 @@ async fn open(socket: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32
 async fn open(_: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
     Err(io::Error::from(io::ErrorKind::NotFound))
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_daemon_that_is_stalled_is_said_to_be_and_nobody_waits_for_ever() {
+        let path = std::env::temp_dir().join(format!("drived-stalled-{}.sock", std::process::id()));
+        // It is connected to, and never says anything.
+        let stalled = tokio::net::UnixListener::bind(&path).unwrap();
+        let mut daemon = Daemon::connect(Some(&path), None).await.unwrap();
+        for _ in 0..2 {
+            let failed = daemon.state().await.unwrap_err();
+            assert!(matches!(failed, Failure::Drive(_)));
+            assert!(failed.to_string().contains("gave no answer in time"), "{failed}");
+        }
+        drop(stalled);
+        std::fs::remove_file(&path).unwrap();
+    }
+}

@@ -373,3 +373,26 @@ async fn what_is_no_command_is_a_problem_document_and_moves_nothing() {
     sleep(Duration::from_secs(5)).await;
     assert!(!is_running(&plant, 0));
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_over_http_is_on_the_wire_within_its_bound_while_a_hundred_starts_wait() {
+    let plant = TestPlant::of(4).await;
+    let north = plant.plant.fleet().lines().remove(0).1;
+    let starts = (0..100).map(|number| {
+        let path = format!("/api/v1/drives/pump%20{}/start?wait=0s", number % 4 + 1);
+        let body = json!({"id": format!("start-{number}"), "setpoint": {"frequency_hz": 20.0}});
+        let plant = &plant.plant;
+        async move { command(plant, &path, &body).await.0 }
+    });
+    let answered = futures_util::future::join_all(starts).await;
+    assert!(answered.contains(&StatusCode::ACCEPTED), "they wait: {answered:?}");
+    let (status, stopped) = command(&plant.plant, "/api/v1/stop?wait=30s", &json!({})).await;
+    assert_eq!((status, &stopped["confirmed"]), (StatusCode::OK, &4.into()), "{stopped}");
+    // The line's own count, from the call of each stop to its first bit, in virtual time.
+    let stats = north.stats();
+    let stops = stats.class(drive_core::Class::Stop);
+    assert!(stops.sent >= 4, "{}", stops.sent);
+    assert!(stops.wait.max() <= north.worst_case_stop(), "{:?}", stops.wait);
+    sleep(Duration::from_secs(10)).await;
+    assert!((0..4).all(|number| !is_running(&plant, number)), "no start came after the stop");
+}
