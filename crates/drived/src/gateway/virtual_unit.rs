@@ -210,11 +210,11 @@ impl Shown {
     }
 
     fn frequency(&self) -> u16 {
-        word(self.live().and_then(|status| status.output_frequency).map(|frequency| frequency.centihertz()))
+        word(self.live().and_then(|status| status.output_frequency).map(drive_core::Frequency::centihertz))
     }
 
     fn current(&self) -> u16 {
-        word(self.live().and_then(|status| status.current).map(|current| current.deciamperes()))
+        word(self.live().and_then(|status| status.current).map(drive_core::Current::deciamperes))
     }
 
     fn age(&self) -> u16 {
