@@ -1,7 +1,7 @@
 //! The face in virtual time, on a simulated plant and a broker in memory.
 
 use drive_fleet::DriveSettings;
-use drive_sparkplug::{Definition, Id, Metric, NodeName, Payload, Quality, Raw};
+use drive_sparkplug::{Definition, Id, Metric, NodeName, Payload, Quality, Raw, Reading};
 use tokio::time::sleep;
 
 use super::*;
@@ -106,7 +106,7 @@ async fn births_tell_every_drive_that_answers_and_every_line() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_value_that_grows_old_is_told_as_stale_before_its_drive_dies() {
+async fn a_drive_that_does_not_answer_any_more_dies_and_is_born_again_when_it_does() {
     let bench = Bench::of(1, config("stale")).await;
     let mark = bench.mark();
     bench.plant.machines[0].mute();
@@ -204,6 +204,25 @@ async fn while_the_daemon_ends_only_stops_are_taken_and_the_node_dies_last() {
         _ => None,
     });
     assert_eq!(goodbye, Some(rumqttc::DisconnectReasonCode::DisconnectWithWillMessage));
+}
+
+#[test]
+fn what_is_old_is_stale_with_its_last_value_and_what_was_never_read_is_bad_without_one() {
+    let drive = json!({
+        "setpoint": { "frequency_hz": 30 },
+        "status": { "quality": "stale", "age_ms": 9_000, "output_frequency_hz": 29.5 },
+        "measurements": { "quality": "missing" },
+    });
+    let read: HashMap<_, _> = metrics::read_drive(&drive, 100_000).collect();
+    let told = |name: &str| (read[name].value.clone(), read[name].quality, read[name].unix_ms);
+    let hertz = |number| Some(drive_sparkplug::Value::Double(number));
+    assert_eq!(told("Status/Output Frequency"), (hertz(29.5), Quality::Stale, 100_000));
+    assert_eq!(told("Measurements/Speed"), (None, Quality::Bad, 100_000));
+    assert_eq!(told("Control/Setpoint"), (hertz(30.0), Quality::Good, 100_000));
+    let live = json!({ "status": { "quality": "good", "age_ms": 9_000, "output_frequency_hz": 29.5 } });
+    let read: HashMap<_, _> = metrics::read_drive(&live, 100_000).collect();
+    let Reading { quality, unix_ms, .. } = &read["Status/Output Frequency"];
+    assert_eq!((*quality, *unix_ms), (Quality::Good, 91_000), "the time at which it was read");
 }
 
 #[test]
