@@ -194,7 +194,12 @@ async fn restore(
     }
     if !carried.written.is_empty() {
         let written = output::counted(carried.written.len(), "parameter was", "parameters were");
-        text.insert(0, format!("{name}: {written} written and read back"));
+        let by_itself = plan.changes.len().saturating_sub(carried.written.len());
+        let more = match by_itself {
+            1.. if failure.is_none() => format!("; {by_itself} more came right by these"),
+            _ => String::new(),
+        };
+        text.insert(0, format!("{name}: {written} written and read back{more}"));
     }
     json.extend([
         ("written".to_owned(), carried.written.iter().map(|change| change.row.code).collect()),
