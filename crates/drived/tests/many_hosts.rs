@@ -1,10 +1,11 @@
-//! Several daemons and what joins them: one Prometheus that scrapes them all, as it is installed, with the rules and the names
-//! that the program gives out.
+//! Several daemons and what joins them: one Prometheus that scrapes them all, with the rules that the program gives out, and
+//! one broker.
 #![cfg(unix)]
 
 mod support;
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::PathBuf,
     process::{Child, Command, Stdio},
@@ -25,9 +26,14 @@ struct Host {
 
 impl Host {
     fn start(name: &str) -> Self {
+        Self::with(name, "")
+    }
+
+    /// The same with more sections.
+    fn with(name: &str, sections: &str) -> Self {
         let (sim, port) = (Sim::serve(name, &["atv312@1-2"]), free_port());
         let text = format!(
-            "snapshots = \"500ms\"\n[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.{name}]\nport = \"{},19200,8E1\"\n\
+            "snapshots = \"500ms\"\n{sections}[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.{name}]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"{name}\"\ndrive = \"atv312@1-2\"\nname = \"{name} pump {{}}\"\ncontrol = true\n",
             sim.link()
         );
@@ -38,6 +44,40 @@ impl Host {
             daemon.wait_for(r#""event":"connected""#);
         }
         Self { port, daemon, sim, _file: file }
+    }
+}
+
+/// A mosquitto that keeps nothing when it goes; killed when dropped.
+struct Broker(Child);
+
+impl Broker {
+    fn start(port: u16) -> Self {
+        let config = path(&format!("mosquitto-{port}.conf"));
+        let text = format!("user root\nlistener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n");
+        fs::write(&config, text).expect("it can be written");
+        let mut mosquitto = Command::new("mosquitto");
+        mosquitto.arg("-c").arg(&config).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        Self(mosquitto.spawn().expect("it was there a moment ago"))
+    }
+
+    /// The next messages of some topics, as they are told or kept.
+    fn hear(port: u16, topics: &str, count: u8) -> BTreeSet<String> {
+        let (port, count) = (port.to_string(), count.to_string());
+        let mut heard = Command::new("mosquitto_sub");
+        heard.args(["-V", "mqttv5", "-h", "127.0.0.1", "-p", &port, "-t", topics, "-C", &count, "-v"]);
+        loop {
+            let output = heard.output().expect("it comes with mosquitto");
+            if output.status.success() {
+                return String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
+            }
+        }
+    }
+}
+
+impl Drop for Broker {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
@@ -148,6 +188,50 @@ fn one_prometheus_sees_three_daemons_and_fires_when_a_drive_of_one_trips() {
     for host in hosts {
         let Host { mut daemon, .. } = host;
         daemon.wait_for(r#""quality":"good""#);
+        assert_eq!(daemon.interrupt().0, Some(0));
+    }
+}
+
+#[test]
+fn three_daemons_follow_a_broker_that_moves_tell_it_everything_again_and_are_missed_when_they_go() {
+    if !is_there("sh", &["-c", "command -v mosquitto && command -v mosquitto_sub"]) {
+        return;
+    }
+    let (first, second) = (free_port(), free_port());
+    let broker = Broker::start(first);
+    let mut hosts = ["ash", "birch", "cedar"].map(|name| {
+        let servers = format!("\"mqtt://127.0.0.1:{first}\", \"mqtt://127.0.0.1:{second}\"");
+        Host::with(
+            name,
+            &format!("[mqtt]\nservers = [{servers}]\nbase = \"plant/{name}\"\nheartbeat = \"1s\"\n"),
+        )
+    });
+    let all: BTreeSet<String> = ["ash", "birch", "cedar"]
+        .iter()
+        .flat_map(|name| {
+            [1, 2].map(|pump| format!("plant/{name}/drive/{name}_pump_{pump}/availability online"))
+        })
+        .collect();
+    // A drive that is told again stands here once.
+    let hear_all = |port| while Broker::hear(port, "plant/+/drive/+/availability", 6) != all {};
+    hear_all(first);
+
+    // The drives are asked on while there is no broker, and the one that comes knows nothing.
+    drop(broker);
+    for host in &mut hosts {
+        let snapshot = host.daemon.wait_for(r#""kind":"snapshot""#);
+        assert!(snapshot.contains(r#""quality":"good""#), "{snapshot}");
+    }
+    let _broker = Broker::start(second);
+    hear_all(second);
+    for host in &hosts {
+        assert!(get(host.port, "/metrics", "*/*").contains("\ndrived_mqtt_connected 1\n"));
+    }
+
+    let [mut ash, birch, cedar] = hosts;
+    ash.daemon.signal("-KILL");
+    while !Broker::hear(second, "plant/ash/status", 1).contains("plant/ash/status offline") {}
+    for Host { daemon, .. } in [birch, cedar] {
         assert_eq!(daemon.interrupt().0, Some(0));
     }
 }

@@ -171,6 +171,18 @@ fn commands(board: &mut Board) {
             "{{route}} {{code}}",
         ),
         (
+            "MQTT messages",
+            "cps",
+            format!("rate(drived_mqtt_sent_messages_total{{{HOSTS}}}[$__rate_interval])"),
+            "{{instance}}",
+        ),
+        (
+            "MQTT messages that were lost",
+            "short",
+            format!("increase(drived_mqtt_dropped_messages_total{{{HOSTS}}}[$__rate_interval]) > 0"),
+            "{{instance}} {{reason}}",
+        ),
+        (
             "Resident memory",
             "bytes",
             format!(r#"process_resident_memory_bytes{{{HOSTS}}} * on (instance) drived_build_info"#),
