@@ -54,6 +54,8 @@ struct State {
     retained: BTreeMap<String, Publish>,
     counted: u64,
     forgets: bool,
+    /// What is to be delivered, while it is held up.
+    held: Option<Vec<Publish>>,
     client: Option<mpsc::UnboundedSender<Option<Publish>>>,
 }
 
@@ -97,9 +99,20 @@ impl TestBroker {
 
     /// Sends a message to the client.
     pub(crate) fn deliver(&self, publish: Publish) {
-        let state = self.state();
-        let client = state.client.as_ref().expect("a client is connected");
-        client.send(Some(publish)).expect("its connection stands");
+        self.state().deliver(publish);
+    }
+
+    /// Holds up whatever is to be delivered.
+    pub(crate) fn hold(&self) {
+        self.state().held = Some(Vec::new());
+    }
+
+    /// Delivers what was held up, in its order.
+    pub(crate) fn release(&self) {
+        let mut state = self.state();
+        for publish in state.held.take().unwrap_or_default() {
+            state.deliver(publish);
+        }
     }
 
     /// The topics and payloads that were published so far.
@@ -144,6 +157,19 @@ impl TestBroker {
 
     fn state(&self) -> MutexGuard<'_, State> {
         self.0.state()
+    }
+}
+
+impl State {
+    fn deliver(&mut self, publish: Publish) {
+        match (&mut self.held, &self.client) {
+            (Some(held), _) => held.push(publish),
+            (None, Some(client)) => {
+                let _ = client.send(Some(publish));
+            }
+            // It has just been cut off.
+            (None, None) => {}
+        }
     }
 }
 
@@ -241,6 +267,10 @@ impl Inner {
                     state.retained.remove(&topic);
                 } else if publish.retain {
                     state.retained.insert(topic, publish.clone());
+                }
+                if words(publish).0.ends_with("/echo") && answers {
+                    // What the client is subscribed to itself.
+                    state.deliver(Publish { pkid: 0, retain: false, ..publish.clone() });
                 }
                 let (pkid, asks) = (publish.pkid, publish.qos != rumqttc::QoS::AtMostOnce);
                 if !state.forgets {

@@ -5,7 +5,7 @@
 //! looks like. Commands are carried out in the order in which they come, except that a stop waits for nothing.
 
 use std::{
-    collections::HashMap,
+    collections::{HashMap, VecDeque},
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
@@ -43,6 +43,10 @@ const WAITING: usize = 64;
 const FOLLOWED: usize = 256;
 /// For how long an outcome may still be settled, and an answer waits for a broker that is away.
 const SETTLES_FOR: Duration = Duration::from_secs(600);
+/// A command that may have been on its way from the broker for longer is late.
+const LATE: Duration = Duration::from_secs(3);
+/// Calls of the daemon to itself that may be under way.
+const CALLS: usize = 30;
 /// In a flood, a stop that comes so soon after the same one has nothing to add.
 pub(crate) const SAME_STOP: Duration = Duration::from_millis(50);
 
@@ -71,9 +75,15 @@ struct Order {
 pub(super) struct Commanding {
     judge: Arc<Judge>,
     orders: mpsc::Sender<Order>,
-    pace: Pace,
-    /// The last stop of each target.
-    stopped: HashMap<Meant, (StopMode, Instant)>,
+    /// How fast each commander may come; those whom the configuration does not name, together.
+    paces: HashMap<String, Pace>,
+    /// When each target was last stopped by each mode.
+    stopped: HashMap<(Meant, StopMode), Instant>,
+    /// The calls that have not come back, the oldest first.
+    calls: VecDeque<(u64, Instant)>,
+    called: u64,
+    /// When the last call was made that has come back: what comes after it was sent after that.
+    sent_after: Option<Instant>,
 }
 
 /// What carries them out.
@@ -93,15 +103,65 @@ impl Commanding {
         let followed = Arc::new(Semaphore::new(FOLLOWED));
         let judge = Arc::new(Judge { face, audit, closing, stops: Mutex::new(0), followed });
         tokio::spawn(Arc::clone(&judge).work(waiting));
-        Self { judge, orders, pace: Pace::new(Instant::now()), stopped: HashMap::new() }
+        Self {
+            judge,
+            orders,
+            paces: HashMap::new(),
+            stopped: HashMap::new(),
+            calls: VecDeque::new(),
+            called: 0,
+            sent_after: None,
+        }
+    }
+
+    /// There is a new connection, which has proved nothing yet.
+    pub(super) fn connected(&mut self) {
+        self.calls.clear();
+        self.sent_after = None;
+        self.call();
+    }
+
+    /// Says something to itself over the broker. A broker delivers in order, so that a command behind it is younger.
+    pub(super) fn call(&mut self) {
+        let face = &self.judge.face;
+        if !face.config.commands {
+            return;
+        }
+        let now = Instant::now();
+        self.called += 1;
+        let mut call = Message::new(face.topics.echo(), self.called.to_string());
+        call.expires = Some(now + LATE);
+        if face.broker.publish(call, Kept::Latest) {
+            self.calls.push_back((self.called, now));
+            self.calls.drain(..self.calls.len().saturating_sub(CALLS));
+        }
+    }
+
+    /// A call has come back.
+    fn echoed(&mut self, arrived: &Arrived) {
+        let number = std::str::from_utf8(&arrived.payload).ok().and_then(|text| text.parse::<u64>().ok());
+        let at = self.calls.iter().position(|(call, _)| Some(*call) == number);
+        if let Some((_, made)) = at.and_then(|at| self.calls.drain(..=at).next_back()) {
+            self.sent_after = Some(made);
+        }
+    }
+
+    /// Whether nobody can say that it was sent a moment ago.
+    fn is_late(&self, arrived: &Arrived) -> bool {
+        self.sent_after.is_none_or(|sent| arrived.at.saturating_duration_since(sent) > LATE)
     }
 
     /// Takes what has arrived.
     pub(super) fn handle(&mut self, arrived: &Arrived) {
         let face = Arc::clone(&self.judge.face);
+        if arrived.topic == face.topics.echo() {
+            return self.echoed(arrived);
+        }
         let Some(asking) = face.topics.asked(&arrived.topic) else { return };
         let said = Said::of(asking.verb, &arrived.payload);
-        let (is_stop, in_time) = (said.is_stop(), self.pace.allows(arrived.at));
+        let named = asking.commander.clone().filter(|name| face.config.commanders.contains_key(name));
+        let pace = self.paces.entry(named.unwrap_or_default()).or_insert_with(|| Pace::new(arrived.at));
+        let (is_stop, in_time) = (said.is_stop(), pace.allows(arrived.at));
         if !(in_time || is_stop) {
             return;
         }
@@ -125,11 +185,11 @@ impl Commanding {
         if is_stop {
             let mode = said.mode();
             let id = said.id.clone();
-            let last = self.stopped.get(&asking.meant);
-            if !in_time && last.is_some_and(|(same, at)| *same == mode && arrived.at < *at + SAME_STOP) {
+            let key = (asking.meant, mode);
+            if !in_time && self.stopped.get(&key).is_some_and(|at| arrived.at < *at + SAME_STOP) {
                 return;
             }
-            self.stopped.insert(asking.meant, (mode, arrived.at));
+            self.stopped.insert(key, arrived.at);
             let action = Action::Stop(mode);
             let request = Request { id, target, action, lifetime: LIFETIME, arrived: arrived.at };
             return self.judge.stop(&caller, request, record, &answers);
@@ -138,6 +198,10 @@ impl Commanding {
         if arrived.retain {
             let text = "it is retained: the broker would send it again and again; publish it without the retain flag";
             return refuse("retained", text);
+        }
+        if self.is_late(arrived) {
+            let text = "the connection to the broker has stalled, and nobody can say how old it is";
+            return refuse("late", text);
         }
         if *self.judge.closing.borrow() {
             return refuse("closing", "the daemon is about to end");

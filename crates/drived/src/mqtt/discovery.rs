@@ -43,6 +43,20 @@ const STATES: [State; 9] = [
     State::Unknown,
 ];
 
+/// The events that somebody should look at now.
+const ALARMS: [&str; 10] = [
+    "lost",
+    "tripped",
+    "identity_changed",
+    "watchdog_broken",
+    "watchdog_not_in_force",
+    "stop_unconfirmed",
+    "run_command_stands",
+    "restarts_itself",
+    "limit",
+    "warning",
+];
+
 /// Which of a drive's topics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Of {
@@ -260,6 +274,16 @@ impl Device {
                                        status.state in ['running', 'stopping', 'fault_reaction'] or status.state == 'quick_stop' \
                                        and status.output_frequency_hz | default(1) > 0 else 'OFF') }}",
                     "expire_after": expire_after,
+                }),
+            ),
+            component(
+                "alarm",
+                "event",
+                json!({
+                    "name": "Alarm", "event_types": ALARMS, "state_topic": topic("event"),
+                    // Whatever else happens is none: Home Assistant ignores an empty text.
+                    "value_template": "{{ {'event_type': value_json.event, 'text': value_json.text} | to_json \
+                                       if value_json.alarm and value_json.event != 'exit' else '' }}",
                 }),
             ),
             component(

@@ -14,7 +14,7 @@ mod topics;
 
 use std::{collections::HashMap, fs, sync::Arc, time::Duration};
 
-use drive_fleet::DriveHandle;
+use drive_fleet::{DriveHandle, Received};
 use tokio::{
     sync::{Notify, mpsc, watch},
     task::JoinHandle,
@@ -97,7 +97,7 @@ impl Mqtt {
         let options = Options {
             subscriptions: subscriptions(&config),
             queue: NEWS,
-            is_urgent: topics::is_stop,
+            is_urgent: topics::is_urgent,
             ..options(&config)?
         };
         Ok(Prepared { config, options })
@@ -166,7 +166,8 @@ fn login(config: &MqttConfig) -> Result<Option<Login>, Failure> {
 /// refused.
 fn subscriptions(config: &MqttConfig) -> Vec<Subscription> {
     let topics = Topics::new(config);
-    let commands = config.commands.then(|| topics.command_filters()).into_iter().flatten();
+    let commands = config.commands.then(|| topics.command_filters().into_iter().chain([topics.echo()]));
+    let commands = commands.into_iter().flatten();
     let birth = (config.discovery != Discovery::Off).then(|| topics.birth());
     commands
         .chain(birth)
@@ -202,7 +203,14 @@ async fn keep(
     let mut tellers: HashMap<Arc<str>, Watched> = HashMap::new();
     let mut daemon = telling::Daemon::default();
     let mut birth = None;
+    let mut happened = Some(face.plant.fleet().events());
     loop {
+        let next = async {
+            match &mut happened {
+                Some(events) => events.recv().await,
+                None => std::future::pending().await,
+            }
+        };
         let born = async {
             match birth {
                 Some(at) => sleep_until(at).await,
@@ -215,6 +223,7 @@ async fn keep(
                     face.tell_for_good(face.topics.status(), "online");
                     face.anew.send_modify(|number| *number += 1);
                     daemon.tell(&face, true);
+                    commanding.connected();
                 }
                 Some(Event::Disconnected) => {}
                 Some(Event::Message(arrived)) if arrived.topic == face.topics.birth() => {
@@ -225,10 +234,16 @@ async fn keep(
                 Some(Event::Message(arrived)) => commanding.handle(&arrived),
                 None => return events,
             },
+            received = next => match received {
+                Received::Event(event) => telling::tell_event(&face, &event),
+                Received::Missed(_) => {}
+                Received::End => happened = None,
+            },
             () = closed.notified() => return events,
             _ = looks.tick() => {
                 look(&face, &mut tellers);
                 daemon.tell(&face, false);
+                commanding.call();
             }
             () = born => {
                 birth = None;

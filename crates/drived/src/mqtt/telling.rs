@@ -3,18 +3,22 @@
 //! What a person has to know at once (state, link, fault, stop) is told at once; values that change all the time at most
 //! once in an interval; everything at each heartbeat, though nothing has changed.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use drive_core::{Direction, Setpoint, State};
-use drive_fleet::{DriveHandle, Freshness, Link, Snapshot};
+use drive_fleet::{DriveHandle, Event, EventKind, Freshness, Link, Snapshot};
 use serde_json::{Map, Value, json};
 use tokio::time::{Instant, sleep_until};
 
 use super::{Face, discovery::Discovered};
 use crate::{
-    json::unix,
+    broker::{Kept, Message},
+    json::{line, unix},
     plant::views::{DriveView, Gist, LineView},
 };
+
+/// For how long news are of interest to a broker that was away.
+const NEWS_FOR: Duration = Duration::from_secs(600);
 
 /// What is told at once.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,6 +26,8 @@ struct Head {
     link: Link,
     quality: Freshness,
     state: Option<(State, Option<Direction>, Option<u16>)>,
+    /// The code of the trip that it shows: it is read a moment after the state.
+    trip: Option<Option<u16>>,
     stops: bool,
     setpoint: Option<Setpoint>,
 }
@@ -33,6 +39,7 @@ impl Head {
             link: snapshot.link,
             quality: snapshot.freshness(now),
             state: status.map(|status| (status.state, status.direction, status.fault_code)),
+            trip: snapshot.present_trip().map(|trip| trip.fault().map(|fault| fault.code)),
             stops: snapshot.stop.is_some(),
             setpoint: snapshot.setpoint,
         }
@@ -79,8 +86,7 @@ impl Teller {
             };
             // A status becomes stale though nothing comes.
             let stale_at = snapshot.status.as_ref().map(|status| status.at + snapshot.max_age);
-            let stale_at =
-                stale_at.filter(|at| *at >= now).map(|at| at + std::time::Duration::from_millis(1));
+            let stale_at = stale_at.filter(|at| *at >= now).map(|at| at + Duration::from_millis(1));
             tokio::select! {
                 changed = watch.changed() => if changed.is_err() {
                     return;
@@ -136,6 +142,16 @@ impl Parts {
         }
         Self { state, measurements, fault }
     }
+}
+
+/// Tells what has happened to a drive; what becomes of commands is told to those who asked.
+pub(super) fn tell_event(face: &Face, event: &Event) {
+    if matches!(event.kind, EventKind::Command { .. }) {
+        return;
+    }
+    let mut message = Message::new(face.topics.drive(&event.drive, "event"), line(event));
+    message.expires = Some(Instant::now() + NEWS_FOR);
+    face.broker.publish(message, Kept::InOrder);
 }
 
 /// Takes back what was told of a drive that is here no more.

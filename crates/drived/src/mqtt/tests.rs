@@ -287,6 +287,26 @@ async fn what_comes_again_moves_no_motor() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_command_that_was_held_up_on_its_way_from_the_broker_moves_no_motor() {
+    let bench = Bench::of(1).await;
+    bench.broker.hold();
+    bench.command(&start("late"));
+    sleep(Duration::from_secs(8)).await;
+    bench.broker.release();
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers()[0]["reason"]), (false, &"late".into()));
+    bench.command(&start("in-time"));
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers());
+    bench.broker.hold();
+    bench.ask("drive/pump_1/stop", "");
+    sleep(Duration::from_secs(8)).await;
+    bench.broker.release();
+    a_while().await;
+    assert!(!bench.runs(0), "a stop is never too late");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_command_lives_as_long_as_its_message_and_no_longer_than_ten_seconds() {
     let bench = Bench::of(1).await;
     let deliver = |seconds: Option<u32>, body: &Value| {
@@ -411,6 +431,31 @@ async fn who_may_what_stands_in_the_configuration_and_a_stop_is_a_right_of_its_o
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_trip_is_told_with_its_meaning_as_it_happens_and_for_as_long_as_it_is_there() {
+    let bench = Bench::of(1).await;
+    bench.plant.machines[0].trip(9);
+    a_while().await;
+    let fault = bench.drive("fault");
+    assert_eq!(
+        (&fault["present"], &fault["code"], &fault["mnemonic"]),
+        (&true.into(), &9.into(), &"OCF".into()),
+        "{fault}"
+    );
+    assert!(fault["meaning"].is_string() && fault["at_trip"].is_object(), "{fault}");
+    let events = bench.answers_on("plant/north/drive/pump_1/event");
+    let trip = events.iter().find(|event| event["event"] == "tripped").expect("it is told");
+    assert_eq!(trip["alarm"], true);
+    assert!(!bench.broker.retained().contains_key("plant/north/drive/pump_1/event"), "it has happened once");
+    let types =
+        bench.state("homeassistant/device/plant_north_pump_1/config")["components"]["alarm"]["event_types"]
+            .clone();
+    assert!(types.as_array().unwrap().contains(&trip["event"]));
+    bench.ask("drive/pump_1/reset", "");
+    a_while().await;
+    assert_eq!(bench.drive("fault")["present"], false);
+}
+
+#[tokio::test(start_paused = true)]
 async fn groups_are_commanded_and_all_are_only_stopped() {
     let bench = Bench::of(3).await;
     bench.ask("group/pumps/command", &start("g").to_string());
@@ -493,7 +538,7 @@ async fn a_flood_of_commands_and_garbage_fills_no_queue_and_a_stop_gets_through(
     assert_eq!(writes(0), before, "the drive has heard of nothing");
     let counts = bench.mqtt.face.broker.counts();
     assert!(counts.waiting <= NEWS && counts.connected, "{counts:?}");
-    assert_eq!(counts.arrived + counts.lost.flood, 40_002);
+    assert!(counts.arrived + counts.lost.flood >= 40_002, "{counts:?}");
 }
 
 #[tokio::test(start_paused = true)]
@@ -638,23 +683,38 @@ async fn the_documents_fit_the_schema_of_what_home_assistant_checks() {
 /// A day on a broker that is cut off each hour, and away for ten minutes of it: nothing grows.
 #[tokio::test(start_paused = true)]
 async fn a_day_leaves_nothing_behind() {
+    live_on(24, false).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_hour_with_commands_leaves_nothing_behind() {
+    live_on(1, true).await;
+}
+
+async fn live_on(hours: u64, commands: bool) {
     let seldom = |name| DriveSettings {
         periods: drive_fleet::Periods {
-            running: Duration::from_secs(5),
-            rest: Duration::from_secs(10),
-            slow: Duration::from_secs(60),
-            max_age: Duration::from_secs(30),
+            running: Duration::from_secs(20),
+            rest: Duration::from_secs(30),
+            slow: Duration::from_secs(300),
+            max_age: Duration::from_secs(120),
         },
         ..DriveSettings::controlled(name)
     };
-    let bench = Bench::with(TestPlant::with(2, seldom).await, config()).await;
+    let heartbeat = Duration::from_secs(300);
+    let bench =
+        Bench::with(TestPlant::with(2, seldom).await, MqttConfig { commands, heartbeat, ..config() }).await;
     bench.broker.forget();
     a_while().await;
     let topics = bench.broker.retained().len();
-    for hour in 0..24 {
+    let tasks = || tokio::runtime::Handle::current().metrics().num_alive_tasks();
+    let before = tasks();
+    for hour in 0..hours {
         bench.ask("drive/pump_1/set/run", if hour % 2 == 0 { "forward" } else { "reverse" });
-        sleep(Duration::from_secs(50 * 60)).await;
+        sleep(Duration::from_secs(49 * 60)).await;
+        assert_eq!(bench.runs(0), commands);
         bench.ask("drive/pump_1/stop", "");
+        sleep(Duration::from_secs(60)).await;
         bench.broker.behave(Conduct::Away);
         bench.broker.cut();
         sleep(Duration::from_secs(10 * 60)).await;
@@ -663,11 +723,10 @@ async fn a_day_leaves_nothing_behind() {
         let counts = bench.mqtt.face.broker.counts();
         assert!(counts.connected && counts.waiting < 10, "{counts:?}");
         assert_eq!(bench.broker.retained().len(), topics);
+        assert!(tasks() <= before + 2, "{} tasks, {before} before", tasks());
     }
-    let counts = bench.mqtt.face.broker.counts();
-    assert_eq!(counts.lost.by_reason().map(|(_, lost)| lost), [0; 4]);
-    let most = 2 * 4 * 24 * 60 * 2 + 24 * 60 * 60;
-    assert!((2 * 24 * 60..most).contains(&bench.broker.counted()), "{}", bench.broker.counted());
-    let metrics = tokio::runtime::Handle::current().metrics();
-    assert!(metrics.num_alive_tasks() < 60, "{} tasks", metrics.num_alive_tasks());
+    assert_eq!(bench.mqtt.face.broker.counts().lost.by_reason().map(|(_, lost)| lost), [0; 4]);
+    // Eight topics of drives and two others each five minutes, what the daemon says to itself, and some more.
+    let most = hours * (12 * 10 + 3_600) * 2;
+    assert!((hours * 10 * 8..most).contains(&bench.broker.counted()), "{}", bench.broker.counted());
 }

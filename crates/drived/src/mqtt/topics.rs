@@ -76,6 +76,11 @@ impl Topics {
         format!("{}/status", self.base)
     }
 
+    /// What the daemon says to itself, so that it knows how late the broker is.
+    pub(super) fn echo(&self) -> String {
+        format!("{}/echo", self.base)
+    }
+
     pub(super) fn daemon(&self) -> String {
         format!("{}/daemon", self.base)
     }
@@ -166,10 +171,9 @@ impl Topics {
     }
 }
 
-/// Whether a message to this topic is a stop, whatever it says.
-pub(super) fn is_stop(topic: &str) -> bool {
-    let last = topic.rsplit('/').take(2);
-    last.into_iter().any(|level| level == "stop")
+/// Whether a message to this topic is taken also in a flood: a stop, whatever it says, and what the daemon says to itself.
+pub(super) fn is_urgent(topic: &str) -> bool {
+    topic.rsplit('/').take(2).any(|level| level == "stop") || topic.ends_with("/echo")
 }
 
 /// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.
