@@ -7,6 +7,8 @@
 //! Writing may block for as long as a terminal is held or a pipe is full, and may fail for ever. The tasks that feed the
 //! drives' watchdogs write to the log, so they only hand their lines to a thread: what it cannot take is lost and counted.
 
+mod tail;
+
 use std::{
     fmt::{self, Write as _},
     io::{self, IsTerminal as _, Write},
@@ -26,6 +28,7 @@ use tracing_subscriber::{
     registry::LookupSpan,
 };
 
+pub(crate) use self::tail::{is_shown, may_be_shown, show, shown, write_again};
 use crate::failure::Failure;
 
 const VARIABLE: &str = "DRIVED_LOG";
@@ -44,7 +47,7 @@ pub(crate) fn start(level: Option<Level>) -> Result<Option<Log>, Failure> {
     let Some(level) = level else { return Ok(None) };
     let filter =
         EnvFilter::builder().with_default_directive(LevelFilter::from_level(level).into()).parse_lossy(said);
-    let log = Log::to(io::stderr());
+    let log = Log::to(tail::Tail);
     let lines = log.lines.clone();
     tracing_subscriber::fmt()
         .with_env_filter(filter)

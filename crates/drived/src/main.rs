@@ -11,6 +11,7 @@ mod commanded;
 mod commands;
 mod config;
 mod doors;
+mod drive_cells;
 mod drive_options;
 mod drive_spec;
 mod duration;

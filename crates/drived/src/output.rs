@@ -167,7 +167,7 @@ pub(crate) fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// The same, with the lines that go on set in by a little.
-fn hanging(text: &str, width: usize) -> Vec<String> {
+pub(crate) fn hanging(text: &str, width: usize) -> Vec<String> {
     broken(text, width, GAP)
 }
 

@@ -6,6 +6,7 @@ mod json;
 mod notify;
 pub(crate) mod reload;
 mod report;
+mod screen;
 
 use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
@@ -17,6 +18,7 @@ use self::{
     notify::Notify,
     reload::Reloader,
     report::{Form, Report},
+    screen::Screen,
 };
 use crate::{
     api,
@@ -27,7 +29,7 @@ use crate::{
     },
     failure::Failure,
     gateway::Gateways,
-    journal, metrics,
+    journal, logging, metrics,
     mqtt::Mqtt,
     one_drive, page,
     plant::Plant,
@@ -40,8 +42,8 @@ const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 
 /// Watch and command the drives of a configuration
 ///
-/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal, where the log tells
-/// the events, stdout has one line for each drive whose state has changed instead. Ctrl-C and SIGTERM end it: each drive's
+/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
+/// a table with the log below it; where only stdout is one, it has a line for each drive whose state has changed. Ctrl-C and SIGTERM end it: each drive's
 /// policy acts, and what was done is told. A second Ctrl-C ends it at once. Exit code 1 when a motor may turn that no policy
 /// leaves turning. A stdout that nobody reads any more ends nothing: the drives are watched on.
 #[derive(Debug, clap::Args)]
@@ -73,7 +75,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let lines = start_lines(&config)?;
     let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
-    let form = if args.json || !std::io::stdout().is_terminal() { Form::Json } else { Form::Text };
+    let with_table = !args.json && logging::may_be_shown();
+    let form = match with_table {
+        true => Form::Table,
+        false if args.json || !std::io::stdout().is_terminal() => Form::Json,
+        false => Form::Text,
+    };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
@@ -91,6 +98,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
+    let screen = with_table.then(|| Screen::open(plant.clone())).flatten();
     let mut read = None;
     loop {
         tokio::select! {
@@ -114,6 +122,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         }
     }
     drop(watching);
+    // What becomes of the motors is told in words.
+    let screen = OptionFuture::from(screen.map(Screen::close));
+    let screen = tokio::spawn(screen);
     let stopping = notify.stopping(fleet.clone());
     drop(gateways);
     if let Some(mqtt) = &mqtt {
@@ -125,6 +136,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
+    let _ = screen.await;
     drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;

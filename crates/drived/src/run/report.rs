@@ -30,6 +30,8 @@ pub(super) enum Form {
     Json,
     /// A person, who reads the events in the log: what the drives show, where it has changed.
     Text,
+    /// The table of a terminal, which shows both: nothing more.
+    Table,
 }
 
 /// Events and snapshots on their way to stdout.
@@ -84,13 +86,15 @@ impl Writer {
         match (received, self.form) {
             (Received::Event(event), Form::Json) => Some(json::event(event)),
             (Received::Missed(events), Form::Json) => Some(json::missed(*events)),
-            (Received::Event(_) | Received::Missed(_), Form::Text) | (Received::End, _) => None,
+            (Received::Event(_) | Received::Missed(_), Form::Text | Form::Table) | (Received::End, _) => None,
         }
     }
 
     fn of_snapshot(&mut self, snapshot: &Snapshot) -> Option<String> {
-        if self.form == Form::Json {
-            return Some(json::snapshot(snapshot));
+        match self.form {
+            Form::Json => return Some(json::snapshot(snapshot)),
+            Form::Table => return None,
+            Form::Text => {}
         }
         let text = text(snapshot);
         let known = self.shown.insert(Arc::clone(&snapshot.name), text.clone());

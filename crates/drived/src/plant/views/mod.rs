@@ -15,7 +15,7 @@ pub(crate) use self::{
     command::{CommandView, SeveralView},
     drive::{DriveView, Gist, Shown},
     exchange::{ExchangeView, LineDetailView},
-    line::LineView,
+    line::{LineLink, LineView},
     notice::NoticeView,
 };
 use crate::{config::Group, doors::Rights};
