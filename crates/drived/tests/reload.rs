@@ -82,10 +82,13 @@ fn a_closed_terminal_ends_the_program_by_its_policies() {
     let sim = Sim::serve("terminal", &["atv312@1"]);
     let told = support::path("terminal.log");
     let file = File::new("terminal", &configuration(sim.link(), &[(1, "control = true")]));
-    // script gives the program a terminal of its own; when it is killed that terminal is closed.
+    // script gives the program a terminal of its own; when it is killed that terminal is closed. That means something to the
+    // program also where the tests are run by nohup.
+    let socket = support::path("terminal.sock");
     let program = format!(
-        "exec {} run --json --config {} >{} 2>&1",
+        "exec env --default-signal=HUP {} run --json --socket {} --config {} >{} 2>&1",
         env!("CARGO_BIN_EXE_drived"),
+        socket.display(),
         file.path(),
         told.display()
     );
