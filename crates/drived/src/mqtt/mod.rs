@@ -1,7 +1,7 @@
 //! The plant on an MQTT v5 broker: what it is like, what is asked of it there, and how Home Assistant finds it.
 //!
-//! Everything stands on [`broker`], which never holds up anybody. State is retained and expires, so that nothing of a
-//! daemon that is gone looks alive; commands are judged in [`commanding`] before the plant hears of them.
+//! Everything stands on [`broker`](crate::broker), which never holds up anybody. State is retained and expires, so that
+//! nothing of a daemon that is gone looks alive; commands are judged in [`commanding`] before the plant hears of them.
 
 mod commanding;
 mod counts;
