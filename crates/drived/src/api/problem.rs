@@ -132,16 +132,11 @@ impl Problem {
         match rejected {
             Rejected::NoRight { right, .. } => Self::lacks_right(caller, right),
             Rejected::NoDrive(_) | Rejected::NoGroup(_) => Self::not_found(detail),
-            Rejected::Stopped(_) => Self {
-                kind: REFUSED,
-                why: Some(Why::Refused(Refused { outcome: OutcomeWord::Superseded, reason: "stop" })),
-                ..Self::new(StatusCode::CONFLICT, detail)
-            },
-            Rejected::IdReused(_) => Self {
-                kind: REFUSED,
-                why: Some(Why::Refused(Refused { outcome: OutcomeWord::Refused, reason: "id_reused" })),
-                ..Self::new(StatusCode::CONFLICT, detail)
-            },
+            Rejected::Stopped(_) | Rejected::IdReused(_) => {
+                let (outcome, reason) = rejected.told();
+                let why = Some(Why::Refused(Refused { outcome, reason }));
+                Self { kind: REFUSED, why, ..Self::new(StatusCode::CONFLICT, detail) }
+            }
         }
     }
 

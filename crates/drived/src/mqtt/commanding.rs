@@ -278,13 +278,8 @@ impl Judge {
         let mut told = match begun {
             Ok(told) => told,
             Err(rejected) => {
-                let reason = match rejected {
-                    Rejected::NoRight { .. } => "no_right",
-                    Rejected::NoDrive(_) | Rejected::NoGroup(_) => "not_found",
-                    Rejected::Stopped(_) => "stop",
-                    Rejected::IdReused(_) => "id_reused",
-                };
-                return self.answered(caller, record, answers, refusal(caller, named, reason, &rejected));
+                let said = refusal(caller, named, rejected.told(), &rejected);
+                return self.answered(caller, record, answers, said);
             }
         };
         let view = Arc::clone(&told.borrow_and_update());
@@ -318,7 +313,8 @@ impl Judge {
         text: &str,
     ) {
         self.audit.record(record.clone()).whenever();
-        self.answered(caller, record, answers, refusal(caller, named, reason, &text));
+        let outcome = if reason == "superseded" { OutcomeWord::Superseded } else { OutcomeWord::Refused };
+        self.answered(caller, record, answers, refusal(caller, named, (outcome, reason), &text));
     }
 
     /// Answers for the first time, and keeps that in the audit log.
@@ -520,8 +516,12 @@ fn said(view: &CommandView) -> Value {
     said
 }
 
-fn refusal(caller: &Caller, named: &Named, reason: &str, text: &dyn std::fmt::Display) -> Value {
-    let outcome = if reason == "superseded" { "superseded" } else { "refused" };
+fn refusal(
+    caller: &Caller,
+    named: &Named,
+    (outcome, reason): (OutcomeWord, &str),
+    text: &dyn std::fmt::Display,
+) -> Value {
     let mut said = json!({
         "outcome": outcome, "reason": reason, "text": text.to_string(),
         "caller": caller.name, "origin": caller.origin, "time_unix_ms": unix(Instant::now()),

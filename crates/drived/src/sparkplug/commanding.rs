@@ -26,7 +26,7 @@ use crate::{
     mqtt::{Pace, SAME_STOP, is_id, is_open},
     plant::{
         Plant,
-        commands::{Action, Asked, LIFETIME, Rejected, Request, Target, Told},
+        commands::{Action, Asked, LIFETIME, OutcomeWord, Rejected, Request, Target, Told},
         views::CommandView,
     },
 };
@@ -74,8 +74,7 @@ struct Order {
 /// Why nothing is done.
 struct Refusal {
     id: Option<String>,
-    /// `refused`, `expired` or `superseded`.
-    outcome: &'static str,
+    outcome: OutcomeWord,
     reason: &'static str,
     text: String,
 }
@@ -195,7 +194,7 @@ impl Commanding {
         let age = Duration::from_millis(now.saturating_sub(sent));
         if age >= request.lifetime {
             let text = format!("it is {age:?} old, and was to be carried out within {:?}", request.lifetime);
-            return Err(Refusal { id, outcome: "expired", reason: "expired", text });
+            return Err(Refusal { id, outcome: OutcomeWord::Expired, reason: "expired", text });
         }
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
         request.arrived = arrived.at.checked_sub(age).unwrap_or(arrived.at);
@@ -243,12 +242,7 @@ impl Judge {
         let mut told = match begun {
             Ok(told) => told,
             Err(rejected) => {
-                let (outcome, reason) = match rejected {
-                    Rejected::NoRight { .. } => ("refused", "no_right"),
-                    Rejected::NoDrive(_) | Rejected::NoGroup(_) => ("refused", "not_found"),
-                    Rejected::Stopped(_) => ("superseded", "stopped"),
-                    Rejected::IdReused(_) => ("refused", "id_reused"),
-                };
+                let (outcome, reason) = rejected.told();
                 let refused = Refusal { id, outcome, reason, text: rejected.to_string() };
                 return self.answered(&drive, record, answer_of(&refused));
             }
@@ -324,7 +318,7 @@ fn setpoint(unit: &str, number: f64) -> Result<Asked, Refusal> {
 }
 
 fn refusal(reason: &'static str, text: String) -> Refusal {
-    Refusal { id: None, outcome: "refused", reason, text }
+    Refusal { id: None, outcome: OutcomeWord::Refused, reason, text }
 }
 
 fn answer_of(refused: &Refusal) -> Json {

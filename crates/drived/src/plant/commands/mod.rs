@@ -86,6 +86,18 @@ pub(crate) enum Rejected {
     IdReused(String),
 }
 
+impl Rejected {
+    /// The outcome and the reason by which every face tells it.
+    pub(crate) const fn told(&self) -> (OutcomeWord, &'static str) {
+        match self {
+            Self::NoRight { .. } => (OutcomeWord::Refused, "no_right"),
+            Self::NoDrive(_) | Self::NoGroup(_) => (OutcomeWord::Refused, "not_found"),
+            Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
+            Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
+        }
+    }
+}
+
 impl Action {
     pub(crate) const fn name(&self) -> &'static str {
         match self {
@@ -216,4 +228,18 @@ async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
     // What is not known in time is told as it is.
     let _ = timeout(wait, told.wait_for(|view| view.outcome != OutcomeWord::Pending)).await;
     Arc::clone(&told.borrow())
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_fleet::{Outcome, Refused};
+
+    use super::*;
+
+    #[test]
+    fn what_a_stop_has_overtaken_is_told_by_the_same_words_whoever_finds_it_out() {
+        let (word, reason, _) = outcome::told(&Outcome::Refused(Refused::Stopped));
+        let (here, why) = Rejected::Stopped("pump 1".to_owned()).told();
+        assert_eq!((here, Some(why)), (word, reason));
+    }
 }
