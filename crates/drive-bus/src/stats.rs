@@ -84,6 +84,12 @@ impl Histogram {
         self.max()
     }
 
+    /// The buckets from the shortest to the longest that was counted: where each ends, and how many are in it. A bucket begins
+    /// where the one before it ends, an eighth of an octave below.
+    pub fn buckets(&self) -> impl Iterator<Item = (Duration, u32)> + '_ {
+        self.buckets.iter().enumerate().map(|(index, &count)| (end_of(self.first + index), count))
+    }
+
     /// Adds what another one counted.
     pub fn add(&mut self, other: &Self) {
         for (index, &theirs) in other.buckets.iter().enumerate() {
@@ -384,6 +390,22 @@ mod tests {
         assert_eq!(histogram.min(), Duration::from_micros(1));
         assert_eq!(histogram.max(), Duration::from_millis(10));
         assert_eq!(histogram.mean(), Duration::from_nanos(5_000_500));
+    }
+
+    #[test]
+    fn the_buckets_hold_every_duration_below_their_end_and_above_the_one_before() {
+        let mut histogram = Histogram::new();
+        assert_eq!(histogram.buckets().count(), 0);
+        // One bucket goes from 7680 to 8192 µs.
+        for micros in [8_100, 8_150, 12_000] {
+            histogram.record(Duration::from_micros(micros));
+        }
+        let filled: Vec<_> = histogram.buckets().filter(|(_, count)| *count > 0).collect();
+        assert_eq!(filled.iter().map(|(_, count)| *count).collect::<Vec<_>>(), [2, 1]);
+        for (micros, (end, _)) in [8_150, 12_000].into_iter().zip(filled) {
+            let exact = Duration::from_micros(micros);
+            assert!(exact < end && end <= exact + exact / 8 + Duration::from_micros(1), "{exact:?} {end:?}");
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@ use crate::{
     outcome::{Order, Outcome, Refused, Until},
     plan::Demand,
     settings::DriveSettings,
-    snapshot::Snapshot,
+    snapshot::{Snapshot, WatchdogCheck},
     supervisor::{Leave, Question, Told},
     task::{Message, Urgent},
 };
@@ -128,6 +128,19 @@ impl DriveHandle {
     #[must_use]
     pub fn snapshot(&self) -> Arc<Snapshot> {
         Arc::clone(&self.entry.snapshots.borrow())
+    }
+
+    /// The time of the communication watchdog that runs in the drive, as far as is known: as it was read last, or the one that
+    /// the drive always has. `None` where it is off or nothing is known of it.
+    #[must_use]
+    pub fn watchdog_timeout(&self) -> Option<Duration> {
+        let fixed = self.entry.watchdog.and_then(|watchdog| watchdog.fixed());
+        let read = match &self.snapshot().watchdog {
+            WatchdogCheck::Verified(found) | WatchdogCheck::WaitsForStandstill(found) => Some(*found),
+            WatchdogCheck::NoContract { found } => *found,
+            WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => None,
+        };
+        read.and_then(|found| found.timeout).or(fixed)
     }
 
     /// What is known of it, and a notice of every change. A reader that is slow sees the latest.

@@ -30,6 +30,14 @@ pub(super) async fn drive(
     plant.drive(&name).map(|drive| fresh(&drive)).ok_or_else(|| no_drive(&name))
 }
 
+pub(super) async fn settings(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(name): Named,
+) -> Result<Response, Problem> {
+    plant.settings(&name).map(|settings| fresh(&settings)).ok_or_else(|| no_drive(&name))
+}
+
 pub(super) async fn history(
     State(plant): State<Plant>,
     _: Viewer,

@@ -20,7 +20,7 @@ use crate::plant::{
     history::HistoryView,
     parameters::{ParameterView, WrittenView},
     recent::RecentView,
-    views::{CommandView, DriveView, LineDetailView, LineView, StateView},
+    views::{CommandView, DriveView, LineDetailView, LineView, SettingsView, StateView},
 };
 
 /// How the schema of a type is made.
@@ -213,6 +213,11 @@ fn reads() -> Vec<Route> {
             .answers::<StateView>(200, "the state"),
         Route::get("/api/v1/drives", read::drives, "All drives").answers::<Vec<DriveView>>(200, "the drives"),
         Route::get("/api/v1/drives/{name}", read::drive, "One drive").answers::<DriveView>(200, "the drive"),
+        Route::get("/api/v1/drives/{name}/settings", read::settings, "What the program was told of a drive")
+            .answers::<SettingsView>(
+            200,
+            "its periods, times, limits, alarms and policies, and what the plan makes of them",
+        ),
         Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
             .answers::<HistoryView>(200, "the history"),
         Route::get("/api/v1/drives/{name}/faults", parameter::faults, "What a drive says of its faults")
@@ -240,8 +245,12 @@ fn reads() -> Vec<Route> {
             })
             .or_problem(503),
         Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
-        Route::get("/api/v1/lines/{name}", read::line, "One line, and what was on it lately")
-            .answers::<LineDetailView>(200, "the line and its last 100 exchanges"),
+        Route::get(
+            "/api/v1/lines/{name}",
+            read::line,
+            "One line: its plan, what was measured on it, and what was on it lately",
+        )
+        .answers::<LineDetailView>(200, "the line, its plan, the measured and its last 100 exchanges"),
         Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
             .with_query(WAIT)
             .answers::<CommandView>(200, "the command, whatever its outcome"),

@@ -22,7 +22,10 @@ use tokio::{
     time::Instant,
 };
 
-use self::views::{DaemonView, DriveView, ExchangeView, LineDetailView, LineView, StateView};
+use self::views::{
+    DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, PlannedLineView,
+    SettingsView, StateView,
+};
 use self::{
     commands::{Log, Stopped},
     history::{History, HistoryView},
@@ -139,11 +142,16 @@ impl Plant {
         self.0.lines()
     }
 
-    /// A line with its last exchanges.
+    /// A line with its plan, what was measured on it, and its last exchanges.
     pub(crate) fn line(&self, name: &str) -> Option<LineDetailView> {
         let (name, line) = self.0.fleet.lines().into_iter().find(|(known, _)| **known == *name)?;
         let last = line.exchanges().iter().map(ExchangeView::of).collect();
-        Some(LineDetailView { line: self.0.line(&name, &line)?, last })
+        Some(LineDetailView {
+            line: self.0.line(&name, &line)?,
+            planned: PlannedLineView::of(&line, self.0.fleet.plan(&name)?),
+            measured: MeasuredLineView::of(&line, &self.0.fleet.drives_on(&name)),
+            last,
+        })
     }
 
     /// The lines on which no drive has been asked for longer than its periods allow.
@@ -159,6 +167,13 @@ impl Plant {
     pub(crate) fn drive(&self, name: &str) -> Option<DriveView> {
         let (line, drive) = self.members().find(|(_, drive)| **drive.name() == *name)?;
         Some(DriveView::of(&line, &drive))
+    }
+
+    /// What a drive was told when the fleet was started, and what the plan of its line makes of it.
+    pub(crate) fn settings(&self, name: &str) -> Option<SettingsView> {
+        let drive = self.0.fleet.drive(name)?;
+        let plan = self.0.fleet.plan(drive.line().0)?;
+        Some(SettingsView::of(&drive, plan))
     }
 
     /// The last ten minutes of a drive.

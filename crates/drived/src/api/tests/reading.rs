@@ -119,6 +119,63 @@ async fn a_line_shows_its_last_hundred_exchanges_its_load_now_and_when_who_is_of
     assert!(get(&plant, "/api/v1/lines").await.1[0]["last"].is_null(), "the list is short");
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_line_tells_its_plan_beside_what_was_measured_with_the_answer_times_of_each_slave() {
+    let TestPlant { plant, line, machines } = TestPlant::of(2).await;
+    for machine in &machines {
+        machine.set_turnaround(Some(Duration::from_millis(30)));
+    }
+    let _ = command(&plant, "/api/v1/drives/pump%201/stop", &json!({})).await;
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    let (_, north) = get(&plant, "/api/v1/lines/north").await;
+    let measured = &north["measured"];
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{measured}"));
+    // The silence of Modbus over serial line V1.02, 2.5.1.1: 3.5 characters of 11 bits at 19200 bit/s.
+    assert!((number(&measured["needed_silence_ms"]) - 2.01).abs() < 0.01, "{measured}");
+    assert!(number(&measured["silence_ms"]["min"]) >= 2.0, "{measured}");
+    for answers in measured["answers"].as_array().unwrap() {
+        let steps = answers["times"].as_array().unwrap();
+        let counted: f64 = steps.iter().map(|step| number(&step["count"])).sum();
+        assert_eq!(counted, number(&answers["answered"]), "{answers}");
+        let most = steps.iter().max_by_key(|step| step["count"].as_u64()).unwrap();
+        // As the simulator is set.
+        assert!((30.0..=34.0).contains(&number(&most["up_to_ms"])), "{answers}");
+    }
+    // Of each drive a request of 8 characters, its answer of 7 at least, and the silence.
+    let least = 2.0 * (30.0 + 18.5 * 11.0 / 19.2);
+    let exchanges = north["last"].as_array().unwrap().iter().map(|exchange| number(&exchange["took_ms"]));
+    let longest = 2.0 * (exchanges.fold(0.0, f64::max) + number(&measured["silence_ms"]["max"]));
+    assert!((least..longest).contains(&number(&measured["cycle_ms"])), "{measured}");
+    assert!(number(&measured["stop_wait_ms"]["max"]) <= number(&north["planned"]["stop_ms"]), "{measured}");
+    assert!(number(&measured["stop_ms"]) <= number(&north["planned"]["stop_ms"]), "{measured}");
+    assert!(number(&north["planned"]["cycle_ms"]) > 0.0);
+    line.cut();
+    tokio::time::sleep(Duration::from_secs(30)).await;
+    let (_, north) = get(&plant, "/api/v1/lines/north").await;
+    assert_eq!(north["measured"]["answers"][0]["went_offline"], 1);
+    assert!(north["measured"]["cycle_ms"].is_null(), "nobody is there to be asked: {}", north["measured"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_tells_its_settings_and_how_its_watchdog_is_fed_as_it_was_found() {
+    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    tokio::time::sleep(Duration::from_secs(15)).await;
+    let (_, told) = get(&plant, "/api/v1/drives/pump%201/settings").await;
+    assert_eq!(told["settings"]["control"], true, "{told}");
+    assert_eq!(
+        told["settings"]["periods"]["rest_ms"],
+        json!(DriveSettings::watched("").periods.rest.as_millis())
+    );
+    // BBV51701 p. 55: ttO is 10.0 s from the factory.
+    assert_eq!(
+        (&told["feed"]["time_ms"], &told["feed"]["in_time"]),
+        (&json!(10_000.0), &json!(true)),
+        "{told}"
+    );
+    assert!(told["feed"]["heard_within_ms"].as_f64().is_some_and(|within| within < 10_000.0), "{told}");
+    assert_eq!(get(&plant, "/api/v1/drives/pump%202/settings").await.0, StatusCode::NOT_FOUND);
+}
+
 /// Whatever has a quality says that it is old, and how old.
 fn nothing_is_live(told: &Value, path: &str) {
     if let Some(quality) = told.get("quality") {

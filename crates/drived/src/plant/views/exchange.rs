@@ -4,14 +4,16 @@ use drive_bus::record::{Ending, Exchange};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::LineView;
+use super::{LineView, MeasuredLineView, PlannedLineView};
 use crate::json::{microseconds, unix};
 
-/// A line with its last exchanges.
+/// A line with what it was planned to be, what was measured on it, and its last exchanges.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct LineDetailView {
     #[serde(flatten)]
     pub(crate) line: LineView,
+    pub(crate) planned: PlannedLineView,
+    pub(crate) measured: MeasuredLineView,
     /// The last exchanges, the newest last.
     pub(crate) last: Vec<ExchangeView>,
 }

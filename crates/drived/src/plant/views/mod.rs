@@ -6,6 +6,7 @@ mod command;
 mod drive;
 mod exchange;
 mod line;
+mod measured;
 mod notice;
 
 use schemars::JsonSchema;
@@ -16,6 +17,7 @@ pub(crate) use self::{
     drive::{DriveView, Gist, Shown},
     exchange::{ExchangeView, LineDetailView},
     line::{LineLink, LineView},
+    measured::{MeasuredLineView, PlannedLineView, SettingsView},
     notice::NoticeView,
 };
 use crate::{config::Group, doors::Rights};
