@@ -120,13 +120,13 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
     runtime.block_on(command.run())
 }
 
-/// Says why a subcommand failed, on one line, and gives the exit code.
+/// Says why a subcommand failed, on one line or as an object, and gives the exit code.
 pub(crate) fn end(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure != Failure::OutputClosed {
-                output::complain(&failure);
+                output::end(&failure);
             }
             failure.exit_code()
         }
@@ -143,10 +143,7 @@ pub(crate) fn refuse(error: &clap::Error) -> ExitCode {
             let _ = error.print();
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
-        _ => {
-            output::complain(one_line(&error.to_string()));
-            ExitCode::from(2)
-        }
+        _ => end(Err(Failure::Input(one_line(&error.to_string())))),
     }
 }
 

@@ -18,9 +18,14 @@ pub(crate) enum Failure {
 
 impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
+        ExitCode::from(self.code())
+    }
+
+    /// The exit code as a number.
+    pub(crate) const fn code(&self) -> u8 {
         match self {
-            Self::Drive(_) | Self::OutputClosed => ExitCode::FAILURE,
-            Self::Input(_) => ExitCode::from(2),
+            Self::Drive(_) | Self::OutputClosed => 1,
+            Self::Input(_) => 2,
         }
     }
 

@@ -11,7 +11,7 @@ mod tail;
 
 use std::{
     fmt::{self, Write as _},
-    io::{self, IsTerminal as _, Write},
+    io::{self, Write},
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
@@ -29,7 +29,7 @@ use tracing_subscriber::{
 };
 
 pub(crate) use self::tail::{is_shown, may_be_shown, show, shown, write_again};
-use crate::failure::Failure;
+use crate::{failure::Failure, output};
 
 const VARIABLE: &str = "DRIVED_LOG";
 /// Lines that wait for the writer.
@@ -52,7 +52,7 @@ pub(crate) fn start(level: Option<Level>) -> Result<Option<Log>, Failure> {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(move || lines.clone())
-        .with_ansi(io::stderr().is_terminal())
+        .with_ansi(output::is_coloured(&io::stderr()))
         // It would be told on stderr, by a panic where nobody reads that.
         .log_internal_errors(false)
         .event_format(Form)

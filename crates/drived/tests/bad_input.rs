@@ -138,6 +138,31 @@ fn what_is_missing_or_misspelt_is_said() {
 }
 
 #[test]
+fn a_program_is_told_the_same_words_in_an_object() {
+    for arguments in [
+        &["status", "--line", PORT, "--drive", "atv312@1"][..],
+        &["stop", "--line", PORT, "--drive", "atv312@1"],
+        &["poll", "--line", PORT],
+        &["fly"],
+    ] {
+        let said = run(arguments);
+        let told = run(&[arguments, &["--json"]].concat());
+        assert_eq!((told.code, told.out.as_str()), (said.code, ""), "{told:?}");
+        let objects = told.err.lines().map(|line| serde_json::from_str(line).expect("an object"));
+        let objects: Vec<serde_json::Value> = objects.collect();
+        let (object, before) = objects.split_last().expect("why it ended");
+        assert!(before.iter().all(|object| object["warning"].is_string()), "{told:?}");
+        assert_eq!(object["exit_code"].as_i64(), said.code.map(i64::from), "{object}");
+        let words = object["error"].as_str().expect("a text");
+        // What is told to try instead names the arguments, which differ.
+        let same = said.err.trim_end().strip_prefix("drived: ").expect("its name").split(" (usage").next();
+        assert!(same.is_some_and(|same| words.starts_with(same)), "{words}\n{said:?}");
+    }
+    // Behind two dashes it is a name.
+    run(&["status", "--", "--json"]).assert_refused(2, "no daemon serves");
+}
+
+#[test]
 fn a_plan_that_cannot_work_is_refused_with_the_arithmetic() {
     let plan = ["plan", "--line", PORT, "--drive", "atv312@1-31"];
     let ended = run(&[&plan[..], &["--period", "500ms"]].concat());

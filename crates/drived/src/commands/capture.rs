@@ -1,10 +1,6 @@
 //! `drived capture`: what goes over a line of the daemon, as a file for Wireshark and for `drived explain`.
 
-use std::{
-    fs::OpenOptions,
-    io::{IsTerminal as _, Write as _, stderr},
-    path::PathBuf,
-};
+use std::{fs::OpenOptions, io::Write as _, path::PathBuf, time::Duration};
 
 use http_body_util::BodyExt as _;
 use serde_json::Value;
@@ -72,16 +68,17 @@ pub(super) async fn from_daemon(args: &DaemonArgs, line: &str, seconds: u64) -> 
         )));
     };
     let known = known(&state, line, found);
-    if stderr().is_terminal() {
-        output::complain(format_args!("{line} is captured for {seconds} s"));
-    }
     let path = format!("{}/capture?seconds={seconds}", path_of(&["lines", line]));
-    let answer = daemon.send("GET", &path, None).await?;
-    if !answer.status().is_success() {
-        return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
-    }
-    let bytes = answer.into_body().collect().await;
-    let bytes = bytes.map_err(|error| Failure::Drive(format!("the capture broke off: {error}")))?;
+    let captured = async {
+        let answer = daemon.send("GET", &path, None).await?;
+        if !answer.status().is_success() {
+            return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
+        }
+        let bytes = answer.into_body().collect().await;
+        bytes.map_err(|error| Failure::Drive(format!("the capture broke off: {error}")))
+    };
+    let whole = Some(Duration::from_secs(seconds));
+    let bytes = output::during(format_args!("capturing {line}"), whole, captured).await?;
     Ok(FromDaemon { bytes: bytes.to_bytes().to_vec(), known })
 }
 

@@ -249,8 +249,11 @@ async fn persist(args: &OneDriveArgs, one: &mut OneDrive) -> Result<(), Failure>
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {
     let mut one = args.open().await?;
     let capabilities = one.drive.capabilities();
+    let readable: Vec<&Row> = capabilities.rows.iter().filter(|row| row.access.is_readable()).collect();
+    let mut progress = output::Progress::of(format_args!("reading {}", one.name), readable.len());
     let mut read = Vec::new();
-    for row in capabilities.rows.iter().filter(|row| row.access.is_readable()) {
+    for row in readable {
+        progress.step();
         read.push(match one.drive.read_parameter(row).await {
             Ok(word) => {
                 let row = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;

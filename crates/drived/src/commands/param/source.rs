@@ -1,6 +1,6 @@
 //! The drives whose parameters are kept, compared and restored: on a line, or of the running daemon.
 
-use std::{collections::BTreeMap, io::IsTerminal};
+use std::collections::BTreeMap;
 
 use chrono::{SecondsFormat, Utc};
 use drive_core::{ErrorKind, Row, SlaveAddress};
@@ -15,7 +15,7 @@ use crate::{
     failure::Failure,
     line_spec::{self, LineSpec},
     one_drive::{OneDrive, may_have_written},
-    output,
+    output::Progress,
 };
 
 /// A drive that does not answer so often in a row is not asked for the rest.
@@ -347,35 +347,6 @@ impl Source {
     pub(super) async fn close(self) {
         if let Self::OnLine(one) = self {
             one.close().await;
-        }
-    }
-}
-
-/// How far it is, in one line of a terminal, which is gone when it is done.
-pub(super) struct Progress {
-    name: String,
-    done: usize,
-    of: usize,
-    is_shown: bool,
-}
-
-impl Progress {
-    pub(super) fn of(name: &str, of: usize) -> Self {
-        Self { name: name.to_owned(), done: 0, of, is_shown: std::io::stderr().is_terminal() }
-    }
-
-    pub(super) fn step(&mut self) {
-        self.done += 1;
-        if self.is_shown {
-            output::progress(&format!("{}: {} of {}", self.name, self.done, self.of));
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if self.is_shown {
-            output::progress("");
         }
     }
 }

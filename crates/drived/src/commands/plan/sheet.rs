@@ -128,9 +128,8 @@ fn fed(feed: Feed) -> String {
 
 /// A table with the cases as heads.
 fn table_of(cases: &[Case]) -> Table {
-    let mut table = Table::texts().with_numbers_from(1);
-    table.cells([String::new()].into_iter().chain(cases.iter().map(|case| case.label.clone())));
-    table
+    let labels = cases.iter().map(|case| case.label.clone());
+    Table::headed([String::new()].into_iter().chain(labels)).with_numbers_from(1)
 }
 
 /// Prints what holds for the lines together. They work beside each other, so a stop of all is as long as that of the
@@ -144,8 +143,8 @@ pub(super) fn say_all_lines(lines: &[(&PlannedLine, Vec<Case>)]) -> Result<(), F
             labels.push(&case.label);
         }
     }
-    let mut table = Table::texts().with_numbers_from(1);
-    table.cells([""].into_iter().chain(labels.iter().copied()).map(str::to_owned));
+    let heads = [""].into_iter().chain(labels.iter().copied()).map(str::to_owned);
+    let mut table = Table::headed(heads).with_numbers_from(1);
     let mut row = |label: &str, of: &dyn Fn(&Case) -> Duration| {
         // A line that does not have the case stays as it is planned.
         let slowest = |wanted: &&str| {

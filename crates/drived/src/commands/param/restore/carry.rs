@@ -7,7 +7,8 @@ use drive_core::{
 
 use super::plan::{Plan, ordered};
 use crate::{
-    commands::param::source::{Progress, Source, Unread, Unwritten},
+    commands::param::source::{Source, Unread, Unwritten},
+    output::Progress,
     signals::Ending,
 };
 
@@ -44,7 +45,7 @@ impl Carried {
 pub(super) async fn carry(plan: &Plan, source: &mut Source, ending: &mut Ending) -> Carried {
     let mut carried = Carried::default();
     let rows: usize = plan.steps.iter().map(Vec::len).sum();
-    let mut progress = Progress::of(&format!("{}: restoring", source.name()), rows);
+    let mut progress = Progress::of(format_args!("{}: restoring", source.name()), rows);
     for step in &plan.steps {
         if let Err(stopped) = carry_step(step, source, ending, &mut progress, &mut carried.written).await {
             carried.stopped = Some(stopped);
@@ -69,6 +70,7 @@ async fn carry_step(
 ) -> Result<(), Stopped> {
     let mut held = Vec::new();
     for wanted in step {
+        progress.note(wanted.row.code);
         progress.step();
         let word = source.read(wanted.row).await.map_err(|unread| {
             let (Unread::Refused(why) | Unread::Silent(why)) = unread;
