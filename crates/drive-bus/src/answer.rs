@@ -40,21 +40,58 @@ pub fn extent(request: &Request<'_>, pdu: &[u8]) -> Extent {
         | Request::ReadWriteMultipleRegisters(_, quantity, ..) => {
             counted(pdu, Some(usize::from(*quantity) * 2))
         }
-        Request::WriteSingleCoil(..)
-        | Request::WriteSingleRegister(..)
-        | Request::WriteMultipleCoils(..)
-        | Request::WriteMultipleRegisters(..) => Extent::Exactly(5),
-        Request::MaskWriteRegister(..) => Extent::Exactly(7),
-        Request::ReportServerId => counted(pdu, None),
-        Request::ReadDeviceIdentification(..) => identification_extent(pdu),
-        Request::Custom(function, data) => match function {
-            0x07 => Extent::Exactly(2),
-            0x08 => Extent::Exactly(1 + data.len()),
-            0x0B => Extent::Exactly(5),
-            0x0C | 0x11 | 0x14 | 0x15 => counted(pdu, None),
-            0x2B if data.first() == Some(&MEI_IDENTIFICATION) => identification_extent(pdu),
-            _ => Extent::From(1),
-        },
+        Request::Custom(0x08, data) => Extent::Exactly(1 + data.len()),
+        // What carries the code of another request as a vendor's own has no length that is known.
+        Request::Custom(0x01..=0x06 | 0x0F | 0x10 | 0x16 | 0x17, _) => Extent::From(1),
+        Request::Custom(0x2B, data) if data.first() != Some(&MEI_IDENTIFICATION) => Extent::From(1),
+        _ => extent_unasked(pdu),
+    }
+}
+
+/// How long the PDU of an answer is whose request is not known, from the bytes of it that are there. Function 08 counts
+/// as one with a word of data, as all but 08/00 are.
+#[must_use]
+pub fn extent_unasked(pdu: &[u8]) -> Extent {
+    let Some(&function) = pdu.first() else { return Extent::AtLeast(2) };
+    match function {
+        0 => Extent::Never,
+        0x80.. => exception_extent(function, pdu),
+        0x01..=0x04 | 0x0C | 0x11 | 0x14 | 0x15 | 0x17 => counted(pdu, None),
+        0x05 | 0x06 | 0x08 | 0x0B | 0x0F | 0x10 => Extent::Exactly(5),
+        0x07 => Extent::Exactly(2),
+        0x16 => Extent::Exactly(7),
+        0x2B => identification_extent(pdu),
+        _ => Extent::From(1),
+    }
+}
+
+/// How long the PDU of a request is, from the bytes of it that are there (MODBUS Application Protocol V1.1b3,
+/// section 6). Function 08 as in [`extent_unasked`].
+#[must_use]
+pub fn extent_of_request(pdu: &[u8]) -> Extent {
+    // The count of the bytes behind it stands at this place.
+    let counted = |at: usize| match pdu.get(at) {
+        None => Extent::AtLeast(at + 1),
+        Some(&count) => bounded(at + 1 + usize::from(count)),
+    };
+    match pdu {
+        [] => Extent::AtLeast(1),
+        [0 | 0x80.., ..] => Extent::Never,
+        [0x01..=0x06 | 0x08, ..] => Extent::Exactly(5),
+        [0x07 | 0x0B | 0x0C | 0x11, ..] => Extent::Exactly(1),
+        [0x10, _, _, high, low, count, ..]
+            if u16::from_be_bytes([*high, *low]).checked_mul(2) != Some(u16::from(*count)) =>
+        {
+            Extent::Never
+        }
+        [0x0F | 0x10, ..] => counted(5),
+        [0x14 | 0x15, ..] => counted(1),
+        [0x16, ..] => Extent::Exactly(7),
+        [0x17, ..] => counted(9),
+        [0x18, ..] => Extent::Exactly(3),
+        [0x2B] => Extent::AtLeast(4),
+        [0x2B, MEI_IDENTIFICATION, ..] => Extent::Exactly(4),
+        _ => Extent::From(1),
     }
 }
 

@@ -33,6 +33,8 @@ pub enum Direction {
     Sent,
     /// Anybody else.
     Received,
+    /// The capture does not say.
+    Unknown,
 }
 
 /// One frame, or what stood in its place.
@@ -58,7 +60,9 @@ pub enum Dissector {
 }
 
 impl Dissector {
-    pub(crate) const fn of(config: &LineConfig) -> Self {
+    /// That of what a line of this configuration speaks.
+    #[must_use]
+    pub const fn of(config: &LineConfig) -> Self {
         match config.protocol {
             Protocol::Rtu => Self::Rtu,
             #[cfg(feature = "tcp")]

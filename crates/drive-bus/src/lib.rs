@@ -68,9 +68,11 @@ struct Readme;
 pub mod answer;
 pub mod capture;
 pub mod config;
+pub mod content;
 #[doc(hidden)]
 pub mod exchange;
 mod line;
+pub mod listen;
 #[doc(hidden)]
 pub mod master;
 #[doc(hidden)]

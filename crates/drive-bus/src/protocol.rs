@@ -202,6 +202,9 @@ pub enum ProtocolMismatch {
     #[cfg(all(feature = "serial", feature = "tcp"))]
     #[error("Modbus TCP is for connections, not for a serial port")]
     Tcp,
+    /// Modbus TCP is a connection of two, which nobody else hears.
+    #[error("Modbus TCP cannot be listened to: expected a serial port or RTU over TCP")]
+    NoLine,
     /// UNI-TELWAY has one format.
     #[cfg(feature = "unitelway")]
     #[error("UNI-TELWAY needs the format 8O1, not {0}")]

@@ -49,13 +49,23 @@ pub fn poll(address: u8) -> Bytes {
 
 /// What was heard.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Heard {
-    /// One of the three single characters. `alone`: nothing else came since something was last sent.
-    Signal { byte: u8, alone: bool },
+pub enum Heard {
+    /// One of the three single characters: 06h, 15h or 04h.
+    Signal {
+        /// Which of them.
+        byte: u8,
+        /// Nothing else came since something was last sent.
+        alone: bool,
+    },
     /// Somebody polls a slave.
     Poll(u8),
     /// A data frame whose BCC fits.
-    Data { address: u8, message: Bytes },
+    Data {
+        /// The slave that it is for or from.
+        address: u8,
+        /// What it carries: the network header, and UNI-TE behind it.
+        message: Bytes,
+    },
     /// So many bytes of a data frame whose BCC does not fit, or that breaks off.
     Damaged(usize),
     /// Bytes that make nothing.
@@ -70,9 +80,10 @@ enum Found {
     Nothing,
 }
 
-/// The receiver. It finds the next good frame behind whatever came before it.
+/// The receiver: an iterator of what was heard in the bytes that were [pushed](Self::push), all of them in their order.
+/// It finds the next good frame behind whatever came before it.
 #[derive(Debug, Default)]
-pub(crate) struct Receiver {
+pub struct Receiver {
     /// What has come and is not yet part of anything. It never holds more than one frame can have.
     received: BytesMut,
     /// How many bytes have come since something was sent.
@@ -81,32 +92,12 @@ pub(crate) struct Receiver {
 
 impl Receiver {
     /// Takes what came in.
-    pub(crate) fn push(&mut self, bytes: &[u8]) {
+    pub fn push(&mut self, bytes: &[u8]) {
         self.received.extend_from_slice(bytes);
     }
 
-    /// The next thing that was heard, if it is whole.
-    pub(crate) fn next(&mut self) -> Option<Heard> {
-        let mut noise = 0;
-        loop {
-            match look(&self.received) {
-                Found::Nothing => {
-                    self.received.advance(1);
-                    noise += 1;
-                }
-                // What made nothing is told first; the next call finds the rest.
-                _ if noise > 0 => return Some(self.take(Heard::Noise(noise), noise)),
-                Found::Whole(heard, len) => {
-                    self.received.advance(len);
-                    return Some(self.take(heard, len));
-                }
-                Found::Beginning => return None,
-            }
-        }
-    }
-
     /// What has begun goes on no more: it is dropped, and what stands behind its beginning is looked at anew.
-    pub(crate) fn give_up(&mut self) -> Option<Heard> {
+    pub fn give_up(&mut self) -> Option<Heard> {
         if self.received.is_empty() {
             return None;
         }
@@ -117,7 +108,8 @@ impl Receiver {
     }
 
     /// Whether something has begun.
-    pub(crate) fn is_open(&self) -> bool {
+    #[must_use]
+    pub fn is_open(&self) -> bool {
         !self.received.is_empty()
     }
 
@@ -138,6 +130,30 @@ impl Receiver {
         match heard {
             Heard::Signal { byte, .. } => Heard::Signal { byte, alone },
             other => other,
+        }
+    }
+}
+
+impl Iterator for Receiver {
+    type Item = Heard;
+
+    /// The next thing that was heard, if it is whole.
+    fn next(&mut self) -> Option<Heard> {
+        let mut noise = 0;
+        loop {
+            match look(&self.received) {
+                Found::Nothing => {
+                    self.received.advance(1);
+                    noise += 1;
+                }
+                // What made nothing is told first; the next call finds the rest.
+                _ if noise > 0 => return Some(self.take(Heard::Noise(noise), noise)),
+                Found::Whole(heard, len) => {
+                    self.received.advance(len);
+                    return Some(self.take(heard, len));
+                }
+                Found::Beginning => return None,
+            }
         }
     }
 }

@@ -92,7 +92,7 @@ mod values;
 struct Readme;
 
 pub use self::{
-    frame::{data as data_frame, len as frame_len, poll},
+    frame::{Heard, Receiver, data as data_frame, len as frame_len, poll},
     link::{Answer, Failure, Step, Stray, UniTelway},
     network::NetworkHeader,
     request::{Refusal, Reply, Request, RequestError, code},

@@ -65,7 +65,11 @@ impl<W: Write> Writer<W> {
         block.extend(len.to_le_bytes());
         block.extend_from_slice(&packet);
         pad(&mut block);
-        let flags: u32 = if frame.direction == Direction::Received { 1 } else { 2 };
+        let flags: u32 = match frame.direction {
+            Direction::Unknown => 0,
+            Direction::Received => 1,
+            Direction::Sent => 2,
+        };
         put_option(&mut block, OPTION_FLAGS, &flags.to_le_bytes());
         put_option(&mut block, 0, &[]);
         write_block(&mut self.sink, ENHANCED_PACKET, &block)
@@ -172,12 +176,14 @@ fn read_packet(body: &[u8]) -> Option<(Captured, Option<Dissector>)> {
         }
     }
     let options = 20 + len.next_multiple_of(4);
-    let inbound = word(options)? == u32::from(OPTION_FLAGS) | 4 << 16 && word(options + 4)? & 3 == 1;
-    let frame = Captured {
-        at: Duration::from_nanos(nanos),
-        direction: if inbound { Direction::Received } else { Direction::Sent },
-        bytes: Bytes::copy_from_slice(packet),
+    let has_flags = word(options) == Some(u32::from(OPTION_FLAGS) | 4 << 16);
+    let direction = match word(options + 4).filter(|_| has_flags).map(|flags| flags & 3) {
+        Some(1) => Direction::Received,
+        Some(2) => Direction::Sent,
+        _ => Direction::Unknown,
     };
+    let frame =
+        Captured { at: Duration::from_nanos(nanos), direction, bytes: Bytes::copy_from_slice(packet) };
     Some((frame, spoken))
 }
 
@@ -194,7 +200,7 @@ mod tests {
         vec![
             frame(1_700_000_000_000, Direction::Sent, &[1, 3, 0, 0, 0, 1, 0x84, 0x0A]),
             frame(1_700_000_000_020, Direction::Received, &[1, 3, 2, 0, 7, 0xF8, 0x46]),
-            frame(1_700_000_000_025, Direction::Received, &[]),
+            frame(1_700_000_000_025, Direction::Unknown, &[]),
         ]
     }
 

@@ -21,11 +21,12 @@ use drive_core::{Class, serial::SerialSettings};
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
+pub(crate) use frame::{BEGIN, Heard, Receiver};
 pub use frame::{frame, len};
 
 use self::{
     delimiter::{Delimiters, new_delimiter},
-    frame::{BEGIN, Heard, LINE_FEED, MAX_FRAME, Receiver},
+    frame::{LINE_FEED, MAX_FRAME},
 };
 use super::{
     Failure, Machine, Step, Stray,

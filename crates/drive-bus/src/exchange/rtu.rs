@@ -14,10 +14,9 @@ use drive_core::serial::SerialSettings;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-pub(crate) use self::frame::OVERHEAD;
+pub(crate) use self::frame::{MAX_FRAME, OVERHEAD};
 pub use self::frame::{frame, is_frame};
 
-use self::frame::MAX_FRAME;
 use super::{
     Failure, Machine, Step, Stray,
     echo::{Echo, EchoState},

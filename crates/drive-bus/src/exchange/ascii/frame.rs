@@ -7,7 +7,7 @@ use bytes::{Bytes, BytesMut};
 use crate::pdu::MAX_PDU;
 
 /// Begins a frame, wherever it stands.
-pub(super) const BEGIN: u8 = b':';
+pub(crate) const BEGIN: u8 = b':';
 const CARRIAGE_RETURN: u8 = b'\r';
 /// Ends a frame until function 08/03 says otherwise.
 pub(super) const LINE_FEED: u8 = b'\n';
@@ -40,7 +40,7 @@ pub fn frame(slave: u8, pdu: &[u8], delimiter: u8) -> Bytes {
 
 /// What was heard.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Heard {
+pub(crate) enum Heard {
     /// A frame whose LRC fits.
     Frame { slave: u8, pdu: Bytes },
     /// Something that began as a frame and is none.
@@ -56,7 +56,7 @@ pub(super) enum Heard {
 
 /// The receiver of MODBUS over Serial Line V1.02 p. 17: idle, reception, waiting for the end.
 #[derive(Debug, Default)]
-pub(super) struct Receiver {
+pub(crate) struct Receiver {
     stage: Stage,
     digits: Vec<u8>,
     /// Characters between frames since somebody asked.
@@ -74,7 +74,7 @@ enum Stage {
 
 impl Receiver {
     /// Takes one character; what it completes.
-    pub(super) fn hear(&mut self, character: u8) -> Option<Heard> {
+    pub(crate) fn hear(&mut self, character: u8) -> Option<Heard> {
         match (self.stage, character) {
             (_, BEGIN) => {
                 let cut_short = self.give_up();
@@ -112,17 +112,17 @@ impl Receiver {
     }
 
     /// Whether a frame has begun.
-    pub(super) fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.stage != Stage::Idle
     }
 
     /// The frame that has begun goes on no more.
-    pub(super) fn give_up(&mut self) -> Option<Heard> {
+    pub(crate) fn give_up(&mut self) -> Option<Heard> {
         if self.is_open() { self.garbled("it breaks off") } else { None }
     }
 
     /// How many characters came between frames since the last call.
-    pub(super) fn take_noise(&mut self) -> usize {
+    pub(crate) fn take_noise(&mut self) -> usize {
         mem::take(&mut self.noise)
     }
 

@@ -11,7 +11,7 @@ static CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MODBUS);
 pub(crate) const OVERHEAD: usize = 3;
 
 /// The longest frame.
-pub(super) const MAX_FRAME: usize = MAX_PDU + OVERHEAD;
+pub(crate) const MAX_FRAME: usize = MAX_PDU + OVERHEAD;
 
 /// The frame of a PDU.
 #[must_use]

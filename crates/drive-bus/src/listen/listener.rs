@@ -1,0 +1,101 @@
+//! The ear at a port.
+
+use std::{
+    future, io,
+    pin::Pin,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
+
+use tokio::{
+    io::{AsyncRead, AsyncReadExt},
+    time::{Instant, sleep_until},
+};
+
+use super::{Ear, Heard};
+use crate::{
+    config::LineConfig,
+    protocol::ProtocolMismatch,
+    transport::{Connector, OpenError},
+};
+
+/// Listens to a port, and never writes to it.
+pub struct Listener {
+    stream: Pin<Box<dyn AsyncRead + Send>>,
+    ear: Ear,
+    /// One moment by two clocks.
+    began: (Duration, Instant),
+    has_ended: bool,
+}
+
+impl Listener {
+    /// Opens the port of this configuration: a serial port, or a serial server that gives what it hears to each connection
+    /// (RTU over TCP). What that does to a line stands in the [module's documentation](super#the-port).
+    ///
+    /// # Errors
+    /// [`OpenError`]; also for Modbus TCP, which is no line.
+    pub async fn open(config: &LineConfig) -> Result<Self, OpenError> {
+        if !config.protocol.is_paced() {
+            return Err(ProtocolMismatch::NoLine.into());
+        }
+        let opening = Connector::to(config)?.connect().ok_or(OpenError::NoPort)?;
+        let stream = opening.await?;
+        Self::over(stream, config)
+    }
+
+    /// Listens to a stream: in memory, a pty, a pipe.
+    ///
+    /// # Errors
+    /// [`OpenError::Protocol`] for Modbus TCP, which is no line.
+    pub fn over(stream: impl AsyncRead + Send + 'static, config: &LineConfig) -> Result<Self, OpenError> {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let ear = Ear::new(config, since).ok_or(ProtocolMismatch::NoLine)?;
+        Ok(Self { stream: Box::pin(stream), ear, began: (since, Instant::now()), has_ended: false })
+    }
+
+    /// The next frame, or the next bytes that make none, with times since 1970 that no change of the clock disturbs. `None`:
+    /// the stream has ended.
+    ///
+    /// # Errors
+    /// The port's.
+    ///
+    /// # Cancellation
+    /// Nothing is lost.
+    pub async fn next(&mut self) -> io::Result<Option<Heard>> {
+        let mut buffer = [0; 512];
+        loop {
+            if let Some(heard) = self.ear.next() {
+                return Ok(Some(heard));
+            }
+            if self.has_ended {
+                return Ok(None);
+            }
+            let (since, began) = self.began;
+            let deadline = self.ear.deadline().map(|at| began + at.saturating_sub(since));
+            tokio::select! {
+                // What is there to read counts before the time is over.
+                biased;
+                read = self.stream.read(&mut buffer) => match buffer.get(..read?) {
+                    None | Some([]) => {
+                        self.has_ended = true;
+                        self.ear.handle_timeout();
+                    }
+                    Some(bytes) => self.ear.hear(since + began.elapsed(), bytes),
+                },
+                () = passed(deadline) => self.ear.handle_timeout(),
+            }
+        }
+    }
+}
+
+async fn passed(deadline: Option<Instant>) {
+    match deadline {
+        Some(deadline) => sleep_until(deadline).await,
+        None => future::pending().await,
+    }
+}
+
+impl std::fmt::Debug for Listener {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Listener").field("ear", &self.ear).finish_non_exhaustive()
+    }
+}
