@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use drive_core::{Frequency, Reaction, State};
 use drive_families::Family;
-use drive_fleet::{EventKind, ExitAction, OnFault, WatchdogContract};
+use drive_fleet::{EventKind, ExitAction, OnFault, WatchdogBefore, WatchdogContract};
 use support::{
     drives,
     plant::{PATIENCE, Plant, contract},
@@ -80,6 +80,46 @@ async fn a_watchdog_in_an_eeprom_is_put_back_only_where_the_policy_says_so_and_e
         let after = plant.machine().observe();
         assert_eq!(after.trip.is_none(), restores);
         assert_eq!(after.eeprom_writes > written, restores);
+    }
+}
+
+/// A drive whose watchdog was off before a program armed it and was killed, and the program after it, which knows what was
+/// kept, changed by `change`.
+async fn after_a_kill(change: impl FnOnce(&mut WatchdogBefore)) -> Plant {
+    let mut plant = Plant::single(Family::Atv312, |_| {});
+    // CMI bit 14, BBV51701 p. 20.
+    plant.happens("set CMI 16384");
+    let verified = plant.event("the contract", |kind| is_named(kind, "watchdog verified")).await;
+    let EventKind::WatchdogVerified { written: true, before: Some(before), .. } = verified else {
+        panic!("{verified:?}")
+    };
+    let mut before = (*before).clone();
+    assert_eq!(before.found.timeout, None);
+    change(&mut before);
+    plant.sites[0].members[0].2.watchdog_before = Some(before);
+    let mut plant = plant.restarted().await;
+    plant.event("the contract", |kind| is_named(kind, "watchdog verified")).await;
+    plant
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_a_killed_program_left_armed_is_put_back_at_the_exit_of_the_next() {
+    let mut plant = after_a_kill(|_| {}).await;
+    let told = ended(&mut plant).await;
+    assert!(told.iter().any(|kind| is_named(kind, "watchdog put back")), "{told:?}");
+    sleep(600 * SECOND).await;
+    assert_eq!(plant.machine().observe().trip, None);
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_was_kept_of_another_drive_or_another_setting_is_not_put_back() {
+    let of_another = |before: &mut WatchdogBefore| "ATV312HU22N4".clone_into(&mut before.identity);
+    let otherwise = |before: &mut WatchdogBefore| before.set.timeout = Some(29 * SECOND);
+    for mut plant in [after_a_kill(of_another).await, after_a_kill(otherwise).await] {
+        let writes = Plant::writes(plant.machine());
+        let told = ended(&mut plant).await;
+        assert!(told.iter().any(|kind| is_named(kind, "watchdog stays armed")), "{told:?}");
+        assert_eq!(Plant::writes(plant.machine()), writes);
     }
 }
 

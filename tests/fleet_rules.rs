@@ -387,7 +387,7 @@ async fn rule_9_a_watchdog_is_armed_verified_fed_and_trips_in_its_time_when_the_
         let mut plant = Plant::single(family, |_| {});
         let verified =
             plant.event("the contract", |kind| matches!(kind, EventKind::WatchdogVerified { .. })).await;
-        let EventKind::WatchdogVerified { watchdog, written } = verified else { unreachable!() };
+        let EventKind::WatchdogVerified { watchdog, written, .. } = verified else { unreachable!() };
         assert_eq!(watchdog.timeout, Some(contract.timeout), "{family}");
         let settable = family.capabilities().watchdog.is_some_and(|watchdog| watchdog.settable);
         assert_eq!(written, settable, "{family}");

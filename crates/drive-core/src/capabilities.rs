@@ -251,7 +251,7 @@ impl fmt::Display for Reaction {
 
 /// A drive's communication watchdog as it is set now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Watchdog {
     /// The time without a message after which it acts; `None`: it is off.
@@ -259,14 +259,15 @@ pub struct Watchdog {
         feature = "serde",
         serde(
             rename = "time_ms",
+            default,
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::milliseconds"
+            with = "crate::serialize::maybe_ms"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
     pub timeout: Option<Duration>,
     /// What it does then; `None` where the drive does not tell.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub reaction: Option<Reaction>,
 }
 

@@ -1,5 +1,7 @@
 //! [`Identity`]: what a drive says it is.
 
+use std::fmt;
+
 use crate::status::RawWord;
 
 /// What a drive says it is. Two drives that differ in any part are different drives.
@@ -18,4 +20,13 @@ pub struct Identity {
     pub version: Option<String>,
     /// Words that tell one model from another, where the family has registers for it.
     pub codes: Vec<RawWord>,
+}
+
+/// Every part that it says, one after the other.
+impl fmt::Display for Identity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let words = [&self.vendor, &self.model, &self.version].into_iter().flatten().cloned();
+        let codes = self.codes.iter().map(|word| format!("{} {}", word.code, word.value));
+        f.write_str(&words.chain(codes).collect::<Vec<_>>().join(" "))
+    }
 }

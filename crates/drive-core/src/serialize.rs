@@ -75,6 +75,19 @@ pub mod duration_ms {
     }
 }
 
+/// A time in milliseconds, or none.
+pub(crate) mod maybe_ms {
+    use super::{Deserialize, Deserializer, Duration};
+
+    pub(crate) use super::milliseconds as serialize;
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Duration>, D::Error> {
+        Ok(Option::<u64>::deserialize(deserializer)?.map(Duration::from_millis))
+    }
+}
+
 /// A time in hours.
 pub(crate) fn hours<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
     time.map(|time| time.as_secs_f64() / 3_600.0).serialize(serializer)

@@ -9,6 +9,7 @@ use tokio::time::Instant;
 
 use crate::{
     outcome::{Outcome, Tenths},
+    settings::WatchdogBefore,
     snapshot::Trip,
 };
 
@@ -90,6 +91,8 @@ pub enum EventKind {
         watchdog: Watchdog,
         /// Whether it was written.
         written: bool,
+        /// What the exit would put back; `None`: nothing, or the drive does not say which it is.
+        before: Option<Arc<WatchdogBefore>>,
     },
     /// Its communication watchdog is not as the contract says.
     WatchdogBroken(String),
@@ -214,11 +217,11 @@ impl fmt::Display for EventKind {
                 write!(f, ": {limit}, {}", if *exceeded { "exceeded" } else { "kept again" })
             }
             Self::ControlTaken(control) => write!(f, " by {control}"),
-            Self::Identified(identity) => write!(f, ": {}", describe(identity)),
+            Self::Identified(identity) => write!(f, ": {}", identity),
             Self::IdentityChanged { remembered, found } => {
-                write!(f, ": {} instead of {}", describe(found), describe(remembered))
+                write!(f, ": {} instead of {}", found, remembered)
             }
-            Self::WatchdogVerified { watchdog, written } => {
+            Self::WatchdogVerified { watchdog, written, .. } => {
                 let how = if *written { "written and read back" } else { "found so" };
                 match watchdog.timeout {
                     Some(timeout) => write!(f, ": {timeout:?}, {how}"),
@@ -278,13 +281,6 @@ fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
 }
 
 /// An identity in one line.
-fn describe(identity: &Identity) -> String {
-    let mut parts: Vec<String> =
-        [&identity.vendor, &identity.model, &identity.version].into_iter().flatten().cloned().collect();
-    parts.extend(identity.codes.iter().map(|word| format!("{} {}", word.code, word.value)));
-    parts.join(" ")
-}
-
 /// A measured value that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Limit {

@@ -71,7 +71,7 @@ pub use outcome::{LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until
 pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
 pub use settings::{
     Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
-    OnLoss, Periods, Times, WatchdogContract,
+    OnLoss, Periods, Times, WatchdogBefore, WatchdogContract,
 };
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,

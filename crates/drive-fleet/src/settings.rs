@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Current, Identity, Percent, Reaction, StopMode};
+use drive_core::{Current, Identity, Percent, Reaction, StopMode, Watchdog};
 
 use crate::limits::FrequencyLimits;
 
@@ -60,6 +60,9 @@ pub struct DriveSettings {
     /// What it said it was, from an earlier run; `None`: what it says first is remembered.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub identity: Option<Identity>,
+    /// What an earlier run found of its communication watchdog, armed it over, and did not live to put back.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub watchdog_before: Option<WatchdogBefore>,
 }
 
 impl DriveSettings {
@@ -83,6 +86,7 @@ impl DriveSettings {
             on_control_taken: OnControlTaken::default(),
             accept_self_restart: Vec::new(),
             identity: None,
+            watchdog_before: None,
         }
     }
 
@@ -250,6 +254,22 @@ pub struct WatchdogContract {
     pub timeout: Duration,
     /// What it does then.
     pub reaction: Reaction,
+}
+
+/// What a drive's communication watchdog was before it was armed. Whoever keeps it beyond the life of the program, from
+/// [`WatchdogVerified`](crate::EventKind::WatchdogVerified), gives it to the next as
+/// [`watchdog_before`](DriveSettings::watchdog_before): a program that was killed cannot put it back itself.
+///
+/// It is put back only where the drive says that it is the same one and still has the watchdog that was set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct WatchdogBefore {
+    /// Which drive it was, as [`Identity`] is displayed.
+    pub identity: String,
+    /// What was set.
+    pub set: Watchdog,
+    /// What was found, and is to be put back.
+    pub found: Watchdog,
 }
 
 /// What happens to a drive when the fleet shuts down (rule 8).

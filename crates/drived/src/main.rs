@@ -28,6 +28,7 @@ mod one_drive;
 mod output;
 mod page;
 mod plant;
+mod replaced_file;
 mod run;
 mod signals;
 mod simulated;

@@ -201,3 +201,29 @@ fn a_simulator_replaces_nothing_that_it_did_not_make() {
     sim.on("atv312@1", &["status"]).assert_done();
     std::fs::remove_file(&other).expect("it is there");
 }
+
+#[test]
+fn a_daemon_puts_back_the_watchdog_that_one_before_it_had_armed_when_it_was_killed() {
+    let mut sim = Sim::serve("killed", &["atv312@1"]);
+    // NTO, CMI bit 14 (BBV51701 p. 20): the watchdog is off.
+    sim.say("atv312@1 set CMI 16384", "done");
+    let kept = path("killed.json");
+    let text = line("north", &format!("{},19200,8E1", sim.link()), "atv312@1", CONTROL);
+    let text = format!("watchdogs = {:?}\n{text}", kept.to_str().expect("the path is text"));
+    let file = File::new("killed", &text);
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"watchdog_verified""#);
+    while !std::fs::read_to_string(&kept).is_ok_and(|text| text.contains("north 1")) {
+        std::thread::yield_now();
+    }
+    daemon.signal("-KILL");
+    daemon.end();
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"watchdog_verified""#);
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains(r#""event":"watchdog_put_back""#), "{rest}");
+    let text = std::fs::read_to_string(&kept).expect("it was written");
+    assert!(!text.contains("north 1"), "{text}");
+    let _ = std::fs::remove_file(kept);
+}

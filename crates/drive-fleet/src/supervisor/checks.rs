@@ -9,7 +9,7 @@ use tokio::time::Instant;
 
 use crate::{
     event::EventKind,
-    settings::{DriveSettings, WatchdogContract},
+    settings::{DriveSettings, WatchdogBefore, WatchdogContract},
     snapshot::{IdentityCheck, WatchdogCheck},
     supervisor::Job,
 };
@@ -41,6 +41,8 @@ pub(crate) struct Checks {
     found: Option<Watchdog>,
     /// It was written here.
     written: bool,
+    /// What an earlier run found, and did not live to put back.
+    inherited: Option<WatchdogBefore>,
     /// That it is not as it should be while the motor turns has been told.
     told: bool,
     heard: Option<Instant>,
@@ -69,6 +71,7 @@ impl Checks {
             armed: false,
             found: None,
             written: false,
+            inherited: settings.watchdog_before.clone(),
             told: false,
             heard: None,
             feed_again: None,
@@ -174,7 +177,26 @@ impl Checks {
             self.watchdog,
             WatchdogCheck::Verified(_) | WatchdogCheck::NoContract { found: Some(_) }
         );
-        self.found.filter(|_| self.written && known && verified)
+        self.before().filter(|_| known && verified)
+    }
+
+    /// The watchdog as it was before this program, or one that was killed, wrote to it.
+    fn before(&self) -> Option<Watchdog> {
+        let inherited = self.inherited.as_ref().filter(|before| {
+            self.found == Some(before.set)
+                && matches!(&self.identity, IdentityCheck::Same(identity) if identity.to_string() == before.identity)
+        });
+        match inherited {
+            Some(before) => Some(before.found),
+            None => self.found.filter(|_| self.written),
+        }
+    }
+
+    /// The same for who keeps it beyond the life of this program, of a drive that says which it is.
+    fn to_keep(&self, set: Watchdog) -> Option<Arc<WatchdogBefore>> {
+        let IdentityCheck::Same(identity) = &self.identity else { return None };
+        let found = self.before()?;
+        Some(Arc::new(WatchdogBefore { identity: identity.to_string(), set, found }))
     }
 
     /// The time of the watchdog that the drive has now, as far as it is known.
@@ -237,7 +259,7 @@ impl Checks {
         match &self.remembered {
             Some(remembered) if *remembered != found => {
                 let remembered = Arc::clone(remembered);
-                (self.found, self.written) = (None, false);
+                (self.found, self.written, self.inherited) = (None, false, None);
                 self.identity =
                     IdentityCheck::Changed { remembered: Arc::clone(&remembered), found: Arc::clone(&found) };
                 Some(EventKind::IdentityChanged { remembered, found })
@@ -296,7 +318,8 @@ impl Checks {
                 self.armed = true;
                 self.written |= written;
                 self.watchdog = WatchdogCheck::Verified(watchdog);
-                Some(EventKind::WatchdogVerified { watchdog, written })
+                let before = self.to_keep(watchdog);
+                Some(EventKind::WatchdogVerified { watchdog, written, before })
             }
             Ok(watchdog) if control && self.settable && !written => {
                 self.watchdog = WatchdogCheck::WaitsForStandstill(watchdog);

@@ -115,7 +115,7 @@ impl Supervisor {
             _ if !self.settings.control => return self.exit_done(action),
             _ if self.link != Link::Connected => "the drive does not answer",
             _ if !self.stands() => "the motor turns",
-            None => "it was not written by this program",
+            None => "it was found so, and nothing tells what it was before",
             Some(_) if policy == OnExitWatchdog::Leave => "its policy says so",
             Some(_) if policy == OnExitWatchdog::RestoreInRam && self.watchdog_wears => {
                 "to put it back writes to the drive's EEPROM, on_exit_watchdog = \"restore\" does it all the same"

@@ -11,9 +11,15 @@ mod mqtt;
 mod place;
 mod raw;
 mod sparkplug;
+mod state;
 mod values;
 
-use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
+use std::{
+    collections::BTreeMap,
+    ops::Range,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use drive_bus::{LineConfig, Protocol};
 use drive_core::{StopMode, WatchdogCapability};
@@ -60,6 +66,8 @@ pub(crate) struct Config {
     pub(crate) snapshots: Duration,
     /// How long the exit may take.
     pub(crate) shutdown: Duration,
+    /// The file that keeps what each watchdog was before it was armed; `None`: nothing keeps it.
+    pub(crate) watchdogs: Option<PathBuf>,
     /// Who may come in, and by which door.
     pub(crate) doors: DoorsConfig,
     pub(crate) lines: Vec<LinePart>,
@@ -157,6 +165,7 @@ impl Config {
         let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
         let gateways = gateway::gateways(source, &raw.gateways, &lines)?;
         Ok(Self {
+            watchdogs: state::file(source, raw.watchdogs.as_deref(), state::WATCHDOGS),
             doors,
             gateways,
             snapshots: checks::snapshots(source, raw.snapshots.as_ref())?.unwrap_or(SNAPSHOTS),

@@ -31,6 +31,8 @@ pub(super) struct File {
     pub(super) tokens: Option<PathBuf>,
     /// The file of the audit log.
     pub(super) audit: Option<PathBuf>,
+    /// The file that keeps what each watchdog was before it was armed.
+    pub(super) watchdogs: Option<PathBuf>,
     /// What holds for every drive that does not say otherwise.
     pub(super) defaults: Option<DriveEntry>,
     #[serde(default)]

@@ -1,9 +1,6 @@
 //! `[mqtt.sparkplug]`: the daemon as an edge node of Sparkplug B, for the SCADA hosts of the same brokers.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{path::PathBuf, time::Duration};
 
 use drive_sparkplug::{Id, NodeName};
 use serde::Deserialize;
@@ -11,6 +8,7 @@ use toml::Spanned;
 
 use super::{
     place::{ConfigError, Source},
+    state,
     values::Parsed,
 };
 use crate::{doors::Role, duration::Time, plant::commands::LONGEST_LIFETIME};
@@ -107,15 +105,10 @@ impl SparkplugConfig {
             let problem = format_args!("{lifetime:?}: expected up to {LONGEST_LIFETIME:?}");
             return Err(source.error(said.span(), problem));
         }
-        let folder = source.file.parent().unwrap_or(Path::new(""));
-        let state = match &entry.state {
-            Some(said) => folder.join(said),
-            None => state_folder().map(|folder| folder.join(STATE)).ok_or_else(|| {
-                let problem =
-                    "bdSeq has to outlive the daemon: expected state = \"FILE\", or a STATE_DIRECTORY";
-                source.error(entry.group.span(), problem)
-            })?,
-        };
+        let state = state::file(source, entry.state.as_deref(), STATE).ok_or_else(|| {
+            let problem = "bdSeq has to outlive the daemon: expected state = \"FILE\", or a STATE_DIRECTORY";
+            source.error(entry.group.span(), problem)
+        })?;
         Ok(Self {
             name: NodeName { group: id(&entry.group)?, edge_node },
             primary_host: entry.primary_host.as_ref().map(id).transpose()?,
@@ -132,12 +125,6 @@ fn alike<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     let mut lower: Vec<(String, &str)> = names.iter().map(|name| (name.to_lowercase(), *name)).collect();
     lower.sort_unstable();
     lower.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| (pair[0].1, pair[1].1))
-}
-
-/// Where systemd keeps the state of the daemon.
-fn state_folder() -> Option<PathBuf> {
-    let folders = std::env::var_os("STATE_DIRECTORY")?;
-    std::env::split_paths(&folders).next().filter(|folder| folder.is_absolute())
 }
 
 /// The name of this machine, without its domain; `None` where the system keeps none in a file.

@@ -7,6 +7,7 @@ mod notify;
 pub(crate) mod reload;
 mod report;
 mod screen;
+mod watchdogs;
 
 use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
@@ -19,6 +20,7 @@ use self::{
     reload::Reloader,
     report::{Form, Report},
     screen::Screen,
+    watchdogs::Kept as Watchdogs,
 };
 use crate::{
     api,
@@ -73,7 +75,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let notify = Notify::start();
     let mut wishes = Wishes::listen()?;
     let lines = start_lines(&config)?;
-    let fleet = build(&config, &lines).start().map_err(|error| Failure::Input(error.to_string()))?;
+    let watchdogs = Watchdogs::open(config.watchdogs.as_deref());
+    let fleet =
+        build(&config, &lines, &watchdogs).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let with_table = !args.json && logging::may_be_shown();
     let form = match with_table {
@@ -83,6 +87,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
+    let watchdogs = watchdogs.follow(fleet.events());
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let gateways = Gateways::open(&config, &plant, &doors.audit());
     let shutdown = config.shutdown;
@@ -140,6 +145,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;
+    let _ = watchdogs.await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
     if read.is_none() {
         report.finish().await;
@@ -186,11 +192,13 @@ fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     lines.map_err(|error| Failure::Input(error.to_string()))
 }
 
-fn build(config: &Config, lines: &[Line]) -> FleetBuilder {
+fn build(config: &Config, lines: &[Line], watchdogs: &Watchdogs) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        builder = part.drives.iter().fold(builder, |builder, drive| reload::add(builder, part, drive));
+        builder = part.drives.iter().fold(builder, |builder, drive| {
+            reload::add(builder, part, drive, watchdogs.of(&drive.settings.name))
+        });
     }
     builder
 }

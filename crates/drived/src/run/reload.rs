@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_bus::Line;
-use drive_fleet::{Fleet, FleetBuilder, FleetError, LineBudget};
+use drive_fleet::{DriveSettings, Fleet, FleetBuilder, FleetError, LineBudget, WatchdogBefore};
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
@@ -152,8 +152,11 @@ fn add_all(
             let is_added = |drive: &&DrivePart| {
                 changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
             };
-            builder =
-                part.drives.iter().filter(is_added).fold(builder, |builder, drive| add(builder, part, drive));
+            builder = part
+                .drives
+                .iter()
+                .filter(is_added)
+                .fold(builder, |builder, drive| add(builder, part, drive, None));
         }
         // The file was planned as a whole.
         builder.whatever_the_plan()
@@ -208,9 +211,15 @@ impl Source for Reloader {
 }
 
 /// Adds a drive of a line.
-pub(super) fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart) -> FleetBuilder {
+pub(super) fn add(
+    builder: FleetBuilder,
+    line: &LinePart,
+    drive: &DrivePart,
+    watchdog_before: Option<WatchdogBefore>,
+) -> FleetBuilder {
     let DrivePart { name, settings, options } = drive;
-    builder.drive(&line.name, name.slave.number(), settings.clone(), |port, slave| {
+    let settings = DriveSettings { watchdog_before, ..settings.clone() };
+    builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, &options.values)
     })
 }

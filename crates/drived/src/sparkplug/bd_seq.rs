@@ -1,12 +1,13 @@
 //! The number of the connections, which outlives the program.
 
 use std::{
-    fs,
-    io::{self, Write as _},
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use drive_sparkplug::BdSeq;
+
+use crate::replaced_file;
 
 /// The number that is kept in a file.
 #[derive(Debug)]
@@ -18,7 +19,7 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Reads the file; a file that is not there yet is made.
+    /// Reads the file; one that is not there yet is made with the first connection.
     ///
     /// # Errors
     /// It is none of this, or cannot be written.
@@ -31,8 +32,6 @@ impl Kept {
         };
         if let Some(last) = last {
             write(file, last).map_err(|error| failed(&error))?;
-        } else if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            fs::create_dir_all(folder).map_err(|error| failed(&error))?;
         }
         Ok(Self { file: file.to_owned(), last, is_failing: false })
     }
@@ -52,13 +51,8 @@ impl Kept {
     }
 }
 
-/// All or nothing, also when the power fails.
 fn write(file: &Path, number: BdSeq) -> io::Result<()> {
-    let beside = file.with_extension("new");
-    let mut new = fs::File::create(&beside)?;
-    writeln!(new, "{number}")?;
-    new.sync_all()?;
-    fs::rename(&beside, file)
+    replaced_file::write(file, format!("{number}\n").as_bytes())
 }
 
 #[cfg(test)]

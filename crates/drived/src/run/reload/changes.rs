@@ -155,6 +155,7 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         (old.shutdown != new.shutdown, "shutdown"),
         (old.doors.http != new.doors.http, "[http]"),
         (old.doors.socket != new.doors.socket, "[socket]"),
+        (old.watchdogs != new.watchdogs, "another file of watchdogs"),
         (old.doors.tokens != new.doors.tokens, "another file of tokens"),
         (old.doors.audit != new.doors.audit, "another audit log"),
         (old.gateways != new.gateways, "gateways"),

@@ -2,15 +2,14 @@
 
 use std::{
     fmt::{self, Write as _},
-    fs,
-    io::{self, Write as _},
+    fs, io,
     path::Path,
 };
 
 use drive_core::registers::Part;
 
 use super::{Backup, Entry};
-use crate::{commands::param::factory, failure::Failure};
+use crate::{commands::param::factory, failure::Failure, replaced_file};
 
 /// How a backup begins. Only a file that begins so is overwritten by the next one.
 pub(super) const FIRST_LINE: &str = "# The parameters of a drive, kept by drived param backup.";
@@ -72,15 +71,7 @@ impl Backup {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(failed(&error)),
         }
-        let mut beside = path.as_os_str().to_owned();
-        beside.push(".new");
-        let write = || {
-            let mut file = fs::File::create(&beside)?;
-            file.write_all(self.to_string().as_bytes())?;
-            file.sync_all()?;
-            fs::rename(&beside, path)
-        };
-        write().map_err(|error| failed(&error))
+        replaced_file::write(path, self.to_string().as_bytes()).map_err(|error| failed(&error))
     }
 }
 
