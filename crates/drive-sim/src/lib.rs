@@ -26,7 +26,7 @@ pub use control::ControlError;
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use habits::{HeaderForm, LinkHabits, Unacknowledged};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};
-pub use model::{Block, Cast, Damage, Exception, Model, Observation, Panel, Protocol, Rules, UniTe};
+pub use model::{Block, Cast, Damage, Dialect, Exception, Model, Observation, Panel, Protocol, Rules, UniTe};
 pub use motor::{Motor, Nameplate, Ramp, Ramps};
 pub use pdu::identification;
 pub use record::{Breach, LineStats, Violation};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::Frequency;
+use drive_core::{Frequency, SerialSettings};
 
 use crate::world::{Act, Surroundings};
 
@@ -86,6 +86,15 @@ pub enum Protocol {
     Ascii,
     /// UNI-TELWAY with UNI-TE requests.
     UniTelway,
+}
+
+/// How a party of a line speaks and listens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Dialect {
+    /// Speed and character format.
+    pub settings: SerialSettings,
+    /// The protocol.
+    pub protocol: Protocol,
 }
 
 /// What a drive needs to answer UNI-TE requests (VVDED397054 p. 11–13); reads and writes of words go to its registers.

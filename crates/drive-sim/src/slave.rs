@@ -10,7 +10,7 @@ use tokio::time::Instant;
 
 use crate::{
     habits::LinkHabits,
-    model::{Cast, Damage, Exception, Model, Observation},
+    model::{Cast, Damage, Dialect, Exception, Model, Observation},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
     record::Breach,
     unite::{self, LinkCounters},
@@ -64,6 +64,8 @@ pub(crate) struct Slave {
     model: Box<dyn Model>,
     /// Where it was put on the line.
     address: u8,
+    /// How it speaks and listens.
+    dialect: Dialect,
     /// Until when the model's time has passed.
     advanced: Instant,
     counters: Counters,
@@ -83,10 +85,18 @@ pub(crate) struct Slave {
 }
 
 impl Slave {
-    pub(crate) fn new(model: Box<dyn Model>, address: u8, now: Instant, line: LineCounters) -> Self {
+    pub(crate) fn new(
+        mut model: Box<dyn Model>,
+        address: u8,
+        dialect: Dialect,
+        now: Instant,
+        line: LineCounters,
+    ) -> Self {
+        model.join(address, dialect.protocol);
         Self {
             model,
             address,
+            dialect,
             advanced: now,
             counters: Counters { line_base: line, ..Counters::default() },
             listen_only: false,
@@ -255,6 +265,16 @@ impl Slave {
 
     fn reset_counters(&mut self, line: LineCounters) {
         self.counters = Counters { line_base: line, ..Counters::default() };
+    }
+
+    pub(crate) const fn dialect(&self) -> Dialect {
+        self.dialect
+    }
+
+    pub(crate) fn set_dialect(&mut self, dialect: Dialect, line: LineCounters) {
+        self.dialect = dialect;
+        self.model.join(self.address, dialect.protocol);
+        self.reset_counters(line);
     }
 
     pub(crate) fn turnaround(&self) -> Duration {

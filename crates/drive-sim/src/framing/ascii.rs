@@ -73,6 +73,13 @@ impl Framing for Ascii {
         }
     }
 
+    fn damaged(&mut self, _: Instant, line: &mut State) {
+        if self.stage != Stage::Idle {
+            self.stage = Stage::Idle;
+            line.bad_frame(Damage::Check);
+        }
+    }
+
     fn awaits_more(&self) -> bool {
         true
     }

@@ -8,12 +8,22 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-pub(crate) use self::{ascii::Ascii, rtu::Rtu, unitelway::UniTelway};
+use self::{ascii::Ascii, rtu::Rtu, unitelway::UniTelway};
 
 use crate::{
+    model::Protocol,
     speech::{Content, Speech},
     state::State,
 };
+
+/// The slaves' side of a protocol, that has heard nothing yet.
+pub(crate) fn of(protocol: Protocol) -> Box<dyn Framing> {
+    match protocol {
+        Protocol::Rtu => Box::new(Rtu::default()),
+        Protocol::Ascii => Box::new(Ascii::default()),
+        Protocol::UniTelway => Box::new(UniTelway::default()),
+    }
+}
 
 /// The slaves' side of a protocol. It has no clock: it is told when each character ended, and when a
 /// silence has ended a frame.
@@ -29,6 +39,9 @@ pub(crate) trait Framing: Send {
 
     /// A character whose last bit was on the wire at this moment.
     fn byte(&mut self, byte: u8, at: Instant, line: &mut State, speech: &mut Vec<Speech>);
+
+    /// A character of which parity or stop bit is wrong: the frame that it belongs to is none.
+    fn damaged(&mut self, at: Instant, line: &mut State);
 
     /// Whether the end of the frame that has begun is still to come, as far as its characters tell.
     fn awaits_more(&self) -> bool;

@@ -20,6 +20,7 @@ const SHORTEST: usize = 4;
 pub(crate) struct Rtu {
     frame: Vec<u8>,
     too_long: bool,
+    damaged: bool,
     last: Option<Instant>,
 }
 
@@ -43,8 +44,17 @@ impl Framing for Rtu {
             return;
         }
         self.frame.push(byte);
-        if expected_length(&self.frame) == Some(self.frame.len()) && is_intact(&self.frame) {
+        let is_whole = expected_length(&self.frame) == Some(self.frame.len()) && is_intact(&self.frame);
+        if is_whole && !self.damaged {
             self.finish(line, speech);
+        }
+    }
+
+    fn damaged(&mut self, at: Instant, _: &mut State) {
+        self.last = Some(at);
+        self.damaged = true;
+        if self.frame.len() < LONGEST {
+            self.frame.push(0);
         }
     }
 
@@ -71,8 +81,9 @@ impl Rtu {
     fn finish(&mut self, line: &mut State, speech: &mut Vec<Speech>) {
         let received = std::mem::take(&mut self.frame);
         let too_long = std::mem::take(&mut self.too_long);
+        let damaged = std::mem::take(&mut self.damaged);
         match (self.last, &received[..]) {
-            (Some(at), [slave, request @ .., _, _]) if !too_long && is_intact(&received) => {
+            (Some(at), [slave, request @ .., _, _]) if !too_long && !damaged && is_intact(&received) => {
                 speech.extend(line.request(at, *slave, request));
             }
             _ if too_long || received.len() < SHORTEST => line.bad_frame(Damage::Length),

@@ -144,6 +144,12 @@ impl Framing for UniTelway {
         };
     }
 
+    fn damaged(&mut self, _: Instant, line: &mut State) {
+        if self.stage != Stage::Idle {
+            self.stage = self.give_up(line);
+        }
+    }
+
     fn awaits_more(&self) -> bool {
         true
     }

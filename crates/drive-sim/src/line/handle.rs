@@ -8,8 +8,9 @@ use tokio::time::Instant;
 use super::SimLine;
 use crate::{
     habits::LinkHabits,
-    model::{Exception, Observation, Panel},
+    model::{Dialect, Exception, Observation, Panel},
     slave::{LineCounters, Received, Slave},
+    state::Place,
     world::{Act, Surroundings, UnknownName},
 };
 
@@ -20,14 +21,14 @@ const LOOK: Duration = Duration::from_millis(1);
 #[derive(Debug, Clone)]
 pub struct SimSlave {
     pub(super) line: SimLine,
-    pub(super) address: u8,
+    pub(super) place: Place,
 }
 
 impl SimSlave {
     /// The address at which it was put on the line.
     #[must_use]
     pub const fn address(&self) -> u8 {
-        self.address
+        self.place.0
     }
 
     /// What an observer of the machine sees now.
@@ -42,6 +43,16 @@ impl SimSlave {
     /// Safe to drop.
     pub async fn wait_until(&self, is_so: impl Fn(&Observation) -> bool) -> Observation {
         self.wait_for(|slave| slave.observe(Instant::now()), is_so).await
+    }
+
+    /// Changes speed, format and protocol of this drive alone, as somebody at its panel does. It hears a master that has
+    /// others as a UART would hear it, and is heard so.
+    pub fn set_dialect(&self, dialect: Dialect) {
+        let mut state = self.line.shared.lock();
+        let counters = state.counters(dialect);
+        if let Some(slave) = state.at(self.place) {
+            slave.set_dialect(dialect, counters);
+        }
     }
 
     /// Cuts the drive's cable: it hears nothing and says nothing, and goes on doing what it does.
@@ -69,7 +80,7 @@ impl SimSlave {
 
     /// Sends the answer that is held back, at once; without one, ends the holding.
     pub fn release(&self) {
-        self.line.shared.lock().release(self.address);
+        self.line.shared.lock().release(self.place);
         self.line.shared.wake.send_replace(());
         self.line.shared.has_changed();
     }
@@ -228,8 +239,9 @@ impl SimSlave {
     /// Looks at the slave. It never leaves its line, so the default is never taken.
     fn with<R: Default>(&self, look: impl FnOnce(&mut Slave, LineCounters) -> R) -> R {
         let mut state = self.line.shared.lock();
-        let counters = state.counters();
-        state.slave(self.address).map(|slave| look(slave, counters)).unwrap_or_default()
+        let dialect = state.at(self.place).map(|slave| slave.dialect()).unwrap_or_default();
+        let counters = state.counters(dialect);
+        state.at(self.place).map(|slave| look(slave, counters)).unwrap_or_default()
     }
 
     /// Acts on the slave and tells observers.

@@ -15,11 +15,10 @@ pub use handle::SimSlave;
 
 use crate::{
     fault::{Fault, Faults, PerMillion},
-    framing::{Ascii, Framing, Rtu, UniTelway},
-    model::{Model, Protocol},
+    model::{Dialect, Model, Protocol},
     record::{LineStats, Violation},
     slave::Slave,
-    state::{BROADCAST, State},
+    state::{BROADCAST, Place, State},
     wire::{Delivery, Pacing, Wire},
 };
 
@@ -29,9 +28,10 @@ const HIGHEST: u8 = 247;
 /// How a line is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wiring {
-    /// Speed and character format.
+    /// Speed and character format, of the slaves that have no others ([`SimSlave::set_dialect`]) and of a master that does
+    /// not tell its own.
     pub settings: SerialSettings,
-    /// What is spoken.
+    /// What is spoken by the slaves that have no protocol of their own.
     pub protocol: Protocol,
     /// Whether characters take no time at all: for measurements of everything but the line.
     pub unpaced: bool,
@@ -53,12 +53,12 @@ impl Wiring {
             (false, true) => Pacing::Hardware,
             (false, false) => Pacing::Simulated,
         };
-        let framing: Box<dyn Framing> = match self.protocol {
-            Protocol::Rtu => Box::new(Rtu::default()),
-            Protocol::Ascii => Box::new(Ascii::default()),
-            Protocol::UniTelway => Box::new(UniTelway::default()),
-        };
-        Wire::new(self.settings, pacing, self.delivery, framing)
+        Wire::new(self.dialect(), pacing, self.delivery)
+    }
+
+    /// How its slaves speak and listen, unless they are told otherwise.
+    const fn dialect(self) -> Dialect {
+        Dialect { settings: self.settings, protocol: self.protocol }
     }
 }
 
@@ -130,31 +130,40 @@ impl SimLine {
     ///
     /// # Errors
     /// As [`add`](Self::add).
-    pub fn add_boxed(&self, address: u8, mut model: Box<dyn Model>) -> Result<SimSlave, AddressError> {
+    pub fn add_boxed(&self, address: u8, model: Box<dyn Model>) -> Result<SimSlave, AddressError> {
+        if self.slave(address).is_some() {
+            return Err(AddressError::Taken(address));
+        }
+        self.add_beside(address, model)
+    }
+
+    /// [`add_boxed`](Self::add_boxed) where another drive may have the address already: both carry out what is sent to it, and
+    /// answer, as on a line where somebody has set it twice. Answers that are equal and begin at the same moment are heard as
+    /// one; what differs is damaged where it overlaps. On a UNI-TELWAY line the one that was there first is polled alone.
+    ///
+    /// # Errors
+    /// [`AddressError::OutOfRange`].
+    pub fn add_beside(&self, address: u8, model: Box<dyn Model>) -> Result<SimSlave, AddressError> {
         if address == BROADCAST || address > HIGHEST {
             return Err(AddressError::OutOfRange(address));
         }
-        model.join(address, self.wiring.protocol);
-        let mut state = self.shared.lock();
-        let slave = Slave::new(model, address, Instant::now(), state.counters());
-        if !state.add(address, slave) {
-            return Err(AddressError::Taken(address));
-        }
-        Ok(SimSlave { line: self.clone(), address })
+        let (dialect, mut state) = (self.wiring.dialect(), self.shared.lock());
+        let slave = Slave::new(model, address, dialect, Instant::now(), state.counters(dialect));
+        let place = state.add(address, slave);
+        Ok(SimSlave { line: self.clone(), place })
     }
 
-    /// The drive at an address.
+    /// The drive at an address, the first one where there are several.
     #[must_use]
     pub fn slave(&self, address: u8) -> Option<SimSlave> {
-        let found = self.shared.lock().slave(address).is_some();
-        found.then(|| SimSlave { line: self.clone(), address })
+        self.slaves().into_iter().find(|slave| slave.address() == address)
     }
 
     /// All drives, by rising address.
     #[must_use]
     pub fn slaves(&self) -> Vec<SimSlave> {
-        let addresses = self.shared.lock().addresses();
-        addresses.into_iter().map(|address| SimSlave { line: self.clone(), address }).collect()
+        let places = self.shared.lock().places();
+        places.into_iter().map(|place: Place| SimSlave { line: self.clone(), place }).collect()
     }
 
     /// Cuts the cable of every drive, as [`SimSlave::mute`] does of one.
@@ -225,10 +234,10 @@ impl Default for SimLine {
 
 impl fmt::Debug for SimLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let addresses = self.shared.lock().addresses();
+        let places = self.shared.lock().places();
         f.debug_struct("SimLine")
             .field("wiring", &self.wiring)
-            .field("slaves", &addresses)
+            .field("slaves", &places)
             .finish_non_exhaustive()
     }
 }

@@ -8,10 +8,11 @@ mod wired;
 use std::{fmt, io};
 
 use drive_clock::Timer;
+use drive_core::SerialSettings;
 use tokio::{io::DuplexStream, net::TcpListener, task::JoinHandle};
 use tokio_serial::{DataBits, FlowControl, SerialPortBuilderExt, StopBits};
 
-use crate::line::SimLine;
+use crate::{line::SimLine, wire::Master};
 
 /// Characters that an endpoint in memory keeps for a master that does not read, about as many as a pty keeps.
 const MEMORY: usize = 4_096;
@@ -76,20 +77,29 @@ impl SimLine {
     /// Outside a tokio runtime, as every endpoint does.
     #[must_use]
     pub fn in_memory(&self) -> DuplexStream {
-        self.in_memory_with(Timer::tokio())
+        self.in_memory_with(Timer::tokio(), self.wiring().settings)
     }
 
     /// Serves a master in memory to tens of microseconds, in real time: not under a paused clock.
     #[must_use]
     pub fn in_memory_precise(&self) -> DuplexStream {
-        self.in_memory_with(Timer::precise())
+        self.in_memory_with(Timer::precise(), self.wiring().settings)
     }
 
-    fn in_memory_with(&self, timer: Timer) -> DuplexStream {
+    /// [`in_memory`](Self::in_memory) for a master whose port is set to this: slaves with other settings hear it, and are
+    /// heard, as a UART hears another speed or format. A character with a wrong parity or stop bit is read as a zero where
+    /// the format has a parity, and as it is where it has none: so does a port of Linux that a serial port library has set.
+    #[must_use]
+    pub fn in_memory_at(&self, settings: SerialSettings) -> DuplexStream {
+        self.in_memory_with(Timer::tokio(), settings)
+    }
+
+    fn in_memory_with(&self, timer: Timer, settings: SerialSettings) -> DuplexStream {
         let (master, slaves) = tokio::io::duplex(MEMORY);
         let wire = self.wiring().wire(false);
+        let tuned = Master::of(settings);
         // Detached: it ends by itself with the master's end.
-        drop(tokio::spawn(wired::serve(self.shared().clone(), slaves, timer, wire, || true)));
+        drop(tokio::spawn(wired::serve(self.shared().clone(), slaves, timer, wire, move || Some(tuned))));
         master
     }
 
@@ -97,8 +107,10 @@ impl SimLine {
     /// link that is there already is replaced; anything else at that path is an error. The link goes with the
     /// [`Serving`].
     ///
-    /// A pty does not pace and has no parity: the line paces by itself and takes whatever format a master sets. The speed
-    /// it tells: a master that has set another than the line's is not understood, unless the line is unpaced.
+    /// A pty does not pace: the line paces by itself. A master that has set another speed or parity than a slave hears it as
+    /// a UART would, as far as a pty tells what was set: the speed, two stop bits, an odd parity, any parity that is checked
+    /// (`INPCK`), and none where errors are ignored (`IGNPAR` alone). Data bits, and what is not told of the parity, are
+    /// taken for the line's. An unpaced line takes whatever a master sets.
     ///
     /// # Errors
     /// No pty can be had, or the link cannot be made.
@@ -106,10 +118,9 @@ impl SimLine {
     pub fn serve_pty(&self, link: impl Into<std::path::PathBuf>) -> io::Result<Serving> {
         let (port, kept, pty) = pty::open(link.into())?;
         let wire = self.wiring().wire(false);
-        let (baud, unpaced) = (self.wiring().settings.baud(), self.wiring().unpaced);
-        let is_understood = move || unpaced || kept.is_set_to(baud);
-        let task =
-            tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire, is_understood));
+        let (settings, unpaced) = (self.wiring().settings, self.wiring().unpaced);
+        let tuned = move || if unpaced { Some(Master::of(settings)) } else { kept.master(settings) };
+        let task = tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire, tuned));
         let mut serving = Serving::new(task);
         serving.pty = Some(pty);
         Ok(serving)
@@ -139,7 +150,7 @@ impl SimLine {
             port,
             Timer::precise(),
             wire,
-            || true,
+            move || Some(Master::of(settings)),
         ))))
     }
 

@@ -2,11 +2,18 @@
 
 use std::{
     fs, io,
-    os::unix::fs::symlink,
+    os::{fd::OwnedFd, unix::fs::symlink},
     path::{Path, PathBuf},
 };
 
+use drive_core::{SerialSettings, serial::Parity};
+use rustix::{
+    fs::{Mode, OFlags},
+    termios::{ControlModes, InputModes, tcgetattr},
+};
 use tokio_serial::{SerialPort, SerialStream};
+
+use crate::wire::{Errors, Master};
 
 /// The slave side of a pty and the link to it.
 pub(super) struct Pty {
@@ -15,13 +22,35 @@ pub(super) struct Pty {
 }
 
 /// The slave side, kept open: while it is, a master that closes the device does not end it, and reading our side does not
-/// fail. It tells the speed that the master has set.
-pub(super) struct Kept(SerialStream);
+/// fail. It tells how the master has set it.
+pub(super) struct Kept(OwnedFd);
 
 impl Kept {
-    /// Whether a master that has set this speed is understood.
-    pub(super) fn is_set_to(&self, baud: u32) -> bool {
-        self.0.baud_rate().is_ok_and(|set| set == baud)
+    /// How a master has set the port, on a line whose own settings are these; `None`: at no speed that a line has.
+    ///
+    /// A pty keeps 8 data bits and no parity whatever is set, but the flags that go with a parity stay as the master left
+    /// them. Whoever leaves none of them means, as far as anybody can tell, the line's.
+    pub(super) fn master(&self, line: SerialSettings) -> Option<Master> {
+        let set = tcgetattr(&self.0).ok()?;
+        let (input, control) = (set.input_modes, set.control_modes);
+        let checks = input.contains(InputModes::INPCK);
+        let parity = match line.format().parity() {
+            _ if control.contains(ControlModes::PARODD) => 'O',
+            _ if checks => 'E',
+            _ if input.contains(InputModes::IGNPAR) => 'N',
+            Parity::Odd => 'O',
+            Parity::Even => 'E',
+            Parity::None => 'N',
+        };
+        let stop_bits = if control.contains(ControlModes::CSTOPB) { 2 } else { 1 };
+        let format = format!("{}{parity}{stop_bits}", line.format().data_bits());
+        let settings = SerialSettings::new(set.output_speed(), format.parse().ok()?).ok()?;
+        let errors = match (checks, input.contains(InputModes::IGNPAR)) {
+            (false, _) => Errors::Pass,
+            (true, false) => Errors::Zero,
+            (true, true) => Errors::Drop,
+        };
+        Some(Master { settings, errors })
     }
 }
 
@@ -48,8 +77,9 @@ fn is_left_behind(link: &Path) -> bool {
 
 /// Opens a pty in raw mode and links to it: our side, and what keeps it.
 pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Kept, Pty)> {
-    let (ours, kept) = SerialStream::pair()?;
-    let device = kept.name().ok_or_else(|| io::Error::other("the pty has no name"))?;
+    let (ours, other) = SerialStream::pair()?;
+    let device = other.name().ok_or_else(|| io::Error::other("the pty has no name"))?;
+    let kept = rustix::fs::open(&device, OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK, Mode::empty())?;
     match fs::symlink_metadata(&link) {
         Ok(found) if found.is_symlink() && is_left_behind(&link) => fs::remove_file(&link)?,
         Ok(_) => {

@@ -15,6 +15,7 @@ use crate::{
     fault::Fault,
     line::SimLine,
     speech::{Content, Speech},
+    wire::Master,
 };
 
 /// Transaction, protocol, length, unit.
@@ -27,8 +28,10 @@ pub(super) async fn serve_rtu(line: SimLine, listener: TcpListener) -> io::Resul
         let (stream, _) = listener.accept().await?;
         hurry(&stream);
         let wire = line.wiring().wire(false);
+        let master = Master::of(line.wiring().settings);
         // A broken connection ends that master's service, not the line's.
-        if let Err(error) = wired::serve(line.shared().clone(), stream, Timer::precise(), wire, || true).await
+        if let Err(error) =
+            wired::serve(line.shared().clone(), stream, Timer::precise(), wire, || Some(master)).await
         {
             tracing::debug!(%error, "connection lost");
         }
@@ -72,7 +75,9 @@ async fn connection(line: SimLine, mut stream: TcpStream) -> io::Result<()> {
         while let Some((transaction, unit, request)) = next_request(&mut received)? {
             let speech = {
                 let mut state = line.shared().lock();
-                let speech = state.request(Instant::now(), unit, &request);
+                // A gateway knows how each of its slaves speaks.
+                state.reached = None;
+                let speech = state.request(Instant::now(), unit, &request).into_iter().next();
                 let lost = state.faults.strikes(Fault::Lost).is_some();
                 let late = state.faults.strikes(Fault::Late).map(|_| ());
                 let lateness = late.map(|()| state.faults.lateness()).unwrap_or_default();
@@ -99,7 +104,7 @@ async fn connection(line: SimLine, mut stream: TcpStream) -> io::Result<()> {
                     return Ok(());
                 }
                 let released = line.shared().lock().take_released(|unit| held.contains_key(&unit));
-                for (unit, answer) in released {
+                for (_, unit, answer) in released {
                     if let Some(transaction) = held.remove(&unit) {
                         stream.write_all(&frame(transaction, unit, &answer)).await?;
                     }

@@ -10,20 +10,24 @@ use tokio::{
 
 use crate::{
     line::Shared,
-    wire::{Step, Wire},
+    wire::{Master, Step, Wire},
 };
 
-/// Serves one master until its end of the port closes. What comes while it is not understood is nothing to the slaves.
+/// Serves one master until its end of the port closes, as its port is set at the moment; where nobody can tell how, what
+/// comes is nothing to the slaves.
 pub(super) async fn serve(
     shared: Arc<Shared>,
     mut port: impl AsyncRead + AsyncWrite + Unpin,
     mut timer: Timer,
     mut wire: Wire,
-    is_understood: impl Fn() -> bool,
+    master: impl Fn() -> Option<Master>,
 ) -> io::Result<()> {
     let mut wakes = shared.wakes();
-    let mut buffer = [0; 512];
+    let mut buffer = [0; 1_024];
     loop {
+        if let Some(master) = master() {
+            wire.tune(master);
+        }
         let step = wire.poll(Instant::now(), &mut shared.lock());
         let due = match step {
             Step::Send(bytes) => {
@@ -40,9 +44,8 @@ pub(super) async fn serve(
             read = port.read(&mut buffer) => {
                 let now = Instant::now();
                 let Some(bytes) = buffer.get(..read?).filter(|bytes| !bytes.is_empty()) else { return Ok(()) };
-                if !is_understood() {
-                    continue;
-                }
+                let Some(master) = master() else { continue };
+                wire.tune(master);
                 wire.receive(now, bytes, &mut shared.lock());
                 shared.has_changed();
             }

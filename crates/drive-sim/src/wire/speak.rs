@@ -6,11 +6,12 @@ use fastrand::Rng;
 use tokio::time::Instant;
 
 use super::{
-    Delivery, Pacing, Wire, count_of,
+    Delivery, Pacing, Wire, count_of, misheard,
     transmission::{Overlap, Transmission},
 };
 use crate::{
     fault::{Fault, flip},
+    model::Dialect,
     pdu::is_confirmation,
     speech::{Content, Speech},
     state::State,
@@ -19,38 +20,40 @@ use crate::{
 impl Wire {
     /// Puts on the wire what the slaves have to say.
     pub(super) fn answer(&mut self, line: &mut State) {
-        for speech in std::mem::take(&mut self.speech) {
-            self.say(speech, line);
+        for (ear, speech) in std::mem::take(&mut self.speech) {
+            self.say(ear, speech, line);
         }
     }
 
     /// One answer, with what the faults make of it.
-    fn say(&mut self, speech: Speech, line: &mut State) {
+    fn say(&mut self, ear: usize, speech: Speech, line: &mut State) {
         let Speech { slave, content, heard, turnaround } = speech;
+        let Some(dialect) = self.ears.get(ear).map(|ear| ear.dialect) else { return };
         let start = heard + turnaround;
         let (bytes, start) = match content {
             Content::Signal(signal) => (signal, start),
-            Content::Message(message) => self.message(slave, message, start, line),
+            Content::Message(message) => self.message(ear, slave, message, start, line),
         };
-        line.stats.ideal += turnaround + self.time(bytes.len());
-        let bytes = self.garble(bytes, line);
+        line.stats.ideal += turnaround + self.time(bytes.len(), dialect.settings);
+        let bytes = garble(bytes, dialect, line);
         let late = line.faults.strikes(Fault::Late).is_some();
         let start = if late { start + line.faults.lateness() } else { start };
         if line.faults.strikes(Fault::Lost).is_some() {
             return;
         }
         if line.faults.strikes(Fault::Duplicated).is_some() {
-            let again = start + self.time(bytes.len()) + self.t3_5();
-            self.transmit(slave, start, bytes.clone(), late, line);
-            self.transmit(slave, again, bytes, late, line);
+            let again = start + self.time(bytes.len(), dialect.settings) + self.t3_5(dialect.settings);
+            self.transmit((slave, dialect), start, &bytes, late, line);
+            self.transmit((slave, dialect), again, &bytes, late, line);
         } else {
-            self.transmit(slave, start, bytes, late, line);
+            self.transmit((slave, dialect), start, &bytes, late, line);
         }
     }
 
     /// The frame of a message and its start, after the faults that need to understand it.
     fn message(
         &mut self,
+        ear: usize,
         slave: u8,
         mut message: Vec<u8>,
         start: Instant,
@@ -63,43 +66,42 @@ impl Wire {
             flip(data, 8, random);
         }
         let foreign = line.faults.strikes(Fault::Foreign).map(Rng::fork);
-        let Some(mut random) = foreign else { return (self.framing.encode(slave, &message, line), start) };
-        let stranger = line.stranger(slave, &mut random);
-        let frame = self.framing.encode(stranger, &message, line);
-        let after = start + self.time(frame.len()) + self.t3_5();
-        self.transmit(stranger, start, frame, false, line);
-        (self.framing.encode(slave, &message, line), after)
+        let Some(heard) = self.ears.get(ear) else { return (Vec::new(), start) };
+        let frame = heard.framing.encode(slave, &message, line);
+        let Some(mut random) = foreign else { return (frame, start) };
+        let (stranger, dialect) = (line.stranger(slave, &mut random), heard.dialect);
+        let foreign = heard.framing.encode(stranger, &message, line);
+        let after = start + self.time(foreign.len(), dialect.settings) + self.t3_5(dialect.settings);
+        self.transmit((stranger, dialect), start, &foreign, false, line);
+        (frame, after)
     }
 
-    /// What the faults that only see characters make of a frame.
-    fn garble(&self, mut bytes: Vec<u8>, line: &mut State) -> Vec<u8> {
-        if let Some(random) = line.faults.strikes(Fault::Flipped) {
-            flip(&mut bytes, self.settings.format().data_bits(), random);
-        }
-        if let Some(random) = line.faults.strikes(Fault::Truncated) {
-            bytes.truncate(random.usize(0..bytes.len().max(1)));
-        }
-        if let Some(random) = line.faults.strikes(Fault::Noise) {
-            let noise = random.usize(1..=4);
-            bytes.splice(0..0, std::iter::repeat_with(|| random.u8(..)).take(noise));
-        }
-        bytes
-    }
-
-    fn transmit(&mut self, slave: u8, start: Instant, bytes: Vec<u8>, late: bool, line: &mut State) {
-        let mut transmission = Transmission { slave, start, bytes, delivered: 0, late, echo: false };
-        let (settings, ends) = (self.settings, start + self.time(transmission.bytes.len()));
+    fn transmit(
+        &mut self,
+        (slave, dialect): (u8, Dialect),
+        start: Instant,
+        bytes: &[u8],
+        late: bool,
+        line: &mut State,
+    ) {
+        line.stats.answers += 1;
+        let takes = self.time(bytes.len(), dialect.settings);
+        let characters = misheard::heard(bytes, dialect.settings, self.master.settings);
+        let mut transmission =
+            Transmission { slave, dialect, start, characters, takes, delivered: 0, late, echo: false };
         if self.pacing == Pacing::Simulated {
             for other in self.transmissions.iter_mut().filter(|other| !other.echo) {
-                if let Some(overlap) = Overlap::of(other, start, ends, settings) {
+                if let Some(overlap) = Overlap::of(other, start, start + takes) {
                     line.stats.slave_collisions += 1;
-                    other.damage(overlap, settings);
-                    transmission.damage(overlap, settings);
+                    if other.merge(&transmission) {
+                        return;
+                    }
+                    other.damage(overlap);
+                    transmission.damage(overlap);
                 }
             }
         }
-        line.stats.answers += 1;
-        if !transmission.bytes.is_empty() {
+        if !bytes.is_empty() {
             self.transmissions.push_back(transmission);
         }
     }
@@ -107,16 +109,30 @@ impl Wire {
     /// The transmission that has something to deliver first: its index, up to which character, and when.
     pub(super) fn next_delivery(&self) -> Option<(usize, usize, Instant)> {
         let next = |(index, transmission): (usize, &Transmission)| {
-            let whole = transmission.bytes.len();
+            let whole = transmission.characters.len();
             let upto = match self.delivery {
                 Delivery::Whole => whole,
                 Delivery::Pieces(size) => (transmission.delivered + size.max(1)).min(whole),
             };
             // A real port paces by itself what it is given.
-            let (upto, taken) = if self.pacing == Pacing::Hardware { (whole, 0) } else { (upto, upto) };
-            (index, upto, transmission.start + self.time(taken))
+            let (upto, ends) = match self.pacing {
+                Pacing::Hardware => (whole, transmission.start),
+                Pacing::Simulated | Pacing::None => (upto, self.ends(transmission, upto)),
+            };
+            (index, upto, ends)
         };
         self.transmissions.iter().enumerate().map(next).min_by_key(|(_, _, due)| *due)
+    }
+
+    /// When so many characters of a transmission are on the wire.
+    fn ends(&self, transmission: &Transmission, characters: usize) -> Instant {
+        let last = characters.checked_sub(1).and_then(|last| transmission.characters.get(last));
+        let takes = match last {
+            _ if characters == transmission.characters.len() => transmission.takes,
+            Some(last) if self.pacing != Pacing::None => transmission.dialect.settings.bits(last.ends),
+            Some(_) | None => Duration::ZERO,
+        };
+        transmission.start + takes
     }
 
     pub(super) fn deliver(
@@ -127,14 +143,15 @@ impl Wire {
         now: Instant,
         line: &mut State,
     ) -> Vec<u8> {
-        let wire_time = self.time(upto);
+        let on_the_wire = self.transmissions.get(index).map(|transmission| self.ends(transmission, upto));
         let Some(transmission) = self.transmissions.get_mut(index) else { return Vec::new() };
-        let piece = transmission.bytes.get(transmission.delivered..upto).unwrap_or_default().to_vec();
+        let heard = transmission.characters.get(transmission.delivered..upto).unwrap_or_default();
+        let piece = self.master.errors.read(heard);
         transmission.delivered = upto;
-        let is_over = upto == transmission.bytes.len();
+        let is_over = upto == transmission.characters.len();
+        // Nobody can hear a character before it is handed over, so a late hand-over is a later end.
+        let ends = on_the_wire.unwrap_or(now).max(now);
         if !transmission.echo {
-            // Nobody can hear a character before it is handed over, so a late hand-over is a later end.
-            let ends = (transmission.start + wire_time).max(now);
             self.quiet_since = self.quiet_since.max(Some(ends));
             line.stats.last = line.stats.last.max(Some(ends));
             line.stats.characters_out += count_of(piece.len());
@@ -144,8 +161,23 @@ impl Wire {
             && let Some(transmission) = self.transmissions.remove(index)
             && !transmission.echo
         {
-            line.answered(transmission.slave, (transmission.start + wire_time).max(now));
+            line.answered(transmission.slave, ends);
         }
         piece
     }
+}
+
+/// What the faults that only see characters make of a frame.
+fn garble(mut bytes: Vec<u8>, dialect: Dialect, line: &mut State) -> Vec<u8> {
+    if let Some(random) = line.faults.strikes(Fault::Flipped) {
+        flip(&mut bytes, dialect.settings.format().data_bits(), random);
+    }
+    if let Some(random) = line.faults.strikes(Fault::Truncated) {
+        bytes.truncate(random.usize(0..bytes.len().max(1)));
+    }
+    if let Some(random) = line.faults.strikes(Fault::Noise) {
+        let noise = random.usize(1..=4);
+        bytes.splice(0..0, std::iter::repeat_with(|| random.u8(..)).take(noise));
+    }
+    bytes
 }

@@ -11,10 +11,12 @@ fn wire(baud: u32, delivery: Delivery) -> (Wire, State, Instant) {
     let settings = SerialSettings::new(baud, CharacterFormat::F8E1).unwrap();
     let now = Instant::now();
     let mut line = State::default();
-    let mut slave = Slave::new(Box::new(Atv312::under_bus_control()), 1, now, line.counters());
+    let dialect = Dialect { settings, ..Dialect::default() };
+    let drive = Box::new(Atv312::under_bus_control());
+    let mut slave = Slave::new(drive, 1, dialect, now, line.counters(dialect));
     slave.set_turnaround(Some(TURNAROUND));
-    assert!(line.add(1, slave));
-    (Wire::new(settings, Pacing::Simulated, delivery, Box::new(rtu::Rtu::default())), line, now)
+    line.add(1, slave);
+    (Wire::new(dialect, Pacing::Simulated, delivery), line, now)
 }
 
 /// Reads the status word.
@@ -41,9 +43,9 @@ fn an_answer_ends_after_request_turnaround_and_answer_to_the_nanosecond() {
 fn in_pieces_each_is_due_with_its_last_bit() {
     let (mut wire, mut line, now) = wire(19_200, Delivery::Pieces(3));
     wire.receive(now, &request(), &mut line);
-    let begins = now + wire.settings.characters(8) + TURNAROUND;
+    let begins = now + wire.master.settings.characters(8) + TURNAROUND;
     for (characters, length) in [(3, 3), (6, 3), (7, 1)] {
-        let due = begins + wire.settings.characters(characters);
+        let due = begins + wire.master.settings.characters(characters);
         assert_eq!(wire.poll(now, &mut line), Step::Wait(Some(due)));
         let Step::Send(piece) = wire.poll(due, &mut line) else { panic!("nothing is sent") };
         assert_eq!(piece.len(), length);
@@ -57,7 +59,7 @@ fn a_silence_of_t3_5_is_kept_and_one_nanosecond_less_is_not() {
         wire.receive(now, &request(), &mut line);
         let Step::Wait(Some(due)) = wire.poll(now, &mut line) else { panic!("nothing is due") };
         assert!(matches!(wire.poll(due, &mut line), Step::Send(_)));
-        let next = due + wire.settings.t3_5() - Duration::from_nanos(missing);
+        let next = due + wire.master.settings.t3_5() - Duration::from_nanos(missing);
         wire.receive(next, &request(), &mut line);
         assert_eq!(line.stats.violations, violations);
         assert_eq!(line.stats.requests, 2);
@@ -72,6 +74,6 @@ fn an_answer_that_is_handed_over_late_begins_the_silence_late() {
     let late = due + Duration::from_millis(1);
     assert!(matches!(wire.poll(late, &mut line), Step::Send(_)));
     assert_eq!(line.stats.lag, Duration::from_millis(1));
-    wire.receive(due + wire.settings.t3_5(), &request(), &mut line);
+    wire.receive(due + wire.master.settings.t3_5(), &request(), &mut line);
     assert_eq!(line.stats.violations, 1);
 }

@@ -20,9 +20,14 @@ fn line() -> SimLine {
 
 #[cfg(unix)]
 mod pty {
-    use std::{fs, path::PathBuf};
+    use std::{
+        fs,
+        path::{Path, PathBuf},
+    };
 
-    use tokio_serial::SerialPortBuilderExt;
+    use drive_core::SerialSettings;
+    use drive_sim::Dialect;
+    use tokio_serial::{Parity, SerialPortBuilderExt, SerialStream};
 
     use super::*;
 
@@ -53,13 +58,36 @@ mod pty {
         let line = SimLine::default();
         line.add(1, Small::new()).unwrap();
         let _serving = line.serve_pty(&link).unwrap();
-        let mut port = tokio_serial::new(link.to_str().unwrap(), 19_200).open_native_async().unwrap();
+        let mut port = at(&link, "19200 8E1");
         for _ in 0..10 {
             whole(&mut port, &read(1, KEEP.address(), 1), 7).await;
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
         assert_eq!(line.violations(), []);
         assert!(line.stats().ideal > Duration::from_millis(150));
+    }
+
+    #[tokio::test]
+    async fn a_master_that_sets_another_speed_or_parity_is_misheard_until_it_sets_the_slaves() {
+        let link = link("misheard");
+        let line = SimLine::default();
+        let own = |text: &str| Dialect { settings: text.parse().unwrap(), ..Dialect::default() };
+        for (address, text) in [(1, "19200 8E1"), (2, "9600 8N1"), (3, "19200 8O1")] {
+            line.add(address, Small::new()).unwrap().set_dialect(own(text));
+        }
+        let _serving = line.serve_pty(&link).unwrap();
+        let request = |address| read(address, KEEP.address(), 1);
+        for (text, address) in [("19200 8E1", 1), ("9600 8N1", 2), ("19200 8O1", 3), ("19200 8E1", 1)] {
+            let mut port = at(&link, text);
+            for other in (1..=3).filter(|other| *other != address) {
+                // Nobody takes it; whoever hears noise takes it for a frame's end a silence later.
+                port.write_all(&request(other)).await.unwrap();
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+            whole(&mut port, &request(address), 7).await;
+        }
+        let taken = [1, 2, 3].map(|address| line.slave(address).unwrap().requests(3));
+        assert_eq!(taken, [2, 1, 1]);
     }
 
     #[tokio::test]
@@ -80,7 +108,19 @@ mod pty {
         assert_eq!(fs::read_link(&link).unwrap(), PathBuf::from(serving.device().unwrap()));
     }
 
-    async fn whole(port: &mut tokio_serial::SerialStream, request: &[u8], length: usize) -> Vec<u8> {
+    /// Opens the port as a program does that uses a serial port library.
+    fn at(link: &Path, settings: &str) -> SerialStream {
+        let settings: SerialSettings = settings.parse().unwrap();
+        let parity = match settings.format().parity() {
+            drive_core::serial::Parity::None => Parity::None,
+            drive_core::serial::Parity::Even => Parity::Even,
+            drive_core::serial::Parity::Odd => Parity::Odd,
+        };
+        let port = tokio_serial::new(link.to_str().unwrap(), settings.baud()).parity(parity);
+        port.open_native_async().unwrap()
+    }
+
+    async fn whole(port: &mut SerialStream, request: &[u8], length: usize) -> Vec<u8> {
         port.write_all(request).await.unwrap();
         let mut answer = vec![0; length];
         tokio::time::timeout(PATIENCE, port.read_exact(&mut answer)).await.unwrap().unwrap();

@@ -2,6 +2,7 @@
 
 mod ascii;
 mod control;
+mod dialects;
 mod endpoints;
 mod faults;
 mod fuzz;
