@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, capture, check, demo, explain, export, families, faults, init, param, plan, poll, release,
-        reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
+        audit, capture, check, completions, demo, explain, export, families, faults, init, param, plan, poll,
+        release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -24,6 +24,7 @@ The running daemon: all these without --line and with the names of its drives; w
 One line, read:     scan, poll; init writes a configuration from a scan
 What went over it:  capture, explain
 The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
+Your shell:         completions, for subcommands, options, and the names of drives and parameters
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
 tcp://HOST:PORT. Speed and format are the drives' factory setting when they are not given; PROTOCOL is rtu, ascii or \
@@ -62,6 +63,7 @@ pub(crate) enum Command {
     Param(param::Command),
     Families(families::Args),
     Export(export::Args),
+    Completions(completions::Args),
     Watch(watch::Args),
     Reload(reload::Args),
     #[command(subcommand)]
@@ -104,6 +106,7 @@ impl Command {
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
             Self::Export(args) => export::run(&args),
+            Self::Completions(args) => completions::run(args).await,
             Self::Watch(args) => watch::run(args).await,
             Self::Reload(args) => reload::run(args).await,
             Self::Token(command) => token::run(command),

@@ -3,6 +3,7 @@
 pub(crate) mod audit;
 pub(crate) mod capture;
 pub(crate) mod check;
+pub(crate) mod completions;
 pub(crate) mod demo;
 pub(crate) mod explain;
 pub(crate) mod export;
