@@ -3,6 +3,7 @@
 
 mod bank;
 mod control;
+mod defects;
 mod fault;
 mod framing;
 mod habits;
@@ -23,6 +24,7 @@ mod world;
 
 pub use bank::{Bank, Refusal};
 pub use control::ControlError;
+pub use defects::{Defects, Interference, Noise, Rest, SecondMaster};
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use habits::{HeaderForm, LinkHabits, Unacknowledged};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};

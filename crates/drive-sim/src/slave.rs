@@ -74,6 +74,7 @@ pub(crate) struct Slave {
     turnaround: Option<Duration>,
     /// The end of its last answer, or of a request to all.
     pause_from: Option<Instant>,
+    deaf_for: Duration,
     habits: LinkHabits,
     busy_until: Option<Instant>,
     connected: bool,
@@ -103,6 +104,7 @@ impl Slave {
             delimiter: LINE_FEED,
             turnaround: None,
             pause_from: None,
+            deaf_for: Duration::ZERO,
             habits: LinkHabits::default(),
             busy_until: None,
             connected: true,
@@ -309,6 +311,17 @@ impl Slave {
     /// Something ended after which the slave needs its pause.
     pub(crate) const fn pause_from(&mut self, at: Instant) {
         self.pause_from = Some(at);
+    }
+
+    /// Whether it does not hear a frame that began at this moment, because it is still busy with its last answer.
+    pub(crate) fn is_deaf(&self, began: Option<Instant>) -> bool {
+        let deaf_until =
+            self.pause_from.map(|from| from + self.deaf_for).filter(|_| !self.deaf_for.is_zero());
+        began.zip(deaf_until).is_some_and(|(began, until)| began < until)
+    }
+
+    pub(crate) const fn set_deaf_for(&mut self, pause: Duration) {
+        self.deaf_for = pause;
     }
 
     /// How a frame that began at this moment broke the slave's pause, if it did.

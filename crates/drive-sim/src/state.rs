@@ -6,6 +6,7 @@ use fastrand::Rng;
 use tokio::time::Instant;
 
 use crate::{
+    defects::Defective,
     fault::Faults,
     model::{Cast, Damage, Dialect},
     record::{Breach, KEPT, LineStats, Violation},
@@ -32,6 +33,7 @@ pub(crate) struct State {
     /// For an endpoint to send.
     released: Vec<Released>,
     pub(crate) faults: Faults,
+    pub(crate) defective: Defective,
     pub(crate) stats: LineStats,
     pub(crate) violations: VecDeque<Violation>,
     /// When the frame that is being received began, on a line where silences count.
@@ -118,7 +120,10 @@ impl State {
     ) -> Vec<Speech> {
         self.good_frame();
         self.check_pauses(at, address);
-        let sees_end = |slave: &Slave| delimiter.is_none_or(|delimiter| delimiter == slave.delimiter());
+        let began = self.frame_began;
+        let sees_end = |slave: &Slave| {
+            delimiter.is_none_or(|delimiter| delimiter == slave.delimiter()) && !slave.is_deaf(began)
+        };
         if address == BROADCAST {
             self.stats.broadcasts += 1;
         }

@@ -96,6 +96,12 @@ impl SimSlave {
         self.order(|slave, _| slave.set_turnaround(turnaround));
     }
 
+    /// Makes it deaf for this long after each of its answers: a request that begins sooner it does not hear. Zero: it hears
+    /// every one.
+    pub fn set_deaf_for(&self, pause: Duration) {
+        self.order(|slave, _| slave.set_deaf_for(pause));
+    }
+
     /// Changes what it does on a UNI-TELWAY line where the card's manual says nothing; in the other protocols it has no
     /// effect.
     pub fn set_link_habits(&self, habits: LinkHabits) {

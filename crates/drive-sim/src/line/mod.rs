@@ -14,6 +14,7 @@ use tokio::{sync::watch, time::Instant};
 pub use handle::SimSlave;
 
 use crate::{
+    defects::{Defective, Defects},
     fault::{Fault, Faults, PerMillion},
     model::{Dialect, Model, Protocol},
     record::{LineStats, Violation},
@@ -213,6 +214,12 @@ impl SimLine {
     /// Changes by how much a late answer is late.
     pub fn set_lateness(&self, lateness: Duration) {
         self.shared.lock().faults.set_lateness(lateness);
+    }
+
+    /// Gives the line these defects from now on, and takes away those that it had.
+    pub fn set_defects(&self, defects: Defects) {
+        self.shared.lock().defective = Defective::new(defects, Instant::now());
+        self.shared.wake.send_replace(());
     }
 
     /// How often a fault has struck.

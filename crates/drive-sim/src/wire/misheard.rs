@@ -11,6 +11,8 @@ use drive_core::{
     serial::{CharacterFormat, Parity},
 };
 
+use crate::defects::{Polarity, Rest};
+
 /// A character as a listener hears it. Times are in bits of the speaker, from the start of its first character.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Character {
@@ -23,7 +25,17 @@ pub(super) struct Character {
 
 /// What a listener hears of characters that follow each other without a pause, between two silences.
 pub(super) fn heard(bytes: &[u8], speaker: SerialSettings, listener: SerialSettings) -> Vec<Character> {
-    let wave = Wave { bytes, format: speaker.format() };
+    heard_as(Polarity::Right, bytes, speaker, listener)
+}
+
+/// The same where the wires may be swapped between the two.
+pub(super) fn heard_as(
+    polarity: Polarity,
+    bytes: &[u8],
+    speaker: SerialSettings,
+    listener: SerialSettings,
+) -> Vec<Character> {
+    let wave = Wave { bytes, format: speaker.format(), polarity };
     let format = listener.format();
     // The bit of the speaker that the listener looks at in the middle of its own bit number so many after an edge.
     let (speed, own) = (u64::from(speaker.baud()), u64::from(listener.baud()));
@@ -53,10 +65,20 @@ pub(super) fn heard(bytes: &[u8], speaker: SerialSettings, listener: SerialSetti
 struct Wave<'a> {
     bytes: &'a [u8],
     format: CharacterFormat,
+    polarity: Polarity,
 }
 
 impl Wave<'_> {
     fn is_high(&self, bit: u32) -> bool {
+        let is_over = u64::from(bit) >= self.bytes.len() as u64 * u64::from(self.format.bits());
+        match self.polarity {
+            Polarity::Right => self.is_high_as_sent(bit),
+            Polarity::Swapped(rest) if is_over => rest == Rest::High,
+            Polarity::Swapped(_) => !self.is_high_as_sent(bit),
+        }
+    }
+
+    fn is_high_as_sent(&self, bit: u32) -> bool {
         let width = self.format.bits();
         let byte = usize::try_from(bit / width).ok().and_then(|index| self.bytes.get(index));
         let (Some(&byte), data) = (byte, u32::from(self.format.data_bits())) else { return true };
@@ -165,6 +187,22 @@ mod tests {
     #[test]
     fn eight_bits_without_parity_hear_the_parity_of_seven_as_their_highest_bit() {
         assert_eq!(hears("9600 8N1", "9600 7E1", &[0x01, 0x03]), [(0x81, true), (0x03, true)]);
+    }
+
+    /// Upside down 55h is H L H L H L H L H L: a start at its second bit, H L H L H L H L for data, and what the line is at
+    /// rest for a stop bit. 00h is nine high bits and a low stop bit: a start, and what the
+    /// line is at rest for all that follows.
+    #[test]
+    fn on_swapped_wires_a_character_is_heard_upside_down_from_its_first_low_bit_on() {
+        let hears = |rest, byte| {
+            let polarity = Polarity::Swapped(rest);
+            let characters = heard_as(polarity, &[byte], at("9600 8N1"), at("9600 8N1"));
+            characters.into_iter().map(|character| (character.byte, character.intact)).collect::<Vec<_>>()
+        };
+        assert_eq!(hears(Rest::High, 0x55), [(0x55, true)]);
+        assert_eq!(hears(Rest::Low, 0x55), [(0x55, false)]);
+        assert_eq!(hears(Rest::High, 0x00), [(0xFF, true)]);
+        assert_eq!(hears(Rest::Low, 0x00), [(0x00, false)]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The wire: which character is on it when, who speaks, and what rule is broken. No clock and no I/O: `now` is an
 //! argument.
 
+mod disturb;
 mod ear;
 mod misheard;
 mod speak;
@@ -13,7 +14,7 @@ use tokio::time::Instant;
 
 use self::{
     ear::Ear,
-    transmission::{Overlap, Transmission},
+    transmission::{Kind, Overlap, Transmission},
 };
 
 pub(crate) use self::ear::{Errors, Master};
@@ -74,6 +75,10 @@ pub(crate) struct Wire {
     transmissions: VecDeque<Transmission>,
     /// What slaves have to say, and by which ear they have heard what they answer.
     speech: Vec<(usize, Speech)>,
+    /// Up to when noise on the idle wire was heard.
+    noise_until: Option<Instant>,
+    /// When the master last saw the line fall low because nobody drives it.
+    fell_low: Option<Instant>,
 }
 
 impl Wire {
@@ -87,6 +92,8 @@ impl Wire {
             quiet_since: None,
             transmissions: VecDeque::new(),
             speech: Vec::new(),
+            noise_until: None,
+            fell_low: None,
         }
     }
 
@@ -119,6 +126,7 @@ impl Wire {
         line.stats.first.get_or_insert(begins);
         let mut heard = bytes.to_vec();
         self.disturb(begins, &mut heard, line);
+        self.disturb_request(begins, &mut heard, line);
         self.collide(begins, &mut heard, line);
         self.hear(&heard, line);
         // Without time there is no silence to wait for: a frame of unknown length ends with what came at once.
@@ -139,14 +147,15 @@ impl Wire {
         }
         let pacing = self.pacing;
         self.end_frames(line, |ear| ear.silence_due(pacing).is_some_and(|due| due <= now));
-        if let Some((index, end, due)) = self.next_delivery()
+        let others_due = self.others(now, line);
+        if let Some((index, end, due)) = self.next_delivery(line)
             && due <= now
         {
             return Step::Send(self.deliver(index, end, due, now, line));
         }
-        let delivery_due = self.next_delivery().map(|(_, _, due)| due);
+        let delivery_due = self.next_delivery(line).map(|(_, _, due)| due);
         let silences = self.ears.iter().filter_map(|ear| ear.silence_due(self.pacing));
-        Step::Wait(silences.chain(delivery_due).min())
+        Step::Wait(silences.chain(delivery_due).chain(others_due).min())
     }
 
     /// t3.5 between frames that are spoken so.
@@ -226,7 +235,8 @@ impl Wire {
         let is_alike = ear.dialect.settings == settings;
         let at = |bits: u32| if pacing == Pacing::None { start } else { start + settings.bits(bits) };
         line.reached = Some(ear.dialect);
-        for character in misheard::heard(bytes, settings, ear.dialect.settings) {
+        let polarity = line.defective.polarity();
+        for character in misheard::heard_as(polarity, bytes, settings, ear.dialect.settings) {
             let (begins, ends) = (at(character.begins), at(character.ends));
             if ear.framing.is_between_frames() {
                 ear.characters = 0;
@@ -267,7 +277,7 @@ impl Wire {
                 takes: self.time(heard.len(), settings),
                 delivered: 0,
                 late: false,
-                echo: true,
+                kind: Kind::Echo,
             });
         }
         if let Some(random) = line.faults.strikes(Fault::RequestFlipped) {
@@ -286,7 +296,7 @@ impl Wire {
         let settings = self.master.settings;
         let ends = begins + self.time(heard.len(), settings);
         let mut hit = None;
-        for transmission in self.transmissions.iter_mut().filter(|transmission| !transmission.echo) {
+        for transmission in self.transmissions.iter_mut().filter(|transmission| !transmission.is_echo()) {
             let overlap = Overlap::of(transmission, begins, ends);
             if let Some(overlap) = overlap {
                 hit = hit.or(Some((transmission.slave, transmission.late)));

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::{
     Delivery, Pacing, Wire, count_of, misheard,
-    transmission::{Overlap, Transmission},
+    transmission::{Kind, Overlap, Transmission},
 };
 use crate::{
     fault::{Fault, flip},
@@ -86,14 +86,27 @@ impl Wire {
     ) {
         line.stats.answers += 1;
         let takes = self.time(bytes.len(), dialect.settings);
-        let characters = misheard::heard(bytes, dialect.settings, self.master.settings);
+        let polarity = line.defective.polarity();
+        let characters = misheard::heard_as(polarity, bytes, dialect.settings, self.master.settings);
+        let kind = Kind::Answer;
         let mut transmission =
-            Transmission { slave, dialect, start, characters, takes, delivered: 0, late, echo: false };
+            Transmission { slave, dialect, start, characters, takes, delivered: 0, late, kind };
+        self.disturb_answer(&mut transmission, line);
+        self.put(transmission, line);
+    }
+
+    /// Puts something on the wire, and damages it and what others send at the same time.
+    pub(super) fn put(&mut self, mut transmission: Transmission, line: &mut State) {
+        let (start, ends) = (transmission.start, transmission.start + transmission.takes);
         if self.pacing == Pacing::Simulated {
-            for other in self.transmissions.iter_mut().filter(|other| !other.echo) {
-                if let Some(overlap) = Overlap::of(other, start, start + takes) {
+            for other in self.transmissions.iter_mut().filter(|other| !other.is_echo()) {
+                if let Some(overlap) = Overlap::of(other, start, ends) {
                     line.stats.slave_collisions += 1;
                     if other.merge(&transmission) {
+                        return;
+                    }
+                    if other.is_of_the_same_address(&transmission) {
+                        other.speak_over(&transmission, overlap);
                         return;
                     }
                     other.damage(overlap);
@@ -101,15 +114,21 @@ impl Wire {
                 }
             }
         }
-        if !bytes.is_empty() {
+        if !transmission.characters.is_empty() || !transmission.takes.is_zero() {
             self.transmissions.push_back(transmission);
         }
     }
 
     /// The transmission that has something to deliver first: its index, up to which character, and when.
-    pub(super) fn next_delivery(&self) -> Option<(usize, usize, Instant)> {
+    pub(super) fn next_delivery(&self, line: &State) -> Option<(usize, usize, Instant)> {
         let next = |(index, transmission): (usize, &Transmission)| {
             let whole = transmission.characters.len();
+            let first = (transmission.delivered + 1).min(whole);
+            if let Some(handed_over) = line.defective.handed_over(self.ends(transmission, first)) {
+                let arrived =
+                    (first..=whole).take_while(|&upto| self.ends(transmission, upto) <= handed_over);
+                return (index, arrived.last().unwrap_or(whole), handed_over);
+            }
             let upto = match self.delivery {
                 Delivery::Whole => whole,
                 Delivery::Pieces(size) => (transmission.delivered + size.max(1)).min(whole),
@@ -151,17 +170,23 @@ impl Wire {
         let is_over = upto == transmission.characters.len();
         // Nobody can hear a character before it is handed over, so a late hand-over is a later end.
         let ends = on_the_wire.unwrap_or(now).max(now);
-        if !transmission.echo {
+        if !transmission.is_echo() {
             self.quiet_since = self.quiet_since.max(Some(ends));
             line.stats.last = line.stats.last.max(Some(ends));
             line.stats.characters_out += count_of(piece.len());
             line.stats.lag += if is_over { now.saturating_duration_since(due) } else { Duration::ZERO };
         }
-        if is_over
-            && let Some(transmission) = self.transmissions.remove(index)
-            && !transmission.echo
-        {
-            line.answered(transmission.slave, ends);
+        if is_over && let Some(transmission) = self.transmissions.remove(index) {
+            match transmission.kind {
+                Kind::Answer => line.answered(transmission.slave, ends),
+                Kind::Request { sent, pdu } if sent == transmission.characters => {
+                    (line.reached, line.frame_began) = (Some(transmission.dialect), Some(transmission.start));
+                    let at = on_the_wire.unwrap_or(now);
+                    let said = line.request(at, transmission.slave, &pdu);
+                    self.speech.extend(said.into_iter().map(|speech| (0, speech)));
+                }
+                Kind::Request { .. } | Kind::Echo | Kind::Noise => {}
+            }
         }
         piece
     }

@@ -19,11 +19,33 @@ pub(super) struct Transmission {
     pub(super) takes: Duration,
     pub(super) delivered: usize,
     pub(super) late: bool,
-    /// The adapter's echo of the master's own characters: it is no use of the line.
-    pub(super) echo: bool,
+    pub(super) kind: Kind,
+}
+
+/// Whose characters these are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A slave's.
+    Answer,
+    /// The adapter's echo of the master's own: it is no use of the line.
+    Echo,
+    /// Nobody's.
+    Noise,
+    /// A second master's: this PDU, if it arrives as it was sent.
+    Request { sent: Vec<Character>, pdu: Vec<u8> },
 }
 
 impl Transmission {
+    pub(super) fn is_echo(&self) -> bool {
+        self.kind == Kind::Echo
+    }
+
+    /// Whether it is another answer in the name of the same slave, to the same request.
+    pub(super) fn is_of_the_same_address(&self, other: &Self) -> bool {
+        let answers = |one: &Self| one.kind == Kind::Answer && !one.late;
+        answers(self) && answers(other) && (self.slave, self.dialect) == (other.slave, other.dialect)
+    }
+
     /// Inverts the characters that fall into a span and are not yet delivered.
     pub(super) fn damage(&mut self, overlap: Overlap) {
         let (start, settings) = (self.start, self.dialect.settings);
@@ -51,6 +73,24 @@ impl Transmission {
         self.characters.extend_from_slice(other.characters.get(self.characters.len()..).unwrap_or_default());
         self.takes = self.takes.max(other.takes);
         true
+    }
+
+    /// Takes in what another slave with the same address begins to say while this one speaks: one UART hears them, nothing
+    /// whole from there on, and no more characters than there is time for.
+    pub(super) fn speak_over(&mut self, other: &Self, overlap: Overlap) {
+        self.damage(overlap);
+        let (over, settings) = (self.start + self.takes, other.dialect.settings);
+        let shift = other.start.saturating_duration_since(self.start);
+        let bits = u32::try_from(shift.as_nanos() / settings.bits(1).as_nanos().max(1)).unwrap_or(u32::MAX);
+        let behind =
+            other.characters.iter().filter(|character| other.start + settings.bits(character.begins) >= over);
+        self.characters.extend(behind.map(|character| Character {
+            byte: !character.byte,
+            begins: character.begins.saturating_add(bits),
+            ends: character.ends.saturating_add(bits),
+            intact: character.intact,
+        }));
+        self.takes = self.takes.max(shift + other.takes);
     }
 }
 
