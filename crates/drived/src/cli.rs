@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, capture, check, completions, demo, explain, export, families, faults, init, param, plan, poll,
-        release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
+        audit, capture, check, completions, demo, explain, export, families, faults, init, monitor, param,
+        plan, poll, release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -20,8 +20,8 @@ To try it:          demo; or sim in one terminal and poll, status, start in anot
 Before wiring:      families, plan
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
-The running daemon: all these without --line and with the names of its drives; watch, reload
-One line, read:     scan, poll; init writes a configuration from a scan
+The running daemon: all these without --line and with the names of its drives; watch, monitor, reload
+One line, read:     scan, poll, monitor; init writes a configuration from a scan
 What went over it:  capture, explain
 The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
@@ -65,6 +65,7 @@ pub(crate) enum Command {
     Export(export::Args),
     Completions(completions::Args),
     Watch(watch::Args),
+    Monitor(monitor::Args),
     Reload(reload::Args),
     #[command(subcommand)]
     Token(token::Command),
@@ -108,6 +109,7 @@ impl Command {
             Self::Export(args) => export::run(&args),
             Self::Completions(args) => completions::run(args).await,
             Self::Watch(args) => watch::run(args).await,
+            Self::Monitor(args) => monitor::run(args).await,
             Self::Reload(args) => reload::run(args).await,
             Self::Token(command) => token::run(command),
             Self::Audit(command) => audit::run(command),

@@ -30,6 +30,7 @@ mod page;
 mod plant;
 mod replaced_file;
 mod run;
+mod screen;
 mod signals;
 mod simulated;
 mod sparkplug;

@@ -132,6 +132,46 @@ impl Wishes {
     }
 }
 
+/// Hears Ctrl-Z, so that the terminal is given back before the program stands still.
+#[cfg(unix)]
+pub(crate) struct Suspending(tokio::signal::unix::Signal);
+
+#[cfg(unix)]
+impl Suspending {
+    pub(crate) fn listen() -> Result<Self, Failure> {
+        use tokio::signal::unix::{SignalKind, signal};
+        let kind = SignalKind::from_raw(rustix::process::Signal::TSTP.as_raw());
+        signal(kind).map(Self).map_err(|error| cannot_listen(&error))
+    }
+
+    /// Waits until somebody asks. Safe to drop.
+    pub(crate) async fn asked(&mut self) {
+        self.0.recv().await;
+    }
+
+    /// Stands still until somebody lets it go on.
+    pub(crate) fn suspend(&self) {
+        // One that cannot be suspended goes on at once.
+        let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::STOP);
+    }
+}
+
+#[cfg(not(unix))]
+pub(crate) struct Suspending;
+
+#[cfg(not(unix))]
+impl Suspending {
+    pub(crate) fn listen() -> Result<Self, Failure> {
+        Ok(Self)
+    }
+
+    pub(crate) async fn asked(&mut self) {
+        std::future::pending().await
+    }
+
+    pub(crate) fn suspend(&self) {}
+}
+
 /// Whether the program has a terminal. A daemon has none, and one that was closed is none any more.
 #[cfg(unix)]
 fn has_terminal() -> bool {

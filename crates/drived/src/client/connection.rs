@@ -1,12 +1,13 @@
 //! A connection to the daemon, and its answers.
 
 use std::{
-    io,
+    fmt, io,
     path::{Path, PathBuf},
     time::Duration,
 };
 
 use axum::{
+    Router,
     body::Bytes,
     http::{Request, Response, StatusCode, header},
 };
@@ -14,22 +15,41 @@ use http_body_util::{BodyExt as _, Full};
 use hyper::{
     body::Incoming,
     client::conn::http1::{self, SendRequest},
+    server::conn::http1 as server,
 };
-use hyper_util::rt::TokioIo;
+use hyper_util::{rt::TokioIo, service::TowerToHyperService};
 use serde_json::Value;
-use tokio::time::timeout;
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    time::timeout,
+};
 
 use crate::failure::Failure;
 
 /// How long the daemon may take to begin an answer: it waits itself for what it is asked to.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
+/// How much of what this program serves itself waits for its reader.
+const PIPE: usize = 64 << 10;
 
 /// A connection to the daemon.
 pub(crate) struct Daemon {
     sender: SendRequest<Full<Bytes>>,
-    token: Option<String>,
-    socket: PathBuf,
     pid: Option<i32>,
+    way: Way,
+}
+
+/// The way to a daemon, for one connection after the other.
+#[derive(Clone)]
+pub(crate) struct Way {
+    place: Place,
+    token: Option<String>,
+}
+
+#[derive(Clone)]
+enum Place {
+    Socket(PathBuf),
+    /// This program itself.
+    Here(Router),
 }
 
 /// What the daemon answered.
@@ -77,8 +97,9 @@ impl Daemon {
         let places = socket.map_or_else(crate::doors::usual_places, |socket| vec![socket.to_owned()]);
         let mut why = None;
         for place in places {
-            match open(&place).await {
-                Ok((sender, pid)) => return Ok(Self { sender, token, socket: place, pid }),
+            let way = Way { place: Place::Socket(place.clone()), token: token.clone() };
+            match open(&way.place).await {
+                Ok((sender, pid)) => return Ok(Self { sender, pid, way }),
                 // The one that was expected first says why.
                 Err(error) => why = why.or(Some((place, error))),
             }
@@ -98,6 +119,11 @@ impl Daemon {
             }
             _ => format!("no daemon can be reached at {}: {error}: {what_to_do}", place.display()),
         }))
+    }
+
+    /// The way to it.
+    pub(crate) const fn way(&self) -> &Way {
+        &self.way
     }
 
     /// Whose it is, as the system knows.
@@ -144,7 +170,7 @@ impl Daemon {
         if body.is_some() {
             request = request.header(header::CONTENT_TYPE, "application/json");
         }
-        if let Some(token) = &self.token {
+        if let Some(token) = &self.way.token {
             request = request.header(header::AUTHORIZATION, format!("Bearer {token}"));
         }
         let body = body.map(Value::to_string).unwrap_or_default();
@@ -152,38 +178,77 @@ impl Daemon {
         let request = request.map_err(|error| Failure::Input(error.to_string()))?;
         // The connection may have been idle for as long as the daemon allows.
         if self.sender.ready().await.is_err() {
-            let opened = open(&self.socket).await;
+            let opened = open(&self.way.place).await;
             (self.sender, self.pid) = opened.map_err(|error| self.lost(&error))?;
         }
         match timeout(ANSWERED_WITHIN, self.sender.send_request(request)).await {
             Ok(answer) => answer.map_err(|error| self.lost(&error)),
             Err(_) => Err(Failure::Drive(format!(
-                "the daemon at {} gave no answer in time: nobody knows what became of it",
-                self.socket.display()
+                "{} gave no answer in time: nobody knows what became of it",
+                self.way
             ))),
         }
     }
 
     fn lost(&self, error: &dyn std::fmt::Display) -> Failure {
-        Failure::Drive(format!(
-            "the daemon at {} has gone: {error}: read the state before you ask again",
-            self.socket.display()
-        ))
+        Failure::Drive(format!("{} has gone: {error}: read the state before you ask again", self.way))
+    }
+}
+
+impl Way {
+    /// The way to what this program itself serves.
+    pub(crate) const fn here(router: Router) -> Self {
+        Self { place: Place::Here(router), token: None }
+    }
+
+    /// Connects once more.
+    pub(crate) async fn connect(&self) -> Result<Daemon, Failure> {
+        match open(&self.place).await {
+            Ok((sender, pid)) => Ok(Daemon { sender, pid, way: self.clone() }),
+            Err(error) => Err(Failure::Drive(format!("{self} cannot be reached: {error}"))),
+        }
+    }
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.place {
+            Place::Socket(socket) => write!(f, "the daemon at {}", socket.display()),
+            Place::Here(_) => f.write_str("this program"),
+        }
+    }
+}
+
+async fn open(place: &Place) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
+    match place {
+        Place::Socket(socket) => open_socket(socket).await,
+        Place::Here(router) => {
+            let (ours, theirs) = tokio::io::duplex(PIPE);
+            let service = TowerToHyperService::new(router.clone());
+            tokio::spawn(server::Builder::new().serve_connection(TokioIo::new(theirs), service));
+            Ok((over(ours).await?, None))
+        }
     }
 }
 
 #[cfg(unix)]
-async fn open(socket: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
+async fn open_socket(socket: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
     let stream = tokio::net::UnixStream::connect(socket).await?;
     let pid = stream.peer_cred().ok().and_then(|daemon| daemon.pid());
-    let (sender, connection) = http1::handshake(TokioIo::new(stream)).await.map_err(io::Error::other)?;
-    tokio::spawn(connection);
-    Ok((sender, pid))
+    Ok((over(stream).await?, pid))
 }
 
 #[cfg(not(unix))]
-async fn open(_: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
+async fn open_socket(_: &Path) -> io::Result<(SendRequest<Full<Bytes>>, Option<i32>)> {
     Err(io::Error::from(io::ErrorKind::NotFound))
+}
+
+async fn over(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+) -> io::Result<SendRequest<Full<Bytes>>> {
+    let (sender, connection) = http1::handshake(TokioIo::new(stream)).await.map_err(io::Error::other)?;
+    tokio::spawn(connection);
+    Ok(sender)
 }
 
 #[cfg(all(test, unix))]

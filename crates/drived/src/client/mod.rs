@@ -10,12 +10,12 @@ mod watch;
 use std::path::PathBuf;
 
 pub(crate) use self::{
-    connection::{Answer, Daemon},
+    connection::{Answer, Daemon, Way},
     holder::explain,
     names::{Target, path_of},
     order::{Told, order},
-    show::{faults, overview, registers, whole},
-    watch::watch,
+    show::{faults, measurement, overview, registers, status_in_words, whole},
+    watch::{Frames, watch},
 };
 use crate::{failure::Failure, output};
 

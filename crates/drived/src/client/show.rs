@@ -102,8 +102,8 @@ pub(crate) fn whole(drive: &Value, all: bool) -> Result<(), Failure> {
     row("watchdog", drive["watchdog"]["check"].as_str().map(words));
     if all {
         for (key, value) in drive["measurements"].as_object().into_iter().flatten() {
-            let label = if key == "age_ms" { "measured".to_owned() } else { words(key_without_unit(key).0) };
-            row(&label, measured(key, value));
+            let (label, value) = measurement(key, value);
+            row(&label, value);
         }
     }
     output::say_table(table)?;
@@ -251,6 +251,12 @@ fn key_without_unit(key: &str) -> (&str, &str) {
     ];
     let unit = UNITS.iter().find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, *unit)));
     unit.unwrap_or((key, ""))
+}
+
+/// A measurement's label and its value in its unit; no value where it is none for a person.
+pub(crate) fn measurement(key: &str, value: &Value) -> (String, Option<String>) {
+    let label = if key == "age_ms" { "measured".to_owned() } else { words(key_without_unit(key).0) };
+    (label, measured(key, value))
 }
 
 fn measured(key: &str, value: &Value) -> Option<String> {

@@ -60,7 +60,7 @@ fn text(name: &str, data: &Value, shown: &mut BTreeMap<String, String>) -> Optio
 
 /// Bytes of a stream of server-sent events, until they are whole.
 #[derive(Default)]
-struct Frames {
+pub(crate) struct Frames {
     rest: Vec<u8>,
     event: String,
     data: String,
@@ -68,7 +68,7 @@ struct Frames {
 
 impl Frames {
     /// The events that are whole with these bytes.
-    fn take(&mut self, bytes: &[u8]) -> Vec<(String, Value)> {
+    pub(crate) fn take(&mut self, bytes: &[u8]) -> Vec<(String, Value)> {
         self.rest.extend_from_slice(bytes);
         let mut whole = Vec::new();
         while let Some(end) = self.rest.iter().position(|byte| *byte == b'\n') {

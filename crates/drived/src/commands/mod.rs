@@ -10,6 +10,7 @@ pub(crate) mod export;
 pub(crate) mod families;
 pub(crate) mod faults;
 pub(crate) mod init;
+pub(crate) mod monitor;
 pub(crate) mod param;
 pub(crate) mod plan;
 pub(crate) mod poll;

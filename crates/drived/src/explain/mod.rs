@@ -19,6 +19,12 @@ use self::{
 };
 use crate::output::milliseconds;
 
+/// A word of a register in words: its bits, where it is a word of bits.
+pub(crate) fn word_in_words(family: Option<Family>, address: u16, word: u16) -> String {
+    let told = Words::default().told(family, 0, address, word);
+    told.detail.unwrap_or(told.short)
+}
+
 /// What is known of a line beforehand.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Known {

@@ -4,9 +4,9 @@ mod descriptors;
 mod exit;
 mod json;
 mod notify;
+mod picture;
 pub(crate) mod reload;
 mod report;
-mod screen;
 mod watchdogs;
 
 use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
@@ -17,9 +17,9 @@ use futures_util::future::OptionFuture;
 
 use self::{
     notify::Notify,
+    picture::Picture,
     reload::Reloader,
     report::{Form, Report},
-    screen::Screen,
     watchdogs::Kept as Watchdogs,
 };
 use crate::{
@@ -35,6 +35,7 @@ use crate::{
     mqtt::Mqtt,
     one_drive, page,
     plant::Plant,
+    screen::Screen,
     signals::{Ending, Wish, Wishes},
     sparkplug::Sparkplug,
 };
@@ -103,7 +104,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
-    let screen = with_table.then(|| Screen::open(plant.clone())).flatten();
+    let screen = with_table.then(|| table(plant.clone())).flatten();
     let mut read = None;
     loop {
         tokio::select! {
@@ -158,6 +159,11 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         one_drive::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Shows the drives and the lines as a table, and the log below it.
+fn table(plant: Plant) -> Option<Screen> {
+    Screen::open(move |frame| Picture::of(&plant, logging::shown()).draw(frame))
 }
 
 /// Reads the configuration again and says what became of it.

@@ -18,7 +18,8 @@ use crate::logging;
 pub(super) struct Terminal(ratatui::Terminal<CrosstermBackend<Stdout>>);
 
 impl Terminal {
-    /// Takes the terminal. What is typed still makes signals, and is not shown.
+    /// Takes the terminal. Ctrl-C and Ctrl-Z still make signals; everything else that is typed is a key, Ctrl-S too, and is
+    /// not shown.
     pub(super) fn open() -> io::Result<Self> {
         static GIVEN_BACK: Once = Once::new();
         GIVEN_BACK.call_once(|| {
@@ -30,7 +31,7 @@ impl Terminal {
         });
         let terminal = ratatui::Terminal::new(CrosstermBackend::new(io::stdout()))?;
         execute!(io::stdout(), EnterAlternateScreen, Hide)?;
-        echo::off();
+        keys::take();
         logging::show();
         Ok(Self(terminal))
     }
@@ -53,32 +54,33 @@ fn give_back() {
     }
     // A terminal that is gone needs nothing.
     let _ = execute!(io::stdout(), LeaveAlternateScreen, Show);
-    echo::on();
+    keys::give_back();
     logging::write_again();
 }
 
-/// Whether the terminal shows what is typed.
+/// Whether what is typed is shown, kept until the end of a line, and holds up or quotes what the terminal shows.
 #[cfg(unix)]
-mod echo {
+mod keys {
     use std::{
         io::stdin,
         sync::{Mutex, PoisonError},
     };
 
-    use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+    use rustix::termios::{InputModes, LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
 
     static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
-    pub(super) fn off() {
+    pub(super) fn take() {
         let Ok(before) = tcgetattr(stdin()) else { return };
         let mut quiet = before.clone();
-        quiet.local_modes -= LocalModes::ECHO | LocalModes::ICANON;
+        quiet.local_modes -= LocalModes::ECHO | LocalModes::ICANON | LocalModes::IEXTEN;
+        quiet.input_modes -= InputModes::IXON;
         if tcsetattr(stdin(), OptionalActions::Now, &quiet).is_ok() {
             *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
         }
     }
 
-    pub(super) fn on() {
+    pub(super) fn give_back() {
         if let Some(before) = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take() {
             // What was typed meanwhile is nobody's.
             let _ = tcsetattr(stdin(), OptionalActions::Flush, &before);
@@ -87,8 +89,8 @@ mod echo {
 }
 
 #[cfg(not(unix))]
-mod echo {
-    pub(super) fn off() {}
+mod keys {
+    pub(super) fn take() {}
 
-    pub(super) fn on() {}
+    pub(super) fn give_back() {}
 }

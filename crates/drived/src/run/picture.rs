@@ -1,4 +1,4 @@
-//! What is drawn.
+//! `drived run` on a terminal: the drives and the lines as a table, the log below it.
 
 use std::sync::Arc;
 
