@@ -79,11 +79,6 @@ pub fn extent_of_request(pdu: &[u8]) -> Extent {
         [0 | 0x80.., ..] => Extent::Never,
         [0x01..=0x06 | 0x08, ..] => Extent::Exactly(5),
         [0x07 | 0x0B | 0x0C | 0x11, ..] => Extent::Exactly(1),
-        [0x10, _, _, high, low, count, ..]
-            if u16::from_be_bytes([*high, *low]).checked_mul(2) != Some(u16::from(*count)) =>
-        {
-            Extent::Never
-        }
         [0x0F | 0x10, ..] => counted(5),
         [0x14 | 0x15, ..] => counted(1),
         [0x16, ..] => Extent::Exactly(7),

@@ -18,7 +18,7 @@ use tokio::{
     time::Instant,
 };
 
-pub use self::pcapng::{ReadError, Recording, Writer, read};
+pub use self::pcapng::{ReadError, Reader, Recording, Writer, read};
 
 use crate::{config::LineConfig, protocol::Protocol};
 

@@ -28,7 +28,7 @@ pub enum Content {
     Message {
         /// Whom it is for or from.
         slave: u8,
-        /// The network header, and UNI-TE behind it.
+        /// The network header, and UNI-TE behind it: `unite_of` of drive-unitelway takes them apart.
         message: Bytes,
     },
     /// UNI-TELWAY: one of its single characters.

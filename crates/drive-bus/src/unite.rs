@@ -5,10 +5,9 @@ use std::{borrow::Cow, time::Duration};
 
 use bytes::Bytes;
 use drive_core::{Class, Port, PortError, Terms};
-use drive_unitelway::code;
 use tokio_modbus::{ExceptionCode, Request, Response, client::Client};
 
-pub use drive_unitelway::{Identification, LinkCounters, SpecificCommand, SpecificReport};
+pub use drive_unitelway::{Identification, LinkCounters, SpecificCommand, SpecificReport, code, unite_of};
 
 use crate::{exchange::unitelway::UNITE, protocol::Protocol, slave::Slave};
 

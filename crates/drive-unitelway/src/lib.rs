@@ -94,7 +94,7 @@ struct Readme;
 pub use self::{
     frame::{Heard, Receiver, data as data_frame, len as frame_len, poll},
     link::{Answer, Failure, Step, Stray, UniTelway},
-    network::NetworkHeader,
+    network::{NetworkHeader, unite_of},
     request::{Refusal, Reply, Request, RequestError, code},
     settings::{UniTelwaySettings, longest, reply_len, request_len},
     values::{Identification, LinkCounters, SpecificCommand, SpecificReport},

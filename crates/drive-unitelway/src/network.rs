@@ -52,8 +52,9 @@ impl NetworkHeader {
     }
 }
 
-/// The UNI-TE part of a message, or what the network has to say instead; `None` for an unknown header.
-pub(crate) fn unite_of(message: &Bytes) -> Option<Result<Bytes, Refusal>> {
+/// The UNI-TE part of a data frame's message, or what the network has to say instead; `None` for an unknown header.
+#[must_use]
+pub fn unite_of(message: &Bytes) -> Option<Result<Bytes, Refusal>> {
     match *message.first()? {
         SIMPLIFIED => Some(Ok(message.slice(1..))),
         STANDARD if message.len() >= STANDARD_LEN => Some(Ok(message.slice(STANDARD_LEN..))),

@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
 
 use super::{Captured, Direction, Dissector};
 
@@ -15,8 +15,12 @@ const ENHANCED_PACKET: u32 = 6;
 const BYTE_ORDER: u32 = 0x1A2B_3C4D;
 const UPPER_PDU: u16 = 252;
 const TAG_PROTOCOL: u16 = 12;
+const OPTION_DESCRIPTION: u16 = 3;
 const OPTION_RESOLUTION: u16 = 9;
 const OPTION_FLAGS: u16 = 2;
+
+/// How the description of a line that was only listened to begins; microseconds follow.
+const LISTENED: &str = "listened to; late by at most, in us: ";
 
 /// The longest block that is read: more than any frame with its tags.
 const MAX_BLOCK: usize = 65_536;
@@ -29,17 +33,33 @@ pub struct Writer<W> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a capture.
+    /// Begins a capture of what a master has sent and received.
     ///
     /// # Errors
     /// The sink's.
-    pub fn new(mut sink: W, dissector: Dissector) -> io::Result<Self> {
+    pub fn new(sink: W, dissector: Dissector) -> io::Result<Self> {
+        Self::begin(sink, dissector, "")
+    }
+
+    /// Begins a capture of a line that is only listened to, where each frame is handed over up to `late` after it was on the
+    /// line.
+    ///
+    /// # Errors
+    /// The sink's.
+    pub fn of_listener(sink: W, dissector: Dissector, late: Duration) -> io::Result<Self> {
+        Self::begin(sink, dissector, &format!("{LISTENED}{}", late.as_micros()))
+    }
+
+    fn begin(mut sink: W, dissector: Dissector, description: &str) -> io::Result<Self> {
         let mut section = BYTE_ORDER.to_le_bytes().to_vec();
         section.extend([1, 0, 0, 0]); // version 1.0
         section.extend([0xFF; 8]); // length unknown
         write_block(&mut sink, SECTION_HEADER, &section)?;
         let mut interface = u32::from(UPPER_PDU).to_le_bytes().to_vec();
         interface.extend([0; 4]); // no limit of length
+        if !description.is_empty() {
+            put_option(&mut interface, OPTION_DESCRIPTION, description.as_bytes());
+        }
         put_option(&mut interface, OPTION_RESOLUTION, &[9]); // nanoseconds
         put_option(&mut interface, 0, &[]);
         write_block(&mut sink, INTERFACE, &interface)?;
@@ -126,6 +146,8 @@ pub enum ReadError {
 pub struct Recording {
     /// What its line spoke; [`Dissector::Data`] where no frame says.
     pub dissector: Dissector,
+    /// How late each frame was handed over at the most, where the line was only listened to.
+    pub late: Option<Duration>,
     /// Its frames, in their order.
     pub frames: Vec<Captured>,
 }
@@ -135,31 +157,117 @@ pub struct Recording {
 /// # Errors
 /// [`ReadError`] when it is none.
 pub fn read(file: &[u8]) -> Result<Recording, ReadError> {
-    let word = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?));
-    if word(0) != Some(SECTION_HEADER) || word(8) != Some(BYTE_ORDER) {
-        return Err(ReadError::NotPcapng);
+    let mut reader = Reader::default();
+    reader.push(file);
+    let mut frames = Vec::new();
+    while let Some(frame) = reader.next_frame()? {
+        frames.push(frame);
     }
-    let (mut frames, mut dissector, mut at) = (Vec::new(), Dissector::Data, 0);
-    while at < file.len() {
-        let broken = ReadError::Broken(at);
-        let (kind, len) = (word(at).ok_or(broken)?, word(at + 4).ok_or(broken)? as usize);
-        if !(12..=MAX_BLOCK).contains(&len) || len % 4 != 0 {
-            return Err(broken);
-        }
-        let body = file.get(at + 8..at + len - 4).ok_or(broken)?;
-        if kind == ENHANCED_PACKET {
-            let (frame, spoken) = read_packet(body).ok_or(broken)?;
-            frames.push(frame);
-            dissector = spoken.unwrap_or(dissector);
-        }
-        at += len;
+    reader.finish()?;
+    Ok(Recording { dissector: reader.dissector(), late: reader.late(), frames })
+}
+
+/// Reads a capture while it is still being written, piece by piece.
+#[derive(Debug, Default)]
+pub struct Reader {
+    /// What makes no whole block yet.
+    unread: BytesMut,
+    /// How many bytes were read before.
+    at: usize,
+    dissector: Option<Dissector>,
+    late: Option<Duration>,
+}
+
+impl Reader {
+    /// Takes a piece of the file.
+    pub fn push(&mut self, piece: &[u8]) {
+        self.unread.extend_from_slice(piece);
     }
-    Ok(Recording { dissector, frames })
+
+    /// The next frame; `None`: the file goes on.
+    ///
+    /// # Errors
+    /// [`ReadError`] when it is no capture.
+    pub fn next_frame(&mut self) -> Result<Option<Captured>, ReadError> {
+        loop {
+            if self.at == 0 && self.unread.len() >= 12 {
+                let begins = word(&self.unread, 0) == Some(SECTION_HEADER);
+                if !begins || word(&self.unread, 8) != Some(BYTE_ORDER) {
+                    return Err(ReadError::NotPcapng);
+                }
+            }
+            let (Some(kind), Some(len)) = (word(&self.unread, 0), word(&self.unread, 4)) else {
+                return Ok(None);
+            };
+            let (len, broken) = (len as usize, ReadError::Broken(self.at));
+            if !(12..=MAX_BLOCK).contains(&len) || len % 4 != 0 {
+                return Err(broken);
+            }
+            if self.unread.len() < len {
+                return Ok(None);
+            }
+            let block = self.unread.split_to(len);
+            self.at += len;
+            let body = block.get(8..len - 4).ok_or(broken)?;
+            match kind {
+                INTERFACE => self.late = late_of(body),
+                ENHANCED_PACKET => {
+                    let (frame, spoken) = read_packet(body).ok_or(broken)?;
+                    self.dissector = spoken.or(self.dissector);
+                    return Ok(Some(frame));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The file has ended.
+    ///
+    /// # Errors
+    /// [`ReadError`] when it ends inside a block.
+    pub fn finish(&self) -> Result<(), ReadError> {
+        match (self.at, self.unread.is_empty()) {
+            (0, _) => Err(ReadError::NotPcapng),
+            (_, true) => Ok(()),
+            (at, false) => Err(ReadError::Broken(at)),
+        }
+    }
+
+    /// As [`Recording::dissector`], of what was read so far.
+    #[must_use]
+    pub fn dissector(&self) -> Dissector {
+        self.dissector.unwrap_or(Dissector::Data)
+    }
+
+    /// As [`Recording::late`].
+    #[must_use]
+    pub const fn late(&self) -> Option<Duration> {
+        self.late
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
+}
+
+/// What the description of an interface says of a line that was only listened to.
+fn late_of(interface: &[u8]) -> Option<Duration> {
+    let mut options = interface.get(8..)?;
+    loop {
+        let (head, rest) = options.split_first_chunk::<4>()?;
+        let [code, len] = [[head[0], head[1]], [head[2], head[3]]].map(u16::from_le_bytes);
+        let (value, rest) = rest.split_at_checked(usize::from(len).next_multiple_of(4))?;
+        if code == OPTION_DESCRIPTION {
+            let text = std::str::from_utf8(value.get(..usize::from(len))?).ok()?;
+            return text.strip_prefix(LISTENED)?.parse().ok().map(Duration::from_micros);
+        }
+        options = rest;
+    }
 }
 
 /// A frame, and what the packet says that it speaks.
 fn read_packet(body: &[u8]) -> Option<(Captured, Option<Dissector>)> {
-    let word = |at: usize| Some(u32::from_le_bytes(*body.get(at..)?.first_chunk()?));
+    let word = |at: usize| word(body, at);
     let nanos = u64::from(word(4)?) << 32 | u64::from(word(8)?);
     let len = word(12)? as usize;
     let mut packet = body.get(20..20 + len)?;
@@ -217,6 +325,24 @@ mod tests {
     fn what_is_written_is_read_back() {
         let read = read(&file()).unwrap();
         assert_eq!((read.dissector, read.frames), (Dissector::Rtu, frames()));
+    }
+
+    #[test]
+    fn a_file_is_read_while_it_is_written_and_says_how_late_a_listener_was() {
+        let mut file = Vec::new();
+        let late = Duration::from_micros(5_200);
+        let mut writer = Writer::of_listener(&mut file, Dissector::Data, late).unwrap();
+        for frame in frames() {
+            writer.write(&frame).unwrap();
+        }
+        let (mut reader, mut read) = (Reader::default(), Vec::new());
+        for byte in file {
+            assert!(reader.finish().is_err() || reader.unread.is_empty());
+            reader.push(&[byte]);
+            read.extend(reader.next_frame().unwrap());
+        }
+        assert_eq!((read, reader.finish()), (frames(), Ok(())));
+        assert_eq!((reader.dissector(), reader.late()), (Dissector::Data, Some(late)));
     }
 
     #[test]

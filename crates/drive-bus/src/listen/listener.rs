@@ -13,10 +13,19 @@ use tokio::{
 
 use super::{Ear, Heard};
 use crate::{
-    config::LineConfig,
+    config::{Endpoint, LineConfig},
     protocol::ProtocolMismatch,
     transport::{Connector, OpenError},
 };
+
+/// What a busy host adds to the time at which it is handed something: one slice of its scheduler.
+const HOST: Duration = Duration::from_millis(4);
+/// What USB adds, where the adapter's driver does not say how long it collects.
+const USB: Duration = Duration::from_millis(1);
+/// What a serial server and the network add at the most, as far as one can say.
+const NETWORK: Duration = Duration::from_millis(100);
+/// What a UART collects before it hands anything over, and how long it waits for more.
+const COLLECTED: usize = 8 + 4;
 
 /// Listens to a port, and never writes to it.
 pub struct Listener {
@@ -24,6 +33,7 @@ pub struct Listener {
     ear: Ear,
     /// One moment by two clocks.
     began: (Duration, Instant),
+    late: Duration,
     has_ended: bool,
 }
 
@@ -49,7 +59,15 @@ impl Listener {
     pub fn over(stream: impl AsyncRead + Send + 'static, config: &LineConfig) -> Result<Self, OpenError> {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let ear = Ear::new(config, since).ok_or(ProtocolMismatch::NoLine)?;
-        Ok(Self { stream: Box::pin(stream), ear, began: (since, Instant::now()), has_ended: false })
+        let (stream, began) = (Box::pin(stream), (since, Instant::now()));
+        Ok(Self { stream, ear, began, late: lateness(config), has_ended: false })
+    }
+
+    /// How much later than its last bit a frame is handed over at the most, as far as the port and its adapter tell: the
+    /// error of every time of [`Heard`], and of every silence between two of them.
+    #[must_use]
+    pub const fn late(&self) -> Duration {
+        self.late
     }
 
     /// The next frame, or the next bytes that make none, with times since 1970 that no change of the clock disturbs. `None`:
@@ -85,6 +103,19 @@ impl Listener {
             }
         }
     }
+}
+
+fn lateness(config: &LineConfig) -> Duration {
+    let way = match &config.endpoint {
+        #[cfg(feature = "serial")]
+        Endpoint::Serial(path) => {
+            crate::transport::adapter_latency(path).unwrap_or(USB) + config.characters(COLLECTED)
+        }
+        #[cfg(feature = "tcp")]
+        Endpoint::Tcp(_) => NETWORK,
+        Endpoint::Stream => Duration::ZERO,
+    };
+    way + HOST
 }
 
 async fn passed(deadline: Option<Instant>) {

@@ -1,97 +1,128 @@
-//! `drived capture`: what goes over a line of the daemon, as a file for Wireshark and for `drived explain`.
+//! `drived capture`: what goes over a line, of the daemon or listened to, as a file for Wireshark and for `drived explain`.
 
-use std::{fs::OpenOptions, io::Write as _, path::PathBuf, time::Duration};
-
-use http_body_util::BodyExt as _;
-use serde_json::Value;
-
-use crate::{
-    client::{DaemonArgs, path_of},
-    explain::Known,
-    failure::Failure,
-    line_spec::LineSpec,
-    output,
+use std::{
+    fs::{self, File, OpenOptions},
+    io,
+    path::PathBuf,
+    time::Duration,
 };
 
-/// Keep what goes over a line of the running daemon in a file that Wireshark opens
+use drive_bus::capture::Writer;
+use serde_json::json;
+use tokio::time::Instant;
+
+use super::frames::Frames;
+use crate::{
+    client::DaemonArgs,
+    failure::Failure,
+    line_spec::{LineSpec, describe},
+    output::{self, counted},
+    signals::Ending,
+};
+
+/// For how long a line of the daemon is captured, unless it is said.
+const SECONDS: u64 = 10;
+
+/// Keep what goes over a line in a file that Wireshark opens
 ///
-/// The file is made anew; one that is there already is not written over.
+/// A line of the running daemon, by its name; or a port that is only listened to, by --line: nothing is ever written to
+/// it, so that whoever speaks there is not disturbed. A port is listened to until Ctrl-C. The file is made anew; one that
+/// is there already is not written over, and what was captured before an error is kept.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The line, by its name in the configuration
-    #[arg(value_name = "LINE")]
-    line: String,
+    /// The line of the daemon, by its name in the configuration
+    #[arg(value_name = "LINE", required_unless_present = "port", conflicts_with = "port")]
+    line: Option<String>,
+    /// A port to listen to: PATH,BAUD,FORMAT[,PROTOCOL] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT,BAUD,FORMAT
+    #[arg(long = "line", id = "port", value_name = "PORT", conflicts_with_all = ["socket", "token_file"])]
+    port: Option<LineSpec>,
     /// The file to be made
     #[arg(long, value_name = "FILE")]
     to: PathBuf,
-    /// For how many seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=600))]
-    seconds: u64,
+    /// For how many seconds; 10 of the daemon, until Ctrl-C from a port
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
+    seconds: Option<u64>,
     #[command(flatten)]
     daemon: DaemonArgs,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| Failure::Input(format!("{}: {error}", args.to.display()));
-    let mut file = OpenOptions::new().write(true).create_new(true).open(&args.to).map_err(failed)?;
-    let captured = from_daemon(&args.daemon, &args.line, args.seconds).await;
-    if captured.is_err() {
-        // What it made and left empty helps nobody.
-        let _ = std::fs::remove_file(&args.to);
-    }
-    let bytes = captured?.bytes;
-    file.write_all(&bytes).map_err(failed)?;
-    if args.daemon.is_json() {
-        let said = serde_json::json!({ "file": args.to, "bytes": bytes.len() });
-        return output::say_as_it_is(said);
-    }
-    output::say(format_args!("{}: {} bytes", args.to.display(), bytes.len()))
-}
-
-/// A capture, and what the daemon knows of its line.
-pub(super) struct FromDaemon {
-    pub(super) bytes: Vec<u8>,
-    pub(super) known: Known,
-}
-
-/// Captures a line of the running daemon.
-pub(super) async fn from_daemon(args: &DaemonArgs, line: &str, seconds: u64) -> Result<FromDaemon, Failure> {
-    let mut daemon = args.connect().await?;
-    let state = daemon.state().await?;
-    let found = state["lines"].as_array().into_iter().flatten().find(|known| known["name"] == *line);
-    let Some(found) = found else {
-        let names = state["lines"].as_array().into_iter().flatten().filter_map(|line| line["name"].as_str());
-        let names: Vec<&str> = names.collect();
-        return Err(Failure::Input(format!(
-            "there is no line {line:?}: expected one of {}",
-            names.join(", ")
-        )));
-    };
-    let known = known(&state, line, found);
-    let path = format!("{}/capture?seconds={seconds}", path_of(&["lines", line]));
-    let captured = async {
-        let answer = daemon.send("GET", &path, None).await?;
-        if !answer.status().is_success() {
-            return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
+    let Args { line, port, to, seconds, daemon } = args;
+    let mut ending = Ending::listen()?;
+    let (mut frames, name, whole) = match (&line, &port) {
+        (Some(line), _) => {
+            let seconds = seconds.unwrap_or(SECONDS);
+            let (frames, _) = Frames::of_daemon(&daemon, line, seconds).await?;
+            (frames, line.clone(), Some(seconds))
         }
-        let bytes = answer.into_body().collect().await;
-        bytes.map_err(|error| Failure::Drive(format!("the capture broke off: {error}")))
+        (None, Some(port)) => {
+            let config = port.config(&[]).map_err(|error| Failure::Input(error.to_string()))?;
+            (Frames::of_port(&config).await?, describe(&config), seconds)
+        }
+        (None, None) => return Err(Failure::Input("expected LINE or --line PORT".to_owned())),
     };
-    let whole = Some(Duration::from_secs(seconds));
-    let bytes = output::during(format_args!("capturing {line}"), whole, captured).await?;
-    Ok(FromDaemon { bytes: bytes.to_bytes().to_vec(), known })
+    let failed = |error: io::Error| Failure::Input(format!("{}: {error}", to.display()));
+    let file = OpenOptions::new().write(true).create_new(true).open(&to).map_err(failed)?;
+    let whole = whole.map(Duration::from_secs);
+    let until = port.and(whole).map(|whole| Instant::now() + whole);
+    let mut kept = Kept::default();
+    let work = keep(&mut frames, file, &mut kept, failed, until, &mut ending);
+    let ended = output::during(format_args!("capturing {name}"), whole, work).await;
+    if kept.frames == 0 && ended.is_err() {
+        // What it made and left empty helps nobody.
+        let _ = fs::remove_file(&to);
+    }
+    ended?;
+    let Kept { frames: count, bytes } = kept;
+    if daemon.is_json() {
+        return output::say_as_it_is(json!({ "file": to, "frames": count, "bytes": bytes }));
+    }
+    let count = counted(count, "frame", "frames");
+    output::say(format_args!("{}: {count}, {bytes} bytes of them", to.display()))
 }
 
-/// What the daemon's state says of a line.
-fn known(state: &Value, name: &str, line: &Value) -> Known {
-    let drives = state["drives"].as_array().into_iter().flatten().filter(|drive| drive["line"] == *name);
-    let drives = drives.filter_map(|drive| {
-        let slave = u8::try_from(drive["slave"].as_u64()?).ok()?;
-        let family = drive["family"].as_str()?.parse().ok()?;
-        Some((slave, (family, drive["name"].as_str()?.to_owned())))
-    });
-    let port = line["port"].as_str().and_then(|port| port.parse::<LineSpec>().ok());
-    let config = port.and_then(|port| port.config(&[]).ok());
-    let serial = config.filter(|config| config.protocol.is_paced()).map(|config| config.serial);
-    Known { serial, drives: drives.collect() }
+/// What was written.
+#[derive(Debug, Clone, Copy, Default)]
+struct Kept {
+    frames: usize,
+    bytes: usize,
+}
+
+/// Writes frame by frame, so that the file is whole whenever it ends.
+async fn keep(
+    frames: &mut Frames,
+    file: File,
+    kept: &mut Kept,
+    failed: impl Fn(io::Error) -> Failure,
+    until: Option<Instant>,
+    ending: &mut Ending,
+) -> Result<(), Failure> {
+    // What the line speaks is known with the first frame.
+    let (mut file, mut writer) = (Some(file), None);
+    loop {
+        let next = tokio::select! {
+            biased;
+            () = ending.asked() => None,
+            () = passed(until) => None,
+            next = frames.next() => next?,
+        };
+        if let Some(file) = file.take() {
+            let begun = match frames.late() {
+                Some(late) => Writer::of_listener(file, frames.dissector(), late),
+                None => Writer::new(file, frames.dissector()),
+            };
+            writer = Some(begun.map_err(&failed)?);
+        }
+        let (Some(frame), Some(writer)) = (next, &mut writer) else { return Ok(()) };
+        writer.write(&frame).map_err(&failed)?;
+        kept.frames += 1;
+        kept.bytes += frame.bytes.len();
+    }
+}
+
+async fn passed(until: Option<Instant>) {
+    match until {
+        Some(until) => tokio::time::sleep_until(until).await,
+        None => std::future::pending().await,
+    }
 }

@@ -1,43 +1,47 @@
-//! `drived explain`: what a capture says, frame by frame.
+//! `drived explain`: what goes over a line, frame by frame, in words.
 
-use std::{collections::BTreeMap, fs, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
-use drive_bus::capture::{self, Recording};
 use drive_core::SerialSettings;
 use drive_families::Family;
 use serde_json::json;
+use tokio::time::{Instant, sleep};
 
-use super::capture::from_daemon;
+use super::frames::Frames;
 use crate::{
     client::DaemonArgs,
     config::Config,
-    drive_spec::{DriveSpec, on_one_line},
+    drive_spec::{DriveName, DriveSpec, on_one_line},
     explain::{Counts, Explained, Explainer, Known},
     failure::Failure,
     json,
-    line_spec::SerialSpec,
-    output::{self, milliseconds},
+    line_spec::{LineSpec, SerialSpec, describe},
+    output::{self, counted, milliseconds},
+    signals::Ending,
 };
 
-/// The longest capture that is read.
-const LONGEST: u64 = 256 << 20;
+/// For how long a line of the daemon is captured, unless it is said.
+const SECONDS: u64 = 10;
 
-/// Put a capture into words: each frame, which drive, which register, which bit has changed, which silence was too short
+/// Put what goes over a line into words: each frame, which drive, which register, which bit has changed, which silence was too short
 ///
-/// A capture is a pcapng file as drived writes it, by capture, from the page, or by a program that embeds the library.
-/// Without the drives' families registers have numbers alone. Times are seconds since the first frame.
+/// From a capture, a pcapng file as drived writes it; from a line of the running daemon; or from a port that is only
+/// listened to, to which nothing is ever written: frame by frame as they are heard, until Ctrl-C. Without the drives'
+/// families registers have numbers alone. Times are seconds since the first frame.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The capture; without it, a line of the running daemon is captured first
-    #[arg(value_name = "FILE", required_unless_present = "from", conflicts_with = "from")]
+    /// The capture
+    #[arg(value_name = "FILE", required_unless_present_any = ["from", "line"], conflicts_with_all = ["from", "line"])]
     file: Option<PathBuf>,
     /// A line of the running daemon, by its name
-    #[arg(long, value_name = "LINE")]
+    #[arg(long, value_name = "LINE", conflicts_with = "line")]
     from: Option<String>,
-    /// For how many seconds it is captured
-    #[arg(long, value_name = "SECONDS", default_value_t = 10, requires = "from",
-          value_parser = clap::value_parser!(u64).range(1..=600))]
-    seconds: u64,
+    /// A port to listen to: PATH[,BAUD[,FORMAT[,PROTOCOL]]] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]
+    #[arg(long, value_name = "PORT", conflicts_with = "serial")]
+    line: Option<LineSpec>,
+    /// For how many seconds; 10 of the daemon, until Ctrl-C from a port
+    #[arg(long, value_name = "SECONDS", conflicts_with = "file", value_parser = clap::value_parser!(u64).range(1..))]
+    seconds: Option<u64>,
     /// Which drives are on the line
     #[arg(long, value_name = "FAMILY@ADDRESSES")]
     drive: Vec<DriveSpec>,
@@ -58,51 +62,93 @@ pub(crate) struct Args {
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let (bytes, of_daemon) = match (&args.file, &args.from) {
-        (Some(file), _) => (read(file)?, None),
-        (None, Some(line)) => {
-            let captured = from_daemon(&args.daemon, line, args.seconds).await?;
-            (captured.bytes, Some(captured.known))
-        }
-        (None, None) => return Err(Failure::Input("expected FILE or --from LINE".to_owned())),
-    };
-    let named =
-        args.file.as_ref().map_or_else(|| "the capture".to_owned(), |file| file.display().to_string());
-    let Recording { dissector, frames } =
-        capture::read(&bytes).map_err(|error| Failure::Input(format!("{named}: {error}")))?;
-    let known = match (&args.config, of_daemon) {
+    let mut ending = Ending::listen()?;
+    let drives = on_one_line(&args.drive).map_err(|error| Failure::Input(error.to_string()))?;
+    let (mut frames, known) = open(&args, &drives).await?;
+    let known = match (&args.config, known) {
         (Some(file), _) => of_config(file, args.name.as_deref())?,
-        (None, Some(known)) if args.drive.is_empty() && args.serial.is_none() => known,
-        _ => of_options(&args)?,
+        (None, Some(known)) => known,
+        (None, None) => of_options(args.serial, &drives)?,
     };
-    let mut explainer = Explainer::new(dissector, known);
-    let began = frames.first().map_or(Duration::ZERO, |frame| frame.at);
-    for frame in &frames {
-        let explained = explainer.explain(frame);
+    let mut explainer = Explainer::new(Known { late: frames.late(), ..known });
+    let until =
+        args.line.as_ref().and(args.seconds).map(|seconds| Instant::now() + Duration::from_secs(seconds));
+    let mut began = None;
+    loop {
+        let frame = tokio::select! {
+            biased;
+            () = ending.asked() => break,
+            () = passed(until) => break,
+            frame = frames.next() => frame?,
+        };
+        let Some(frame) = frame else { break };
+        let explained = explainer.explain(frames.dissector(), &frame);
+        let began = *began.get_or_insert(frame.at);
         if args.trouble && explained.trouble.is_empty() {
             continue;
         }
         if args.daemon.is_json() {
             output::say_as_it_is(json::line(&explained))?;
         } else {
-            say(&explained, began)?;
+            say(&explained, began, explainer.late())?;
         }
     }
     let counts = explainer.counts();
-    if args.daemon.is_json() { output::say_as_it_is(json!({ "counts": counts })) } else { say_counts(counts) }
+    if args.daemon.is_json() {
+        return output::say_as_it_is(json!({ "counts": counts }));
+    }
+    say_counts(counts, explainer.late())
 }
 
-fn say(explained: &Explained, began: Duration) -> Result<(), Failure> {
+/// The frames that are asked for, and what is known of their line without the other options.
+async fn open(args: &Args, drives: &[DriveName]) -> Result<(Frames, Option<Known>), Failure> {
+    match (&args.file, &args.from, &args.line) {
+        (Some(file), ..) => Ok((Frames::of_file(file)?, None)),
+        (_, Some(line), _) => {
+            let seconds = args.seconds.unwrap_or(SECONDS);
+            let (frames, known) = Frames::of_daemon(&args.daemon, line, seconds).await?;
+            Ok((frames, Some(known).filter(|_| drives.is_empty() && args.serial.is_none())))
+        }
+        (.., Some(port)) => {
+            let config = port.config(drives).map_err(|error| Failure::Input(error.to_string()))?;
+            let frames = Frames::of_port(&config).await?;
+            if !args.daemon.is_json() {
+                let port = describe(&config);
+                output::say(format_args!("listening to {port}; nothing is ever written (Ctrl-C ends it)"))?;
+            }
+            let known = Known { serial: Some(config.serial), late: None, drives: named(drives) };
+            Ok((frames, Some(known)))
+        }
+        _ => Err(Failure::Input("expected FILE, --from LINE or --line PORT".to_owned())),
+    }
+}
+
+async fn passed(until: Option<Instant>) {
+    match until {
+        Some(until) => sleep(until.saturating_duration_since(Instant::now())).await,
+        None => std::future::pending().await,
+    }
+}
+
+fn say(explained: &Explained, began: Duration, late: Option<Duration>) -> Result<(), Failure> {
     let Explained { at, sent, slave, drive, text, details, trouble, after, .. } = explained;
     let since = at.saturating_sub(began).as_micros();
-    let way = if *sent { ">" } else { "<" };
+    let way = match sent {
+        Some(true) => ">",
+        Some(false) => "<",
+        None => "?",
+    };
     let who = match (slave, drive) {
         (_, Some(name)) => format!("{name}: "),
         (Some(0), None) => "all: ".to_owned(),
         (Some(slave), None) => format!("slave {slave}: "),
         (None, None) => String::new(),
     };
-    let after = after.map_or_else(String::new, |after| format!(", after {}", milliseconds(after)));
+    let after = after.map(|after| match late {
+        Some(_) => format!(", after about {} ms", after.as_millis()),
+        None => format!(", after {}", milliseconds(after)),
+    });
+    let after = after.unwrap_or_default();
     let (seconds, rest) = (since / 1_000_000, since % 1_000_000 / 10);
     output::say(format_args!("{seconds:>4}.{rest:05} {way} {who}{text}{after}"))?;
     for detail in details {
@@ -114,30 +160,31 @@ fn say(explained: &Explained, began: Duration) -> Result<(), Failure> {
     Ok(())
 }
 
-fn say_counts(counts: Counts) -> Result<(), Failure> {
-    let Counts { requests, answers, exceptions, unanswered, damaged, silences_broken } = counts;
-    output::say(format_args!(
+fn say_counts(counts: Counts, late: Option<Duration>) -> Result<(), Failure> {
+    let Counts { requests, answers, exceptions, unanswered, damaged, silences_broken, silences_doubtful } =
+        counts;
+    let told = format!(
         "{requests} requests, {answers} answers, {exceptions} exceptions, {unanswered} without an answer, \
          {damaged} damaged, {silences_broken} silences too short"
+    );
+    let Some(late) = late else { return output::say(told) };
+    let doubtful = counted(usize::try_from(silences_doubtful).unwrap_or(usize::MAX), "silence", "silences");
+    output::say(format_args!(
+        "{told}; {doubtful} too close to call: frames are heard up to {} late",
+        milliseconds(late)
     ))
 }
 
-fn read(file: &PathBuf) -> Result<Vec<u8>, Failure> {
-    let failed = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", file.display()));
-    let found = fs::metadata(file).map_err(|error| failed(&error))?;
-    if !found.is_file() || found.len() > LONGEST {
-        return Err(failed(&format_args!("expected a file of at most {} MiB", LONGEST >> 20)));
-    }
-    fs::read(file).map_err(|error| failed(&error))
+/// What the options say of the line.
+fn of_options(serial: Option<SerialSpec>, drives: &[DriveName]) -> Result<Known, Failure> {
+    let serial = serial.map(|serial| serial.settings(drives)).transpose();
+    let serial = serial.map_err(|error| Failure::Input(error.to_string()))?;
+    Ok(Known { serial, late: None, drives: named(drives) })
 }
 
-/// What the options say of the line.
-fn of_options(args: &Args) -> Result<Known, Failure> {
-    let drives = on_one_line(&args.drive).map_err(|error| Failure::Input(error.to_string()))?;
-    let serial = args.serial.map(|serial| serial.settings(&drives)).transpose();
-    let serial = serial.map_err(|error| Failure::Input(error.to_string()))?;
-    let drives = drives.iter().map(|drive| (drive.slave.number(), (drive.family, drive.to_string())));
-    Ok(Known { serial, drives: drives.collect() })
+/// The drives by their addresses.
+fn named(drives: &[DriveName]) -> BTreeMap<u8, (Family, String)> {
+    drives.iter().map(|drive| (drive.slave.number(), (drive.family, drive.to_string()))).collect()
 }
 
 /// What a configuration says of the line.
@@ -154,5 +201,5 @@ fn of_config(file: &std::path::Path, name: Option<&str>) -> Result<Known, Failur
         .map(|drive| (drive.name.slave.number(), (drive.name.family, drive.settings.name.clone())))
         .collect();
     let serial: Option<SerialSettings> = line.config.protocol.is_paced().then_some(line.config.serial);
-    Ok(Known { serial, drives })
+    Ok(Known { serial, late: None, drives })
 }

@@ -9,6 +9,7 @@ pub(crate) mod explain;
 pub(crate) mod export;
 pub(crate) mod families;
 pub(crate) mod faults;
+mod frames;
 pub(crate) mod init;
 pub(crate) mod monitor;
 pub(crate) mod param;

@@ -1,22 +1,21 @@
 //! Frames of a line in words: which drive, which registers, what their bits say and which have changed, and which silence
 //! was too short. Pure: it is fed frame by frame, in their order.
 
-mod content;
 mod pdu;
+mod unite;
 mod words;
 
 use std::{collections::BTreeMap, time::Duration};
 
-use drive_bus::capture::{Captured, Direction, Dissector};
+use drive_bus::{
+    capture::{Captured, Direction, Dissector},
+    content::Content,
+};
 use drive_core::SerialSettings;
 use drive_families::Family;
 use serde::Serialize;
 
-use self::{
-    content::{Content, content},
-    pdu::Asked,
-    words::Words,
-};
+use self::{pdu::Asked, unite::Telway, words::Words};
 use crate::output::milliseconds;
 
 /// A word of a register in words: its bits, where it is a word of bits.
@@ -30,6 +29,8 @@ pub(crate) fn word_in_words(family: Option<Family>, address: u16, word: u16) -> 
 pub(crate) struct Known {
     /// Its speed and format, by which silences are judged; `None`: they are not.
     pub(crate) serial: Option<SerialSettings>,
+    /// How late each frame was handed over at the most, where the line is only listened to.
+    pub(crate) late: Option<Duration>,
     /// Its drives: family and name, by address.
     pub(crate) drives: BTreeMap<u8, (Family, String)>,
 }
@@ -40,8 +41,9 @@ pub(crate) struct Explained {
     /// When its last byte was handed over, since 1970.
     #[serde(serialize_with = "crate::explain::as_milliseconds", rename = "time_unix_ms")]
     pub(crate) at: Duration,
-    /// Whether the master of the capture sent it.
-    pub(crate) sent: bool,
+    /// Whether the master sent it, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) sent: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) slave: Option<u8>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,38 +76,49 @@ pub(crate) struct Counts {
     pub(crate) unanswered: u64,
     pub(crate) damaged: u64,
     pub(crate) silences_broken: u64,
+    /// Silences that may have been too short, and are not known well enough.
+    pub(crate) silences_doubtful: u64,
 }
 
 /// Puts the frames of one line into words.
 pub(crate) struct Explainer {
-    dissector: Dissector,
     known: Known,
     words: Words,
-    /// The request whose answer is awaited.
+    /// The Modbus request whose answer is awaited.
     asked: Option<(u8, Asked)>,
+    telway: Telway,
     /// When the line was last busy.
     busy_until: Option<Duration>,
     counts: Counts,
 }
 
 impl Explainer {
-    pub(crate) fn new(dissector: Dissector, known: Known) -> Self {
-        let words = Words::default();
-        Self { dissector, known, words, asked: None, busy_until: None, counts: Counts::default() }
+    pub(crate) fn new(known: Known) -> Self {
+        Self {
+            known,
+            words: Words::default(),
+            asked: None,
+            telway: Telway::default(),
+            busy_until: None,
+            counts: Counts::default(),
+        }
     }
 
-    /// The next frame.
-    pub(crate) fn explain(&mut self, frame: &Captured) -> Explained {
-        let sent = frame.direction == Direction::Sent;
-        let content = content(self.dissector, &frame.bytes);
-        let timing = self.timing(frame, sent);
-        let (slave, mut said) = match content {
-            Content::Pdu { slave, pdu } if sent => (Some(slave), self.request(slave, &pdu)),
-            Content::Pdu { slave, pdu } => (Some(slave), self.answer(slave, &pdu)),
-            Content::Link { slave, text } => (slave, Said::text(text)),
-            Content::Damaged(why) => {
+    /// The next frame of a line that speaks this.
+    pub(crate) fn explain(&mut self, dissector: Dissector, frame: &Captured) -> Explained {
+        let sent = match frame.direction {
+            Direction::Sent => Some(true),
+            Direction::Received => Some(false),
+            Direction::Unknown => None,
+        };
+        let content = Content::of(dissector, &frame.bytes);
+        let timing = self.timing(frame, sent, dissector == Dissector::Rtu && content.is_ok());
+        let slave = content.as_ref().ok().and_then(Content::slave);
+        let mut said = match content {
+            Ok(content) => self.said(&content, sent),
+            Err(why) => {
                 self.counts.damaged += 1;
-                (None, Said { trouble: vec![why], ..Said::text(format!("{} bytes", frame.bytes.len())) })
+                Said::trouble(format!("{} bytes", frame.bytes.len()), why.to_string())
             }
         };
         said.trouble.extend(timing.trouble);
@@ -117,14 +130,42 @@ impl Explainer {
             text: said.text,
             details: said.details,
             trouble: said.trouble,
-            after: timing.after.filter(|_| !sent),
+            after: timing.after.filter(|_| sent == Some(false)),
             bytes: hex(&frame.bytes),
+        }
+    }
+
+    fn said(&mut self, content: &Content, sent: Option<bool>) -> Said {
+        match content {
+            Content::Pdu { slave, pdu } => match sent {
+                Some(true) => self.request(*slave, pdu),
+                Some(false) => self.answer(*slave, pdu),
+                // What has one form for both: nothing is told from it.
+                None => {
+                    let said = Asked::of(pdu).said(self.family(*slave), *slave, &mut self.words);
+                    Said { text: format!("{}, or confirms it", said.text), ..said }
+                }
+            },
+            Content::Poll { .. } => self.telway.poll(),
+            Content::Signal(signal) => self.telway.signal(*signal),
+            Content::Message { slave, message } => {
+                let family = self.family(*slave);
+                let Self { telway, words, counts, .. } = self;
+                telway.message((*slave, message), sent, family, words, counts)
+            }
+            _ => Said::text("nothing that is known here"),
         }
     }
 
     /// What was counted; a request that is still open has not been answered.
     pub(crate) fn counts(&self) -> Counts {
-        Counts { unanswered: self.counts.unanswered + u64::from(self.asked.is_some()), ..self.counts }
+        let open = u64::from(self.asked.is_some()) + self.telway.waiting();
+        Counts { unanswered: self.counts.unanswered + open, ..self.counts }
+    }
+
+    /// How late a frame may have been handed over, where the line is only listened to.
+    pub(crate) const fn late(&self) -> Option<Duration> {
+        self.known.late
     }
 
     fn request(&mut self, slave: u8, pdu: &[u8]) -> Said {
@@ -136,7 +177,8 @@ impl Explainer {
         }
         let family = self.family(slave);
         let asked = Asked::of(pdu);
-        let said = Said { trouble, ..asked.said(family, slave, &mut self.words) };
+        let mut said = asked.said(family, slave, &mut self.words);
+        said.trouble.extend(trouble);
         // Nobody answers a broadcast.
         self.asked = (slave != 0).then_some((slave, asked));
         said
@@ -164,35 +206,60 @@ impl Explainer {
         answer.said(&asked, family, slave, &mut self.words)
     }
 
+    /// The family of a slave; of all, where they are of one.
     fn family(&self, slave: u8) -> Option<Family> {
-        self.known.drives.get(&slave).map(|(family, _)| *family)
+        if slave != 0 {
+            return self.known.drives.get(&slave).map(|(family, _)| *family);
+        }
+        let mut families = self.known.drives.values().map(|(family, _)| *family);
+        let first = families.next()?;
+        families.all(|family| family == first).then_some(first)
     }
 
     /// How long the line was quiet before a frame. What is sent is handed over at once and takes its time on the wire; what
     /// is received has had its time when its last byte is there.
-    fn timing(&mut self, frame: &Captured, sent: bool) -> Timing {
+    fn timing(&mut self, frame: &Captured, sent: Option<bool>, keeps_silences: bool) -> Timing {
         let Some(serial) = self.known.serial else { return Timing::default() };
         let on_wire = serial.characters(frame.bytes.len());
-        let (begin, end) =
-            if sent { (frame.at, frame.at + on_wire) } else { (frame.at.saturating_sub(on_wire), frame.at) };
+        let is_ours = sent == Some(true) && self.known.late.is_none();
+        let (begin, end) = if is_ours {
+            (frame.at, frame.at + on_wire)
+        } else {
+            (frame.at.saturating_sub(on_wire), frame.at)
+        };
         let before = self.busy_until.replace(end);
         let Some(before) = before else { return Timing::default() };
-        let quiet = begin.saturating_sub(before);
-        let least = serial.t3_5();
-        // Only what the master of the capture sends is known to the microsecond: an adapter hands over late what it hears.
-        let is_broken = sent && self.dissector == Dissector::Rtu && quiet < least;
-        self.counts.silences_broken += u64::from(is_broken);
-        let trouble = is_broken.then(|| {
-            format!("silence before it {}, 3.5 characters are {}", milliseconds(quiet), milliseconds(least))
-        });
-        Timing { after: Some(quiet), trouble: trouble.into_iter().collect() }
+        let (quiet, least) = (begin.saturating_sub(before), serial.t3_5());
+        let mut timing = Timing { after: Some(quiet), trouble: None };
+        // Only what the master of the capture sends is known to the microsecond. What is heard may have been on the line
+        // earlier, this frame or the one before it.
+        let late = match self.known.late {
+            _ if is_ours => Duration::ZERO,
+            Some(late) => late,
+            None => return timing,
+        };
+        if !keeps_silences || begin >= before + least + late {
+            return timing;
+        }
+        if begin + late >= before + least {
+            self.counts.silences_doubtful += 1;
+            return timing;
+        }
+        self.counts.silences_broken += 1;
+        let at_most = if late.is_zero() { "" } else { "at most " };
+        timing.trouble = Some(format!(
+            "silence before it {at_most}{}, 3.5 characters are {}",
+            milliseconds(quiet + late),
+            milliseconds(least)
+        ));
+        timing
     }
 }
 
 #[derive(Default)]
 struct Timing {
     after: Option<Duration>,
-    trouble: Vec<String>,
+    trouble: Option<String>,
 }
 
 /// What a frame says.
@@ -206,6 +273,10 @@ struct Said {
 impl Said {
     fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), ..Self::default() }
+    }
+
+    fn trouble(text: impl Into<String>, trouble: impl Into<String>) -> Self {
+        Self { trouble: vec![trouble.into()], ..Self::text(text) }
     }
 }
 

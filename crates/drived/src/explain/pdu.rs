@@ -136,9 +136,9 @@ impl Asked {
             Self::Read { first, quantity, .. } => {
                 Said::text(format!("reads {}", span(family, *first, *quantity)))
             }
-            Self::Write { first, words, .. } => written("writes", family, slave, *first, words, seen),
+            Self::Write { first, words, .. } => written("writes", family, slave, &run(*first, words), seen),
             Self::ReadWrite { read: (from, quantity), first, words } => {
-                let said = written("writes", family, slave, *first, words, seen);
+                let said = written("writes", family, slave, &run(*first, words), seen);
                 let text = format!("{}; reads {}", said.text, span(family, *from, *quantity));
                 Said { text, ..said }
             }
@@ -151,7 +151,12 @@ impl Asked {
             }
             Self::Other { function, data } => {
                 let data = if data.is_empty() { String::new() } else { format!(": {}", hex(data)) };
-                Said::text(format!("function {function:02X}h, {}{data}", named(*function)))
+                let text = format!("function {function:02X}h, {}{data}", named(*function));
+                // Those of a known form have been told apart before.
+                match function {
+                    3 | 4 | 6 | 0x10 | 0x17 => Said::trouble(text, "its counts or its length do not fit"),
+                    _ => Said::text(text),
+                }
             }
         }
     }
@@ -160,7 +165,7 @@ impl Asked {
 impl Answer {
     pub(super) fn said(&self, asked: &Asked, family: Option<Family>, slave: u8, seen: &mut Words) -> Said {
         match self {
-            Self::Words { first, words } => written("answers", family, slave, *first, words, seen),
+            Self::Words { first, words } => written("answers", family, slave, &run(*first, words), seen),
             Self::Done => Said::text("done".to_owned()),
             Self::Identification(texts) => {
                 let texts: Vec<String> =
@@ -185,26 +190,30 @@ fn done_if(same: bool) -> Answer {
     if same { Answer::Done } else { Answer::Unfitting("it confirms something else than was written") }
 }
 
-/// Words with their registers, and the bits of those that have some.
-fn written(
+/// Registers with their words, and the bits of those that have some.
+pub(super) fn written(
     verb: &str,
     family: Option<Family>,
     slave: u8,
-    first: u16,
-    words: &[u16],
+    words: &[(u16, u16)],
     seen: &mut Words,
 ) -> Said {
     let (mut short, mut details) = (Vec::new(), Vec::new());
-    for (offset, &word) in (0..).zip(words) {
-        let told = seen.told(family, slave, first.wrapping_add(offset), word);
+    for &(address, word) in words {
+        let told = seen.told(family, slave, address, word);
         short.push(told.short);
         details.extend(told.detail);
     }
     Said { text: format!("{verb} {}", short.join(", ")), details, ..Said::default() }
 }
 
+/// Words of registers that follow each other.
+pub(super) fn run(first: u16, words: &[u16]) -> Vec<(u16, u16)> {
+    (0..).zip(words).map(|(offset, word)| (first.wrapping_add(offset), *word)).collect()
+}
+
 /// The registers of a read.
-fn span(family: Option<Family>, first: u16, quantity: u16) -> String {
+pub(super) fn span(family: Option<Family>, first: u16, quantity: u16) -> String {
     let begin = name(family, first);
     match quantity {
         1 => begin,
@@ -215,7 +224,7 @@ fn span(family: Option<Family>, first: u16, quantity: u16) -> String {
     }
 }
 
-fn counted(words: usize) -> String {
+pub(super) fn counted(words: usize) -> String {
     if words == 1 { "1 word".to_owned() } else { format!("{words} words") }
 }
 
@@ -257,13 +266,17 @@ const fn named(function: u8) -> &'static str {
     match function {
         1 => "read coils",
         2 => "read discrete inputs",
+        3 | 4 => "read registers",
         5 => "write a coil",
+        6 => "write a register",
         7 => "read exception status",
         0x0B => "read event counter",
         0x0C => "read event log",
         0x0F => "write coils",
+        0x10 => "write registers",
         0x11 => "report server id",
         0x16 => "mask write register",
+        0x17 => "read and write registers",
         0x2B => "encapsulated interface",
         _ => "not known here",
     }

@@ -42,10 +42,13 @@ pub(super) struct Told {
     pub(super) detail: Option<String>,
 }
 
-/// A register by its mnemonic, else by its number.
+/// A register by its mnemonic, else by its number, and what it is where the manual has no more than the number.
 pub(super) fn name(family: Option<Family>, address: u16) -> String {
     match row(family, address) {
-        // Codes such as 0020h are the address itself.
+        Some(row) if u16::from_str_radix(row.code.trim_end_matches('h'), 16) == Ok(address) => {
+            let what = row.name.split([':', ';', ',']).next().unwrap_or(row.name);
+            format!("{} ({what})", row.code)
+        }
         Some(row) => row.code.to_owned(),
         None => format!("{address} ({address:04X}h)"),
     }

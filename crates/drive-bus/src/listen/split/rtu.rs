@@ -80,11 +80,11 @@ impl Split for Rtu {
             let whole = bytes.len();
             let found = match look(bytes) {
                 Look::Frame(len) => return self.take_frame(len),
-                Look::Nothing => self.drop_one(),
-                // What a vendor has lengthened.
-                Look::Beginning | Look::Open if self.is_over && may_be_frame(bytes) => {
+                // What a vendor has lengthened, or a request whose counts are wrong.
+                look if (self.is_over || look == Look::Nothing) && may_be_frame(bytes) => {
                     return self.take_frame(whole);
                 }
+                Look::Nothing => self.drop_one(),
                 Look::Beginning | Look::Open if self.is_over => self.drop_one(),
                 Look::Beginning => return None,
                 Look::Open => match self.next_known() {
