@@ -7,8 +7,8 @@ use tracing::Level;
 
 use crate::{
     commands::{
-        audit, capture, check, completions, demo, explain, export, families, faults, init, monitor, param,
-        plan, poll, release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
+        audit, capture, check, completions, demo, doctor, explain, export, families, faults, init, monitor,
+        param, plan, poll, release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
     },
     failure::Failure,
     output, run,
@@ -21,7 +21,7 @@ Before wiring:      families, plan
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; watch, monitor, reload
-One line, read:     scan, poll, monitor; init writes a configuration from a scan
+One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain
 The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
@@ -49,6 +49,7 @@ pub(crate) enum Command {
     Plan(plan::Args),
     Scan(scan::Args),
     Init(init::Args),
+    Doctor(doctor::Args),
     Poll(poll::Args),
     Capture(capture::Args),
     Explain(explain::Args),
@@ -94,6 +95,7 @@ impl Command {
             Self::Plan(args) => plan::run(&args),
             Self::Scan(args) => scan::run(args).await,
             Self::Init(args) => init::run(args).await,
+            Self::Doctor(args) => doctor::run(args).await,
             Self::Poll(args) => poll::run(args).await,
             Self::Capture(args) => capture::run(args).await,
             Self::Explain(args) => explain::run(args).await,

@@ -20,6 +20,15 @@ pub(crate) async fn explain(port: &Path, drive: Option<DriveName>) -> Option<Str
     Some(format!("{} is {whose}", port.display()))
 }
 
+/// Who has a port that is in use, without what to type instead.
+pub(crate) async fn whose(port: &Path) -> Option<String> {
+    let whole = port.canonicalize().unwrap_or_else(|_| port.to_owned());
+    if let Some(told) = of_daemon(&whole, None).await {
+        return told.split_once(':').map(|(whose, _)| whose.to_owned());
+    }
+    of_system(&whole).map(|(pid, program)| format!("held by {program} (process {pid})"))
+}
+
 /// The daemon on the control socket, if the port is that of one of its lines.
 async fn of_daemon(port: &Path, drive: Option<DriveName>) -> Option<String> {
     let mut daemon = Daemon::connect(None, None).await.ok()?;

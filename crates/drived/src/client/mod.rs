@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 pub(crate) use self::{
     connection::{Answer, Daemon, Way},
-    holder::explain,
+    holder::{explain, whose},
     names::{Target, path_of},
     order::{Told, order},
     show::{faults, measurement, overview, registers, status_in_words, whole},

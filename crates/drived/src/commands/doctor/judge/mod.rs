@@ -1,0 +1,94 @@
+//! From what was noticed to what is wrong. Pure: no clock, no port.
+//!
+//! What explains most is looked for first; what is explained by it is not told again. The bounds are chosen so that a line
+//! which loses or damages one question in a hundred is healthy: it is repeated, and nobody notices.
+
+mod address;
+mod cable;
+mod masters;
+mod timing;
+mod whole;
+
+pub(super) use self::masters::{Habit, habits};
+
+use super::{
+    observations::{Figures, Observations},
+    verdict::Verdict,
+};
+
+/// So few failures are chance, whatever share they are.
+const FEW: usize = 5;
+
+/// What was noticed, and the figures of each slave.
+struct Case<'a> {
+    seen: &'a Observations,
+    figures: Vec<Figures>,
+    /// Whether others talk on this line.
+    is_shared: bool,
+}
+
+impl Case<'_> {
+    /// Slaves that have answered. Where somebody else asks too, some answers to him are taken for ours.
+    fn there(&self) -> impl Iterator<Item = &Figures> {
+        let least = |asked: usize| if self.is_shared { asked / 4 } else { 0 };
+        self.figures.iter().filter(move |figures| figures.answered > least(figures.asked))
+    }
+
+    fn figures(&self, slave: u8) -> Option<&Figures> {
+        self.figures.iter().find(|figures| figures.slave == slave)
+    }
+}
+
+/// Everything that is wrong; nothing: the line is healthy.
+pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
+    let is_shared = seen.listened.frames().next().is_some();
+    let case = Case { seen, figures: seen.figures(), is_shared };
+    let mut verdicts: Vec<Verdict> = masters::second(&case).into_iter().collect();
+    if let Some(whole) = whole::verdict(&case) {
+        verdicts.push(whole);
+        return verdicts;
+    }
+    let mut explained = Vec::new();
+    let mut of_one = |verdict: Option<Verdict>, explained: &mut Vec<u8>| {
+        if let Some(verdict) = verdict {
+            explained.extend(&verdict.slaves);
+            verdicts.push(verdict);
+        }
+    };
+    of_one(address::absent(&case), &mut explained);
+    for figures in &case.figures {
+        let slave = figures.slave;
+        if explained.contains(&slave) {
+            continue;
+        }
+        let found = timing::needs_pause(&case, slave)
+            .or_else(|| cable::interference(&case, slave))
+            .or_else(|| address::two(&case, slave))
+            .or_else(|| cable::damaged_alone(&case, slave));
+        of_one(found, &mut explained);
+    }
+    let held = timing::adapter(&case);
+    let is_held = held.is_some();
+    of_one(held, &mut Vec::new());
+    // What else there is shows when the others are silent.
+    if !is_shared {
+        of_one(timing::late(&case), &mut Vec::new());
+        of_one(timing::slow(&case, is_held), &mut Vec::new());
+        // Two that speak for one disturb whoever is asked next.
+        if !case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some()) {
+            of_one(cable::noise(&case, &explained), &mut Vec::new());
+        }
+    }
+    verdicts
+}
+
+/// A part of a whole as a person reads it.
+fn share(part: usize, whole: usize) -> String {
+    let percent = (part * 1_000).checked_div(whole).unwrap_or_default();
+    format!("{}.{} %", percent / 10, percent % 10)
+}
+
+/// Whether the first share is at least so many times the second.
+fn is_times(times: usize, (part, whole): (usize, usize), (other, of): (usize, usize)) -> bool {
+    part * of >= times * other * whole
+}
