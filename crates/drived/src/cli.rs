@@ -30,7 +30,30 @@ A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rt
 tcp://HOST:PORT. Speed and format are the drives' factory setting when they are not given; PROTOCOL is rtu, ascii or \
 unitelway. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as atv312@1-10,12.
 
-Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input or a plan that cannot work.";
+Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input or a plan that cannot work.
+
+Environment: DRIVED_LOG says how much is logged, such as debug or drive_bus=trace,warn; NO_COLOR=1 switches colours off.";
+
+/// The exit codes and what they mean.
+pub(crate) const EXIT_CODES: [(&str, &str); 3] = [
+    ("0", "done and confirmed"),
+    ("1", "a drive did not answer or did not do it"),
+    ("2", "bad input or a plan that cannot work"),
+];
+
+/// The variables of the environment that are looked at.
+pub(crate) const ENVIRONMENT: [(&str, &str); 3] = [
+    (
+        "DRIVED_LOG",
+        "how much is logged on stderr: off, error, warn, info, debug or trace; or for parts of the program, such as \
+         drive_bus=trace,warn",
+    ),
+    ("NO_COLOR", "where it has a value nothing is coloured; colours are for terminals in any case"),
+    (
+        "RUNTIME_DIRECTORY, XDG_RUNTIME_DIR",
+        "the folders in which the control socket of the daemon is looked for, before /run/drived",
+    ),
+];
 
 /// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones
 #[derive(Debug, Parser)]
@@ -175,6 +198,14 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_tells_the_exit_codes_that_the_man_pages_tell() {
+        for (code, meaning) in EXIT_CODES {
+            assert!(NOTES.contains(&format!("{code} {meaning}")), "{code}");
+        }
+        assert!(ENVIRONMENT.iter().take(2).all(|(name, _)| NOTES.contains(name)));
     }
 
     #[test]

@@ -28,7 +28,7 @@ impl Plant {
     fn start(name: &str) -> Self {
         let sim = Sim::serve(name, &["atv312@1-2", "atv21@5"]);
         let text = format!(
-            "[http]\nlisten = \"off\"\n[groups]\n\"both pumps\" = [\"pump 1\", \"pump 2\"]\n[lines.bench]\nport = \"{},19200,8N1\"\n\
+            "[http]\nlisten = \"off\"\n[groups]\n\"both pumps\" = [\"pump 1\", \"pump 2\"]\n[lines.bench]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv21@5\"\nname = \"Fan:O'Neill $5\"\n",
             sim.link()

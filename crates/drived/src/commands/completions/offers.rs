@@ -139,7 +139,7 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         (["init" | "scan"] | ["token", _], "NAME") => Offers::default(),
         (["faults"] | ["param", _], "NAME") => drives(),
         (_, "NAME" | "NAME|SETPOINT") => drives().and(groups()),
-        (["param", action], "NAME] [REGISTER" | "NAME] [REGISTER] [VALUE") => {
+        (["param", action], "[NAME] REGISTER" | "[NAME] REGISTER VALUE") => {
             words_of_param(place, known, action).unwrap_or_else(drives)
         }
         (_, "FAMILY|NAME") => families().and(drives()),

@@ -38,21 +38,23 @@ pub(crate) enum Command {
         daemon: DaemonArgs,
     },
     /// Read registers
+    #[command(override_usage = "drived param get [OPTIONS] [NAME] REGISTER...")]
     Get {
         #[command(flatten)]
         one: OneDriveArgs,
         /// The drive of the running daemon, which --line and --drive stand for otherwise; and mnemonics or addresses, such as
         /// ACC, 9001 or 2329h
-        #[arg(value_name = "NAME] [REGISTER", required = true)]
+        #[arg(value_name = "[NAME] REGISTER", required = true)]
         words: Vec<String>,
     },
     /// Write one register and read it back
+    #[command(override_usage = "drived param set [OPTIONS] [NAME] REGISTER VALUE")]
     Set {
         #[command(flatten)]
         one: OneDriveArgs,
         /// The drive of the running daemon, which --line and --drive stand for otherwise; the mnemonic or the address of the
         /// register; and a number in its unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
-        #[arg(value_name = "NAME] [REGISTER] [VALUE", required = true, num_args = 2..=3, allow_negative_numbers = true)]
+        #[arg(value_name = "[NAME] REGISTER VALUE", required = true, num_args = 2..=3, allow_negative_numbers = true)]
         words: Vec<String>,
         /// Then save the drive's parameters to its EEPROM, all of them, as `drived param save` does, also when the value was
         /// there already

@@ -1,10 +1,12 @@
-//! `drived export`: what a metrics store, a board and a SCADA need to know of drived.
+//! `drived export`: what a metrics store, a board, a SCADA and a manual's reader need to know of drived.
+
+mod man;
 
 use std::path::PathBuf;
 
 use crate::{config::Config, failure::Failure, gateway::virtual_unit, metrics, output};
 
-/// Print the alert rules for Prometheus, the board for Grafana, or the map of a gateway's virtual unit
+/// Print the alert rules for Prometheus, the board for Grafana, or the map of a gateway's virtual unit; write the man pages
 ///
 /// A running daemon has the first two at /alerts.yml and /grafana.json.
 #[derive(Debug, clap::Args)]
@@ -14,6 +16,9 @@ pub(crate) struct Args {
     /// The configuration whose drives stand in the map
     #[arg(long, value_name = "FILE", default_value = "drives.toml")]
     config: PathBuf,
+    /// The folder of the man pages
+    #[arg(long, value_name = "FOLDER", required_if_eq("what", "man"))]
+    to: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -24,17 +29,22 @@ enum What {
     Dashboard,
     /// The registers of the virtual unit, in CSV
     GatewayMap,
+    /// A man page for each subcommand
+    Man,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    match args.what {
-        What::Alerts => output::say_as_it_is(metrics::ALERTS.trim_end()),
-        What::GatewayMap => {
+    match (args.what, &args.to) {
+        (What::Man, Some(folder)) => man::write(folder),
+        (What::Man, None) => Err(Failure::Input("expected --to FOLDER for the man pages".to_owned())),
+        (_, Some(_)) => Err(Failure::Input("--to is for the man pages: this is printed".to_owned())),
+        (What::Alerts, None) => output::say_as_it_is(metrics::ALERTS.trim_end()),
+        (What::GatewayMap, None) => {
             let config = Config::load_workable(&args.config)?;
             let drives = config.lines.iter().flat_map(|line| &line.drives);
             let names: Vec<&str> = drives.map(|drive| drive.settings.name.as_str()).collect();
             output::say_as_it_is(virtual_unit::map(&names))
         }
-        What::Dashboard => output::say_as_it_is(format_args!("{:#}", metrics::dashboard())),
+        (What::Dashboard, None) => output::say_as_it_is(format_args!("{:#}", metrics::dashboard())),
     }
 }
