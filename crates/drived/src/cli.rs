@@ -8,7 +8,8 @@ use tracing::Level;
 use crate::{
     commands::{
         audit, capture, check, completions, demo, doctor, explain, export, families, faults, init, monitor,
-        param, plan, poll, release, reload, reset, scan, setpoint, sim, start, status, stop, token, watch,
+        param, plan, poll, release, reload, report, reset, scan, setpoint, sim, start, status, stop, token,
+        watch,
     },
     failure::Failure,
     output, run,
@@ -23,6 +24,7 @@ A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; watch, monitor, reload
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain
+The service file:   report, of the running daemon or of one line
 The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
 
@@ -86,6 +88,7 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Param(param::Command),
     Families(families::Args),
+    Report(report::Args),
     Export(export::Args),
     Completions(completions::Args),
     Watch(watch::Args),
@@ -131,6 +134,7 @@ impl Command {
             Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
+            Self::Report(args) => report::run(args).await,
             Self::Export(args) => export::run(&args),
             Self::Completions(args) => completions::run(args).await,
             Self::Watch(args) => watch::run(args).await,

@@ -14,7 +14,10 @@ pub(crate) use self::{
     holder::{explain, whose},
     names::{Target, path_of},
     order::{Told, order},
-    show::{faults, measurement, overview, registers, status_in_words, whole},
+    show::{
+        age, fault_in_words, faults, measured, measurement, overview, registers, state_in_words,
+        status_in_words, whole, words,
+    },
     watch::{Frames, watch},
 };
 use crate::{failure::Failure, output};

@@ -184,7 +184,8 @@ fn trouble(drive: &Value) -> u8 {
     }
 }
 
-fn state_in_words(drive: &Value) -> String {
+/// What a drive does, as far as that is known: an old state is one that was.
+pub(crate) fn state_in_words(drive: &Value) -> String {
     let status = &drive["status"];
     let state = status["state"].as_str().map(words);
     let state = match (state, status["direction"].as_str()) {
@@ -210,7 +211,8 @@ fn old_in_words(status: &Value) -> String {
     }
 }
 
-fn fault_in_words(fault: &Value) -> String {
+/// The code, the mnemonic and the meaning of a fault.
+pub(crate) fn fault_in_words(fault: &Value) -> String {
     let code = fault["code"].as_u64().map(|code| code.to_string());
     let mnemonic = fault["mnemonic"].as_str().map(|mnemonic| format!("{mnemonic}:"));
     let meaning = fault["meaning"].as_str().map(str::to_owned);
@@ -259,7 +261,8 @@ pub(crate) fn measurement(key: &str, value: &Value) -> (String, Option<String>) 
     (label, measured(key, value))
 }
 
-fn measured(key: &str, value: &Value) -> Option<String> {
+/// A value with the unit that its key says; nothing where it is only a mark.
+pub(crate) fn measured(key: &str, value: &Value) -> Option<String> {
     let (_, unit) = key_without_unit(key);
     match (key, value) {
         ("quality", value) if value == "good" => None,
@@ -272,7 +275,8 @@ fn measured(key: &str, value: &Value) -> Option<String> {
     }
 }
 
-fn words(text: &str) -> String {
+/// A key, or a word of the API, as a person reads it.
+pub(crate) fn words(text: &str) -> String {
     text.replace('_', " ")
 }
 
@@ -290,7 +294,7 @@ fn current(status: &Value) -> Option<String> {
 }
 
 /// An age as a person says it.
-fn age(milliseconds: u64) -> String {
+pub(crate) fn age(milliseconds: u64) -> String {
     match milliseconds {
         0..10_000 => format!("{}.{} s", milliseconds / 1_000, milliseconds % 1_000 / 100),
         10_000..120_000 => format!("{} s", milliseconds / 1_000),

@@ -4,6 +4,7 @@
 //! arithmetic of the lines. Whatever is wrong is told with its file, line and field.
 
 mod checks;
+mod described;
 mod doors;
 mod gateway;
 mod groups;

@@ -211,7 +211,7 @@ impl Source for Reloader {
 }
 
 /// Adds a drive of a line.
-pub(super) fn add(
+pub(crate) fn add(
     builder: FleetBuilder,
     line: &LinePart,
     drive: &DrivePart,

@@ -43,7 +43,7 @@ struct Side {
 
 /// What one side has for a register.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Cell {
+pub(crate) enum Cell {
     /// The value, and its word.
     Holds(String, u16),
     /// It could not be read.
@@ -53,19 +53,19 @@ enum Cell {
 
 /// A register in which they differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Difference {
-    pub(super) row: &'static Row,
-    sides: [Cell; 2],
+pub(crate) struct Difference {
+    pub(crate) row: &'static Row,
+    pub(crate) sides: [Cell; 2],
 }
 
 /// What two sides have in common, and what not.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct Comparison {
-    pub(super) differences: Vec<Difference>,
+pub(crate) struct Comparison {
+    pub(crate) differences: Vec<Difference>,
     /// Registers that are the same.
-    pub(super) same: usize,
-    /// Registers for which the manual prints no number as factory setting.
-    pub(super) without_factory: usize,
+    pub(crate) same: usize,
+    /// Registers for which the manual prints no number as factory setting, and those that could not be read.
+    pub(crate) unjudged: Vec<Difference>,
 }
 
 pub(super) async fn run(args: Args) -> Result<(), Failure> {
@@ -147,7 +147,7 @@ fn is_file(word: &str) -> bool {
 
 impl Comparison {
     /// Compares the settings of two drives of one family; those of the line itself if that is wanted.
-    pub(super) fn of(left: &Backup, right: &Backup, with_communication: bool) -> Self {
+    pub(crate) fn of(left: &Backup, right: &Backup, with_communication: bool) -> Self {
         let capabilities = left.head.family.capabilities();
         let mut comparison = Self::default();
         for row in capabilities.rows {
@@ -164,7 +164,7 @@ impl Comparison {
                     comparison.same += 1;
                 }
                 [Cell::Holds(..), Cell::Holds(..)] => comparison.differences.push(Difference { row, sides }),
-                _ if is_factory => comparison.without_factory += 1,
+                _ if is_factory => comparison.unjudged.push(Difference { row, sides }),
                 _ => comparison.differences.push(Difference { row, sides }),
             }
         }
@@ -183,7 +183,7 @@ impl Comparison {
             output::say_table(table)?;
         }
         let same = output::counted(self.same, "parameter is the same", "parameters are the same");
-        match self.without_factory {
+        match self.unjudged.len() {
             0 => output::say(same),
             several => output::say(format_args!(
                 "{same}; {several} not compared: the manual prints no number as their factory setting, or they could not be read"
@@ -206,7 +206,7 @@ impl Comparison {
             "right": right,
             "differences": differences.collect::<Vec<_>>(),
             "same": self.same,
-            "not_compared": self.without_factory,
+            "not_compared": self.unjudged.len(),
         })
     }
 }

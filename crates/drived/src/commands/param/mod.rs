@@ -1,11 +1,11 @@
 //! `drived param`: the registers of a family, and their content in one drive.
 
 mod backup;
-mod diff;
-mod file;
+pub(crate) mod diff;
+pub(crate) mod file;
 mod remote;
 mod restore;
-mod source;
+pub(crate) mod source;
 #[cfg(test)]
 mod testing;
 

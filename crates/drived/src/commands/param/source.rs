@@ -41,7 +41,7 @@ pub(super) enum Named {
 }
 
 /// One drive that can be asked.
-pub(super) enum Source {
+pub(crate) enum Source {
     OnLine(Box<OneDrive>),
     OfDaemon { daemon: Box<Daemon>, view: Value },
 }
@@ -128,12 +128,10 @@ impl SourceArgs {
         let backup = source.keep().await;
         source.close().await;
         let backup = backup?;
-        if backup.entries.iter().all(|entry| entry.held.is_err()) {
-            let why = backup.entries.first().and_then(|entry| entry.held.clone().err());
-            let why = why.unwrap_or_else(|| "its family has no parameters".to_owned());
-            return Err(Failure::Drive(format!("{}: nothing could be read: {why}", named.name())));
+        match backup.nothing_read() {
+            Some(why) => Err(Failure::Drive(format!("{}: {why}", named.name()))),
+            None => Ok(backup),
         }
-        Ok(backup)
     }
 
     /// Opens a drive. Nothing is written by it.
@@ -258,7 +256,7 @@ impl Source {
     }
 
     /// Reads everything that a backup keeps.
-    pub(super) async fn keep(&mut self) -> Result<Backup, Failure> {
+    pub(crate) async fn keep(&mut self) -> Result<Backup, Failure> {
         let head = self.head().await?;
         let family = head.family;
         let rows = family.capabilities().rows.iter();

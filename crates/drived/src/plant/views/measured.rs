@@ -7,7 +7,7 @@ use drive_bus::{
     stats::{Histogram, SlaveStats, Stats},
 };
 use drive_core::Class;
-use drive_fleet::{DriveHandle, DriveSettings, LinePlan};
+use drive_fleet::{DriveHandle, DriveSettings, LinePlan, WatchdogCheck};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -31,8 +31,8 @@ pub(crate) struct PlannedLineView {
 pub(crate) struct MeasuredLineView {
     /// For how long.
     pub(crate) elapsed_ms: u64,
-    /// One status of every drive that is not off-line, each exchange as long as that drive's are on average, with the silence
-    /// that was kept on average; absent before the first answer.
+    /// One status of every drive that is not off-line, each exchange as long as that drive's are on average, with the shortest
+    /// silence that was kept; absent before the first answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) cycle_ms: Option<f64>,
     /// The share of the time in which the line was needed.
@@ -110,7 +110,10 @@ pub(crate) struct SettingsView {
     /// How old its measurements become at the most; absent where none are read, or there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) measurements_age_ms: Option<f64>,
-    /// How its communication watchdog is fed; absent where none is known that runs.
+    /// Whether its communication watchdog runs; absent while that is not known, or where its family has none that can be read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) watchdog_armed: Option<bool>,
+    /// How that is fed; absent where none is known that runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) feed: Option<FeedView>,
 }
@@ -162,7 +165,8 @@ impl MeasuredLineView {
 
 /// One status of every drive that is not off-line, as their exchanges have been on average.
 fn cycle(stats: &Stats, drives: &[DriveHandle]) -> Option<Duration> {
-    let silence = stats.silence.mean();
+    // The others were longer because the line had nothing to do.
+    let silence = stats.silence.min();
     let one = |drive: &DriveHandle| {
         let slave = stats.slaves.get(&drive.slave().number()).filter(|slave| !slave.offline)?;
         let count = u32::try_from(slave.exchanges.up_to().last()?).ok()?;
@@ -209,6 +213,11 @@ impl SettingsView {
             measurements_age_ms: (!periods.slow.is_zero())
                 .then(|| plan.measurements_age(periods.slow))
                 .and_then(limited),
+            watchdog_armed: match (drive.watchdog_timeout(), &drive.snapshot().watchdog) {
+                (Some(_), _) => Some(true),
+                (None, WatchdogCheck::NoContract { found: Some(_) }) => Some(false),
+                (None, _) => None,
+            },
             feed: drive.watchdog_timeout().map(|timeout| FeedView::of(plan, timeout)),
             settings,
         }

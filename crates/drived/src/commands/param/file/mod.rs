@@ -54,6 +54,19 @@ impl Backup {
         entry.held.as_ref().ok().copied()
     }
 
+    /// Why it holds nothing at all, if it does not.
+    pub(crate) fn nothing_read(&self) -> Option<String> {
+        let why = self.entries.iter().find_map(|entry| entry.held.as_ref().err());
+        let why = why.map_or("its family has no parameters", String::as_str);
+        let is_empty = self.entries.iter().all(|entry| entry.held.is_err());
+        is_empty.then(|| format!("nothing could be read: {why}"))
+    }
+
+    /// How many registers could not be read.
+    pub(crate) fn unread(&self) -> usize {
+        self.entries.iter().filter(|entry| entry.held.is_err()).count()
+    }
+
     /// A row in the unit that it had in this drive.
     pub(crate) fn row(&self, row: &Row) -> Row {
         self.head.family.capabilities().in_units(row, |address| self.word(address))

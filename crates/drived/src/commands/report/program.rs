@@ -1,0 +1,111 @@
+//! What the program was told of the drives, and the alarms that it has raised.
+
+use maud::{Markup, PreEscaped, html};
+use serde_json::Value;
+
+use super::{
+    gather::{DriveTold, Told},
+    words::{cell, facts, list, milliseconds, moment, table, text, unread},
+};
+use crate::{client, output};
+
+/// The newest alarms stand in a report, and how many there are besides.
+const ALARMS: usize = 60;
+
+/// The settings, those of drives that are told the same together.
+pub(super) fn settings(drives: &[DriveTold]) -> Markup {
+    let mut alike: Vec<(String, Vec<&str>)> = Vec::new();
+    for drive in drives {
+        let rows = match &drive.settings {
+            Ok(told) => rows(told),
+            Err(why) => vec![("settings".to_owned(), unread(why))],
+        };
+        let shown = facts(rows).into_string();
+        match alike.iter_mut().find(|(other, _)| *other == shown) {
+            Some((_, names)) => names.push(drive.name()),
+            None => alike.push((shown, vec![drive.name()])),
+        }
+    }
+    html! {
+        @for (shown, names) in alike {
+            div.block { h4 { (names.join(", ")) } (PreEscaped(shown)) }
+        }
+    }
+}
+
+fn rows(told: &Value) -> Vec<(String, Markup)> {
+    let settings = &told["settings"];
+    let mut rows = Vec::new();
+    for (key, value) in settings.as_object().into_iter().flatten().filter(|(key, _)| *key != "name") {
+        flatten(&client::words(key), value, &mut rows);
+    }
+    for (key, label) in [
+        ("running_age_ms", "by the plan, a status is never older, running"),
+        ("rest_age_ms", "the same at rest"),
+        ("measurements_age_ms", "the same of measured values"),
+    ] {
+        let told = &told[key];
+        let age = if told.is_null() { "no limit, or none are read".to_owned() } else { milliseconds(told) };
+        rows.push((label.to_owned(), cell(age)));
+    }
+    rows
+}
+
+/// Each value of an object in a row of its own, under the names that lead to it.
+fn flatten(label: &str, value: &Value, rows: &mut Vec<(String, Markup)>) {
+    match value {
+        Value::Object(members) if members.is_empty() => rows.push((label.to_owned(), cell("none"))),
+        Value::Object(members) => {
+            for (key, value) in members {
+                flatten(&format!("{label}: {}", client::words(key)), value, rows);
+            }
+        }
+        Value::Array(all) if all.is_empty() => rows.push((label.to_owned(), cell("none"))),
+        Value::Array(all) => {
+            rows.push((label.to_owned(), cell(all.iter().map(plain).collect::<Vec<_>>().join(", "))));
+        }
+        Value::Number(_) => {
+            let (name, shown) = match label.rsplit_once(' ') {
+                Some((name, "ms")) => (name, milliseconds(value)),
+                Some((name, "hz")) => (name, format!("{value} Hz")),
+                Some((name, "a")) => (name, format!("{value} A")),
+                Some((name, "percent")) => (name, format!("{value} %")),
+                _ => (label, value.to_string()),
+            };
+            rows.push((name.to_owned(), cell(shown)));
+        }
+        _ => rows.push((label.to_owned(), cell(plain(value)))),
+    }
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
+        Value::String(text) => client::words(text),
+        Value::Array(all) => all.iter().map(plain).collect::<Vec<_>>().join(" to "),
+        other => other.to_string(),
+    }
+}
+
+/// The alarms of the last events that the program remembers.
+pub(super) fn alarms(events: &Told, names: &[&str]) -> Markup {
+    let events = match events {
+        Ok(events) => list(events),
+        Err(why) => return html! { p { (unread(why)) } },
+    };
+    let concerns = |event: &&Value| event["drive"].as_str().is_none_or(|drive| names.contains(&drive));
+    let all: Vec<&Value> = events.iter().filter(|event| event["alarm"] == true).filter(concerns).collect();
+    let shown = all.iter().rev().take(ALARMS);
+    let row = |event: &&Value| {
+        let drive = event["drive"].as_str().unwrap_or("the program");
+        vec![cell(moment(&event["time_unix_ms"])), cell(drive), cell(text(&event["text"]))]
+    };
+    html! {
+        @if all.is_empty() { p { "None among the last " (output::counted(events.len(), "event", "events")) " that the program remembers." } }
+        @else {
+            (table("list", &["time", "drive", "alarm"], 9, shown.map(row).collect()))
+            @if all.len() > ALARMS { p.note { (all.len() - ALARMS) " older ones are left out." } }
+        }
+    }
+}
