@@ -52,6 +52,12 @@ impl LineSpec {
         self.serial.protocol
     }
 
+    /// The serial port whatever is said of its speed and format, and whether something is; `None` over TCP.
+    pub(crate) fn port(&self) -> Option<(LineConfig, bool)> {
+        let Target::Serial(path) = &self.target else { return None };
+        Some((LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT), self.serial.baud.is_some()))
+    }
+
     /// The configuration of this line for these drives, checked against what each family can be set to.
     pub(crate) fn config(&self, drives: &[DriveName]) -> Result<LineConfig, LineSpecError> {
         let config = match &self.target {
@@ -92,6 +98,15 @@ pub(crate) fn describe(config: &LineConfig) -> String {
         }
         Endpoint::Tcp(address) => format!("tcp://{address}"),
         _ => config.serial.to_string(),
+    }
+}
+
+/// Where a line goes, without its settings.
+pub(crate) fn port(config: &LineConfig) -> String {
+    match &config.endpoint {
+        Endpoint::Serial(path) => path.display().to_string(),
+        Endpoint::Tcp(address) => address.clone(),
+        _ => String::new(),
     }
 }
 

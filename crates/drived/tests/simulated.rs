@@ -235,9 +235,12 @@ fn a_scan_says_how_long_it_takes_then_names_who_answers_and_how_to_go_on() {
     let line = format!("{},19200,8E1", sim.link());
     let scan = run(&["scan", "--line", &line, "--addresses", "1-6"]);
     let out = scan.assert_done();
-    // Six requests of 8 characters, t3.5 and the 100 ms of the wait: 639.5 ms.
-    assert!(out.starts_with("asking 6 addresses on ") && out.contains(": 640 ms if none answers"), "{out}");
-    assert!(out.contains("    2  atv312 (TELEMECANIQUE ATV312HU15N4 0102), by its own words\n"), "{out}");
+    // Six times 8 characters, the 100 ms of the wait and the 7 characters of an answer that began at its end: 651.6 ms.
+    assert!(out.starts_with("asking 6 addresses on ") && out.contains(": 652 ms if none answers"), "{out}");
+    assert!(
+        out.contains("    2  atv312 (TELEMECANIQUE ATV312HU15N4 0102, 1.5 kW, 4.1 A), by its own words\n"),
+        "{out}"
+    );
     assert!(out.contains("    5  likely 3g3ev, by its registers\n"), "{out}");
     assert!(out.contains("3 of 6 addresses answer\n"), "{out}");
     let next = format!("drived poll --line {line} --drive atv312@1,2 --drive 3g3ev@5");
@@ -247,6 +250,35 @@ fn a_scan_says_how_long_it_takes_then_names_who_answers_and_how_to_go_on() {
     run(&["scan", "--line", sim.link()]).assert_refused(2, "say which speed and format the line has");
     run(&["scan", "--line", &line, "--addresses", "0-8"]).assert_refused(2, "0 is not a slave address");
     run(&["scan", "--line", &line, "--wait", "0"]).assert_refused(2, "how long to wait");
+    run(&["scan", "--line", &line, "--speeds", "9600"])
+        .assert_refused(2, "every motor on this line has to stand");
+    run(&["scan", "--line", "tcp://127.0.0.1:9", "--standstill"]).assert_refused(2, "is for serial ports");
+}
+
+#[test]
+fn a_scan_at_standstill_finds_the_speed_and_saves_a_configuration_that_passes_check() {
+    let sim = Sim::serve_with("scan-all", &["atv312@1", "atv28@3"], &["--baud", "9600", "--format", "8N1"]);
+    let to = support::path("scan-saved.toml");
+    let to = to.to_str().expect("the path is text");
+    let arguments =
+        ["scan", "--line", sim.link(), "--standstill", "--first", "--addresses", "1-3", "--wait", "50ms"];
+    let scan = run(&[&arguments[..], &["--save", to, "--json"]].concat());
+    let out = &scan.out;
+    assert_eq!(scan.code, Some(0), "{scan:?}");
+    assert!(scan.err.contains("every motor on this line has to stand"), "{}", scan.err);
+    let lines: Vec<serde_json::Value> =
+        out.lines().map(|line| serde_json::from_str(line).expect("it is an object")).collect();
+    let [one, other, summary] = &lines[..] else { panic!("{out}") };
+    for (find, address, family) in [(one, 1, "atv312"), (other, 3, "atv28")] {
+        assert_eq!(find["address"], address, "{find}");
+        assert_eq!((&find["baud"], &find["format"]), (&9_600.into(), &"8N1".into()), "{find}");
+        assert_eq!(find["families"][0]["family"], family, "{find}");
+        assert_eq!(find["line"], format!("{},9600,8N1", sim.link()), "{find}");
+    }
+    assert_eq!(summary["summary"]["found"], 2, "{summary}");
+    run(&["check", "--config", to]).assert_done();
+    run(&[&arguments[..], &["--save", to]].concat()).assert_refused(2, "name another by --save");
+    std::fs::remove_file(to).expect("it was ours");
 }
 
 #[test]

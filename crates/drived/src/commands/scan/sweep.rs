@@ -1,0 +1,186 @@
+//! The task that asks: each step of a plan in its order, and whom it has found again and again, each at his own settings.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, SlaveSettings};
+use drive_families::Family;
+use tokio::time::Instant;
+
+use super::{
+    answer::Answer,
+    feeding::{Feeding, interval},
+    look::{self, Heard, Looks},
+    plan::{Found, Plan, Step},
+};
+use crate::{drive_spec::DriveName, failure::Failure, line_spec, one_drive};
+
+/// The scan of a line.
+pub(super) struct Sweep<'a, Open> {
+    plan: &'a Plan,
+    base: LineConfig,
+    wait: Duration,
+    open: Open,
+    /// The line as it is open now, and at which of the trials.
+    at: Option<(usize, Line)>,
+    feeding: Feeding,
+    began: Instant,
+}
+
+/// Somebody who was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Find {
+    pub(crate) step: Step,
+    pub(crate) answer: Answer,
+    /// What it has taken, for the time that the plan takes.
+    pub(crate) found: Found,
+}
+
+impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
+    pub(super) fn new(plan: &'a Plan, line: LineConfig, wait: Duration, open: Open) -> Self {
+        Self {
+            plan,
+            base: patient(line),
+            wait,
+            open,
+            at: None,
+            feeding: Feeding::default(),
+            began: Instant::now(),
+        }
+    }
+
+    /// Asks at every step that is wanted, by it and the trial at which somebody was found first, and tells who answers.
+    pub(super) async fn run(
+        &mut self,
+        mut is_wanted: impl FnMut(Step, Option<usize>) -> bool,
+        mut tell: impl FnMut(Told) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let mut found = None;
+        for (done, &step) in self.plan.steps.iter().enumerate() {
+            if !is_wanted(step, found) {
+                continue;
+            }
+            tell(Told::At { done, step })?;
+            if let Some(find) = self.ask(step).await? {
+                found = found.or(Some(step.trial));
+                tell(Told::Found(find))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the port go.
+    pub(super) async fn close(&mut self) {
+        if let Some((_, line)) = self.at.take() {
+            one_drive::close(&line).await;
+        }
+    }
+
+    async fn ask(&mut self, step: Step) -> Result<Option<Find>, Failure> {
+        let line = self.fed_line(step).await?;
+        let heard = look::ask(&line, step.slave, self.wait).await?;
+        let (answer, interval) = match heard {
+            Heard::Nothing => return Ok(None),
+            Heard::Damaged(answer @ Answer::Damaged(_)) => (answer, None),
+            Heard::Damaged(answer) => (answer, Some(Duration::from_secs(1))),
+            Heard::Somebody => self.recognise(step).await?,
+        };
+        if let Some(interval) = interval {
+            self.feeding.add(step, answer.only(), interval, self.began.elapsed());
+        }
+        let line = self.line(step.trial).await?;
+        let asked = line.stats().slaves.get(&step.slave.number()).map_or(0, |slave| slave.sent);
+        let exchanges = u32::try_from(asked).unwrap_or(u32::MAX);
+        Ok(Some(Find { step, answer, found: Found { step, exchanges, interval } }))
+    }
+
+    /// Reads whoever answers as each family that can be set so, and says how often he is to be fed.
+    async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
+        let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
+        for family in Family::ALL {
+            let line = self.fed_line(step).await?;
+            let config = line.config();
+            if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
+                continue;
+            }
+            match look::status(&line, family, step.slave).await {
+                Looks::Like(()) => {}
+                Looks::Unlike => continue,
+                Looks::Damaged => {
+                    is_damaged = true;
+                    continue;
+                }
+            }
+            let line = self.fed_line(step).await?;
+            if let Looks::Like((likeness, watchdog)) = look::identity(&line, family, step.slave).await {
+                intervals.push((likeness.certain, interval(family, config.protocol.is_ascii(), watchdog)));
+                alike.push(likeness);
+            } else {
+                is_damaged = true;
+            }
+            let line = self.fed_line(step).await?;
+            is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;
+        }
+        if alike.iter().any(|likeness| likeness.certain) {
+            alike.retain(|likeness| likeness.certain);
+            intervals.retain(|(certain, _)| *certain);
+        }
+        let unknown = alike.is_empty().then_some(Duration::from_secs(1));
+        let interval = intervals.into_iter().filter_map(|(_, interval)| interval).chain(unknown).min();
+        if is_damaged {
+            let why = "short answers come intact, longer ones are damaged every time".to_owned();
+            return Ok((Answer::Two { alike, why }, interval));
+        }
+        Ok((Answer::Slave(alike), interval))
+    }
+
+    /// The line at a step's settings, after those were fed who could not wait.
+    async fn fed_line(&mut self, step: Step) -> Result<Line, Failure> {
+        let ahead = self.plan.trials.get(step.trial).map(|trial| trial.silent(self.wait)).unwrap_or_default();
+        for _ in 0..self.feeding.len() {
+            let at = self.at.as_ref().map(|(trial, _)| *trial);
+            let Some(fed) = self.feeding.next(self.began.elapsed(), ahead, at) else { break };
+            let line = self.line(fed.step.trial).await?;
+            look::feed(&line, fed.family, fed.step.slave).await;
+            self.feeding.fed(fed.step, self.began.elapsed());
+        }
+        self.line(step.trial).await
+    }
+
+    /// The line at the settings of a trial.
+    async fn line(&mut self, trial: usize) -> Result<Line, Failure> {
+        if let Some((at, line)) = &self.at
+            && *at == trial
+        {
+            return Ok(line.clone());
+        }
+        self.close().await;
+        let settings = self.plan.trials.get(trial);
+        let config =
+            settings.map_or_else(|| self.base.clone(), |trial| trial.config(self.base.clone(), self.wait));
+        let line = (self.open)(config).await?;
+        self.at = Some((trial, line.clone()));
+        Ok(line)
+    }
+}
+
+/// How a scan goes on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Told {
+    /// It asks there now, after so many steps.
+    At {
+        done: usize,
+        step: Step,
+    },
+    Found(Find),
+}
+
+/// Each address is asked once, however many are silent.
+/// Who answers is not known yet, so whoever has answered gets the longest pause that a family needs.
+fn patient(line: LineConfig) -> LineConfig {
+    let pauses = Family::ALL.map(|family| family.capabilities().turnaround);
+    let turnaround = pauses.into_iter().max().unwrap_or_default();
+    let patient = LineConfig { offline_after: 0, retries: 0, ..line };
+    (1..=247).fold(patient, |config, address| {
+        config.slave(address, SlaveSettings { turnaround, ..SlaveSettings::default() })
+    })
+}
