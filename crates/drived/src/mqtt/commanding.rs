@@ -6,7 +6,7 @@
 
 use std::{
     collections::{HashMap, VecDeque},
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     time::Duration,
 };
 
@@ -67,8 +67,6 @@ struct Order {
     request: Request,
     record: Record,
     answers: Answers,
-    /// How many stops had come before it.
-    stops: u64,
 }
 
 /// What takes commands.
@@ -91,9 +89,6 @@ struct Judge {
     face: Arc<Face>,
     audit: Audit,
     closing: watch::Receiver<bool>,
-    /// How many stops have come. Held while a command is handed to the plant, so that no start slips in behind a stop that
-    /// came after it.
-    stops: Mutex<u64>,
     followed: Arc<Semaphore>,
 }
 
@@ -101,7 +96,7 @@ impl Commanding {
     pub(super) fn new(face: Arc<Face>, audit: Audit, closing: watch::Receiver<bool>) -> Self {
         let (orders, waiting) = mpsc::channel(WAITING);
         let followed = Arc::new(Semaphore::new(FOLLOWED));
-        let judge = Arc::new(Judge { face, audit, closing, stops: Mutex::new(0), followed });
+        let judge = Arc::new(Judge { face, audit, closing, followed });
         tokio::spawn(Arc::clone(&judge).work(waiting));
         Self {
             judge,
@@ -215,14 +210,8 @@ impl Commanding {
                         Data, or QoS 0";
             return refuse("id_needed", text);
         }
-        let stops = *self.judge.stops();
-        let order = Order {
-            caller: caller.clone(),
-            request,
-            record: record.clone(),
-            answers: answers.clone(),
-            stops,
-        };
+        let order =
+            Order { caller: caller.clone(), request, record: record.clone(), answers: answers.clone() };
         if self.orders.try_send(order).is_err() {
             refuse("busy", "too many commands are waiting");
         }
@@ -230,39 +219,24 @@ impl Commanding {
 }
 
 impl Judge {
-    fn stops(&self) -> std::sync::MutexGuard<'_, u64> {
-        self.stops.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Stops at once: no disk and no other command holds it up.
     fn stop(&self, caller: &Caller, request: Request, record: Record, answers: &Answers) {
         self.audit.record(record.clone()).whenever();
         let named = (request.id.clone(), Some("stop".to_owned()));
-        let mut stops = self.stops();
-        *stops += 1;
         let begun = self.face.plant.begin(caller, request);
-        drop(stops);
         self.begun(caller, begun, record, answers, &named);
     }
 
     /// Carries out what waits, one after the other, when it stands in the audit log.
     async fn work(self: Arc<Self>, mut orders: mpsc::Receiver<Order>) {
-        while let Some(Order { caller, request, record, answers, stops }) = orders.recv().await {
+        while let Some(Order { caller, request, record, answers }) = orders.recv().await {
             let named = (request.id.clone(), Some(request.action.name().to_owned()));
-            let refuse =
-                |reason, text: &str| self.refuse(&caller, record.clone(), &answers, &named, reason, text);
             if let Err(error) = self.audit.record(record.clone()).done().await {
-                refuse("audit", &format!("{error}: until it can, only stops are carried out"));
-                continue;
-            }
-            let now = self.stops();
-            if *now != stops {
-                drop(now);
-                refuse("superseded", "a stop came before it could be carried out");
+                let text = format!("{error}: until it can, only stops are carried out");
+                self.refuse(&caller, record, &answers, &named, "audit", &text);
                 continue;
             }
             let begun = self.face.plant.begin(&caller, request);
-            drop(now);
             self.begun(&caller, begun, record, &answers, &named);
         }
     }
@@ -313,8 +287,8 @@ impl Judge {
         text: &str,
     ) {
         self.audit.record(record.clone()).whenever();
-        let outcome = if reason == "superseded" { OutcomeWord::Superseded } else { OutcomeWord::Refused };
-        self.answered(caller, record, answers, refusal(caller, named, (outcome, reason), &text));
+        let said = refusal(caller, named, (OutcomeWord::Refused, reason), &text);
+        self.answered(caller, record, answers, said);
     }
 
     /// Answers for the first time, and keeps that in the audit log.

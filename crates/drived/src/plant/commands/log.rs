@@ -87,6 +87,14 @@ impl Log {
     }
 }
 
+#[cfg(test)]
+impl Log {
+    /// No command is added before what it gives is dropped.
+    pub(super) fn hold(&self) -> impl Drop + '_ {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 impl Entries {
     /// Forgets what is too old, and the oldest of too many.
     fn forget(&mut self, now: Instant) {

@@ -10,7 +10,7 @@ mod settle;
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
@@ -179,7 +179,8 @@ impl Plant {
             }
         }
         drop(groups);
-        self.0.stopped.pass(&request, &members)?;
+        // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
+        let _passed = self.0.stopped.pass(&request, &members)?;
         let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
@@ -208,8 +209,11 @@ impl Plant {
 #[derive(Default)]
 pub(super) struct Stopped(Mutex<HashMap<String, Instant>>);
 
+/// Nothing else passes while this is there.
+type Passed<'a> = MutexGuard<'a, HashMap<String, Instant>>;
+
 impl Stopped {
-    fn pass(&self, request: &Request, members: &[DriveHandle]) -> Result<(), Rejected> {
+    fn pass(&self, request: &Request, members: &[DriveHandle]) -> Result<Passed<'_>, Rejected> {
         let mut stopped = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_stop = matches!(request.action, Action::Stop(_));
         for member in members {
@@ -220,7 +224,7 @@ impl Stopped {
                 return Err(Rejected::Stopped(name));
             }
         }
-        Ok(())
+        Ok(stopped)
     }
 }
 
@@ -233,8 +237,33 @@ async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
 #[cfg(test)]
 mod tests {
     use drive_fleet::{Outcome, Refused};
+    use tokio::task::spawn_blocking;
 
     use super::*;
+    use crate::{doors::Rights, plant::testing::TestPlant};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_start_that_may_be_given_is_on_its_way_before_a_stop_is_taken() {
+        let plant = TestPlant::of(1).await.plant;
+        let held = plant.0.commands.hold();
+        let starting = plant.clone();
+        let started = spawn_blocking(move || {
+            let caller = Caller { name: "page".to_owned(), origin: "page".to_owned(), rights: Rights::ALL };
+            let action =
+                Action::Start { direction: Direction::Forward, setpoint: None, until: Until::default() };
+            let (target, arrived) = (Target::Drive("pump 1".to_owned()), Instant::now());
+            starting.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived })
+        });
+        // It has been let pass and is not handed over yet: no stop can be taken meanwhile.
+        let patience = std::time::Instant::now() + Duration::from_secs(20);
+        while plant.0.stopped.0.try_lock().is_ok() {
+            assert!(std::time::Instant::now() < patience, "a stop would be taken before it");
+            std::thread::yield_now();
+        }
+        drop(held);
+        assert!(started.await.unwrap().is_ok());
+        assert!(plant.0.stopped.0.try_lock().is_ok(), "and then stops are taken");
+    }
 
     #[test]
     fn what_a_stop_has_overtaken_is_told_by_the_same_words_whoever_finds_it_out() {
