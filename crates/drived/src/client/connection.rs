@@ -11,7 +11,7 @@ use axum::{
     body::Bytes,
     http::{Request, Response, StatusCode, header},
 };
-use http_body_util::{BodyExt as _, Full};
+use http_body_util::{BodyExt as _, Full, Limited};
 use hyper::{
     body::Incoming,
     client::conn::http1::{self, SendRequest},
@@ -30,6 +30,11 @@ use crate::failure::Failure;
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 /// How much of what this program serves itself waits for its reader.
 const PIPE: usize = 64 << 10;
+
+/// How long an answer that has begun may take.
+const READ_WITHIN: Duration = Duration::from_secs(20);
+/// The longest answer that is read; the state of 200 drives has a hundredth of it.
+const LONGEST: usize = 32 << 20;
 
 /// A connection to the daemon.
 pub(crate) struct Daemon {
@@ -153,7 +158,9 @@ impl Daemon {
 
     async fn ask(&mut self, method: &str, path: &str, body: Option<&Value>) -> Result<Answer, Failure> {
         let (parts, body) = self.send(method, path, body).await?.into_parts();
-        let body = body.collect().await.map_err(|error| self.lost(&error))?.to_bytes();
+        let read = timeout(READ_WITHIN, Limited::new(body, LONGEST).collect()).await;
+        let read = read.map_err(|_| self.silent("did not end its answer in time"))?;
+        let body = read.map_err(|error| self.lost(&error))?.to_bytes();
         let body = serde_json::from_slice(&body)
             .unwrap_or_else(|_| Value::String(String::from_utf8_lossy(&body).into_owned()));
         Ok(Answer { status: parts.status, body })
@@ -183,11 +190,12 @@ impl Daemon {
         }
         match timeout(ANSWERED_WITHIN, self.sender.send_request(request)).await {
             Ok(answer) => answer.map_err(|error| self.lost(&error)),
-            Err(_) => Err(Failure::Drive(format!(
-                "{} gave no answer in time: nobody knows what became of it",
-                self.way
-            ))),
+            Err(_) => Err(self.silent("gave no answer in time")),
         }
+    }
+
+    fn silent(&self, what: &str) -> Failure {
+        Failure::Drive(format!("{} {what}: nobody knows what became of it", self.way))
     }
 
     fn lost(&self, error: &dyn std::fmt::Display) -> Failure {
@@ -253,6 +261,8 @@ async fn over(
 
 #[cfg(all(test, unix))]
 mod tests {
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
     use super::*;
 
     #[tokio::test(start_paused = true)]
@@ -268,5 +278,43 @@ mod tests {
         }
         drop(stalled);
         std::fs::remove_file(&path).unwrap();
+    }
+
+    /// What is told of a daemon that begins an answer like this, and then says the same again and again, or nothing.
+    async fn told_of(name: &str, head: &'static str, then: Option<&'static [u8]>) -> Failure {
+        let path = std::env::temp_dir().join(format!("drived-{name}-{}.sock", std::process::id()));
+        let listener = tokio::net::UnixListener::bind(&path).unwrap();
+        let daemon = tokio::spawn(async move {
+            let (mut stream, _) = listener.accept().await.unwrap();
+            let mut request = [0; 4096];
+            assert!(stream.read(&mut request).await.unwrap() > 0);
+            stream.write_all(head.as_bytes()).await.unwrap();
+            match then {
+                // Whoever has read enough goes away.
+                Some(more) => while stream.write_all(more).await.is_ok() {},
+                None => std::future::pending().await,
+            }
+        });
+        let mut client = Daemon::connect(Some(&path), None).await.unwrap();
+        let failed = timeout(Duration::from_secs(3600), client.state()).await;
+        daemon.abort();
+        std::fs::remove_file(&path).unwrap();
+        failed.expect("nobody waits for ever").unwrap_err()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_daemon_that_stalls_in_the_middle_of_its_answer_is_said_to() {
+        let head =
+            "HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 100\r\n\r\n{\"drives\":";
+        let failed = told_of("half", head, None).await;
+        assert!(failed.to_string().contains("did not end its answer in time"), "{failed}");
+    }
+
+    #[tokio::test]
+    async fn an_answer_without_end_is_not_read_without_end() {
+        let head = "HTTP/1.1 200 OK\r\ntransfer-encoding: chunked\r\n\r\n";
+        let chunk = [&b"10000\r\n"[..], &[b' '; 0x10000], b"\r\n"].concat();
+        let failed = told_of("endless", head, Some(chunk.leak())).await;
+        assert!(failed.to_string().contains("length limit exceeded"), "{failed}");
     }
 }
