@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use drive_core::{Frequency, SerialSettings};
 
-use crate::world::{Act, Surroundings};
+use crate::{
+    playback::Played,
+    world::{Act, Surroundings},
+};
 
 /// An exception code, as a slave answers it after the function code with its highest bit set.
 ///
@@ -274,6 +277,13 @@ pub trait Model: Send {
     /// The address that the drive has given itself since it [joined](Self::join), for a family where the setting acts
     /// at once; 0: it answers nobody. `None`: still the one that it was put at.
     fn own_address(&self) -> Option<u8> {
+        None
+    }
+
+    /// What a slave that is no model, but plays a recording back, says to a request; `None`: it is none. It is asked before
+    /// anything else.
+    fn play(&mut self, request: &[u8], cast: Cast) -> Option<Played> {
+        let _ = (request, cast);
         None
     }
 

@@ -12,7 +12,9 @@ use crate::{
     habits::LinkHabits,
     model::{Cast, Damage, Dialect, Exception, Model, Observation},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
+    playback::{Played, Says},
     record::Breach,
+    speech::{Content, Speech},
     unite::{self, LinkCounters},
 };
 
@@ -127,14 +129,43 @@ impl Slave {
         &mut *self.model
     }
 
-    /// Takes a request; the PDU of the answer, if one is given.
-    pub(crate) fn request(
+    /// Takes a request that ended now, to this address or to all; what is said to it.
+    pub(crate) fn asked(
         &mut self,
         now: Instant,
+        address: u8,
         request: &[u8],
         cast: Cast,
         line: LineCounters,
-    ) -> Option<Vec<u8>> {
+    ) -> Option<Speech> {
+        let (content, turnaround) = match self.play(now, request, cast) {
+            Some(Played { after, says: Says::Message(message) }) => (Content::Message(message), after),
+            Some(Played { after, says: Says::Characters(characters) }) => {
+                (Content::Signal(characters), after)
+            }
+            Some(Played { says: Says::Nothing, .. }) => return None,
+            None => {
+                let answer = self.request(now, request, cast, line)?;
+                (Content::Message(answer), self.turnaround())
+            }
+        };
+        // Nobody answers a request to all.
+        let speech = Speech { slave: address, content, heard: now, turnaround };
+        (cast == Cast::Unicast).then_some(speech)
+    }
+
+    /// What a recording says to a request that it hears; `None`: this is none.
+    fn play(&mut self, now: Instant, request: &[u8], cast: Cast) -> Option<Played> {
+        let is_connected = self.is_connected(now);
+        let played = self.model.play(request, cast)?;
+        if !is_connected || !self.hears(now, request, cast) {
+            return Some(Played { after: Duration::ZERO, says: Says::Nothing });
+        }
+        Some(played)
+    }
+
+    /// Takes a request; the PDU of the answer, if one is given.
+    fn request(&mut self, now: Instant, request: &[u8], cast: Cast, line: LineCounters) -> Option<Vec<u8>> {
         let &function = request.first()?;
         if !self.hears(now, request, cast) {
             return None;
@@ -167,20 +198,26 @@ impl Slave {
         self.unless_held(answer)
     }
 
-    /// Takes a UNI-TE request; the answer, if one is given. A drive without UNI-TE hears nothing.
+    /// Takes a UNI-TE request; the answer, if one is given, and after how long it is ready. A drive without UNI-TE hears
+    /// nothing.
     pub(crate) fn unite(
         &mut self,
         now: Instant,
         request: &[u8],
         counters: &mut LinkCounters,
-    ) -> Option<Vec<u8>> {
+    ) -> Option<(Vec<u8>, Duration)> {
         self.model.unite()?;
+        match self.play(now, request, Cast::Unicast) {
+            Some(Played { after, says: Says::Message(reply) }) => return Some((reply, after)),
+            Some(_) => return None,
+            None => {}
+        }
         if !self.hears(now, request, Cast::Unicast) {
             return None;
         }
         let answer = unite::answer(&mut *self.model, request, counters);
         let answer = if self.refuses.take().is_some() { unite::REFUSED.to_vec() } else { answer };
-        self.unless_held(answer)
+        Some((self.unless_held(answer)?, self.habits.works_for))
     }
 
     /// Notes that a frame for this slave came, unless it cannot hear it; the model is then at `now`.

@@ -11,7 +11,7 @@ use crate::{
     model::{Cast, Damage, Dialect},
     record::{Breach, KEPT, LineStats, Violation},
     slave::{LineCounters, Slave},
-    speech::{Content, Speech},
+    speech::Speech,
 };
 
 /// The address that every slave hears and none answers.
@@ -136,15 +136,7 @@ impl State {
         let concerned = |slave: &&mut Slave| cast == Cast::Broadcast || slave.address() == address;
         let mut said = Vec::new();
         for slave in self.reached().filter(concerned).filter(|slave| sees_end(slave)) {
-            // Nobody answers a request to all.
-            let answer = slave.request(at, request, cast, counters(slave));
-            let turnaround = slave.turnaround();
-            said.extend(answer.map(|answer| Speech {
-                slave: address,
-                content: Content::Message(answer),
-                heard: at,
-                turnaround,
-            }));
+            said.extend(slave.asked(at, address, request, cast, counters(slave)));
         }
         said
     }

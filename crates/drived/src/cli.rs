@@ -8,8 +8,8 @@ use tracing::Level;
 use crate::{
     commands::{
         audit, capture, check, completions, demo, doctor, explain, export, families, faults, init, monitor,
-        param, plan, poll, release, reload, report, reset, scan, setpoint, sim, start, status, stop, token,
-        watch,
+        param, plan, poll, release, reload, replay, report, reset, scan, setpoint, sim, start, status, stop,
+        token, watch,
     },
     failure::Failure,
     output, run,
@@ -23,7 +23,7 @@ A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; watch, monitor, reload
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
-What went over it:  capture, explain
+What went over it:  capture, explain; replay plays it back
 The service file:   report, of the running daemon or of one line
 The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
@@ -78,6 +78,7 @@ pub(crate) enum Command {
     Poll(poll::Args),
     Capture(capture::Args),
     Explain(explain::Args),
+    Replay(replay::Args),
     Status(status::Args),
     Start(start::Args),
     Stop(stop::Args),
@@ -107,7 +108,7 @@ impl Command {
         match self {
             Self::Demo(args) => args.log_level(),
             Self::Run(_) => Some(Level::INFO),
-            Self::Sim(_) | Self::Poll(_) => Some(Level::WARN),
+            Self::Sim(_) | Self::Poll(_) | Self::Replay(_) => Some(Level::WARN),
             _ => Some(Level::ERROR),
         }
     }
@@ -125,6 +126,7 @@ impl Command {
             Self::Poll(args) => poll::run(args).await,
             Self::Capture(args) => capture::run(args).await,
             Self::Explain(args) => explain::run(args).await,
+            Self::Replay(args) => replay::run(args).await,
             Self::Status(args) => status::run(args).await,
             Self::Start(args) => start::run(args).await,
             Self::Stop(args) => stop::run(args).await,

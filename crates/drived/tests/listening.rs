@@ -1,4 +1,5 @@
-//! `capture` and `explain` on a port that is only listened to: a serial server that gives what it hears to each connection.
+//! `capture` and `explain` on a port that is only listened to, a serial server that gives what it hears to each connection;
+//! and `replay` of what was heard.
 
 mod support;
 
@@ -11,8 +12,13 @@ use std::{
 };
 
 use drive_bus::{
+    Line, LineConfig,
     capture::{self, Captured, Direction, Dissector, Writer},
     exchange::rtu,
+};
+use drive_core::{
+    SerialSettings,
+    tokio_modbus::{Request, Response, client::Client as _},
 };
 use support::{Running, path, run};
 
@@ -150,4 +156,38 @@ fn a_frame_that_may_be_a_write_or_its_confirmation_is_not_said_to_be_the_one_or_
     assert!(said.contains("? atv312@2: writes CMD 000Fh, or confirms it"), "{said}");
     assert!(said.contains("0 requests, 0 answers"), "{said}");
     fs::remove_file(file).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn what_was_heard_is_played_back_to_whoever_asks_the_same() {
+    let frames =
+        [(Direction::Sent, 0, READ), (Direction::Received, 30_000, STATUS), (Direction::Sent, 100_000, READ)];
+    let file = listened("replay", Duration::from_millis(5), &frames);
+    let name = file.to_str().unwrap();
+    let link = path("replay.pty");
+    let pty = link.to_str().unwrap();
+    let mut replay = Running::start(&["replay", name, "--pty", pty, "--drive", "atv312@2"]);
+    replay.wait_for("slave 2: 1 exchange, 1 different request");
+    let config = LineConfig { retries: 0, ..LineConfig::serial(&link, SerialSettings::MODBUS_DEFAULT) };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let answers = runtime.block_on(async {
+        let line = Line::open(config).await.unwrap();
+        let mut slave = line.slave(2);
+        let mut answers = Vec::new();
+        for register in [3201, 3201, 9] {
+            let answer = slave.call(Request::ReadHoldingRegisters(register, 1)).await;
+            answers.push(answer.ok().map(|answer| answer.unwrap()));
+        }
+        answers
+    });
+    let status = Some(Response::ReadHoldingRegisters(vec![0x0627]));
+    assert_eq!(answers, [status.clone(), status, None]);
+    replay.wait_for("not in the capture: slave 2: reads 9 (0009h)");
+    let (code, rest) = replay.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains("3 requests, 2 answers; 1 not in the capture"), "{rest}");
+    fs::remove_file(&file).unwrap();
+    run(&["replay", "/dev/null", "--pty", pty])
+        .assert_refused(2, "/dev/null: not a little-endian pcapng file");
 }

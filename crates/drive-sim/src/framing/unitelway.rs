@@ -241,7 +241,7 @@ impl UniTelway {
             return None;
         }
         let habits = slave.habits();
-        let LinkHabits { unacknowledged, acknowledges_after, works_for, .. } = habits;
+        let LinkHabits { unacknowledged, acknowledges_after, .. } = habits;
         let turnaround = acknowledges_after.unwrap_or(slave.turnaround());
         let station = self.stations.entry(address).or_default();
         let is_full = unacknowledged == Unacknowledged::Refuses && !station.pending.is_empty();
@@ -254,8 +254,8 @@ impl UniTelway {
                 if unacknowledged != Unacknowledged::Queues {
                     station.pending.clear();
                 }
-                let ready = at + works_for;
-                station.pending.extend(answer.map(|answer| (ready, [header, &answer].concat())));
+                let answer = answer.map(|(answer, after)| (at + after, [header, &answer].concat()));
+                station.pending.extend(answer);
                 ACK
             }
             None => {

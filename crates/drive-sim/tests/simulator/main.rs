@@ -7,5 +7,6 @@ mod endpoints;
 mod faults;
 mod fuzz;
 mod line;
+mod playback;
 mod support;
 mod unitelway;

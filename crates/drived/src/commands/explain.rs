@@ -183,7 +183,7 @@ fn of_options(serial: Option<SerialSpec>, drives: &[DriveName]) -> Result<Known,
 }
 
 /// The drives by their addresses.
-fn named(drives: &[DriveName]) -> BTreeMap<u8, (Family, String)> {
+pub(super) fn named(drives: &[DriveName]) -> BTreeMap<u8, (Family, String)> {
     drives.iter().map(|drive| (drive.slave.number(), (drive.family, drive.to_string()))).collect()
 }
 

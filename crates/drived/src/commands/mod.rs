@@ -18,6 +18,7 @@ pub(crate) mod plan;
 pub(crate) mod poll;
 pub(crate) mod release;
 pub(crate) mod reload;
+pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reset;
 pub(crate) mod scan;

@@ -96,12 +96,12 @@ fn standard_input() -> mpsc::Receiver<String> {
 }
 
 #[cfg(unix)]
-fn serve(line: &SimLine, pty: &Path) -> io::Result<Serving> {
+pub(super) fn serve(line: &SimLine, pty: &Path) -> io::Result<Serving> {
     line.serve_pty(pty)
 }
 
 #[cfg(not(unix))]
-fn serve(_: &SimLine, _: &Path) -> io::Result<Serving> {
+pub(super) fn serve(_: &SimLine, _: &Path) -> io::Result<Serving> {
     Err(io::Error::new(io::ErrorKind::Unsupported, "this system has no pseudo-terminals"))
 }
 
