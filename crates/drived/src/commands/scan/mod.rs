@@ -201,7 +201,7 @@ impl What {
             }
         };
         output::say(format_args!(
-            "asking {addresses} on {on}: {} if none answers, about {} more for each that does; only reads",
+            "asking {addresses} on {on}: {} if none answers, up to about {} more for each that does; only reads",
             long(plan.time()),
             long(plan.one_more()),
         ))
