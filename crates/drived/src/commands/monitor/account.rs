@@ -97,7 +97,6 @@ impl Account {
 
     /// What is told of it: first what was done, then how it stands.
     pub(super) fn sentence(&self) -> String {
-        let at = words::clock(self.unix_ms);
         let what = match &self.stop {
             Stop::All => "STOP ALL".to_owned(),
             Stop::One(name) => format!("STOP {name}"),
@@ -105,16 +104,16 @@ impl Account {
         match &self.state {
             Sent::Sending { drives, failed: 0, .. } => {
                 let drives = crate::output::counted(*drives, "drive", "drives");
-                format!("{what} {at}: given to {drives}, no answer yet")
+                format!("{what}: given to {drives}, no answer yet")
             }
             Sent::Sending { failed, why, .. } => {
-                format!("{what} {at}: NOT SENT YET, tried {failed} times: {why}: use the emergency stop")
+                format!("{what}: NOT SENT YET, tried {failed} times: {why}: use the emergency stop")
             }
             Sent::Taken { count, out_of_sight } => {
                 let sight = out_of_sight.as_ref().map(|why| format!("; out of sight: {why}"));
-                format!("{what} {at}: {}{}", count.sentence(), sight.unwrap_or_default())
+                format!("{what}: {}{}", count.sentence(), sight.unwrap_or_default())
             }
-            Sent::Failed(why) => format!("{what} {at}: NOT CONFIRMED: {why}: use the emergency stop"),
+            Sent::Failed(why) => format!("{what}: NOT CONFIRMED: {why}: use the emergency stop"),
         }
     }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use axum::Extension;
 use drive_bus::Line;
+use drive_families::Options;
 use drive_fleet::{DriveSettings, Fleet, OnControlTaken, OnExit};
 
 use super::{Args, account::Stop};
@@ -11,7 +12,7 @@ use crate::{
     api,
     client::Way,
     doors::{Caller, Rights},
-    drive_spec,
+    drive_spec::{self, DriveName},
     failure::Failure,
     one_drive,
     plant::Plant,
@@ -58,21 +59,21 @@ impl Source {
         let names = drive_spec::on_one_line(&args.drives).map_err(|error| input(&error))?;
         let options = args.options.of(&names)?;
         let config = line.config(&names).map_err(|error| input(&error))?;
-        let line = one_drive::open_line(config).await?;
+        Self::over(one_drive::open_line(config).await?, &names, &options)
+    }
+
+    /// Drives on an open line.
+    fn over(line: Line, names: &[DriveName], options: &Options) -> Result<Self, Failure> {
         let mut builder = Fleet::builder().whatever_the_plan().line(LINE, line.clone());
         for name in names {
             builder = builder.drive(LINE, name.slave.number(), watched(name.to_string()), |port, slave| {
-                name.family.open_with(port, slave, &options)
+                name.family.open_with(port, slave, options)
             });
         }
-        Ok(Self::over(builder.start().map_err(|error| input(&error))?, line))
-    }
-
-    /// A fleet on a line of its own.
-    fn over(fleet: Fleet, line: Line) -> Self {
+        let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
         let plant = Plant::start(fleet.clone(), Vec::new(), false);
         let router = api::router(plant).layer(Extension(caller()));
-        Self { way: Way::here(router), own: Some(Own { fleet, line }) }
+        Ok(Self { way: Way::here(router), own: Some(Own { fleet, line }) })
     }
 
     /// Whether it is a line of its own.
@@ -113,5 +114,77 @@ fn watched(name: String) -> DriveSettings {
         on_control_taken: OnControlTaken::Report,
         on_exit: OnExit::Leave,
         ..DriveSettings::watched(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_bus::LineConfig;
+    use drive_core::{Direction, Frequency, SlaveAddress};
+    use drive_families::Family;
+    use drive_sim::{SimLine, SimSlave, Wiring};
+    use serde_json::json;
+    use tokio::{sync::mpsc, time::sleep};
+
+    use super::{
+        super::{account::Progress, model::News, stopping},
+        *,
+    };
+    use crate::simulated::{self, SetUp};
+
+    /// How often anything was written to it.
+    fn writes(machine: &SimSlave) -> u64 {
+        [0x05, 0x06, 0x0F, 0x10, 0x16, 0x17].into_iter().map(|function| machine.requests(function)).sum()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_line_of_its_own_is_only_read_whatever_its_drives_do_until_somebody_stops_them() {
+        for family in Family::ALL {
+            let settings = family.capabilities().factory;
+            let simulated = SimLine::new(Wiring::rtu(settings));
+            let machines = [1, 2]
+                .map(|slave| simulated.add_boxed(slave, simulated::model(family, SetUp::ForTheBus)).unwrap());
+            let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
+            let names =
+                [1, 2].map(|slave| DriveName { family, slave: SlaveAddress::try_from(slave).unwrap() });
+            // Somebody else has started the motors, and has gone.
+            let builder = Fleet::builder().whatever_the_plan().line("line", line.clone());
+            let builder = names.iter().fold(builder, |builder, name| {
+                let settings = DriveSettings::controlled(name.to_string());
+                builder.drive("line", name.slave.number(), settings, |port, slave| {
+                    family.open_with(port, slave, &simulated::options())
+                })
+            });
+            let other = builder.start().unwrap();
+            for drive in other.drives() {
+                let _ = drive.ready(Duration::from_secs(20)).await;
+                let held = drive.set_setpoint(Frequency::from_hertz(20)).await;
+                let started = drive.start(Direction::Forward).await;
+                assert!(held.is_confirmed() && started.is_confirmed(), "{family}: {held} {started}");
+            }
+            drop(other);
+            let before = machines.each_ref().map(writes);
+            let source = Source::over(line, &names, &simulated::options()).unwrap();
+            sleep(Duration::from_secs(60)).await;
+            let [one, two] = &machines;
+            assert!(one.observe().running && two.observe().running, "{family}: their watchdogs are fed");
+            two.trip(simulated::trip_code(family));
+            sleep(Duration::from_secs(60)).await;
+            let mut daemon = source.way.connect().await.unwrap();
+            let start = format!("/api/v1/drives/{}/start", names[0]);
+            assert_eq!(daemon.post(&start, &json!({})).await.unwrap().status.as_u16(), 403, "{family}");
+            assert_eq!(machines.each_ref().map(writes), before, "{family}");
+
+            let (told, mut progress) = mpsc::unbounded_channel();
+            stopping::carry_out(source, 1, Stop::One(names[0].to_string()), told).await;
+            let mut last = None;
+            while let Some(News::Stop { progress, .. }) = progress.recv().await {
+                last = Some(progress);
+            }
+            let Some(Progress::Answer(answer)) = last else { panic!("{family}: {last:?}") };
+            assert_eq!(answer["outcome"], "confirmed", "{family}: {answer}");
+            assert!(!one.observe().running, "{family}");
+            assert_eq!(writes(two), before[1], "{family}: the other one was not meant");
+        }
     }
 }

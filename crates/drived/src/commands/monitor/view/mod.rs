@@ -133,14 +133,11 @@ fn accounts(model: &Model, width: usize) -> Vec<Line<'static>> {
         let bold = Style::new().fg(colour).add_modifier(Modifier::BOLD);
         let left = account.left();
         let last = if account.is_open() { "" } else { " (Esc: close)" };
-        let more =
-            [NO_EMERGENCY_STOP, &left].iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>();
+        let given = format!("at {}, {NO_EMERGENCY_STOP}", words::clock(account.unix_ms));
+        let more = if left.is_empty() { given } else { format!("{given}; {left}") };
         let sentence = output::hanging(&account.sentence(), width.max(1)).into_iter();
         lines.extend(sentence.map(|line| Line::styled(line, bold)));
-        lines.push(Line::styled(
-            fitted(&format!("  {}{last}", more.join("; ")), width),
-            Style::new().fg(colour),
-        ));
+        lines.push(Line::styled(fitted(&format!("  {more}{last}"), width), Style::new().fg(colour)));
     }
     lines
 }
@@ -157,10 +154,12 @@ fn keys(model: &Model, now: Instant, width: usize) -> Line<'static> {
             true => format!("Ctrl-S STOP ALL ({NO_EMERGENCY_STOP}){}", this.unwrap_or_default()),
             false => "you have no right to stop".to_owned(),
         };
+        let shortest = "  ? keys";
         let (short, long) = ("  ? keys  q end", "  Tab views  Enter open  / search  ? keys  q end");
         match stop.chars().count() + long.len() <= width {
             true => stop + long,
             false if stop.chars().count() + short.len() <= width => stop + short,
+            false if stop.chars().count() + shortest.len() <= width => stop + shortest,
             false => format!("Ctrl-S STOP ALL ({NO_EMERGENCY_STOP}){short}"),
         }
     };
