@@ -276,6 +276,10 @@ fn a_scan_at_standstill_finds_the_speed_and_saves_a_configuration_that_passes_ch
         assert_eq!(find["line"], format!("{},9600,8N1", sim.link()), "{find}");
     }
     assert_eq!(summary["summary"]["found"], 2, "{summary}");
+    // Three addresses at 30 settings are 90 questions; it ended with the first setting at which somebody answered.
+    assert!(summary["summary"]["questions"].as_u64().is_some_and(|asked| asked < 45), "{summary}");
+    // ttO is 10 s from the factory (BBV51701 p. 55), and half of it is how often it is asked.
+    assert_eq!(one["fed_every_ms"], 5_000, "{one}");
     run(&["check", "--config", to]).assert_done();
     run(&[&arguments[..], &["--save", to]].concat()).assert_refused(2, "name another by --save");
     std::fs::remove_file(to).expect("it was ours");

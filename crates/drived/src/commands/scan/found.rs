@@ -1,6 +1,9 @@
 //! What has been found so far, and how it is told.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
 
 use drive_bus::LineConfig;
 use drive_core::SlaveAddress;
@@ -46,6 +49,7 @@ impl Finds {
                 object.insert("baud".to_owned(), json!(serial.baud()));
                 object.insert("format".to_owned(), json!(serial.format().to_string()));
                 object.insert("protocol".to_owned(), json!(protocol.name()));
+                object.insert("fed_every_ms".to_owned(), json!(found.interval.map(json::milliseconds)));
             }
             output::say_as_it_is(json::line(&object))?;
         } else if plan.trials.len() == 1 {
@@ -89,6 +93,14 @@ impl Finds {
         }
         let answered = self.all.iter().filter(|(_, find)| !matches!(find.answer, Answer::Damaged(_))).count();
         output::say(format_args!("{answered} of {asked} answer"))?;
+        let watched = self.all.iter().filter(|(_, find)| find.found.interval.is_some());
+        let watched: BTreeSet<SlaveAddress> = watched.map(|(_, find)| find.step.slave).collect();
+        if !watched.is_empty() {
+            output::say(format_args!(
+                "{} may trip now that nobody asks any more: the watchdog is armed there, or cannot be read",
+                Addresses(watched.into_iter().collect())
+            ))?;
+        }
         for (line, drives) in self.known() {
             let drives = drives
                 .iter()
