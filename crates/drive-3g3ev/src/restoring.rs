@@ -1,5 +1,5 @@
 //! What a backup keeps of a 3G3EV and in which order a restore writes it: so that none of the alarms OP2, OP4 and OP5 of §5.3
-//! comes on the way. n02, n39, n40 and n63 to n67 act after the next power-up (§2.1, note 3).
+//! comes on the way.
 
 use drive_core::registers::{Restoring, Step};
 
@@ -14,5 +14,9 @@ pub(crate) const RESTORING: Restoring = Restoring {
     ],
     // §2.1.
     communication: &[N63, N64, N65, N66, N67],
+    acts_later: &[(
+        &[N02, N39, N40, N63, N64, N65, N66, N67],
+        "it acts after the next power-up (§2.1, note 3)",
+    )],
     ..Restoring::NONE
 };

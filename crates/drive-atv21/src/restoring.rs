@@ -24,5 +24,16 @@ pub(crate) const RESTORING: Restoring = Restoring {
     // §8.9, and LinuxCNC vfs11_vfd.
     ratings: &[MODEL_CODE, RATED_CURRENT, RATED_VOLTAGE],
     unkept: &[],
+    by_hand: &[],
+    acts_later: &[
+        (
+            &[PROTOCOL_SELECTION, BAUD_RATE, PARITY],
+            "it acts after a reset or the next power-up (§6, §6.1 p. 11)",
+        ),
+        (
+            &[WRITE_SLOT_1, WRITE_SLOT_2, READ_SLOT_1, READ_SLOT_2, READ_SLOT_3, READ_SLOT_4, READ_SLOT_5],
+            "it acts after a reset or the next power-up (§6.3 p. 18)",
+        ),
+    ],
     left: &[],
 };

@@ -26,5 +26,5 @@ pub(crate) const RESTORING: Restoring = Restoring {
     unkept: &[
         SMIL_LOW, SMIL_HIGH, SMAL_LOW, SMAL_HIGH, SPAL_LOW, SPAL_HIGH, SPAT, SPDL_LOW, SPDL_HIGH, SPDT, COD,
     ],
-    left: &[],
+    ..Restoring::NONE
 };

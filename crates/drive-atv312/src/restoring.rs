@@ -12,7 +12,6 @@ const COMMAND: &str =
 /// See [`Restoring`].
 pub(crate) const RESTORING: Restoring = Restoring {
     first: &[
-        Step { registers: &[CFG], why: "it loads a whole configuration (BBV51701 p. 32)" },
         Step { registers: &[LAC], why: "L3 puts Fr1, Cd1, CHCF and tCC back (BBV51701 p. 35)" },
         Step {
             registers: &[TCC],
@@ -54,6 +53,16 @@ pub(crate) const RESTORING: Restoring = Restoring {
     ratings: &[NCV, VCAL, INV, ARE],
     // LSP, HSP and the ramps in rpm (p. 18), and the code of whoever locked the keypad (p. 56).
     unkept: &[SMIL, SMIL_HIGH, SMAL, SMAL_HIGH, SPAL, SPAL_HIGH, SPAT, SPDL, SPDL_HIGH, SPDT, COD],
+    by_hand: &[(
+        CFG,
+        "it loads a whole configuration at once, with other functions of the terminals and with control by them: see that the \
+         wiring suits it (DANGER, BBV51701 p. 32), set it at the drive at standstill, then restore",
+    )],
+    // The manuals do not say when they act (BBV51701 p. 55, BBV52816 p. 9).
+    acts_later: &[(
+        &[ADD, TBR, TFO, ADCO, BDCO],
+        "the manual does not say when it acts: switch the drive off and on to be sure (BBV51701 p. 55)",
+    )],
     left: &[(&[TUN], "auto-tuning belongs to the motor on its cable: tune at the drive (BBV51701 p. 30)")],
 };
 

@@ -423,5 +423,7 @@ fn a_program_gets_one_object_of_every_subcommand_on_a_line() {
     assert_eq!(json(&["param", "get", "ACC"])[0]["address"], 9001);
     let written = json(&["param", "set", "ACC", "5s"]);
     assert_eq!((&written["raw"], &written["changed"]), (&50.into(), &true.into()), "{written}");
+    let saved = json(&["param", "set", "ACC", "6s", "--save"]);
+    assert_eq!((&saved["raw"], &saved["saves"]), (&60.into(), &1.into()), "one object: {saved}");
     assert!(json(&["param", "dump"]).as_array().is_some_and(|rows| rows.len() > 100));
 }

@@ -14,6 +14,9 @@ pub enum Part {
     Communication,
     /// What the drive is, and no setting: its rating, its voltage. Settings are for drives of one rating.
     Rating,
+    /// A setting that loads others, and that nobody writes over the bus for this reason: kept and compared; whoever restores sets it
+    /// at the drive before.
+    ByHand(&'static str),
     /// Kept, and not restored, for this reason.
     Left(&'static str),
     /// No part of a backup: measured values, commands, orders, and other views of a setting.
@@ -35,6 +38,12 @@ pub struct Restoring {
     /// Registers that keep a value and are no part of a backup: other views of settings that have registers of their own, and
     /// a person's code.
     pub unkept: &'static [u16],
+    /// Settings that load others, and are only set at the drive, with the reason: they have to be as they were before anything
+    /// else is restored, or what is restored would be put back by them.
+    pub by_hand: &'static [(u16, &'static str)],
+    /// What a register needs before its value acts, where that is more than the write, with the page of the manual: the drive
+    /// switched off and on, or reset.
+    pub acts_later: &'static [(&'static [u16], &'static str)],
     /// Registers that keep a value and are not restored, with the reason.
     pub left: &'static [(&'static [u16], &'static str)],
 }
@@ -62,13 +71,31 @@ pub struct Scaled {
 
 impl Restoring {
     /// A family whose manual says nothing of it.
-    pub const NONE: Self =
-        Self { first: &[], last: &[], communication: &[], ratings: &[], unkept: &[], left: &[] };
+    pub const NONE: Self = Self {
+        first: &[],
+        last: &[],
+        communication: &[],
+        ratings: &[],
+        unkept: &[],
+        by_hand: &[],
+        acts_later: &[],
+        left: &[],
+    };
+
+    /// What a register needs before a written value acts; `None` where the manual asks for nothing.
+    #[must_use]
+    pub fn acts_later(&self, address: u16) -> Option<&'static str> {
+        let later = self.acts_later.iter().find(|(registers, _)| registers.contains(&address));
+        later.map(|(_, needs)| *needs)
+    }
 
     /// What a register is to a backup.
     #[must_use]
     pub fn part(&self, row: &Row) -> Part {
         let address = row.address;
+        if let Some((_, why)) = self.by_hand.iter().find(|(register, _)| *register == address) {
+            return Part::ByHand(why);
+        }
         if let Some((_, why)) = self.left.iter().find(|(registers, _)| registers.contains(&address)) {
             return Part::Left(why);
         }
@@ -155,6 +182,8 @@ mod tests {
         communication: &[6001],
         ratings: &[3011],
         unkept: &[8607],
+        by_hand: &[(3052, "it loads a configuration")],
+        acts_later: &[(&[6001], "power")],
         left: &[(&[3003], "a code")],
         ..Restoring::NONE
     };

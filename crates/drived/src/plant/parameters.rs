@@ -229,7 +229,9 @@ impl Plant {
             Storage::Eeprom => "kept in EEPROM",
             Storage::Unknown => "the manual does not say whether it is kept",
         };
-        let text = Some(format!("{} {how} {} ({kept})", row.code, shown.show(word)));
+        let later = drive.capabilities().restoring.acts_later(row.address);
+        let later = later.map(|needs| format!("; {needs}")).unwrap_or_default();
+        let text = Some(format!("{} {how} {} ({kept}){later}", row.code, shown.show(word)));
         Ok(WrittenView { parameter: ParameterView { text, ..parameter }, changed })
     }
 }

@@ -152,7 +152,7 @@ impl Comparison {
         let mut comparison = Self::default();
         for row in capabilities.rows {
             match capabilities.restoring.part(row) {
-                Part::Setting => {}
+                Part::Setting | Part::ByHand(_) => {}
                 Part::Communication if with_communication => {}
                 _ => continue,
             }

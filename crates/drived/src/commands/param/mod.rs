@@ -192,32 +192,39 @@ async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Re
         Storage::Eeprom => "kept in EEPROM",
         Storage::Unknown => "the manual does not say whether it is kept in RAM or EEPROM",
     };
-    let view = WrittenView {
-        parameter: ParameterView::read(one.drive.capabilities(), &shown, word),
-        changed: written.changed,
-    };
-    args.daemon.say(&json!(view), |_| {
-        output::say(format_args!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word)))
-    })?;
-    match written.storage {
-        Storage::Eeprom if save => {
-            let stored = "the write itself has stored it: nothing else was saved";
-            args.daemon
-                .say(&json!({ "drive": name.to_string(), "action": "save", "text": stored }), |_| {
-                    output::say(stored)
-                })?;
+    let later = name.family.capabilities().restoring.acts_later(row.address);
+    let parameter = ParameterView::read(one.drive.capabilities(), &shown, word);
+    let mut body = json!(WrittenView { parameter, changed: written.changed });
+    body["acts_later"] = json!(later);
+    let mut text = vec![format!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word))];
+    text.extend(later.map(|needs| format!("{}: {needs}", row.code)));
+    if save && written.storage == Storage::Eeprom {
+        text.push("the write itself has stored it: nothing else was saved".to_owned());
+    } else if save {
+        match persist(&mut one).await {
+            Ok((saves, told)) => {
+                body["saves"] = json!(saves);
+                text.push(told);
+            }
+            Err(failure) => {
+                // What was written is told though it is not saved.
+                args.daemon.say(&body, |_| text.iter().try_for_each(output::say))?;
+                return Err(failure);
+            }
         }
-        _ if save => persist(args, &mut one).await?,
-        _ => {}
     }
+    args.daemon.say(&body, |_| text.iter().try_for_each(output::say))?;
     one.close().await;
     Ok(())
 }
 
 async fn save_all(args: &OneDriveArgs) -> Result<(), Failure> {
-    saving(args.name()?, "each write says where its register is kept")?;
+    let name = args.name()?;
+    saving(name, "each write says where its register is kept")?;
     let mut one = args.open().await?;
-    persist(args, &mut one).await?;
+    let (saves, text) = persist(&mut one).await?;
+    let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
+    args.daemon.say(&body, |_| output::say(text))?;
     one.close().await;
     Ok(())
 }
@@ -231,21 +238,17 @@ fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
     })
 }
 
-/// Saves whatever the drive keeps in RAM. What an earlier run of this program, another one, or a hand at the panel has
-/// changed cannot be known here, and who asks for a save wants that kept too.
-async fn persist(args: &OneDriveArgs, one: &mut OneDrive) -> Result<(), Failure> {
-    let by = saving(one.name, "")?;
+/// Saves whatever the drive keeps in RAM; tells how often it was done, and the same in words. What an earlier run of this program,
+/// another one, or a hand at the panel has changed cannot be known here, and who asks for a save wants that kept too.
+async fn persist(one: &mut OneDrive) -> Result<(u32, String), Failure> {
+    let (name, by) = (one.name, saving(one.name, "")?);
     one.drive.assume_changed();
-    let saves = told(one.name, &mut Ending::listen()?, one.drive.persist())
-        .await?
-        .map_err(|error| one.failure(&error))?;
-    let name = one.name;
-    let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
-    args.daemon.say(&body, |_| {
-        output::say(format_args!(
-            "{name} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}"
-        ))
-    })
+    let saves = told(name, &mut Ending::listen()?, one.drive.persist()).await?;
+    let saves = saves.map_err(|error| one.failure(&error))?;
+    let text = format!(
+        "{name} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}"
+    );
+    Ok((saves, text))
 }
 
 async fn dump(args: &OneDriveArgs) -> Result<(), Failure> {

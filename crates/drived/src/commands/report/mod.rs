@@ -34,6 +34,9 @@ use crate::{
 /// Identity, hours, state, faults, what differs from the factory setting, watchdogs, the quality of the lines with plots, and
 /// the plan beside what was measured. The file needs nothing else, and prints on A4. What could not be read stands in it with
 /// the reason; the exit code is 1 where a drive does not answer. All drives of the running daemon, unless some are named.
+///
+/// With --line: **a drive whose communication watchdog is armed begins to expect messages by the first one that it hears, and
+/// trips when the report is done and nobody speaks to it any more.** Do that while the motors stand.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Drives, groups or lines of the running daemon; without any, all its drives
@@ -90,7 +93,13 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let written = json!({ "file": args.to, "drives": gathered.drives.len(), "silent": silent });
     args.daemon.say(&written, |_| {
         let drives = output::counted(gathered.drives.len(), "drive", "drives");
-        output::say(format_args!("{}: {drives}", args.to.display()))
+        output::say(format_args!("{}: {drives}", args.to.display()))?;
+        match (&args.line, gathered.armed()) {
+            (None, _) | (_, 0) => Ok(()),
+            (Some(_), armed) => output::say(format_args!(
+                "the communication watchdog of {armed} of them is armed: without another master they trip now"
+            )),
+        }
     })?;
     match silent.len() {
         0 => Ok(()),
@@ -116,6 +125,14 @@ impl Args {
 }
 
 impl Gathered {
+    /// How many drives have a communication watchdog that runs.
+    fn armed(&self) -> usize {
+        let is_armed = |drive: &&gather::DriveTold| {
+            drive.settings.as_ref().is_ok_and(|told| told["watchdog_armed"] == true) && drive.is_there()
+        };
+        self.drives.iter().filter(is_armed).count()
+    }
+
     /// The drives that do not answer.
     fn silent(&self) -> Vec<String> {
         let silent = self.drives.iter().filter(|drive| !drive.is_there());

@@ -63,11 +63,12 @@ pub(super) fn attention(gathered: &Gathered) -> Markup {
         } @else {
             ul {
                 @for (concern, drives) in &all { li {
+                    @if concern.grade == Grade::Severe { strong { (concern.what) } } @else { (concern.what) }
+                    @if !concern.more.is_empty() { ": " (concern.more) }
+                    " – "
                     @for (index, drive) in drives.iter().enumerate() {
                         @if index > 0 { ", " } a href={ "#" (drive.anchor()) } { (drive.name()) }
                     }
-                    ": " @if concern.grade == Grade::Severe { strong { (concern.what) } } @else { (concern.what) }
-                    @if !concern.more.is_empty() { ": " (concern.more) }
                 } }
                 @for line in &lines { li { (line) } }
             }

@@ -106,8 +106,8 @@ async fn a_report_of_five_families_with_one_tripped_and_one_dead_says_so_and_wri
     assert!(!dead.contains("No fault is present") && !dead.contains("\nNone.\n"), "{dead}");
     let attention =
         texts(&html[html.find("What needs attention").unwrap()..html.find("at a glance").unwrap()]);
-    assert!(attention.contains("\natv28@2\n:\ndoes not answer"), "{attention}");
-    assert!(attention.contains("\natv312@4\n:\ntripped\n: 9 OCF"), "{attention}");
+    assert!(attention.contains("\ndoes not answer\n: "), "{attention}");
+    assert!(attention.contains("\ntripped\n: 9 OCF"), "{attention}");
     assert_eq!(gathered.silent(), ["atv28@2"]);
 }
 

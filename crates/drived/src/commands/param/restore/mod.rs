@@ -5,7 +5,7 @@ mod plan;
 
 use std::path::{Path, PathBuf};
 
-use drive_core::registers::{Change, Part};
+use drive_core::registers::{Change, Part, Restoring};
 use serde_json::{Map, Value, json};
 
 use self::{
@@ -41,6 +41,10 @@ pub(crate) struct Args {
     /// Write also address, speed and format of the line, last: the drive is not found where it was then
     #[arg(long)]
     with_communication: bool,
+    /// Write the rest also where a macro configuration (CFG of an Altivar 312) is another one than in the file: it is only set at
+    /// the drive, and puts the rest back when it is
+    #[arg(long)]
+    other_macro: bool,
     /// Write also to a drive of another model or rating of the same family
     #[arg(long)]
     other_model: bool,
@@ -150,6 +154,12 @@ async fn restore(
         )));
     }
     let plan = Plan::of(file, &now, args.with_communication)?;
+    let by_hand = plan.by_hand(file, &now);
+    if let Some(why) = by_hand.as_ref().filter(|_| args.write && !args.other_macro) {
+        return Err(Failure::Input(format!(
+            "{name}: nothing was written: {why}; --other-macro writes the rest all the same"
+        )));
+    }
     let mut json = Map::new();
     json.insert("drive".to_owned(), json!(name));
     json.insert("file".to_owned(), json!(path));
@@ -164,6 +174,7 @@ async fn restore(
     }
     text.extend(other.map(|why| format!("another model: {why}")));
     text.extend(plan.skipped.iter().map(|(row, why)| format!("not written: {}: {why}", row.code)));
+    text.extend(by_hand.map(|why| format!("before anything is written: {why}")));
     if !args.write {
         if !plan.changes.is_empty() {
             text.push("nothing has been written: --write does it, in this order".to_owned());
@@ -201,6 +212,7 @@ async fn restore(
         };
         text.insert(0, format!("{name}: {written} written and read back{more}"));
     }
+    text.extend(later(&of.capabilities().restoring, &carried));
     json.extend([
         ("written".to_owned(), carried.written.iter().map(|change| change.row.code).collect()),
         ("not_written".to_owned(), carried.left.iter().map(|row| row.code).collect()),
@@ -210,6 +222,19 @@ async fn restore(
         ("error".to_owned(), json!(failure.as_ref().map(ToString::to_string))),
     ]);
     Ok(Told { text, json, failure })
+}
+
+/// What has been written and does not act yet, by what it needs.
+fn later(restoring: &Restoring, carried: &Carried) -> Vec<String> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for Change { row, .. } in &carried.written {
+        let Some(needs) = restoring.acts_later(row.address) else { continue };
+        match all.iter_mut().find(|(known, _)| *known == needs) {
+            Some((_, codes)) => codes.push(row.code),
+            None => all.push((needs, vec![row.code])),
+        }
+    }
+    all.into_iter().map(|(needs, codes)| format!("{}: {needs}", codes.join(", "))).collect()
 }
 
 /// In what the drive is another one than that of the file.

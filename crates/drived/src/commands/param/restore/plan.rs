@@ -43,7 +43,7 @@ impl Plan {
             let why = match (capabilities.restoring.part(row), held) {
                 (Part::Rating | Part::Passing, _) => continue,
                 (_, Err(why)) => format!("could not be read when it was kept: {why}"),
-                (Part::Left(why), Ok(_)) if differs => why.to_owned(),
+                (Part::Left(why) | Part::ByHand(why), Ok(_)) if differs => why.to_owned(),
                 (Part::Communication, Ok(_)) if differs && !with_communication => {
                     "it changes the line itself: --with-communication writes it, last".to_owned()
                 }
@@ -81,12 +81,24 @@ impl Plan {
         Ok(Self { steps, changes, skipped })
     }
 
+    /// What has to be set at the drive before anything is written: it would load other values over them.
+    pub(super) fn by_hand(&self, file: &Backup, now: &Backup) -> Option<String> {
+        let restoring = file.head.family.capabilities().restoring;
+        self.skipped.iter().find_map(|(row, _)| {
+            let Part::ByHand(why) = restoring.part(row) else { return None };
+            let (was, is) = (file.word(row.address)?, now.word(row.address)?);
+            Some(format!("{} was {} and is {}: {why}", row.code, file.text(row, was), now.text(row, is)))
+        })
+    }
+
     /// What would be written, and what not, as a person reads it.
     pub(super) fn table(&self, file: &Backup, now: &Backup) -> Table {
         let mut table = Table::new(["", "parameter", "now", "from the file", "what it is, and why here"]);
         for (index, Change { row, held, wanted }) in self.changes.iter().enumerate() {
             let why = file.head.family.capabilities().restoring.why(row.address);
             let name = why.map_or_else(|| row.name.to_owned(), |why| format!("{}: {why}", row.name));
+            let later = file.head.family.capabilities().restoring.acts_later(row.address);
+            let name = later.map_or_else(|| name.clone(), |needs| format!("{name}; {needs}"));
             table.row([
                 (index + 1).to_string(),
                 row.code.to_owned(),
@@ -105,6 +117,7 @@ impl Plan {
                 "address": row.address,
                 "now": { "value": now.text(row, *held), "raw": held },
                 "from_file": { "value": file.text(row, *wanted), "raw": wanted },
+                "acts_later": file.head.family.capabilities().restoring.acts_later(row.address),
                 "why_here": file.head.family.capabilities().restoring.why(row.address),
             })
         });

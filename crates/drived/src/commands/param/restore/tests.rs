@@ -97,6 +97,12 @@ fn settings(family: Family) -> &'static [(u16, u16)] {
     }
 }
 
+/// Of so many cuts one is followed by the next run: `DRIVED_ONE_IN`, 1 for all of them.
+fn one_in() -> u64 {
+    let given = std::env::var("DRIVED_ONE_IN").map_or(Ok(8), |one_in| one_in.parse());
+    given.expect("DRIVED_ONE_IN is a number")
+}
+
 /// Which register the manual wants before which other one.
 fn orders(family: Family) -> &'static [(&'static str, &'static str, &'static str)] {
     match family {
@@ -218,8 +224,8 @@ async fn whenever_the_line_is_cut_it_is_told_what_was_written_and_the_next_run_g
                 assert!(!is_left || !is_sent, "{family}, cut after {cut}: {code} was sent: {told}");
                 assert!(told.contains(code), "{code}: {told}");
             }
-            // Each of the cuts is told; every few of them the next run is looked at too.
-            if cut % 8 == 0 {
+            // Each of the cuts is told; of so many the next run is looked at too.
+            if cut.is_multiple_of(one_in()) {
                 new.machine.unmute();
                 let plan = new.plan(&file).await;
                 assert_eq!(new.carry(&plan).await.stopped, None, "{family}, cut after {cut}");
@@ -249,9 +255,8 @@ async fn functions_that_exclude_each_other_are_taken_away_before_others_are_give
 #[tokio::test(start_paused = true)]
 async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_written() {
     let file = Bench::kept(Family::Atv312).await;
-    // BBV51701 p. 32: CFG loads a configuration at once, which the family leaves to the keypad; p. 35: from L3 back to L1 only
-    // by a factory setting.
-    for (code, word, set_up) in [("CFG", 0, SetUp::Factory), ("LAC", 0, SetUp::ForTheBus)] {
+    // BBV51701 p. 35: from L3 back to L1 only by a factory setting.
+    for (code, word, set_up) in [("LAC", 0, SetUp::ForTheBus)] {
         let mut file = file.clone();
         file.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
         let mut new = Bench::of(Family::Atv312, set_up);
@@ -314,6 +319,69 @@ async fn nothing_is_written_without_write_to_another_family_or_to_another_rating
     }
     let told = say(&mut new, &larger, &["--write", "--other-model"]).await.unwrap();
     assert!(told.failure.is_none(), "{:?}", told.failure);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_macro_configuration_of_another_drive_is_said_before_anything_is_written_and_set_by_hand() {
+    let mut file = Bench::kept(Family::Atv312).await;
+    // BBV51701 p. 32: CFG, 0 = StS, 1 = Std, which is its factory setting; a write loads that configuration at once.
+    file.entries.iter_mut().find(|entry| entry.row.code == "CFG").unwrap().held = Ok(0);
+    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    assert!(new.differences(&file).await.contains(&"CFG"), "diff shows it");
+    let told = say(&mut new, &file, &[]).await.unwrap();
+    let first =
+        told.text.iter().find(|text| text.starts_with("before anything is written: CFG was StS and is Std"));
+    assert!(first.is_some_and(|text| text.contains("p. 32")), "{:?}", told.text);
+    let Err(Failure::Input(why)) = say(&mut new, &file, &["--write"]).await else { panic!("written") };
+    assert!(
+        why.contains("nothing was written: CFG was StS and is Std") && why.contains("--other-macro"),
+        "{why}"
+    );
+    assert_eq!(seen(&new.machine), [0_u16; 0]);
+    // Somebody sets it at the keypad; then it is restored as any other file.
+    assert!(new.machine.poke(3_052, 0));
+    let told = say(&mut new, &file, &["--write"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+    assert_eq!(new.differences(&file).await, [""; 0]);
+    // Without that the rest is written if it is asked for, and CFG never.
+    let mut other = Bench::of(Family::Atv312, SetUp::Factory);
+    let told = say(&mut other, &file, &["--write", "--other-macro"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+    assert_eq!(other.differences(&file).await, ["CFG"]);
+    assert!(!seen(&other.machine).contains(&3_052));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_acts_only_after_a_power_cycle_is_said_before_and_after_it_is_written() {
+    // 3G3EV §2.1, note 3: n02, n39, n40 and n63 to n67 need a power cycle; §2.1: n39 is 0 from the factory.
+    let mut bench = Bench::of(Family::Omron3g3ev, SetUp::Factory);
+    let mut file = bench.source.keep().await.unwrap();
+    file.entries.iter_mut().find(|entry| entry.row.code == "n39").unwrap().held = Ok(1);
+    let told = say(&mut bench, &file, &[]).await.unwrap();
+    let needs = "after the next power-up";
+    assert!(told.text.iter().any(|text| text.contains(needs)), "{:?}", told.text);
+    assert!(told.json["changes"][0]["acts_later"].as_str().is_some_and(|said| said.contains(needs)));
+    let told = say(&mut bench, &file, &["--write"]).await.unwrap();
+    assert!(
+        told.text.iter().any(|text| text.starts_with("n39: ") && text.contains(needs)),
+        "{:?}",
+        told.text
+    );
+    // What acts at once is not said to act later: n19, the acceleration.
+    let of = |family: Family, address| family.capabilities().restoring.acts_later(address).is_some();
+    assert!(of(Family::Omron3g3ev, 0x0102) && !of(Family::Omron3g3ev, 0x0114));
+    // Altivar 21 §6.1: protocol, speed and parity after a reset, the address at once; §6.3: the blocks after a reset.
+    for (address, later) in [
+        (0x0829, true),
+        (0x0800, true),
+        (0x0801, true),
+        (0x0802, false),
+        (0x0870, true),
+        (0x0875, true),
+        (0x0803, false),
+    ] {
+        assert_eq!(of(Family::Atv21, address), later, "{address:04X}h");
+    }
 }
 
 #[tokio::test(start_paused = true)]
