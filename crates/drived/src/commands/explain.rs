@@ -150,12 +150,12 @@ fn say(explained: &Explained, began: Duration, late: Option<Duration>) -> Result
     });
     let after = after.unwrap_or_default();
     let (seconds, rest) = (since / 1_000_000, since % 1_000_000 / 10);
-    output::say(format_args!("{seconds:>4}.{rest:05} {way} {who}{text}{after}"))?;
+    output::say_behind(&format!("{seconds:>4}.{rest:05} {way} "), &format!("{who}{text}{after}"))?;
     for detail in details {
-        output::say(format_args!("             {detail}"))?;
+        output::say_behind("             ", detail)?;
     }
     for what in trouble {
-        output::say(format_args!("           ! {what}"))?;
+        output::say_behind("           ! ", what)?;
     }
     Ok(())
 }

@@ -47,6 +47,20 @@ pub(crate) fn say(line: impl fmt::Display) -> Result<(), Failure> {
     }
 }
 
+/// Prints a text behind a head; on a terminal the lines that go on begin below it.
+pub(crate) fn say_behind(head: &str, text: &str) -> Result<(), Failure> {
+    let Some(width) = terminal::width(&io::stdout()) else {
+        return say_as_it_is(format_args!("{head}{text}"));
+    };
+    let set_in = head.chars().count();
+    let mut head = head.to_owned();
+    for line in wrapped(text, width.saturating_sub(set_in).max(set_in)) {
+        say_as_it_is(format_args!("{head}{line}"))?;
+        head = " ".repeat(set_in);
+    }
+    Ok(())
+}
+
 /// Prints a line for a program, unbroken.
 pub(crate) fn say_as_it_is(line: impl fmt::Display) -> Result<(), Failure> {
     progress::make_room();
