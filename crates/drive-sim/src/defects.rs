@@ -157,7 +157,9 @@ impl Defective {
 
     fn usual_gap(&self) -> Option<Duration> {
         let noise = self.defects.noise.filter(|noise| noise.share > 0)?;
-        Some((noise.burst * (ALWAYS / noise.share.min(ALWAYS))).max(Duration::from_micros(1)))
+        let (share, burst) = (noise.share.min(ALWAYS), noise.burst.as_nanos());
+        let gap = burst * u128::from(ALWAYS - share) / u128::from(share);
+        Some(Duration::from_nanos(u64::try_from(gap).unwrap_or(u64::MAX)).max(Duration::from_micros(1)))
     }
 
     /// Draws the bursts up to this moment: their distances are those of events that come by chance.

@@ -37,7 +37,7 @@ impl Wire {
             self.noise_until = Some(begins);
             if !self.is_busy(begins) {
                 let character = self.time(1, self.master.settings).as_nanos().max(1);
-                let count = (ends - begins).as_nanos().div_ceil(character);
+                let count = ((ends - begins).as_nanos() / character).max(1);
                 let bytes: Vec<u8> = (0..count).map(|_| line.defective.stray()).collect();
                 self.foreign(0, begins, &bytes, None, line);
             }

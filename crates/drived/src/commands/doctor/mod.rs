@@ -146,11 +146,14 @@ fn create(path: &PathBuf) -> Result<File, Failure> {
 /// Says how long it will take, before anything is sent.
 fn announce(task: &Task) -> Result<(), Failure> {
     let listening = match task.config.protocol.is_paced() {
-        true => format!("listening for {}, then ", output::bound(observe::LISTENING)),
+        true => format!("listening for {} s, then ", observe::LISTENING.as_secs()),
         false => String::new(),
     };
+    let silent = task.estimate_of_silent().map_or_else(String::new, |more| {
+        format!(", and {} s more for each drive that is silent", more.as_secs())
+    });
     output::say(format_args!(
-        "{listening}asking {} on {}: up to {} s; only reads",
+        "{listening}asking {} on {}: about {} s{silent}; only reads\n",
         output::counted(task.addresses.len(), "address", "addresses"),
         line_spec::describe(&task.config),
         task.estimate().max(Duration::from_secs(1)).as_secs(),

@@ -43,7 +43,7 @@ const IMPATIENCE: Duration = Duration::from_millis(400);
 const ROUNDS: usize = 10;
 
 /// A slave that should be there and is silent is asked so often before it is left out of the rounds.
-const TRIES: usize = 3;
+const TRIES: u32 = 3;
 
 /// The longest pause that is left to chance: longer than any clock of an adapter that is looked for.
 const DITHER: Duration = Duration::from_millis(48);
@@ -87,11 +87,16 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// How long it takes at the most, unless drives answer slowly.
+    /// How long it takes where nobody is missing.
     pub(super) fn estimate(&self) -> Duration {
-        let per_address = if self.expected.is_empty() { self.wait } else { PATIENCE };
+        let per_address = if self.expected.is_empty() { self.wait } else { DITHER };
         let addresses = u32::try_from(self.addresses.len()).unwrap_or(u32::MAX);
         LISTENING + (per_address + self.config.silence() * 8).saturating_mul(addresses) + self.time
+    }
+
+    /// How much longer for each drive that should be there and is silent.
+    pub(super) fn estimate_of_silent(&self) -> Option<Duration> {
+        (!self.expected.is_empty()).then(|| PATIENCE * TRIES)
     }
 }
 
@@ -235,6 +240,8 @@ struct Asker {
 enum Pause {
     /// As short as the line allows.
     None,
+    /// Of a length left to chance, from the shortest on: for the answers that follow each other.
+    Soon,
     /// Of a length left to chance.
     Chance,
     /// Longer than any slave needs, and something left to chance.
@@ -283,6 +290,9 @@ impl Asking {
                 self.learn_watchdog(&mut asker).await?;
                 there.push(asker);
             } else if asker.is_named {
+                let settings =
+                    SlaveSettings { response_timeout: Some(IMPATIENCE), ..settings_of(task, slave) };
+                self.line.configure_slave(asker.slave, settings);
                 silent.push(asker);
             }
         }
@@ -309,12 +319,7 @@ impl Asking {
         while !there.is_empty()
             && (began.elapsed() < task.time || round < ROUNDS && began.elapsed() < longest)
         {
-            let left = task.time.saturating_sub(began.elapsed()).as_secs();
-            progress(&format!(
-                "asking {} that answer: {} questions so far, {left} s to go",
-                there.len(),
-                self.asked.len()
-            ));
+            progress(&format!("asking {} that answer, {} questions so far", there.len(), self.asked.len()));
             for index in 0..there.len() {
                 self.feed(&mut there).await?;
                 if let Some(asker) = there.get_mut(index).filter(|asker| asker.is_named) {
@@ -324,7 +329,10 @@ impl Asking {
             // One that should be there and was silent may come; each of them in its turn.
             if let Some(mut asker) = silent.pop() {
                 self.ask(&mut asker, Pause::Rest).await?;
-                if self.is_anybody_at(asker.slave) {
+                if let (true, Ok(slave)) =
+                    (self.is_anybody_at(asker.slave), SlaveAddress::try_from(asker.slave))
+                {
+                    self.be_patient(task, slave);
                     there.push(asker);
                 } else {
                     silent.insert(0, asker);
@@ -332,7 +340,8 @@ impl Asking {
             }
             for index in 0..there.len() {
                 self.feed(&mut there).await?;
-                for pause in [Pause::Chance, Pause::None, Pause::Rest] {
+                let soon = if round % 2 == 0 { Pause::None } else { Pause::Soon };
+                for pause in [Pause::Chance, soon, Pause::Rest] {
                     if let Some(asker) = there.get_mut(index) {
                         self.ask(asker, pause).await?;
                     }
@@ -432,12 +441,12 @@ impl Asking {
     async fn ask(&mut self, asker: &mut Asker, pause: Pause) -> Result<(), Failure> {
         match pause {
             Pause::None => {}
-            Pause::Chance => time::sleep(self.chance.up_to(DITHER)).await,
+            Pause::Chance | Pause::Soon => time::sleep(self.chance.up_to(DITHER)).await,
             Pause::Rest => time::sleep(REST + self.chance.up_to(DITHER)).await,
         }
         let strays = self.strays();
         let answer = match pause {
-            Pause::None => self.ask_at_once(asker).await,
+            Pause::None | Pause::Soon => self.ask_at_once(asker).await,
             Pause::Chance | Pause::Rest => asker.drive.keep_alive().await.map_err(|error| match error {
                 Error::Port { problem, .. } => Some(problem),
                 _ => None,
@@ -554,6 +563,8 @@ fn of_doctor(task: &Task) -> LineConfig {
         offline_after: 0,
         retries: 0,
         double_window: Duration::ZERO,
+        // An adapter may hold back the rest of an answer for as long as the slowest clock that is looked for.
+        chunk_gap: DITHER,
         ..task.config.clone()
     };
     task.addresses.iter().fold(config, |config, slave| {

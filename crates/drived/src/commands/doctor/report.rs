@@ -50,8 +50,8 @@ impl Diagnosis<'_> {
             if !lines.is_empty() {
                 lines.push(String::new());
             }
-            lines.push(format!("{} ({})", title(verdict.defect), verdict.certainty));
-            lines.push(format!("  {}", verdict.finding));
+            lines.push(title(verdict.defect).to_owned());
+            lines.push(format!("  {}. {}", verdict.finding, verdict.certainty));
             lines.push("  Next:".to_owned());
             lines.extend(
                 verdict.next.iter().enumerate().map(|(number, step)| format!("  {}. {step}", number + 1)),

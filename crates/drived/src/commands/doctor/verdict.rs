@@ -31,16 +31,16 @@ pub(super) enum Defect {
 pub(super) enum Certainty {
     Certain,
     Likely,
-    /// A master cannot tell it from this.
+    /// Any master hears the same from this; the steps tell them apart.
     CannotBeToldFrom(String),
 }
 
 impl fmt::Display for Certainty {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Certain => f.write_str("certain"),
-            Self::Likely => f.write_str("likely"),
-            Self::CannotBeToldFrom(other) => write!(f, "cannot be told from {other}"),
+            Self::Certain => f.write_str("This is certain."),
+            Self::Likely => f.write_str("This is likely, not proved."),
+            Self::CannotBeToldFrom(other) => write!(f, "A master cannot tell it from {other}."),
         }
     }
 }

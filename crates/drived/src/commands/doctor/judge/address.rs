@@ -20,17 +20,18 @@ pub(super) fn absent(case: &Case<'_>) -> Option<Verdict> {
     let others = case.there().count();
     let menu = format!("see in its menu that it has this address and {}", case.seen.config.serial);
     let around = match others {
-        0 => "though somebody else is heard on the line".to_owned(),
-        1 => "though one other does".to_owned(),
-        _ => format!("though {others} others do"),
+        0 => "though somebody is heard on the line".to_owned(),
+        1 => "and one other does: adapter and cable are right up to that".to_owned(),
+        _ => format!("and {others} others do: adapter and cable are right up to them"),
     };
     Some(Verdict::new(
         Defect::NoAnswer,
         &absent,
-        Certainty::CannotBeToldFrom(
-            "each other by a master: no power, A and B swapped at that drive, another address, speed or format".to_owned(),
+        Certainty::Certain,
+        format!(
+            "{names} never answered, {around}. To a master no power, A and B swapped at that drive, another address and another \
+             speed or format are all the same; the steps tell them apart"
         ),
-        format!("{names} never answered, {around}: adapter and cable are right up to the others"),
         &[
             "see that its display is lit",
             &menu,

@@ -72,7 +72,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     of_one(held, &mut Vec::new());
     // What else there is shows when the others are silent.
     if !is_shared {
-        of_one(timing::late(&case), &mut Vec::new());
+        of_one(timing::late(&case, &explained), &mut Vec::new());
         of_one(timing::slow(&case, is_held), &mut Vec::new());
         // Two that speak for one disturb whoever is asked next.
         if !case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some()) {

@@ -94,11 +94,11 @@ fn nothing_heard(case: &Case<'_>) -> Verdict {
     Verdict::new(
         Defect::NothingHeard,
         &[],
-        Certainty::CannotBeToldFrom(
-            "each other by a master: no power, A and B swapped, a wrong port, other addresses, another speed or format"
-                .to_owned(),
+        Certainty::Certain,
+        format!(
+            "not one byte was heard, neither by listening nor to {silent} questions. To a master no power, A and B swapped, a \
+             wrong port, other addresses and another speed or format are all the same; the steps tell them apart"
         ),
-        format!("not one byte was heard, neither by listening nor to {silent} questions"),
         &[
             "see that the drives' displays are lit",
             "swap A and B (D0 and D1) at the adapter, and try again: nothing breaks by it",

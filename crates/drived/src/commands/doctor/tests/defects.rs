@@ -121,6 +121,7 @@ const TABLE: &[(Broken, &[Found])] = &[
     (Broken::SecondMaster, &[(Defect::SecondMaster, &[])]),
     (Broken::InterferenceByTheSecond, &[(Defect::Interference, &[3])]),
     (Broken::HeldBack(16), &[(Defect::AdapterHoldsBack, &[])]),
+    (Broken::HeldBack(32), &[(Defect::AdapterHoldsBack, &[])]),
     (Broken::HeldBack(10), &[(Defect::AdapterHoldsBack, &[])]),
     (Broken::SlowByAnEeprom, &[(Defect::SlowDrive, &[3])]),
     (Broken::SlowN65, &[(Defect::SlowDrive, &[2])]),
@@ -142,15 +143,23 @@ const TABLE: &[(Broken, &[Found])] = &[
     (Broken::BadContactAtTheSecond, &[(Defect::DamagedAtOneAddress, &[2])]),
 ];
 
-async fn seen_of(defect: Broken) -> Observations {
-    let mut bench = Bench::of(&FAMILIES);
-    if let Broken::OtherSettings(settings, _) = defect {
-        bench = Bench { serial: bench.serial, ..Bench::at(settings.parse().unwrap(), &FAMILIES) };
+fn bench_of(defect: Broken) -> Bench {
+    let bench = Bench::of(&FAMILIES);
+    match defect {
+        Broken::OtherSettings(settings, _) => {
+            Bench { serial: bench.serial, ..Bench::at(settings.parse().unwrap(), &FAMILIES) }
+        }
+        _ => bench,
     }
-    let time = if defect == Broken::InterferenceByTheSecond { 4 * TEN_SECONDS } else { TEN_SECONDS };
-    tokio::select! {
-        seen = bench.seen(time) => seen,
-        () = broken(defect, &bench) => unreachable!(),
+}
+
+/// What is told of a row that is judged wrongly.
+fn misjudged(defect: Broken, expected: &[Found], seen: &Observations) -> String {
+    let found = defects(&judge(seen));
+    let expected: Vec<_> = expected.iter().map(|(defect, slaves)| (*defect, slaves.to_vec())).collect();
+    match found == expected {
+        true => String::new(),
+        false => format!("\n=== {defect:?}: {found:?}, expected {expected:?}\n{}", told(seen)),
     }
 }
 
@@ -158,13 +167,44 @@ async fn seen_of(defect: Broken) -> Observations {
 async fn each_defect_of_a_line_gets_its_verdict_and_no_other() {
     let mut wrong = String::new();
     for (defect, expected) in TABLE {
-        let seen = seen_of(*defect).await;
-        let found = defects(&judge(&seen));
-        let expected: Vec<(Defect, Vec<u8>)> =
-            expected.iter().map(|(defect, slaves)| (*defect, slaves.to_vec())).collect();
-        if found != expected {
-            wrong.push_str(&format!("\n=== {defect:?}: {found:?}, expected {expected:?}\n{}", told(&seen)));
-        }
+        let bench = bench_of(*defect);
+        let time = if *defect == Broken::InterferenceByTheSecond { 4 * TEN_SECONDS } else { TEN_SECONDS };
+        let seen = tokio::select! {
+            seen = bench.seen(time) => seen,
+            () = broken(*defect, &bench) => unreachable!(),
+        };
+        wrong.push_str(&misjudged(*defect, expected, &seen));
     }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_that_lets_no_question_through_is_told_as_such_and_as_nothing_else() {
+    let bench = bench_of(Broken::NoPower);
+    let seen = tokio::select! {
+        seen = bench.seen(TEN_SECONDS) => seen,
+        () = broken(Broken::NoPower, &bench) => unreachable!(),
+    };
+    let seen = Observations { never_quiet: true, ..seen };
+    assert_eq!(defects(&judge(&seen)), [(Defect::NeverQuiet, Vec::new())]);
+}
+
+/// All at once, each on a line of its own: it takes as long as the longest, in real time.
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn on_a_pty_each_defect_gets_the_same_verdict() {
+    // A busy machine keeps no time of 10 ms.
+    let rows = TABLE.iter().filter(|(defect, _)| *defect != Broken::HeldBack(10));
+    let row = async |(index, (defect, expected)): (usize, &(Broken, &'static [Found]))| {
+        let bench = bench_of(*defect);
+        let time = if *defect == Broken::InterferenceByTheSecond { 4 * TEN_SECONDS } else { TEN_SECONDS / 2 };
+        let name = index.to_string();
+        let seen = tokio::select! {
+            seen = bench.seen_on_pty(&name, time) => seen,
+            () = broken(*defect, &bench) => unreachable!(),
+        };
+        misjudged(*defect, expected, &seen)
+    };
+    let wrong = futures_util::future::join_all(rows.enumerate().map(row)).await.concat();
     assert!(wrong.is_empty(), "{wrong}");
 }

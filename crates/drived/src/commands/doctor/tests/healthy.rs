@@ -4,8 +4,8 @@ use drive_sim::{Defects, Noise};
 
 use super::*;
 
-/// A random line: up to 12 drives of any families, at a speed and in a format that all of them have, with up to 0.03 % of the
-/// time noisy: a line that damages one frame in two hundred.
+/// A random line: up to 12 drives of any families, at a speed and in a format that all of them have, with as much noise
+/// as damages one question in two hundred at the most.
 fn line(seed: u64) -> Bench {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let families: Vec<Family> =
@@ -36,8 +36,10 @@ fn line(seed: u64) -> Bench {
             machine.set_turnaround(Some(turnaround));
         }
     }
-    let share = u32::try_from(random.below(300)).unwrap();
     let burst = Duration::from_micros(200 + random.below(1_500) as u64);
+    // So many bursts that up to one of two hundred questions with their answers, of 20 characters, is hit.
+    let most = burst.as_nanos() * 5_000 / serial.characters(20).as_nanos();
+    let share = u32::try_from(random.below(usize::try_from(most).unwrap().max(1))).unwrap();
     bench.line.set_defects(Defects { noise: Some(Noise { share, burst, seed }), ..Defects::default() });
     bench
 }

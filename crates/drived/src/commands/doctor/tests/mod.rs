@@ -74,8 +74,8 @@ impl Bench {
         &self.machines[usize::from(slave) - 1]
     }
 
-    fn task(&self, time: Duration) -> Task {
-        let config = line_spec::with_turnarounds(LineConfig::stream(self.serial), &self.names);
+    fn task(&self, config: LineConfig, time: Duration) -> Task {
+        let config = line_spec::with_turnarounds(config, &self.names);
         Task {
             config,
             expected: self.names.clone(),
@@ -87,7 +87,21 @@ impl Bench {
 
     /// What the doctor notices of the line in memory.
     async fn seen(&self, time: Duration) -> Observations {
-        let seen = observe::observe(&self.task(time), &InMemory(self.line.clone()), |_| {}).await.unwrap();
+        let task = self.task(LineConfig::stream(self.serial), time);
+        let seen = observe::observe(&task, &InMemory(self.line.clone()), |_| {}).await.unwrap();
+        self.nothing_was_written();
+        seen
+    }
+
+    /// What it notices of the line on a pty of this name.
+    #[cfg(unix)]
+    async fn seen_on_pty(&self, name: &str, time: Duration) -> Observations {
+        let link = std::env::temp_dir().join(format!("drived-doctor-{}-{name}", std::process::id()));
+        let serving = self.line.serve_pty(&link).unwrap();
+        let task = self.task(LineConfig::serial(&link, self.serial), time);
+        let port = super::Port(task.config.endpoint.clone());
+        let seen = observe::observe(&task, &port, |_| {}).await.unwrap();
+        drop(serving);
         self.nothing_was_written();
         seen
     }
