@@ -206,6 +206,41 @@ mod tests {
         Cli::command().debug_assert();
     }
 
+    /// The subcommands below one, with the words that call them; those without subcommands of their own.
+    fn last_ones(command: &clap::Command, words: &str, all: &mut Vec<(String, clap::Command)>) {
+        match command.get_subcommands().next() {
+            None => all.push((words.to_owned(), command.clone())),
+            Some(_) => command
+                .get_subcommands()
+                .filter(|one| one.get_name() != "help")
+                .for_each(|one| last_ones(one, format!("{words} {}", one.get_name()).trim(), all)),
+        }
+    }
+
+    fn all() -> Vec<(String, clap::Command)> {
+        let mut root = Cli::command();
+        root.build();
+        let mut all = Vec::new();
+        last_ones(&root, "", &mut all);
+        all
+    }
+
+    #[test]
+    fn every_subcommand_answers_programs_or_has_a_reason_not_to() {
+        let without = [
+            ("demo", "it is a picture for people"),
+            ("sim", "it is spoken to on its standard input, a line each"),
+            ("replay", "it serves a pty until it is ended"),
+            ("export", "it prints or writes files, each in the form that its reader asks for"),
+            ("completions", "a shell reads it"),
+        ];
+        for (words, command) in all() {
+            let has = command.get_arguments().any(|argument| argument.get_long() == Some("json"));
+            let reason = without.iter().find(|(name, _)| *name == words);
+            assert_ne!(has, reason.is_some(), "{words}: --json, or a reason here why not");
+        }
+    }
+
     #[test]
     fn the_help_tells_the_exit_codes_that_the_man_pages_tell() {
         for (code, meaning) in EXIT_CODES {

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use serde_json::json;
+
 use super::token::ConfigArgs;
 use crate::{
     doors::audit::{Verdict, verify},
     failure::Failure,
-    output,
+    output::{self, JsonArgs},
 };
 
 /// Look into the audit log
@@ -22,11 +24,13 @@ pub(crate) enum Command {
         file: Option<PathBuf>,
         #[command(flatten)]
         config: ConfigArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
 }
 
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
-    let Command::Verify { file, config } = command;
+    let Command::Verify { file, config, json } = command;
     let file = match file {
         Some(file) => file,
         None => config.named("audit", config.doors()?.audit)?,
@@ -35,14 +39,17 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
         .map_err(|error| Failure::Input(format!("{}: cannot be read: {error}", file.display())))?;
     match verdict {
         Verdict::Unbroken { records, torn, last } => {
-            let torn = match torn {
-                0 => String::new(),
-                torn => format!(", {torn} torn by a crash"),
-            };
-            output::say(format_args!(
-                "{}: {records} records, unbroken{torn}; the last is {last}",
-                file.display()
-            ))
+            let object = || json!({ "file": file, "records": records, "torn": torn, "last": last });
+            json.say(object, || {
+                let torn = match torn {
+                    0 => String::new(),
+                    torn => format!(", {torn} torn by a crash"),
+                };
+                output::say(format_args!(
+                    "{}: {records} records, unbroken{torn}; the last is {last}",
+                    file.display()
+                ))
+            })
         }
         Verdict::Broken { file, line } => Err(Failure::Drive(format!(
             "{}:{line}: the chain is broken: this line or the one before was changed, added or taken out",

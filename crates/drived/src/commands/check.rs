@@ -1,21 +1,25 @@
 //! `drived check`: what a configuration means.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use drive_fleet::{
     Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted,
     OnExitWatchdog, OnFault, OnLoss, Periods,
 };
 use drive_sparkplug::NodeName;
+use serde_json::{Map, Value, json};
 
 use crate::{
-    config::{Config, DrivePart, GatewayConfig, LinePart, Units},
+    config::{Config, DrivePart, GatewayConfig, LinePart, MqttConfig, SparkplugConfig, Units},
     doors::{Rights, Role},
     drive_spec::{self, DriveName},
     failure::Failure,
     line_spec,
     mqtt::Mqtt,
-    output::{self, Table},
+    output::{self, JsonArgs, Table},
 };
 
 /// Validate a configuration without opening a port, and show what it means for each drive
@@ -26,6 +30,8 @@ pub(crate) struct Args {
     /// The configuration, in TOML
     #[arg(long, value_name = "FILE", default_value = "drives.toml")]
     config: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 /// How long the end may take behind the exit of the drives.
@@ -35,6 +41,45 @@ const PACKAGED: Duration = Duration::from_secs(90);
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
+    if let Some(mqtt) = &config.mqtt {
+        // What it needs is read as the daemon would.
+        Mqtt::prepare(mqtt.clone())?;
+    }
+    args.json.say(|| object(&args.config, &config), || tell(&args.config, &config))
+}
+
+/// What it means, for a program: labels and texts are those that a person reads.
+fn object(file: &Path, config: &Config) -> Value {
+    let texts = |texts: Vec<(&str, String)>| {
+        texts.into_iter().map(|(label, text)| (label.to_owned(), text.into())).collect::<Map<String, Value>>()
+    };
+    let drive = |drive: &DrivePart| {
+        json!({
+            "drive": drive.name.to_string(),
+            "name": drive.settings.name,
+            "control": drive.settings.control,
+            "meaning": texts(meaning(drive)),
+        })
+    };
+    let line = |line: &LinePart| {
+        let drives: Vec<Value> = line.drives.iter().map(drive).collect();
+        json!({ "name": line.name, "port": line_spec::written(&line.config), "drives": drives })
+    };
+    let gateway = |gateway: &GatewayConfig| {
+        let meaning = texts(meaning_of_gateway(gateway));
+        json!({ "name": gateway.name, "listen": gateway.listen.to_string(), "meaning": meaning })
+    };
+    json!({
+        "config": file,
+        "lines": config.lines.iter().map(line).collect::<Vec<_>>(),
+        "gateways": config.gateways.iter().map(gateway).collect::<Vec<_>>(),
+        "mqtt": config.mqtt.as_ref().map(of_mqtt),
+        "sparkplug": config.sparkplug.as_ref().map(of_sparkplug),
+        "timeout_stop_s": (config.shutdown + CLOSING).as_secs(),
+    })
+}
+
+fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
     for LinePart { name, config, drives, .. } in &config.lines {
         let controlled = drives.iter().filter(|drive| drive.settings.control).count();
         output::say(format_args!(
@@ -60,27 +105,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         output::say_table(table)?;
     }
     if let Some(mqtt) = &config.mqtt {
-        // What it needs is read as the daemon would.
-        Mqtt::prepare(mqtt.clone())?;
-        let servers: Vec<String> = mqtt.servers.iter().map(ToString::to_string).collect();
-        let commands = match (mqtt.commands, mqtt.commanders.is_empty()) {
-            (false, _) => "nobody commands there".to_owned(),
-            (true, true) => "WHOEVER MAY PUBLISH THERE OPERATES".to_owned(),
-            (true, false) => {
-                let each = mqtt.commanders.iter().map(|(name, role)| format!("{name} ({})", role.name()));
-                format!("commands by {}", each.collect::<Vec<_>>().join(", "))
-            }
-        };
-        output::say(format_args!("mqtt: {} at {}: {commands}", mqtt.base, servers.join(", ")))?;
+        output::say(format_args!("mqtt: {}", of_mqtt(mqtt)))?;
     }
     if let Some(sparkplug) = &config.sparkplug {
-        let NodeName { group, edge_node } = &sparkplug.name;
-        let host = sparkplug.primary_host.as_ref().map(|host| format!(", for the primary host {host}"));
-        let may = sparkplug.commands.map_or("nobody commands there", |role| match role {
-            Role::Stop => "WHOEVER MAY PUBLISH THERE STOPS",
-            _ => "WHOEVER MAY PUBLISH THERE OPERATES",
-        });
-        output::say(format_args!("sparkplug: {group}/{edge_node}{}: {may}", host.unwrap_or_default()))?;
+        output::say(format_args!("sparkplug: {}", of_sparkplug(sparkplug)))?;
     }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(
@@ -95,8 +123,33 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     ))?;
     output::say(format_args!(
         "{} is a configuration that can work; drived plan --config {0} calculates its lines",
-        args.config.display()
+        file.display()
     ))
+}
+
+/// Where a broker is told everything, and who commands there.
+fn of_mqtt(mqtt: &MqttConfig) -> String {
+    let servers: Vec<String> = mqtt.servers.iter().map(ToString::to_string).collect();
+    let commands = match (mqtt.commands, mqtt.commanders.is_empty()) {
+        (false, _) => "nobody commands there".to_owned(),
+        (true, true) => "WHOEVER MAY PUBLISH THERE OPERATES".to_owned(),
+        (true, false) => {
+            let each = mqtt.commanders.iter().map(|(name, role)| format!("{name} ({})", role.name()));
+            format!("commands by {}", each.collect::<Vec<_>>().join(", "))
+        }
+    };
+    format!("{} at {}: {commands}", mqtt.base, servers.join(", "))
+}
+
+/// What the daemon is called as an edge node, and what is done there.
+fn of_sparkplug(sparkplug: &SparkplugConfig) -> String {
+    let NodeName { group, edge_node } = &sparkplug.name;
+    let host = sparkplug.primary_host.as_ref().map(|host| format!(", for the primary host {host}"));
+    let may = sparkplug.commands.map_or("nobody commands there", |role| match role {
+        Role::Stop => "WHOEVER MAY PUBLISH THERE STOPS",
+        _ => "WHOEVER MAY PUBLISH THERE OPERATES",
+    });
+    format!("{group}/{edge_node}{}: {may}", host.unwrap_or_default())
 }
 
 /// What a gateway lets its clients do, each with its label.

@@ -2,10 +2,11 @@
 
 use drive_core::{Capabilities, WatchdogCapability};
 use drive_families::{Family, OPTIONS, Options};
+use serde_json::{Value, json};
 
 use crate::{
     failure::Failure,
-    output::{self, Table},
+    output::{self, JsonArgs, Table},
 };
 
 /// List the families of drives; for one of them, what it can do and its options
@@ -14,13 +15,43 @@ pub(crate) struct Args {
     /// One family, such as 3g3ev
     #[arg(value_name = "FAMILY")]
     family: Option<Family>,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match args.family {
-        Some(family) => one(family),
+        Some(family) => args.json.say(|| object(family), || one(family)),
+        None if args.json.is_json() => {
+            Family::ALL.into_iter().try_for_each(|family| output::say_as_it_is(object(family)))
+        }
         None => all(),
     }
+}
+
+/// What a family can do, for a program.
+fn object(family: Family) -> Value {
+    let capabilities = family.capabilities();
+    let texts = |all: &[&str]| all.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let options = OPTIONS.iter().filter(|option| option.family == family);
+    let options = options
+        .map(|option| json!({ "name": option.name, "meaning": option.meaning, "value": option.value }));
+    json!({
+        "family": family.to_string(),
+        "name": capabilities.name,
+        "highest_address": capabilities.highest_address,
+        "speeds": capabilities.speeds,
+        "formats": capabilities.formats.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "protocols": texts(capabilities.protocols),
+        "factory": capabilities.factory.to_string(),
+        "stop_modes": capabilities.stop_modes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "fault_reset": capabilities.fault_reset,
+        "stations": capabilities.stations,
+        "watchdog": watchdogs(family),
+        "identification": capabilities.identification,
+        "persist": capabilities.persist,
+        "options": options.collect::<Vec<_>>(),
+    })
 }
 
 fn all() -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::scan::{self, Save, What};
-use crate::failure::Failure;
+use crate::{failure::Failure, output::JsonArgs};
 
 /// Write a commented configuration from a scan of a line; nothing is written to any drive
 ///
@@ -20,9 +20,11 @@ pub(crate) struct Args {
     /// What the line is called
     #[arg(long, value_name = "NAME", default_value = "main")]
     name: String,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
-    let Args { what, to, name } = args;
-    scan::scan(&what, Some(Save { file: to, name, option: "--to" }), false).await
+    let Args { what, to, name, json } = args;
+    scan::scan(&what, Some(Save { file: to, name, option: "--to" }), json.is_json()).await
 }

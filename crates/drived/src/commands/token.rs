@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
+
 use crate::{
     config::{Config, DoorsConfig},
     doors::{
@@ -10,7 +12,7 @@ use crate::{
         tokens::Tokens,
     },
     failure::Failure,
-    output::{self, Table},
+    output::{self, JsonArgs, Table},
 };
 
 /// Add, list and remove the tokens of those who command over HTTP
@@ -28,11 +30,15 @@ pub(crate) enum Command {
         role: Role,
         #[command(flatten)]
         config: ConfigArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
     /// List the tokens by their names
     List {
         #[command(flatten)]
         config: ConfigArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
     /// Remove a token: whoever uses it is refused from now on
     Remove {
@@ -41,6 +47,8 @@ pub(crate) enum Command {
         name: String,
         #[command(flatten)]
         config: ConfigArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
 }
 
@@ -71,7 +79,7 @@ impl ConfigArgs {
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
     let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
     match command {
-        Command::Add { name, role, config } => {
+        Command::Add { name, role, config, json } => {
             let (tokens, audit) = open(&config)?;
             let secret = tokens.add(&name, role).map_err(|error| input(&error))?;
             let what = format!("token {name} added, role {}", role.name());
@@ -79,15 +87,17 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
                 tokens.remove(&name).map_err(|error| input(&error))?;
                 return Err(failure);
             }
-            output::say_as_it_is(secret)
+            let object = || json!({ "name": name, "role": role.name(), "token": secret });
+            json.say(object, || output::say_as_it_is(&secret))
         }
-        Command::List { config } => list(&open(&config)?.0),
-        Command::Remove { name, config } => {
+        Command::List { config, json } => list(&open(&config)?.0, json),
+        Command::Remove { name, config, json } => {
             let (tokens, audit) = open(&config)?;
             tokens.remove(&name).map_err(|error| input(&error))?;
             // What is closed stays closed, whatever the log says.
             tell(audit.as_deref(), format!("token {name} removed"))?;
-            output::say(format_args!("{name} is removed"))
+            let object = || json!({ "name": name, "removed": true });
+            json.say(object, || output::say(format_args!("{name} is removed")))
         }
     }
 }
@@ -99,8 +109,14 @@ fn open(config: &ConfigArgs) -> Result<(Tokens, Option<PathBuf>), Failure> {
     Ok((tokens, doors.audit))
 }
 
-fn list(tokens: &Tokens) -> Result<(), Failure> {
+fn list(tokens: &Tokens, json: JsonArgs) -> Result<(), Failure> {
     let all = tokens.all().map_err(|error| Failure::Input(error.to_string()))?;
+    if json.is_json() {
+        return all.iter().try_for_each(|token| {
+            let object = json!({ "name": token.name, "role": token.role.name(), "made_unix_s": token.made });
+            output::say_as_it_is(object)
+        });
+    }
     if all.is_empty() {
         return output::say("there is no token: drived token add NAME --role ROLE");
     }

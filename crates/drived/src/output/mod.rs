@@ -72,6 +72,29 @@ pub(crate) fn say_table(table: Table) -> Result<(), Failure> {
     say_as_it_is(table.on_terminal())
 }
 
+/// `--json` of a subcommand that needs no daemon.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub(crate) struct JsonArgs {
+    /// Print JSON: one object, or one a line
+    #[arg(long)]
+    json: bool,
+}
+
+impl JsonArgs {
+    /// Prints an object for a program, else what a person reads.
+    pub(crate) fn say(
+        self,
+        object: impl FnOnce() -> serde_json::Value,
+        text: impl FnOnce() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        if self.json { say_as_it_is(object()) } else { text() }
+    }
+
+    pub(crate) const fn is_json(self) -> bool {
+        self.json
+    }
+}
+
 /// Says on stderr what is not well on the way, if anybody reads that.
 pub(crate) fn complain(what: impl fmt::Display) {
     tell(&what, |what| json!({ "warning": what }));

@@ -84,6 +84,11 @@ impl ParameterView {
         Self::of(capabilities, row, Some((raw, Instant::now())), None)
     }
 
+    /// What the family's table says of a register that nobody has read.
+    pub(crate) fn unasked(capabilities: &Capabilities, row: &Row) -> Self {
+        Self::of(capabilities, row, None, None)
+    }
+
     /// What could not be read, and why.
     pub(crate) fn unread(capabilities: &Capabilities, row: &Row, why: String) -> Self {
         Self::of(capabilities, row, None, Some(why))

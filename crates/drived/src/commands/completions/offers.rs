@@ -132,7 +132,9 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
     let families =
         || Offers::of(Family::ALL.map(|family| whole(family.to_string(), family.capabilities().name)));
     match (&*place.path, name) {
-        (_, "LINE") if arg.get_long() == Some("line") => Offers::of(line(typed, family_of_line(place))),
+        (_, "LINE" | "PORT") if arg.get_long() == Some("line") => {
+            Offers::of(line(typed, family_of_line(place)))
+        }
         (_, "LINE") => lines(),
         (["explain" | "capture"], "NAME") => lines(),
         // They are given here.
@@ -163,6 +165,18 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         }
         (_, "BAUD[,FORMAT]") => Offers::of(settings("", typed, family_of_line(place))),
         (_, "FORMAT[,PROTOCOL]") => Offers::of(formats("", family_of_line(place))),
+        (_, "SPEEDS") => Offers::of(settings("", "", None)),
+        (_, "FORMATS") => Offers::of(formats("", None)),
+        (_, "PROTOCOLS") => Offers::of(
+            of(None, |family| family.capabilities().protocols.to_vec())
+                .into_iter()
+                .map(|protocol| part(protocol, "")),
+        ),
+        // Numbers, times and texts are the person's own.
+        (
+            _,
+            "ADDRESS" | "ADDRESSES" | "MNEMONIC" | "N" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME" | "WORD",
+        ) => Offers::default(),
         _ => Offers::default(),
     }
 }
@@ -246,4 +260,33 @@ fn of<T: PartialEq>(family: Option<Family>, has: impl Fn(Family) -> Vec<T>) -> V
         }
         all
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+    use crate::cli::Cli;
+
+    fn check(command: &Command, seen: &mut Vec<String>) {
+        for argument in command.get_arguments().filter(|argument| argument.get_action().takes_values()) {
+            if argument.get_possible_values().is_empty() {
+                seen.extend(argument.get_value_names().unwrap_or_default().iter().map(ToString::to_string));
+            }
+        }
+        command.get_subcommands().for_each(|one| check(one, seen));
+    }
+
+    #[test]
+    fn every_value_name_of_the_help_stands_in_the_table() {
+        let mut root = Cli::command();
+        root.build();
+        let mut names = Vec::new();
+        check(&root, &mut names);
+        let table = include_str!("offers.rs");
+        for name in names.iter().filter(|name| *name != "COMMAND") {
+            assert!(table.contains(&format!("\"{name}\"")), "{name}: what does the tab key offer for it?");
+        }
+    }
 }

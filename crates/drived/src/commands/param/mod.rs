@@ -87,7 +87,12 @@ pub(crate) enum Command {
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::List { of, daemon } => output::say_table(list(family(&of, &daemon).await?)),
+        Command::List { of, daemon } => {
+            let family = family(&of, &daemon).await?;
+            let capabilities = family.capabilities();
+            let rows = capabilities.rows.iter().map(|row| ParameterView::unasked(capabilities, row));
+            daemon.say(&json!(rows.collect::<Vec<_>>()), |_| output::say_table(list(family)))
+        }
         Command::Get { one, words } if one.is_on_line() => get(&one, &words).await,
         Command::Get { one, words } => remote::get(&one, &words).await,
         Command::Set { one, words, save } => match (one.is_on_line(), &*words) {

@@ -21,7 +21,7 @@ use crate::{
     duration::Time,
     failure::Failure,
     line_spec::{self, LineSpec},
-    output,
+    output::{self, JsonArgs},
 };
 
 /// Calculate lines before the cable is pulled: cycle, age of values, load, worst stop, watchdogs
@@ -52,6 +52,8 @@ pub(crate) struct Args {
     /// Segments of the line: 1, and one more behind each repeater
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     segments: u8,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -63,6 +65,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     };
     let forecasts: Vec<(&PlannedLine, Vec<Case>)> = lines.iter().map(|line| (line, line.cases())).collect();
+    let mut problems = problems.into_iter();
+    let first = problems.next();
+    let refused = first.map_or(Ok(()), |problem| Err(Failure::Input(problem)));
+    if args.json.is_json() {
+        forecasts
+            .iter()
+            .try_for_each(|(line, cases)| output::say_as_it_is(Sheet { line, cases }.object()))?;
+        return refused;
+    }
     for (line, cases) in &forecasts {
         Sheet { line, cases }.say()?;
         output::say("")?;
@@ -75,10 +86,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         "Ages and times are the longest there can be while no commands are given; a motor whose stop is confirmed \
          still needs its ramp.",
     )?;
-    let mut problems = problems.into_iter();
-    let first = problems.next();
     problems.try_for_each(output::say)?;
-    first.map_or(Ok(()), |problem| Err(Failure::Input(problem)))
+    refused
 }
 
 /// The lines of a file, and what is wrong with those that cannot work.

@@ -3,11 +3,13 @@
 use std::time::Duration;
 
 use drive_fleet::{Feed, LinePlan, Periods};
+use serde_json::{Value, json};
 
 use super::line::{Case, PlannedLine};
 use crate::{
     drive_spec::{self, DriveName},
     failure::Failure,
+    json::microseconds,
     line_spec,
     output::{self, Table},
 };
@@ -53,6 +55,42 @@ impl Sheet<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The same for a program, an object with each case.
+    pub(super) fn object(self) -> Value {
+        let case = |case: &Case| {
+            let plan = &case.forecast.plan;
+            json!({
+                "case": case.label,
+                "works": case.forecast.problem.is_none(),
+                "problem": case.forecast.problem.as_ref().map(ToString::to_string),
+                "for_comparison_only": case.hypothetical,
+                "cycle_us": microseconds(plan.sweep),
+                "used_ppm": plan.utilisation_ppm,
+                "left_ppm": plan.left_ppm(),
+                "stop_on_the_wire_us": microseconds(case.stop_to_the_wire),
+                "all_stopped_us": microseconds(case.all_stopped),
+            })
+        };
+        let drives = self.line.drives.iter().map(|(name, demand)| {
+            let plan = self.cases.first().map(|case| &case.forecast.plan);
+            let age = |period| {
+                plan.filter(|plan| !plan.is_overloaded()).map(|plan| microseconds(plan.status_age(period)))
+            };
+            json!({
+                "drive": name.to_string(),
+                "name": demand.drive,
+                "age_running_us": age(demand.periods.running),
+                "age_rest_us": age(demand.periods.rest),
+            })
+        });
+        json!({
+            "line": self.line.name,
+            "port": line_spec::written(&self.line.config),
+            "cases": self.cases.iter().map(case).collect::<Vec<_>>(),
+            "drives": drives.collect::<Vec<_>>(),
+        })
     }
 
     fn table(self) -> Table {
