@@ -110,7 +110,7 @@ fn the_key_of_one_drive_stops_that_one_alone() {
     plant.turn();
     let mut monitor = plant.monitor(60, 20);
     monitor.wait_until("two that run", |screen| screen.matches("Running fwd").count() == 2);
-    monitor.press("\u{1b}[B");
+    monitor.press("\u{1b}[B\u{1b}[B");
     monitor.wait_for("▸ pump 2");
     monitor.press(STOP_THIS);
     monitor.wait_for("STOP pump 2");

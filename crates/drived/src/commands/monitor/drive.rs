@@ -16,6 +16,9 @@ const STOP_IS_LATE: Duration = Duration::from_secs(5);
 /// What was heard longer ago is old, whatever it says of itself: a drive of which nothing changes is told anew each 5 s.
 const HEARD_WITHIN: Duration = Duration::from_secs(12);
 
+/// A line with many drives reads each of them so rarely that somebody should know it.
+const RARELY: Duration = Duration::from_secs(3);
+
 /// What a drive is told to be, and when that was heard.
 #[derive(Debug, Clone)]
 pub(super) struct Drive {
@@ -94,6 +97,11 @@ impl Drive {
     /// Whether what it shows is what it shows now, as far as whoever is connected can know.
     pub(super) fn is_live(&self, now: Instant, connected: bool) -> bool {
         connected && self.good && self.heard_ago(now) < HEARD_WITHIN
+    }
+
+    /// Whether the status was old when it was told, though the line has no newer one: then its age is told too.
+    pub(super) fn is_rarely_read(&self) -> bool {
+        self.age.is_some_and(|age| age > RARELY)
     }
 
     /// How old the status is.

@@ -144,7 +144,7 @@ async fn watching(ending: &mut Ending, source: &Source, model: &Arc<Mutex<Model>
     screen.close().await;
     tasks.shutdown().await;
     let model = locked(model);
-    let open: Vec<String> = model.open_stops().map(account::Account::sentence).collect();
+    let open: Vec<String> = model.unconfirmed_stops().map(account::Account::sentence).collect();
     match open.is_empty() {
         true => Ok(()),
         false => Err(Failure::Drive(format!("{UNCONFIRMED}. {}", open.join("; ")))),

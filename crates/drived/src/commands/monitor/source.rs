@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::Extension;
 use drive_bus::Line;
 use drive_families::Options;
-use drive_fleet::{DriveSettings, Fleet, OnControlTaken, OnExit};
+use drive_fleet::{DriveSettings, Fleet, FleetError, OnControlTaken, OnExit, Periods};
 
 use super::{Args, account::Stop};
 use crate::{
@@ -70,7 +70,14 @@ impl Source {
                 name.family.open_with(port, slave, options)
             });
         }
-        let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+        let input = |error: FleetError| Failure::Input(error.to_string());
+        let fleet = builder.start().map_err(input)?;
+        // As often as the line can, with room for the slow values.
+        let sweep = fleet.plan(LINE).map(|plan| plan.sweep).unwrap_or_default();
+        for drive in fleet.drives() {
+            let settings = DriveSettings::clone(&drive.settings());
+            fleet.reconfigure(DriveSettings { periods: periods(2 * sweep), ..settings }).map_err(input)?;
+        }
         let plant = Plant::start(fleet.clone(), Vec::new(), false);
         let router = api::router(plant).layer(Extension(caller()));
         Ok(Self { way: Way::here(router), own: Some(Own { fleet, line }) })
@@ -104,6 +111,17 @@ impl Source {
             let _ = fleet.shutdown(STOPPED_WITHIN).await;
             one_drive::close(&line).await;
         }
+    }
+}
+
+/// The usual periods, or longer ones where a line with many drives needs so long for each.
+fn periods(least: Duration) -> Periods {
+    let Periods { running, rest, slow, max_age } = Periods::default();
+    Periods {
+        running: running.max(least),
+        rest: rest.max(least),
+        slow: slow.max(4 * least),
+        max_age: max_age.max(3 * least),
     }
 }
 

@@ -50,7 +50,7 @@ impl Model {
             STOP_ALL => Some(self.stop(Stop::All, unix(now))),
             STOP_THIS => {
                 let Some(name) = self.marked(now) else {
-                    self.refuse("No drive is marked here: NOTHING WAS STOPPED. Ctrl-S stops all.");
+                    self.refuse("No drive is marked: NOTHING WAS STOPPED. Ctrl-S stops all.");
                     return None;
                 };
                 Some(self.stop(Stop::One(name), unix(now)))
@@ -92,6 +92,8 @@ impl Model {
             self.search.clear();
         } else if self.group.is_some() && self.view == View::Fleet {
             self.group = None;
+        } else if self.view == View::Fleet {
+            self.selected = None;
         } else {
             self.show(View::Fleet);
         }
@@ -133,7 +135,9 @@ impl Model {
     fn in_view(&mut self, code: KeyCode, now: Instant) {
         match (&self.view, code) {
             (View::Fleet, KeyCode::Enter | KeyCode::Right) => {
-                if let Some(name) = self.selected.clone() {
+                let first = || self.rows(now).first().map(|drive| drive.name.clone());
+                if let Some(name) = self.marked(now).or_else(first) {
+                    self.selected = Some(name.clone());
                     self.show(View::Drive(name));
                 }
             }

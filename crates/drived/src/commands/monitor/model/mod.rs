@@ -64,7 +64,7 @@ pub(super) enum Wanted {
 pub(super) struct Model {
     pub(super) plant: Plant,
     pub(super) view: View,
-    /// The drive that the fleet's rows have marked.
+    /// The drive that somebody has marked among the rows. None is marked by itself: a stop key is for what somebody chose.
     pub(super) selected: Option<String>,
     /// What is searched for, and whether it is being typed.
     pub(super) search: String,
@@ -135,10 +135,7 @@ impl Model {
                 account.take(progress, is_silent);
             }
         }
-        let gone = self.selected.as_ref().is_some_and(|name| self.plant.drive(name).is_none());
-        if gone || self.selected.is_none() {
-            self.selected = self.rows(now).first().map(|drive| drive.name.clone());
-        }
+        self.selected.take_if(|name| self.plant.drive(name).is_none());
     }
 
     /// What is to be read for what is looked at.
@@ -208,9 +205,9 @@ impl Model {
         }
     }
 
-    /// Stops whose drives are not all accounted for.
-    pub(super) fn open_stops(&self) -> impl Iterator<Item = &Account> {
-        self.accounts.iter().filter(|account| account.is_open())
+    /// Stops that not every drive has confirmed, and that nobody has closed.
+    pub(super) fn unconfirmed_stops(&self) -> impl Iterator<Item = &Account> {
+        self.accounts.iter().filter(|account| !account.is_done())
     }
 
     fn stop(&mut self, stop: Stop, unix_ms: u64) -> Ask {

@@ -91,7 +91,7 @@ fn known(drive: &Drive, model: &Model, now: Instant, width: usize) -> Document {
     if !told["fault"].is_object() && !remark.is_empty() {
         document.say(&remark, if drive.trouble(now, connected).is_any() { alarm() } else { Style::new() });
     }
-    if let Some(why) = text(&told["start_refused"]) {
+    if let Some(why) = text(&told["start_refused"]).filter(|_| told["control"] == true) {
         document.pair("a start now", Some(format!("would be refused: {why}")));
     }
     document.heading("last commands");

@@ -111,6 +111,7 @@ impl Row {
         let as_setpoint = setpoint.is_none_or(|setpoint| Some(setpoint) == output);
         let current = status.and_then(output::current).unwrap_or_else(|| "-".to_owned());
         let age = match (is_live, drive.age(now)) {
+            (true, Some(age)) if drive.is_rarely_read() => words::time(age),
             (true, _) => "live".to_owned(),
             (false, Some(age)) => format!("{} old", words::time(age)),
             (false, None) => "-".to_owned(),

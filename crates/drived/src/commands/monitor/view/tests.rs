@@ -241,6 +241,9 @@ fn no_key_that_is_typed_in_a_text_stops_anything_or_starts_anything() {
 #[test]
 fn the_key_of_one_drive_stops_the_one_that_is_marked_and_in_sight() {
     let mut monitor = Monitor::of(&[drive("pump 1"), drive("pump 2"), drive("fan 1")]);
+    assert_eq!(monitor.control('t'), None, "nobody has marked one");
+    assert!(monitor.screen(80, 24).contains("NOTHING WAS STOPPED"));
+    monitor.press(KeyCode::Down);
     monitor.press(KeyCode::Down);
     let one = |name: &str, number| Some(Ask::Stop { number, stop: Stop::One(name.to_owned()) });
     assert_eq!(monitor.control('t'), one("pump 2", 1));
@@ -276,13 +279,14 @@ fn a_stop_is_counted_until_every_drive_is_accounted_for() {
     assert!(screen.contains("1 confirmed, 1 pending, 1 not reachable"), "{screen}");
     assert!(screen.contains("pending: pump 1, pump 3"), "{screen}");
     monitor.press(KeyCode::Esc);
-    assert_eq!(monitor.model.open_stops().count(), 1, "what is open is not closed by a key");
+    assert_eq!(monitor.model.unconfirmed_stops().count(), 1, "what is open is not closed by a key");
     monitor.model.take(told(["confirmed", "confirmed", "not_confirmed"], 2, 0, 1), monitor.now);
     let screen = monitor.screen(80, 24);
     assert!(screen.contains("2 confirmed, 0 pending, 1 not reachable"), "{screen}");
     assert!(screen.contains("NOT confirmed: pump 3"), "{screen}");
-    assert_eq!(monitor.model.open_stops().count(), 0);
+    assert_eq!(monitor.model.unconfirmed_stops().count(), 1, "whoever ends it now is told");
     monitor.press(KeyCode::Esc);
+    assert_eq!(monitor.model.unconfirmed_stops().count(), 0);
     assert!(!monitor.screen(80, 24).contains("not reachable"));
 }
 
@@ -304,6 +308,7 @@ fn a_stop_that_could_not_be_given_says_so_and_names_the_emergency_stop() {
 #[test]
 fn a_stop_of_one_drive_that_is_lost_is_counted_as_not_reachable() {
     let mut monitor = Monitor::of(&[lost("pump 1")]);
+    monitor.press(KeyCode::Down);
     monitor.control('t');
     let answer = json!({"id": "c-1", "drive": "pump 1", "outcome": "pending"});
     monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(answer) }, monitor.now);
@@ -429,6 +434,7 @@ fn two_hundred_drives_are_scrolled_searched_and_grouped() {
         screen.contains("200 drives") && screen.contains("pump 20 ") && !screen.contains("pump 150"),
         "{screen}"
     );
+    monitor.press(KeyCode::Down);
     monitor.press(KeyCode::End);
     let screen = monitor.screen(80, 24);
     assert!(screen.contains("▸ fan 1") && screen.contains("pump 199"), "{screen}");
@@ -446,6 +452,20 @@ fn two_hundred_drives_are_scrolled_searched_and_grouped() {
     let screen = monitor.screen(80, 24);
     assert!(screen.contains("\"PUMP 77\": 2 of 200") && screen.contains("▸ pump 77 "), "{screen}");
     assert!(screen.contains("pump 177"), "{screen}");
+}
+
+#[test]
+fn what_begins_to_be_in_trouble_is_in_sight_until_somebody_marks_something_else() {
+    let drives: Vec<Value> = (1..=100).map(|number| drive(&format!("pump {number}"))).collect();
+    let mut monitor = Monitor::of(&drives);
+    for number in [90, 80, 70] {
+        monitor.tell("drive", tripped(&format!("pump {number}")));
+        assert!(monitor.row(&format!("!pump {number}"), 80).contains("Tripped OLF"));
+    }
+    monitor.press(KeyCode::Down);
+    assert!(monitor.screen(80, 24).contains("▸!pump 70"), "the first of those in trouble");
+    monitor.press(KeyCode::Esc);
+    assert!(!monitor.screen(80, 24).contains('▸'));
 }
 
 #[test]
