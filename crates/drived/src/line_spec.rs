@@ -19,6 +19,9 @@ use crate::drive_spec::DriveName;
 pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; \
      PROTOCOL is rtu, ascii or unitelway, such as unitelway,header=simplified,link-timeout=200ms";
 
+/// The same for a port that is only listened to.
+pub(crate) const TO_LISTEN_TO: &str = "A port to listen to: PATH[,BAUD[,FORMAT[,PROTOCOL]]] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]";
+
 /// A line as a person names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LineSpec {

@@ -15,7 +15,7 @@ use super::frames::Frames;
 use crate::{
     client::DaemonArgs,
     failure::Failure,
-    line_spec::{LineSpec, describe},
+    line_spec::{self, LineSpec, describe},
     output::{self, counted},
     signals::Ending,
 };
@@ -33,8 +33,8 @@ pub(crate) struct Args {
     /// The line of the daemon, by its name in the configuration
     #[arg(value_name = "LINE", required_unless_present = "port", conflicts_with = "port")]
     line: Option<String>,
-    /// A port to listen to: PATH,BAUD,FORMAT[,PROTOCOL] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT,BAUD,FORMAT
-    #[arg(long = "line", id = "port", value_name = "PORT", conflicts_with_all = ["socket", "token_file"])]
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long = "line", id = "port", value_name = "PORT", help = line_spec::TO_LISTEN_TO, conflicts_with_all = ["socket", "token_file"])]
     port: Option<LineSpec>,
     /// The file to be made
     #[arg(long, value_name = "FILE")]

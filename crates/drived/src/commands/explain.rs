@@ -15,7 +15,7 @@ use crate::{
     explain::{Counts, Explained, Explainer, Known},
     failure::Failure,
     json,
-    line_spec::{LineSpec, SerialSpec, describe},
+    line_spec::{self, LineSpec, SerialSpec, describe},
     output::{self, counted, milliseconds},
     signals::Ending,
 };
@@ -36,8 +36,8 @@ pub(crate) struct Args {
     /// A line of the running daemon, by its name
     #[arg(long, value_name = "LINE", conflicts_with = "line")]
     from: Option<String>,
-    /// A port to listen to: PATH[,BAUD[,FORMAT[,PROTOCOL]]] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]
-    #[arg(long, value_name = "PORT", conflicts_with = "serial")]
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "PORT", help = line_spec::TO_LISTEN_TO, conflicts_with = "serial")]
     line: Option<LineSpec>,
     /// For how many seconds; 10 of the daemon, until Ctrl-C from a port
     #[arg(long, value_name = "SECONDS", conflicts_with = "file", value_parser = clap::value_parser!(u64).range(1..))]

@@ -19,17 +19,21 @@ use self::{
 };
 use crate::{cli::Cli, failure::Failure, output};
 
-/// Print what makes a shell complete subcommands, options, and the names of drives and parameters
-///
-/// bash: drived completions bash > ~/.local/share/bash-completion/completions/drived
-///
-/// zsh: drived completions zsh > "${fpath[1]}/_drived"
-///
-/// fish: drived completions fish > ~/.config/fish/completions/drived.fish
-///
-/// The names of drives, groups and lines are those of the running daemon, or of the file named by --config. No port is opened.
+// The text has brackets that a doc comment would take for links.
+const ABOUT: &str = "\
+Print what makes a shell complete subcommands, options, and the names of drives and parameters
+
+bash: drived completions bash > ~/.local/share/bash-completion/completions/drived
+
+zsh: drived completions zsh > \"${fpath[1]}/_drived\"
+
+fish: drived completions fish > ~/.config/fish/completions/drived.fish
+
+The names of drives, groups and lines are those of the running daemon, or of the file named by --config. No port is opened.";
+
+/// What makes a shell complete.
 #[derive(Debug, clap::Args)]
-#[command(verbatim_doc_comment)]
+#[command(about = ABOUT.split('\n').next(), long_about = ABOUT)]
 pub(crate) struct Args {
     /// Which shell
     shell: Shell,
