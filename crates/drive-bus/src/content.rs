@@ -70,7 +70,7 @@ impl Content {
             (Dissector::Data, [b':', ..]) => of_ascii(bytes),
             #[cfg(feature = "unitelway")]
             (Dissector::Data, _) => of_unitelway(bytes),
-            #[cfg(not(all(feature = "tcp", feature = "ascii", feature = "unitelway")))]
+            #[cfg(not(all(feature = "tcp", feature = "unitelway")))]
             _ => Err(NoFrame("this build does not know its protocol")),
         }
     }

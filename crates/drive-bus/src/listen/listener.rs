@@ -21,10 +21,13 @@ use crate::{
 /// What a busy host adds to the time at which it is handed something: one slice of its scheduler.
 const HOST: Duration = Duration::from_millis(4);
 /// What USB adds, where the adapter's driver does not say how long it collects.
+#[cfg(feature = "serial")]
 const USB: Duration = Duration::from_millis(1);
 /// What a serial server and the network add at the most, as far as one can say.
+#[cfg(feature = "tcp")]
 const NETWORK: Duration = Duration::from_millis(100);
 /// What a UART collects before it hands anything over, and how long it waits for more.
+#[cfg(feature = "serial")]
 const COLLECTED: usize = 8 + 4;
 
 /// Listens to a port, and never writes to it.
