@@ -110,15 +110,15 @@ impl SimLine {
     /// A pty does not pace: the line paces by itself. A master that has set another speed or parity than a slave hears it as
     /// a UART would, as far as a pty tells what was set: the speed, two stop bits, an odd parity, any parity that is checked
     /// (`INPCK`), and none where errors are ignored (`IGNPAR` alone). Data bits, and what is not told of the parity, are
-    /// taken for the line's. An unpaced line takes whatever a master sets.
+    /// taken for the line's, and so is everything of a master that sets nothing. An unpaced line takes whatever a master sets.
     ///
     /// # Errors
     /// No pty can be had, or the link cannot be made.
     #[cfg(unix)]
     pub fn serve_pty(&self, link: impl Into<std::path::PathBuf>) -> io::Result<Serving> {
-        let (port, kept, pty) = pty::open(link.into())?;
-        let wire = self.wiring().wire(false);
         let (settings, unpaced) = (self.wiring().settings, self.wiring().unpaced);
+        let (port, kept, pty) = pty::open(link.into(), settings)?;
+        let wire = self.wiring().wire(false);
         let tuned = move || if unpaced { Some(Master::of(settings)) } else { kept.master(settings) };
         let task = tokio::spawn(wired::serve(self.shared().clone(), port, Timer::precise(), wire, tuned));
         let mut serving = Serving::new(task);

@@ -9,7 +9,7 @@ use std::{
 use drive_core::{SerialSettings, serial::Parity};
 use rustix::{
     fs::{Mode, OFlags},
-    termios::{ControlModes, InputModes, tcgetattr},
+    termios::{ControlModes, InputModes, OptionalActions, tcgetattr, tcsetattr},
 };
 use tokio_serial::{SerialPort, SerialStream};
 
@@ -26,6 +26,14 @@ pub(super) struct Pty {
 pub(super) struct Kept(OwnedFd);
 
 impl Kept {
+    /// Sets the port as the line is: a master that leaves it as it finds it is understood.
+    fn preset(&self, line: SerialSettings) -> io::Result<()> {
+        let mut set = tcgetattr(&self.0)?;
+        set.set_speed(line.baud())?;
+        set.control_modes.set(ControlModes::CSTOPB, line.format().stop_bits() == 2);
+        Ok(tcsetattr(&self.0, OptionalActions::Now, &set)?)
+    }
+
     /// How a master has set the port, on a line whose own settings are these; `None`: at no speed that a line has.
     ///
     /// A pty keeps 8 data bits and no parity whatever is set, but the flags that go with a parity stay as the master left
@@ -75,11 +83,13 @@ fn is_left_behind(link: &Path) -> bool {
     fs::read_link(link).is_ok_and(|target| target.starts_with("/dev") && !target.exists())
 }
 
-/// Opens a pty in raw mode and links to it: our side, and what keeps it.
-pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Kept, Pty)> {
+/// Opens a pty in raw mode, set as the line is, and links to it: our side, and what keeps it.
+pub(super) fn open(link: PathBuf, line: SerialSettings) -> io::Result<(SerialStream, Kept, Pty)> {
     let (ours, other) = SerialStream::pair()?;
     let device = other.name().ok_or_else(|| io::Error::other("the pty has no name"))?;
     let kept = rustix::fs::open(&device, OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK, Mode::empty())?;
+    let kept = Kept(kept);
+    kept.preset(line)?;
     match fs::symlink_metadata(&link) {
         Ok(found) if found.is_symlink() && is_left_behind(&link) => fs::remove_file(&link)?,
         Ok(_) => {
@@ -91,5 +101,5 @@ pub(super) fn open(link: PathBuf) -> io::Result<(SerialStream, Kept, Pty)> {
     }
     symlink(&device, &link)
         .map_err(|error| io::Error::new(error.kind(), format!("cannot link {}: {error}", link.display())))?;
-    Ok((ours, Kept(kept), Pty { link, device }))
+    Ok((ours, kept, Pty { link, device }))
 }

@@ -27,6 +27,7 @@ mod pty {
 
     use drive_core::SerialSettings;
     use drive_sim::Dialect;
+    use rustix::fs::{Mode, OFlags};
     use tokio_serial::{Parity, SerialPortBuilderExt, SerialStream};
 
     use super::*;
@@ -88,6 +89,29 @@ mod pty {
         }
         let taken = [1, 2, 3].map(|address| line.slave(address).unwrap().requests(3));
         assert_eq!(taken, [2, 1, 1]);
+    }
+
+    #[tokio::test]
+    async fn a_program_that_opens_the_pty_as_a_file_and_sets_nothing_is_understood() {
+        let link = link("as-it-is");
+        let line = SimLine::new(Wiring::rtu("9600 8N2".parse().unwrap()));
+        line.add(1, Small::new()).unwrap();
+        let _serving = line.serve_pty(&link).unwrap();
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK;
+        let port = rustix::fs::open(&link, flags, Mode::empty()).unwrap();
+        rustix::io::write(&port, &read(1, KEEP.address(), 1)).unwrap();
+        let mut heard: Vec<u8> = Vec::new();
+        let answered = async {
+            while heard.len() < 7 {
+                let mut some = [0; 16];
+                match rustix::io::read(&port, &mut some) {
+                    Ok(number) => heard.extend_from_slice(&some[..number]),
+                    Err(_) => tokio::time::sleep(Duration::from_millis(5)).await,
+                }
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(20), answered).await.expect("it is answered");
+        assert_eq!(heard[..2], [1, 3]);
     }
 
     #[tokio::test]
