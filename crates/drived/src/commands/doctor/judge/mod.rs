@@ -56,6 +56,8 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         }
     };
     of_one(address::absent(&case), &mut explained);
+    // Two that speak for one disturb whoever is asked next.
+    let is_doubled = case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some());
     for figures in &case.figures {
         let slave = figures.slave;
         if explained.contains(&slave) {
@@ -64,7 +66,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         let found = timing::needs_pause(&case, slave)
             .or_else(|| cable::interference(&case, slave))
             .or_else(|| address::two(&case, slave))
-            .or_else(|| cable::damaged_alone(&case, slave));
+            .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_doubled || figures.silent > FEW));
         of_one(found, &mut explained);
     }
     let held = timing::adapter(&case);
@@ -74,8 +76,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     if !is_shared {
         of_one(timing::late(&case, &explained), &mut Vec::new());
         of_one(timing::slow(&case, is_held), &mut Vec::new());
-        // Two that speak for one disturb whoever is asked next.
-        if !case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some()) {
+        if !is_doubled {
             of_one(cable::noise(&case, &explained), &mut Vec::new());
         }
     }

@@ -129,7 +129,14 @@ const TABLE: &[(Broken, &[Found])] = &[
     (Broken::Deaf(12), &[(Defect::NeedsPause, &[3])]),
     (Broken::Noise(20_000), &[(Defect::Noise, &[])]),
     (Broken::TwoAtTheThird(300), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(10_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(15_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(20_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(25_000), &[(Defect::TwoAtOneAddress, &[3])]),
     (Broken::TwoAtTheThird(30_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(35_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(40_000), &[(Defect::TwoAtOneAddress, &[3])]),
+    (Broken::TwoAtTheThird(45_000), &[(Defect::TwoAtOneAddress, &[3])]),
     (Broken::OtherSettings("9600 8N1", true), &[(Defect::WrongFraming, &[])]),
     // A port without parity hears those who have one: whoever talks there is understood.
     (Broken::OtherSettings("19200 8E1", true), &[(Defect::SecondMaster, &[]), (Defect::WrongFraming, &[])]),
@@ -189,13 +196,14 @@ async fn a_line_that_lets_no_question_through_is_told_as_such_and_as_nothing_els
     assert_eq!(defects(&judge(&seen)), [(Defect::NeverQuiet, Vec::new())]);
 }
 
-/// All at once, each on a line of its own: it takes as long as the longest, in real time.
+/// All at once, each on a line of its own: it takes as long as the longest, in real time. That makes a machine busy, and what it
+/// holds back looks like a defect: a row that is misjudged is looked at once more alone.
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn on_a_pty_each_defect_gets_the_same_verdict() {
     // A busy machine keeps no time of 10 ms.
     let rows = TABLE.iter().filter(|(defect, _)| *defect != Broken::HeldBack(10));
-    let row = async |(index, (defect, expected)): (usize, &(Broken, &'static [Found]))| {
+    let row = async |(index, (defect, expected)): (usize, &'static (Broken, &'static [Found]))| {
         let bench = bench_of(*defect);
         let time = if *defect == Broken::InterferenceByTheSecond { 4 * TEN_SECONDS } else { TEN_SECONDS / 2 };
         let name = index.to_string();
@@ -205,6 +213,11 @@ async fn on_a_pty_each_defect_gets_the_same_verdict() {
         };
         misjudged(*defect, expected, &seen)
     };
-    let wrong = futures_util::future::join_all(rows.enumerate().map(row)).await.concat();
+    let rows: Vec<_> = rows.enumerate().collect();
+    let at_once = futures_util::future::join_all(rows.iter().copied().map(row)).await;
+    let mut wrong = String::new();
+    for (&again, _) in rows.iter().zip(at_once).filter(|(_, misjudged)| !misjudged.is_empty()) {
+        wrong.push_str(&row(again).await);
+    }
     assert!(wrong.is_empty(), "{wrong}");
 }
