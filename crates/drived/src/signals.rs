@@ -10,26 +10,32 @@ pub(crate) struct Ending {
     /// When a test asks.
     #[cfg(test)]
     at: Option<tokio::time::Instant>,
+    /// A byte for each. A listener of tokio's can miss one that comes while the first is being made.
     #[cfg(unix)]
-    interrupt: tokio::signal::unix::Signal,
+    asked: tokio::net::UnixStream,
     #[cfg(unix)]
-    terminate: tokio::signal::unix::Signal,
-    #[cfg(unix)]
-    quit: tokio::signal::unix::Signal,
+    signals: Vec<signal_hook::SigId>,
 }
 
 impl Ending {
     #[cfg(unix)]
     pub(crate) fn listen() -> Result<Self, Failure> {
-        use tokio::signal::unix::{SignalKind, signal};
-        let listen = |kind| signal(kind).map_err(|error| cannot_listen(&error));
-        Ok(Self {
-            #[cfg(test)]
-            at: None,
-            interrupt: listen(SignalKind::interrupt())?,
-            terminate: listen(SignalKind::terminate())?,
-            quit: listen(SignalKind::quit())?,
-        })
+        use signal_hook::{
+            consts::{SIGINT, SIGQUIT, SIGTERM},
+            low_level::pipe,
+        };
+        let listen = || {
+            let (asked, asks) = tokio::net::UnixStream::pair()?;
+            let asks = asks.into_std()?;
+            let signals = [SIGINT, SIGTERM, SIGQUIT].map(|signal| pipe::register(signal, asks.try_clone()?));
+            io::Result::Ok(Self {
+                #[cfg(test)]
+                at: None,
+                asked,
+                signals: signals.into_iter().collect::<io::Result<_>>()?,
+            })
+        };
+        listen().map_err(|error| cannot_listen(&error))
     }
 
     #[cfg(not(unix))]
@@ -55,10 +61,18 @@ impl Ending {
             self.at = None;
             return;
         }
-        tokio::select! {
-            _ = self.interrupt.recv() => {}
-            _ = self.terminate.recv() => {}
-            _ = self.quit.recv() => {}
+        loop {
+            let heard = match self.asked.readable().await {
+                // Those that came together are one.
+                Ok(()) => self.asked.try_read(&mut [0; 64]),
+                Err(error) => Err(error),
+            };
+            match heard {
+                Ok(1..) => return,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                // The other end is in the hands of the signals.
+                Ok(0) | Err(_) => std::future::pending().await,
+            }
         }
     }
 
@@ -68,6 +82,15 @@ impl Ending {
         if let Err(error) = tokio::signal::ctrl_c().await {
             tracing::warn!("{}", cannot_listen(&error));
             std::future::pending().await
+        }
+    }
+}
+
+#[cfg(unix)]
+impl Drop for Ending {
+    fn drop(&mut self) {
+        for signal in self.signals.drain(..) {
+            signal_hook::low_level::unregister(signal);
         }
     }
 }
