@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Intent, Measurements, Port, Reaction, Result, Row,
-    Setpoint, Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Faults, Intent, Lease, Measurements, Port, Reaction, Result,
+    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
 };
 
 use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
@@ -16,6 +16,14 @@ const LOOP_BACK: u16 = 0xA537;
 #[async_trait]
 impl<P: Port> Drive for Drive3g3ev<P> {
     drive_core::told_by!(registers);
+
+    fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
 
     fn forget(&mut self) {
         self.settings = Settings::default();

@@ -21,8 +21,8 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Reaction, Registers, Row,
-    SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Lease, Port, Reaction, Registers,
+    Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -106,6 +106,8 @@ pub const fn turnaround(baud: u32) -> Duration {
 #[derive(Debug)]
 pub struct Drive3g3ev<P> {
     registers: Registers<P>,
+    /// The run command of this side that stands, or may.
+    lease: Option<Lease>,
     settings: Settings,
     eeprom: Eeprom,
     /// The number of "fault reset" in n06 to n08, as its owner gave it.
@@ -131,6 +133,7 @@ impl<P: Port> Drive3g3ev<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
+            lease: None,
             settings: Settings::default(),
             eeprom: Eeprom::default(),
             fault_reset: None,

@@ -1,6 +1,6 @@
 //! The words of the fast set, and what they say.
 
-use drive_core::{Control, Current, Direction, RawWord, State, Status};
+use drive_core::{Control, Current, Direction, Motion, RawWord, State, Status};
 
 use crate::{
     blocks::Words,
@@ -49,6 +49,8 @@ impl FastWords {
             warning: Some(warning),
             fault_code: (self.errors.bits() != 0).then(|| lowest_bit(self.errors)),
             control: Some(self.control()),
+            verdict: None,
+            motion: Motion::NotKnown,
             raw: self.raw,
             at: None,
         }

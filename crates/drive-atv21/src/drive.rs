@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Measurements, Port, Reaction,
-    Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Lease, Measurements, Port,
+    Reaction, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
 };
 
 use crate::{Atv21, CommandWord, registers};
@@ -13,6 +13,14 @@ use crate::{Atv21, CommandWord, registers};
 #[async_trait]
 impl<P: Port> Drive for Atv21<P> {
     drive_core::told_by!(registers);
+
+    fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
 
     fn forget(&mut self) {
         self.forget_blocks();

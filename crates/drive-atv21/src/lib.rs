@@ -39,7 +39,7 @@ mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Reaction, Refusal, Registers,
+    Capabilities, Command, Error, ExceptionMeaning, Frequency, Lease, Port, Reaction, Refusal, Registers,
     SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
@@ -129,6 +129,8 @@ enum WriteBlock {
 #[derive(Debug)]
 pub struct Atv21<P> {
     registers: Registers<P>,
+    /// The run command of this side that stands, or may.
+    lease: Option<Lease>,
     authority: Authority,
     /// What its owner has chosen; `None`: what the drive holds is kept.
     selections: Option<CommandWord>,
@@ -157,6 +159,7 @@ impl<P: Port> Atv21<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
+            lease: None,
             authority: Authority::default(),
             selections: None,
             held: None,

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Intent, Measurements, Percent, Port,
-    RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
+    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Intent, Lease, Measurements, Percent,
+    Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
     drivecom::{self, StatusWords},
     registers::{Register, access::Readable},
 };
@@ -21,6 +21,14 @@ use crate::{
 #[async_trait]
 impl<P: Port> Drive for Atv28<P> {
     drive_core::told_by!(registers);
+
+    fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
 
     fn forget(&mut self) {
         self.limits = Limits::default();

@@ -14,8 +14,8 @@ mod setpoint;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress, StopMode,
-    serial::CharacterFormat,
+    Capabilities, Control, ExceptionMeaning, Lease, Port, Registers, Row, SerialSettings, SlaveAddress,
+    StopMode, serial::CharacterFormat,
 };
 
 pub use crate::{faults::FAULTS, faults::WARNINGS, registers::ROWS};
@@ -53,6 +53,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv28<P> {
     registers: Registers<P>,
+    /// The run command of this side that stands, or may.
+    lease: Option<Lease>,
     limits: Limits,
     /// The control word that the drive was last seen to hold; `None` when that is not known.
     command: Option<ControlWord>,
@@ -71,6 +73,7 @@ impl<P: Port> Atv28<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
+            lease: None,
             limits: Limits::default(),
             command: None,
             control: None,

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Measurements, Port, Reaction, Result,
-    Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
+    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Lease, Measurements, Port, Reaction,
+    Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
 };
 
 use crate::{
@@ -18,6 +18,14 @@ use crate::{
 #[async_trait]
 impl<P: Port> Drive for Atv312<P> {
     drive_core::told_by!(registers);
+
+    fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
 
     fn forget(&mut self) {
         self.known = Known::default();

@@ -17,7 +17,7 @@ mod settings;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SlaveAddress, StopMode,
+    Capabilities, Control, ExceptionMeaning, Lease, Port, Registers, Row, SlaveAddress, StopMode,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
@@ -60,6 +60,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv312<P> {
     registers: Registers<P>,
+    /// The run command of this side that stands, or may.
+    lease: Option<Lease>,
     known: Known,
     /// The control word that the drive was last seen to hold; `None` when that is not known.
     held: Option<u16>,
@@ -87,6 +89,7 @@ impl<P: Port> Atv312<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, exception_meaning),
+            lease: None,
             known: Known::default(),
             held: None,
             high_bits: 0,

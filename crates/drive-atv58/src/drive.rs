@@ -2,8 +2,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Measurements, Port,
-    Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
+    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease, Measurements,
+    Port, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
     drivecom::{self, ChartState, Drivecom},
     registers::refuse_commands,
 };
@@ -19,6 +19,14 @@ use crate::{
 #[async_trait]
 impl<P: Port> Drive for Atv58<P> {
     drive_core::told_by!(registers);
+
+    fn lease(&self) -> Option<Lease> {
+        self.lease
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.lease = Some(lease);
+    }
 
     fn forget(&mut self) {
         self.limits = None;

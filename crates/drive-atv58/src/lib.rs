@@ -14,7 +14,7 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, Class, ExceptionMeaning, Frequency, Port, Registers, Result, Row, SerialSettings,
+    Capabilities, Class, ExceptionMeaning, Frequency, Lease, Port, Registers, Result, Row, SerialSettings,
     SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
@@ -77,6 +77,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv58<P> {
     registers: Registers<P>,
+    /// The run command of this side that stands, or may.
+    lease: Option<Lease>,
     map: Atv58Map,
     /// Low and high speed, read when the first setpoint needs them.
     limits: Option<(Frequency, Frequency)>,
@@ -101,6 +103,7 @@ impl<P: Port> Atv58<P> {
     pub fn with_map(port: P, slave: SlaveAddress, map: Atv58Map) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
+            lease: None,
             map,
             limits: None,
             stops_by_ramp: false,

@@ -1,7 +1,7 @@
 //! Reading the mapped words, and what they say.
 
 use drive_core::{
-    Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
+    Calls, Control, Current, Direction, Frequency, Measurements, Motion, Percent, Port, RawWord, Result, Row,
     Setpoint, State, Status, Voltage, drivecom::ChartState,
 };
 
@@ -101,6 +101,8 @@ impl Words {
                 .filter(|_| self.is_tripped(map))
                 .and_then(|word| FaultRegister(word).bits().next()),
             control: self.control(map),
+            verdict: None,
+            motion: Motion::NotKnown,
             raw: self.words.clone(),
             at: None,
         }

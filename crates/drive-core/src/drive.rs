@@ -11,6 +11,7 @@ use crate::{
     faults::Faults,
     identity::Identity,
     intent::Intent,
+    lease::{Lease, Recognised},
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
@@ -75,6 +76,21 @@ pub trait Drive: Send {
     /// Forgets everything that was read once (units, limits, block configuration) and is true only as long as the
     /// drive is the same and was not switched off. Call it after a reconnect.
     fn forget(&mut self);
+
+    /// The run command of this side that stands in the drive, or may: kept through [`forget`](Self::forget), a lost line and
+    /// standstill, until the drive's own words showed that it stands no more.
+    fn lease(&self) -> Option<Lease>;
+
+    /// Takes a run command for this side's that an earlier run of the program has given, where the drive holds that very
+    /// word. The next [`status`](Self::status) says whether it is in force; one that does not stand ends then. Nothing is sent.
+    fn adopt(&mut self, lease: Lease);
+
+    /// Whether the drive behind this slave is one of this family, from what it said of itself
+    /// ([`identify`](Self::identify)). Nothing is sent.
+    fn recognise(&self, identity: &Identity) -> Recognised {
+        let _ = identity;
+        Recognised::CannotTell
+    }
 
     /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs.
     async fn status(&mut self) -> Result<Status>;

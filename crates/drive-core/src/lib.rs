@@ -24,6 +24,8 @@ mod error;
 mod faults;
 mod identity;
 mod intent;
+mod lease;
+mod motion;
 mod named;
 pub mod port;
 mod reconnecting;
@@ -50,6 +52,8 @@ pub use error::{
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use intent::Intent;
+pub use lease::{Lack, Lease, Recognised, Verdict};
+pub use motion::{Motion, Output, Shaft};
 pub use named::{NameError, is_name};
 pub use port::{Class, Effect, Port, PortError, Terms};
 pub use reconnecting::Reconnecting;

@@ -24,6 +24,7 @@ use tokio::time::Instant;
 
 use crate::{
     faults::{Fault, FaultEntry},
+    lease::{Lack, Verdict},
     setpoint::Command,
 };
 
@@ -181,6 +182,31 @@ impl Serialize for Command {
 struct Told {
     action: &'static str,
     command: String,
+}
+
+/// A verdict as an object: its word, what is lacking, and the sentence.
+pub(crate) fn verdict<S: Serializer>(verdict: &Option<Verdict>, serializer: S) -> Result<S::Ok, S::Error> {
+    verdict.as_ref().map(VerdictObject::from).serialize(serializer)
+}
+
+#[derive(Serialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub(crate) struct VerdictObject {
+    verdict: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lacks: Option<Lack>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    because: Option<String>,
+}
+
+impl From<&Verdict> for VerdictObject {
+    fn from(verdict: &Verdict) -> Self {
+        let lacks = match verdict {
+            Verdict::NotInForce { lacks, .. } => Some(*lacks),
+            Verdict::InForce | Verdict::NotKnown => None,
+        };
+        Self { verdict: verdict.word(), lacks, because: verdict.because().map(|because| because.to_string()) }
+    }
 }
 
 #[cfg(feature = "schemars")]

@@ -6,6 +6,8 @@ use std::{fmt, time::Duration};
 use tokio::time::Instant;
 
 use crate::{
+    lease::Verdict,
+    motion::Motion,
     setpoint::{Direction, Setpoint},
     units::{Current, Frequency, Percent, Power, Speed, Voltage},
 };
@@ -139,6 +141,21 @@ pub struct Status {
     /// Who commands the drive.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub control: Option<Control>,
+    /// What these words say of the run command that this side has given; `None`: none of this side's stands, as far as is
+    /// known. See [`Lease`](crate::Lease).
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "run_command",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::verdict"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<crate::serialize::VerdictObject>"))]
+    pub verdict: Option<Verdict>,
+    /// Whether the motor turns, as a claim with its evidence.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Motion::is_not_known"))]
+    pub motion: Motion,
     /// Every word that was read for this status.
     pub raw: Vec<RawWord>,
     /// When the oldest of these words ended on the line; `None` on a port that keeps no time.

@@ -6,9 +6,9 @@ use serde_json::{Value, from_value, json, to_value};
 use tokio::time::{Instant, advance};
 
 use crate::{
-    Command, Control, Current, Direction, ErrorKind, Fault, FaultEntry, Faults, Frequency, Identity,
-    Measurements, Percent, Power, RawWord, Reaction, Setpoint, Speed, State, Status, StopMode, Stopped,
-    Voltage, Watchdog,
+    Command, Control, Current, Direction, ErrorKind, Fault, FaultEntry, Faults, Frequency, Identity, Lack,
+    Measurements, Motion, Percent, Power, RawWord, Reaction, Refusal, Setpoint, Speed, State, Status,
+    StopMode, Stopped, Verdict, Voltage, Watchdog,
 };
 
 fn is(told: impl serde::Serialize, expected: Value) {
@@ -31,6 +31,8 @@ async fn a_status_is_told_in_the_units_of_its_keys_with_its_age_when_it_is_told(
         warning: Some(false),
         fault_code: Some(5),
         control: Some(Control::OtherBus),
+        verdict: Some(Verdict::lacks(Lack::Output, Refusal::Tripped)),
+        motion: Motion::AtRest,
         raw: vec![RawWord { address: 3_201, code: "ETA", value: 1_591 }],
         at: Some(Instant::now()),
     };
@@ -40,7 +42,12 @@ async fn a_status_is_told_in_the_units_of_its_keys_with_its_age_when_it_is_told(
         json!({
             "state": "quick_stop", "direction": "reverse", "output_frequency_hz": 30.05, "current_a": 3.2,
             "current_percent": 41.0, "at_reference": true, "warning": false, "fault_code": 5,
-            "control": "other_bus", "raw": [{"address": 3201, "code": "ETA", "value": 1591}], "age_ms": 120
+            "control": "other_bus", "motion": "at_rest",
+            "run_command": {
+                "verdict": "not_in_force", "lacks": "output",
+                "because": "the drive has tripped: remove the cause, then reset it"
+            },
+            "raw": [{"address": 3201, "code": "ETA", "value": 1591}], "age_ms": 120
         }),
     );
 }
