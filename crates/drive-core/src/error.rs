@@ -3,6 +3,7 @@
 use std::{fmt, time::Duration};
 
 use crate::{
+    named::Word,
     port::PortError,
     setpoint::{Command, Setpoint},
     status::{Control, State, Status},
@@ -142,11 +143,15 @@ impl fmt::Display for ExceptionMeaning {
 
 /// A setting by which a drive starts its motor again without being told: after a trip, a power cut or the loss of the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct SelfRestart {
     /// The manual's mnemonic of the setting, such as `Atr`: the name by which it is accepted.
-    pub code: &'static str,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialize::kept"))]
+    pub code: Word,
     /// What it does, in words that finish "the drive …".
-    pub meaning: &'static str,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialize::kept"))]
+    pub meaning: Word,
 }
 
 impl fmt::Display for SelfRestart {
@@ -439,7 +444,7 @@ pub enum Error {
 /// The kind of an [`Error`], for a program that decides by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum ErrorKind {
     /// No valid answer: the drive may be mute, the line disturbed.

@@ -68,7 +68,7 @@ impl fmt::Display for Fault {
 
 /// The faults of a drive.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Faults {
     /// The present faults. Most drives have at most one; the 3G3EV and the Altivar 58 report bits, so several can be

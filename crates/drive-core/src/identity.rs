@@ -6,7 +6,7 @@ use crate::status::RawWord;
 
 /// What a drive says it is. Two drives that differ in any part are different drives.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Identity {
     /// The vendor's name.

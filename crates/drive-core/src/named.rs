@@ -1,5 +1,9 @@
 //! Enums whose variants have names: how they are printed, and how they are read.
 
+/// A word of a manual. Derived code that reads it must not take its lifetime for that of what is read, which it does where
+/// it sees the reference.
+pub(crate) type Word = &'static str;
+
 /// A text that is none of the names that were expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected one of {}", .0.join(", "))]

@@ -12,7 +12,9 @@
 //! ```
 
 use std::{
+    collections::BTreeSet,
     fmt,
+    sync::{Mutex, PoisonError},
     time::{Duration, SystemTime},
 };
 
@@ -23,9 +25,10 @@ use serde::{
 use tokio::time::Instant;
 
 use crate::{
+    error::Refusal,
     faults::{Fault, FaultEntry},
     lease::{Lack, Verdict},
-    setpoint::Command,
+    setpoint::{Command, Direction, Setpoint, StopMode},
 };
 
 /// A moment, or none, as its age in milliseconds when it is written.
@@ -89,9 +92,115 @@ pub(crate) mod maybe_ms {
     }
 }
 
+/// A moment as its age in milliseconds that is also read back, for `#[serde(with = "…")]`: as long before it is read as it
+/// was before it was written.
+pub mod age_ms {
+    use super::{Deserialize, Deserializer, Instant, moment};
+
+    pub use super::age as serialize;
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Instant, D::Error> {
+        u64::deserialize(deserializer).map(moment)
+    }
+}
+
+/// The same, or none.
+pub mod maybe_age {
+    use super::{Deserialize, Deserializer, Instant, moment};
+
+    pub use super::age as serialize;
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Instant>, D::Error> {
+        Ok(Option::<u64>::deserialize(deserializer)?.map(moment))
+    }
+}
+
+/// So long ago, or when this machine was started.
+fn moment(age_ms: u64) -> Instant {
+    let now = Instant::now();
+    now.checked_sub(Duration::from_millis(age_ms)).unwrap_or(now)
+}
+
 /// A time in hours.
-pub(crate) fn hours<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
-    time.map(|time| time.as_secs_f64() / 3_600.0).serialize(serializer)
+pub(crate) mod hours {
+    use super::{Deserialize, Deserializer, Duration, Serialize, Serializer, de};
+
+    pub(crate) fn serialize<S: Serializer>(
+        time: &Option<Duration>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        time.map(|time| time.as_secs_f64() / 3_600.0).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Duration>, D::Error> {
+        let hours = Option::<f64>::deserialize(deserializer)?;
+        let time = hours.map(|hours| Duration::try_from_secs_f64(hours * 3_600.0));
+        time.transpose().map_err(de::Error::custom)
+    }
+}
+
+/// What the words that were read may take together, in bytes; one more is `?`.
+const KEPT: usize = 1 << 20;
+
+/// Words of a manual that were read, each kept once for the life of the program.
+struct Words {
+    texts: BTreeSet<&'static str>,
+    entries: Vec<&'static FaultEntry>,
+    bytes: usize,
+}
+
+static WORDS: Mutex<Words> = Mutex::new(Words { texts: BTreeSet::new(), entries: Vec::new(), bytes: 0 });
+
+impl Words {
+    /// Whether there is room for so many bytes more; they are counted then.
+    fn takes(&mut self, bytes: usize) -> bool {
+        let fits = self.bytes + bytes <= KEPT;
+        self.bytes += if fits { bytes } else { 0 };
+        fits
+    }
+
+    fn text(&mut self, text: &str) -> &'static str {
+        if let Some(known) = self.texts.get(text) {
+            return known;
+        }
+        if !self.takes(text.len() + size_of::<&str>()) {
+            return "?";
+        }
+        let kept: &'static str = Box::leak(text.into());
+        self.texts.insert(kept);
+        kept
+    }
+
+    fn entry(&mut self, entry: FaultEntry) -> Option<&'static FaultEntry> {
+        let known = self.entries.iter().copied().find(|known| **known == entry);
+        known.or_else(|| {
+            let kept: &'static FaultEntry =
+                self.takes(size_of::<FaultEntry>()).then(|| &*Box::leak(Box::new(entry)))?;
+            self.entries.push(kept);
+            Some(kept)
+        })
+    }
+}
+
+/// A word of a manual, such as a mnemonic, for `#[serde(deserialize_with = "…")]`: the types of a drive have it from the
+/// family's tables, for as long as the program lives. What is read is kept as long, once each and 1 MiB of all of them at the
+/// most, whatever is sent; a word that has no room is `?`.
+///
+/// # Errors
+/// Those of the deserializer.
+pub fn kept<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    Ok(WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&text))
 }
 
 fn whole_ms(time: Duration) -> u64 {
@@ -170,29 +279,107 @@ impl Serialize for Fault {
     }
 }
 
-/// Its word and its text: `{"action": "start", "command": "start forward"}`.
-impl Serialize for Command {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Told { action: self.action(), command: self.to_string() }.serialize(serializer)
+impl<'de> Deserialize<'de> for Fault {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        struct Listed {
+            code: u16,
+            mnemonic: Option<String>,
+            meaning: Option<String>,
+            remedy: Option<String>,
+        }
+        let Listed { code, mnemonic, meaning, remedy } = Listed::deserialize(deserializer)?;
+        let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);
+        let entry = mnemonic.zip(meaning).zip(remedy).and_then(|((mnemonic, meaning), remedy)| {
+            let (mnemonic, meaning) = (words.text(&mnemonic), words.text(&meaning));
+            let remedy = words.text(&remedy);
+            words.entry(FaultEntry { code, mnemonic, meaning, remedy })
+        });
+        Ok(Self { code, entry })
     }
 }
 
-#[derive(Serialize)]
+/// Its word, its text and what it was given: `{"action": "start", "command": "start forward", "direction": "forward"}`.
+impl Serialize for Command {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut told = Told {
+            action: self.action().into(),
+            command: self.to_string(),
+            direction: None,
+            mode: None,
+            setpoint: None,
+            register: None,
+        };
+        match *self {
+            Self::Start(direction) => told.direction = Some(direction),
+            Self::Stop(mode) => told.mode = Some(mode),
+            Self::Setpoint(setpoint) => told.setpoint = Some(setpoint),
+            Self::WriteParameter(register) => told.register = Some(register),
+            _ => {}
+        }
+        told.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Command {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Told { action, command, direction, mode, setpoint, register } = Told::deserialize(deserializer)?;
+        let missing = |field| de::Error::missing_field(field);
+        Ok(match &*action {
+            "start" => Self::Start(direction.ok_or_else(|| missing("direction"))?),
+            "stop" => Self::Stop(mode.ok_or_else(|| missing("mode"))?),
+            "withdraw" => Self::Withdraw,
+            "setpoint" => Self::Setpoint(setpoint.ok_or_else(|| missing("setpoint"))?),
+            "reset" => Self::ResetFaults,
+            "release" => Self::Release,
+            "watchdog" => Self::ArmWatchdog,
+            "parameter" => Self::WriteParameter(register.ok_or_else(|| missing("register"))?),
+            "save" => Self::Persist,
+            "configure" => {
+                Self::Configure(WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&command))
+            }
+            other => return Err(de::Error::custom(format_args!("no command is called {other:?}"))),
+        })
+    }
+}
+
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 struct Told {
-    action: &'static str,
+    action: String,
     command: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    direction: Option<Direction>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mode: Option<StopMode>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    setpoint: Option<Setpoint>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    register: Option<u16>,
 }
 
 /// A verdict as an object: its word, what is lacking, and the sentence.
-pub(crate) fn verdict<S: Serializer>(verdict: &Option<Verdict>, serializer: S) -> Result<S::Ok, S::Error> {
-    verdict.as_ref().map(VerdictObject::from).serialize(serializer)
+pub(crate) mod verdict {
+    use super::{Deserialize, Deserializer, Serialize, Serializer, Verdict, VerdictObject};
+
+    pub(crate) fn serialize<S: Serializer>(
+        verdict: &Option<Verdict>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        verdict.as_ref().map(VerdictObject::from).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Verdict>, D::Error> {
+        Ok(Option::<VerdictObject>::deserialize(deserializer)?.map(Verdict::from))
+    }
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub(crate) struct VerdictObject {
-    verdict: &'static str,
+    verdict: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     lacks: Option<Lack>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -205,7 +392,24 @@ impl From<&Verdict> for VerdictObject {
             Verdict::NotInForce { lacks, .. } => Some(*lacks),
             Verdict::InForce | Verdict::NotKnown => None,
         };
-        Self { verdict: verdict.word(), lacks, because: verdict.because().map(|because| because.to_string()) }
+        let because = verdict.because().map(|because| because.to_string());
+        Self { verdict: verdict.word().to_owned(), lacks, because }
+    }
+}
+
+impl From<VerdictObject> for Verdict {
+    fn from(object: VerdictObject) -> Self {
+        let VerdictObject { verdict, lacks, because } = object;
+        match (&*verdict, lacks) {
+            ("in_force", _) => Self::InForce,
+            ("not_in_force", Some(lacks)) => {
+                let because = because.unwrap_or_default();
+                let because = WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&because);
+                // The sentence is what is told of a reason.
+                Self::lacks(lacks, Refusal::Settings(because))
+            }
+            _ => Self::NotKnown,
+        }
     }
 }
 

@@ -8,13 +8,14 @@ use tokio::time::Instant;
 use crate::{
     lease::Verdict,
     motion::Motion,
+    named::Word,
     setpoint::{Direction, Setpoint},
     units::{Current, Frequency, Percent, Power, Speed, Voltage},
 };
 
 /// The state of a drive, in terms that all families share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum State {
     /// It cannot start now: initialising, undervoltage, or locked by something that is not a fault.
@@ -66,7 +67,7 @@ crate::named! { State {
 
 /// Who commands the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Control {
     /// This bus.
@@ -91,13 +92,14 @@ crate::named! { Control {
 
 /// One word as the drive sent it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct RawWord {
     /// Its address.
     pub address: u16,
     /// The manual's mnemonic.
-    pub code: &'static str,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialize::kept"))]
+    pub code: Word,
     /// The word.
     pub value: u16,
 }
@@ -106,7 +108,7 @@ pub struct RawWord {
 ///
 /// A field is `None` when the family has no such value or it cannot be known in these exchanges. Nothing is guessed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Status {
     /// The state.
@@ -147,14 +149,15 @@ pub struct Status {
         feature = "serde",
         serde(
             rename = "run_command",
+            default,
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::verdict"
+            with = "crate::serialize::verdict"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<crate::serialize::VerdictObject>"))]
     pub verdict: Option<Verdict>,
     /// Whether the motor turns, as a claim with its evidence.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Motion::is_not_known"))]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Motion::is_not_known"))]
     pub motion: Motion,
     /// Every word that was read for this status.
     pub raw: Vec<RawWord>,
@@ -164,7 +167,8 @@ pub struct Status {
         serde(
             rename = "age_ms",
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::age"
+            default,
+            with = "crate::serialize::maybe_age"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
@@ -231,7 +235,7 @@ impl fmt::Display for Status {
 ///
 /// `None` where the family has no such value.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Measurements {
     /// When the oldest of these values ended on the line; `None` on a port that keeps no time.
@@ -240,7 +244,8 @@ pub struct Measurements {
         serde(
             rename = "age_ms",
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::age"
+            default,
+            with = "crate::serialize::maybe_age"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
@@ -338,7 +343,8 @@ pub struct Measurements {
         serde(
             rename = "running_time_h",
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::hours"
+            default,
+            with = "crate::serialize::hours"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<f64>"))]
@@ -349,7 +355,8 @@ pub struct Measurements {
         serde(
             rename = "powered_time_h",
             skip_serializing_if = "Option::is_none",
-            serialize_with = "crate::serialize::hours"
+            default,
+            with = "crate::serialize::hours"
         )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<f64>"))]

@@ -193,7 +193,10 @@ fn a_stop_a_watchdog_a_command_and_a_kind_of_error_are_told_in_their_words() {
     let armed = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
     is(armed, json!({"time_ms": 10_000, "reaction": "ramp"}));
     is(Watchdog { timeout: None, reaction: None }, json!({}));
-    is(Command::Start(Direction::Forward), json!({"action": "start", "command": "start forward"}));
+    is(
+        Command::Start(Direction::Forward),
+        json!({"action": "start", "command": "start forward", "direction": "forward"}),
+    );
     is(ErrorKind::OutcomeUnknown, json!("outcome_unknown"));
 }
 
@@ -208,4 +211,73 @@ fn the_schema_of_a_status_names_the_keys_that_it_is_told_by() {
     assert_eq!(properties["output_frequency_hz"]["type"], json!(["number", "null"]));
     assert!(properties.contains_key("age_ms") && !properties.contains_key("at"), "{properties:?}");
     assert_eq!(schema.get("required"), Some(&json!(["state", "raw"])));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_told_of_a_drive_reads_back_as_it_was() {
+    fn comes_back<T>(told: &T)
+    where
+        T: serde::Serialize + serde::de::DeserializeOwned + PartialEq + std::fmt::Debug,
+    {
+        assert_eq!(from_value::<T>(to_value(told).unwrap()).as_ref().ok(), Some(told));
+    }
+    let at = Some(Instant::now());
+    advance(Duration::from_millis(1_250)).await;
+    let raw = vec![RawWord { address: 3_201, code: "ETA", value: 1_591 }];
+    let status = Status {
+        state: State::FaultReaction,
+        direction: Some(Direction::Reverse),
+        output_frequency: Some(Frequency::from_centihertz(3_005)),
+        fault_code: Some(5),
+        control: Some(Control::Terminals),
+        warning: Some(true),
+        verdict: Some(Verdict::lacks(Lack::Reference, Refusal::Settings("the panel gives the reference"))),
+        motion: Motion::Coasting,
+        raw: raw.clone(),
+        at,
+        ..Status::default()
+    };
+    comes_back(&status);
+    comes_back(&Status::default());
+    let measurements = Measurements {
+        at,
+        torque: Some(Percent::from_percent(-40)),
+        running_time: Some(Duration::from_secs(5_400)),
+        reference: Some(Speed::from_rpm(900).into()),
+        inputs: Some(3),
+        raw: raw.clone(),
+        ..Measurements::default()
+    };
+    comes_back(&measurements);
+    comes_back(&Identity { model: Some("ATV312HU15N4".to_owned()), codes: raw, ..Identity::default() });
+    static OLF: FaultEntry = FaultEntry::new(9, "OLF", "motor overload", "let the motor cool");
+    let listed = Fault { code: 9, entry: Some(&OLF) };
+    let unlisted = Fault { code: 77, entry: None };
+    comes_back(&Faults { present: vec![listed], history: vec![unlisted], ..Faults::default() });
+    for command in [
+        Command::Start(Direction::Reverse),
+        Command::Stop(StopMode::DcInjection),
+        Command::Withdraw,
+        Command::Setpoint(Frequency::from_hertz(30).into()),
+        Command::ResetFaults,
+        Command::Release,
+        Command::ArmWatchdog,
+        Command::WriteParameter(3_103),
+        Command::Persist,
+        Command::Configure("accepting the identity"),
+    ] {
+        comes_back(&command);
+    }
+    assert!(from_value::<Command>(json!({"action": "start", "command": "start forward"})).is_err());
+    assert!(from_value::<Command>(json!({"action": "dance", "command": "dance"})).is_err());
+}
+
+#[test]
+fn words_that_a_stranger_sends_do_not_fill_the_memory() {
+    let mut words = super::Words { texts: std::collections::BTreeSet::new(), entries: Vec::new(), bytes: 0 };
+    let large = "x".repeat(300_000);
+    let kept: usize = (0..10).map(|number| words.text(&format!("{number}{large}")).len()).sum();
+    assert!((900_000..=1 << 20).contains(&kept), "{kept}");
+    assert_eq!(words.text(&large), "?", "a word for which there is no room is a question mark");
+    assert_eq!(words.text(&format!("0{large}")).len(), large.len() + 1, "one that is known needs no room");
 }
