@@ -2,7 +2,7 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Port, RawWord, Refusal,
-    Result, SETTLED_WITHIN, State, Status, StopMode, Stopped,
+    Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
 };
 use tokio::time::Instant;
 
@@ -172,12 +172,12 @@ impl<P: Port> Drive3g3ev<P> {
         Err(self.not_confirmed(Order::Stop(asked), status, because))
     }
 
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
         let ours = self.given == Some(held) || commanded_by_other(&status) == Some(OTHER_COMMAND);
         if !held.contains(Command::RUN) || !ours {
-            return Ok(status);
+            return Ok(Withdrawn::Nothing(status));
         }
         self.write_command(held - Command::RUN).await?;
         let status = self.status_and_command().await.map_err(Error::after_write)?;
@@ -185,7 +185,7 @@ impl<P: Port> Drive3g3ev<P> {
             return Err(self.not_confirmed(Order::Withdraw, status, Some(OTHER_WORD)));
         }
         self.given = None;
-        Ok(status)
+        Ok(Withdrawn::Ended(status))
     }
 
     /// Writes 0001h and remembers the word; while the outcome is not known, none is.

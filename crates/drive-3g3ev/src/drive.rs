@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Faults, Intent, Lease, Measurements, Port, Reaction, Result,
-    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
+    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
 };
 
 use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
@@ -70,7 +70,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     /// Writes 0001h without RUN and leaves the rest: if this value gave the run command, or bit A of 002Ch says that it is
     /// not in force.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         self.withdraw_run().await
     }
 

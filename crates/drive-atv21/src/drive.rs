@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Lease, Measurements, Port,
-    Reaction, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Written,
+    Reaction, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
 };
 
 use crate::{Atv21, CommandWord, registers};
@@ -75,7 +75,7 @@ impl<P: Port> Drive for Atv21<P> {
     }
 
     /// Writes FA00 without RUN, and nothing else: if this value gave the run command, or FE45 says that it is not in force.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         self.withdraw_run().await
     }
 

@@ -1,7 +1,9 @@
 //! What is given back: command and reference to whom the settings name, and a run command of ours that is no longer in
 //! force.
 
-use drive_core::{Class, Command, Confirming, Error, Port, Refusal, Result, SETTLED_WITHIN, Status};
+use drive_core::{
+    Class, Command, Confirming, Error, Port, Refusal, Result, SETTLED_WITHIN, Status, Withdrawn,
+};
 
 use crate::{
     Atv21,
@@ -44,12 +46,12 @@ impl<P: Port> Atv21<P> {
 
     /// Ends the run command in FA00, if this side gave it or it is not in force: what another master has written there is
     /// his.
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = self.command_word(Class::Command).await?;
         let ours = self.given == Some(held) || commanded_by_other(&status).is_some();
         if !held.contains(CommandWord::RUN) || !ours {
-            return Ok(status);
+            return Ok(Withdrawn::Nothing(status));
         }
         let word = held - CommandWord::RUN - CommandWord::EDGES;
         self.write_command_word(word).await?;
@@ -59,7 +61,7 @@ impl<P: Port> Atv21<P> {
             return Err(self.not_confirmed(Command::Withdraw, status, Some(OTHER_WORD)));
         }
         self.given = None;
-        Ok(status)
+        Ok(Withdrawn::Ended(status))
     }
 
     /// Writes the references that stood in the drive before the first setpoint of this value: the terminals' next run

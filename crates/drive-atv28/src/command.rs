@@ -3,7 +3,7 @@
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress,
-    State, Status, StopMode,
+    State, Status, StopMode, Withdrawn,
     drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
 };
 
@@ -21,12 +21,12 @@ pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
 };
 
 impl<P: Port> Atv28<P> {
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let is_run = |held| ControlWord::from_bits_retain(held).is_run();
         let held = self.read_control().await?;
         let status = self.read_status(Class::Command).await?;
         if !is_run(held) {
-            return Ok(status);
+            return Ok(Withdrawn::Nothing(status));
         }
         if let Some(reason) = FastWords::of_raw(&status.raw).state_words().refuses_withdrawal() {
             return Err(Error::Unsupported { what: "withdrawal of the run command", reason });
@@ -35,7 +35,7 @@ impl<P: Port> Atv28<P> {
         let held = self.read_control().await.map_err(Error::after_write)?;
         let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
         if !is_run(held) {
-            return Ok(status);
+            return Ok(Withdrawn::Ended(status));
         }
         let (slave, command) = (self.registers.slave(), Command::Withdraw);
         Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None })

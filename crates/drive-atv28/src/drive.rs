@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Intent, Lease, Measurements, Percent,
-    Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Written,
+    Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Withdrawn, Written,
     drivecom::{self, StatusWords},
     registers::{Register, access::Readable},
 };
@@ -103,7 +103,7 @@ impl<P: Port> Drive for Atv28<P> {
 
     /// 100Fh, in forced local mode and where the bus commands: elsewhere a command would take the motor from whoever has it
     /// running.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         self.withdraw_run().await
     }
 

@@ -4,7 +4,7 @@
 use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress, State, Status,
-    StopMode, Stopped,
+    StopMode, Stopped, Withdrawn,
     drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
     registers::{Register, access::ReadWrite},
 };
@@ -34,14 +34,14 @@ impl<P: Port> Atv312<P> {
     }
 
     /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel.
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Status> {
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let unsupported = |reason| Err(Error::Unsupported { what: "withdrawal of the run command", reason });
         self.read_settings(Class::Command).await?;
         let held = self.read_controls(Class::Command).await?.command;
         let status = self.fast_status(Class::Command).await?;
         let settings = &self.known.settings;
         if !settings.meaning(held).is_run() {
-            return Ok(status);
+            return Ok(Withdrawn::Nothing(status));
         }
         if settings.others().contains(ControlWord::STOP) {
             return unsupported(
@@ -58,7 +58,11 @@ impl<P: Port> Atv312<P> {
         let held = self.read_controls(Class::Command).await.map_err(Error::after_write)?.command;
         let status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
         let stands = self.known.settings.meaning(held).is_run();
-        if stands { Err(self.not_confirmed(Command::Withdraw, status, None)) } else { Ok(status) }
+        if stands {
+            Err(self.not_confirmed(Command::Withdraw, status, None))
+        } else {
+            Ok(Withdrawn::Ended(status))
+        }
     }
 
     /// Reads the fast words in a class, without making a status of them.

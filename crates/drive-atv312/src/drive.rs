@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Lease, Measurements, Port, Reaction,
-    Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Written, drivecom,
+    Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written, drivecom,
 };
 
 use crate::{
@@ -63,7 +63,7 @@ impl<P: Port> Drive for Atv312<P> {
     }
 
     /// 100Fh with the bits above it as the drive holds them, where bit 12 has its usual meaning.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         self.withdraw_run().await
     }
 

@@ -3,7 +3,7 @@
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease, Measurements,
-    Port, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Written,
+    Port, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Withdrawn, Written,
     drivecom::{self, ChartState, Drivecom},
     registers::refuse_commands,
 };
@@ -75,14 +75,14 @@ impl<P: Port> Drive for Atv58<P> {
 
     /// A drive that has left "operation enabled", such as a tripped one, has no run command any more. For one that has not the
     /// manual names no word that ends it and nothing else.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         match status.raw(self.map.status).and_then(ChartState::of) {
             None | Some(ChartState::OperationEnabled) => Err(Error::Unsupported {
                 what: "withdrawal of the run command",
                 reason: "the manual names no word that ends it and nothing else",
             }),
-            Some(_) => Ok(status),
+            Some(_) => Ok(Withdrawn::Nothing(status)),
         }
     }
 

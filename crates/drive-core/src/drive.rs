@@ -11,7 +11,7 @@ use crate::{
     faults::Faults,
     identity::Identity,
     intent::Intent,
-    lease::{Lease, Recognised},
+    lease::{Ground, Lease, Recognised, Withdrawn},
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
@@ -85,6 +85,12 @@ pub trait Drive: Send {
     /// word. The next [`status`](Self::status) says whether it is in force; one that does not stand ends then. Nothing is sent.
     fn adopt(&mut self, lease: Lease);
 
+    /// What a contract rests on that a status has found otherwise than it was when it was last read or set; told once.
+    /// Nothing is sent.
+    fn take_changed(&mut self) -> Option<Ground> {
+        None
+    }
+
     /// Whether the drive behind this slave is one of this family, from what it said of itself
     /// ([`identify`](Self::identify)). Nothing is sent.
     fn recognise(&self, identity: &Identity) -> Recognised {
@@ -92,7 +98,8 @@ pub trait Drive: Send {
         Recognised::CannotTell
     }
 
-    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs.
+    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs. While a
+    /// [`lease`](Self::lease) stands, what proves it takes turns: one exchange more at the most.
     async fn status(&mut self) -> Result<Status>;
 
     /// Reads the slow set.
@@ -134,12 +141,12 @@ pub trait Drive: Send {
     /// Ends the run command that this side has given, and nothing else: no fast stop, no freewheel, no injection and no
     /// change of who commands, any of which could stop what somebody else has started. For a drive that somebody else has
     /// taken over while it ran by our command, so that nothing starts when he gives it back. Returns when the drive holds
-    /// no run command of this side.
+    /// no run command of this side; [`Withdrawn`] tells whether there was one.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for families that have no such word; [`Error::NotConfirmed`] when the run command still
     /// stands.
-    async fn withdraw(&mut self) -> Result<Status> {
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
         Err(Error::Unsupported {
             what: "withdrawal of the run command",
             reason: "the family has no word that ends it and nothing else",

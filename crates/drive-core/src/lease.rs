@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::{error::Refusal, setpoint::Direction};
+use crate::{error::Refusal, setpoint::Direction, status::Status};
 
 /// What a drive's own words say of the run command that this side has given. The family alone decides it; whoever sits
 /// above carries it on and judges nothing by the [`State`](crate::State).
@@ -112,6 +112,56 @@ impl Lease {
         Self { direction, word }
     }
 }
+
+/// What became of a withdrawal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Withdrawn {
+    /// A run command of this side stood, and the drive shows that it stands no more.
+    Ended(Status),
+    /// None of this side's stood: nothing was written.
+    Nothing(Status),
+}
+
+impl Withdrawn {
+    /// The status that shows it.
+    #[must_use]
+    pub const fn status(&self) -> &Status {
+        match self {
+            Self::Ended(status) | Self::Nothing(status) => status,
+        }
+    }
+
+    /// The same, as a value.
+    #[must_use]
+    pub fn into_status(self) -> Status {
+        match self {
+            Self::Ended(status) | Self::Nothing(status) => status,
+        }
+    }
+}
+
+/// What a contract with a drive rests on, beside who commands it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub enum Ground {
+    /// How its communication watchdog is set.
+    Watchdog,
+    /// What its frequencies count.
+    Units,
+    /// How fast it may turn.
+    Limits,
+    /// What its inputs do, and which channels command it.
+    Inputs,
+}
+
+crate::named! { Ground {
+    Watchdog => "watchdog",
+    Units => "units",
+    Limits => "limits",
+    Inputs => "inputs",
+} }
 
 /// How a family tells its own drives from others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -52,7 +52,7 @@ pub use error::{
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use intent::Intent;
-pub use lease::{Lack, Lease, Recognised, Verdict};
+pub use lease::{Ground, Lack, Lease, Recognised, Verdict, Withdrawn};
 pub use motion::{Motion, Output, Shaft};
 pub use named::{NameError, is_name};
 pub use port::{Class, Effect, Port, PortError, Terms};

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Drive, Setpoint, StopMode};
+use drive_core::{Drive, Setpoint, StopMode, Withdrawn};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, broadcast, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -294,7 +294,7 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
     }
     match job {
         Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
-        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
+        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await.map(Withdrawn::into_status)),
         Job::Start(direction) => Reply::Ordered(drive.start(direction).await),
         Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
         Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
