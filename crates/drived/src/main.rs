@@ -10,6 +10,7 @@ mod client;
 mod commanded;
 mod commands;
 mod config;
+mod desk;
 mod doors;
 mod drive_cells;
 mod drive_options;

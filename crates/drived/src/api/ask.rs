@@ -9,11 +9,14 @@ use axum::{
     http::{StatusCode, header::CONTENT_TYPE, request::Parts},
 };
 use serde::{Deserialize, de::DeserializeOwned};
-use serde_json::Value;
 use tokio::time::Instant;
 
 use super::problem::Problem;
-use crate::{doors::Caller, duration::Time};
+use crate::{
+    doors::Caller,
+    duration::Time,
+    plant::commands::{Said, body},
+};
 
 /// How long an answer is waited for, unless it is said, and at the longest.
 const WAIT: Duration = Duration::from_secs(2);
@@ -105,27 +108,36 @@ impl<S: Send + Sync> FromRequestParts<S> for Patience {
     }
 }
 
-/// A body in JSON; an empty one, and `null`, stand for an object without members.
+/// A body in JSON, read strictly; an empty one stands for an object without members.
 pub(super) struct Sent<T>(pub(super) T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Sent<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        let kind = request.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok());
-        let kind = kind.and_then(|kind| kind.split(';').next()).map(str::trim);
-        if !kind.is_some_and(|kind| kind.eq_ignore_ascii_case("application/json")) {
-            let detail = "expected the header Content-Type: application/json";
-            return Err(Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail));
-        }
-        let body = Bytes::from_request(request, state).await?;
-        let text = match body.trim_ascii() {
-            b"" | b"null" => b"{}",
-            text => text,
-        };
-        let value: Value = serde_json::from_slice(text).map_err(|error| {
-            Problem::new(StatusCode::BAD_REQUEST, format!("the body is no JSON: {error}"))
-        })?;
-        serde_json::from_value(value).map(Self).map_err(|error| Problem::unprocessable(error.to_string()))
+        Ok(Self(body(&json(request, state).await?)?))
     }
+}
+
+/// The body of a stop, which is one whatever it says.
+pub(super) struct Stopping(pub(super) Said);
+
+impl<S: Send + Sync> FromRequest<S> for Stopping {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let body = json(request, state).await?;
+        Ok(Self(Said::stopping(&String::from_utf8_lossy(&body))))
+    }
+}
+
+/// What is sent as JSON.
+async fn json<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Problem> {
+    let kind = request.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok());
+    let kind = kind.and_then(|kind| kind.split(';').next()).map(str::trim);
+    if !kind.is_some_and(|kind| kind.eq_ignore_ascii_case("application/json")) {
+        let detail = "expected the header Content-Type: application/json";
+        return Err(Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail));
+    }
+    Ok(Bytes::from_request(request, state).await?)
 }

@@ -11,17 +11,18 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
+use drive_core::StopMode;
 use tokio::time::Instant;
 
 use super::{
-    ask::{Arrived, By, Named, Sent, Viewer, Wait},
+    ask::{Arrived, By, Named, Sent, Stopping, Viewer, Wait},
     problem::Problem,
 };
 use crate::{
     doors::Caller,
     plant::{
         Plant,
-        commands::{Asks, OutcomeWord, Request, Stop, Target},
+        commands::{Action, Asks, LIFETIME, OutcomeWord, Request, Said, Target},
         views::CommandView,
     },
 };
@@ -52,16 +53,39 @@ pub(super) async fn to_group<B: Asks>(
     carry_out(&plant, &caller, request, wait).await
 }
 
+/// A stop of a drive.
+pub(super) async fn stop_drive(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Stopping(said): Stopping,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::Drive(name), said, arrived), wait).await
+}
+
+/// A stop of a group.
+pub(super) async fn stop_group(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Stopping(said): Stopping,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::Group(name), said, arrived), wait).await
+}
+
 /// A stop of all drives.
 pub(super) async fn stop_all(
     State(plant): State<Plant>,
     By(caller): By,
     Arrived(arrived): Arrived,
     Wait(wait): Wait,
-    Sent(body): Sent<Stop>,
+    Stopping(said): Stopping,
 ) -> Result<Response, Problem> {
-    let request = request(Target::All, body, arrived)?;
-    carry_out(&plant, &caller, request, wait).await
+    carry_out(&plant, &caller, stop(Target::All, said, arrived), wait).await
 }
 
 /// What became of a command.
@@ -77,6 +101,11 @@ pub(super) async fn command(
 
 fn request(target: Target, body: impl Asks, arrived: Instant) -> Result<Request, Problem> {
     body.asked().of(target, arrived).map_err(Problem::unprocessable)
+}
+
+fn stop(target: Target, said: Said, arrived: Instant) -> Request {
+    let action = Action::Stop(said.stops().unwrap_or(StopMode::Ramp));
+    Request { id: said.id, target, action, lifetime: LIFETIME, arrived }
 }
 
 async fn carry_out(

@@ -16,7 +16,7 @@ use serde_json::Value;
 use crate::{
     doors::Caller,
     plant::{
-        commands::{OutcomeWord, Rejected},
+        commands::{OutcomeWord, Rejected, Unclear},
         views::CommandView,
     },
 };
@@ -150,7 +150,7 @@ impl Problem {
     /// A command that has ended, and not by a confirmation.
     pub(super) fn of_command(command: &CommandView) -> Self {
         let (status, title, kind) = match command.outcome {
-            OutcomeWord::Refused if command.reason == Some("no_right") => {
+            OutcomeWord::Refused if command.reason.as_deref() == Some("no_right") => {
                 (StatusCode::FORBIDDEN, "The command was refused", REFUSED)
             }
             OutcomeWord::Refused => (StatusCode::CONFLICT, "The command was refused", REFUSED),
@@ -193,6 +193,15 @@ impl IntoResponse for Problem {
 impl From<QueryRejection> for Problem {
     fn from(rejection: QueryRejection) -> Self {
         Self::new(StatusCode::BAD_REQUEST, rejection.body_text())
+    }
+}
+
+impl From<Unclear> for Problem {
+    fn from(unclear: Unclear) -> Self {
+        match unclear {
+            Unclear::NoJson(why) => Self::new(StatusCode::BAD_REQUEST, format!("the body is no JSON: {why}")),
+            unclear => Self::unprocessable(unclear.to_string()),
+        }
     }
 }
 

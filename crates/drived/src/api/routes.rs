@@ -274,11 +274,7 @@ fn commands() -> Vec<Route> {
             command::to_drive::<Start>,
             "Starts a motor",
         ),
-        Route::command::<_, _, Stop>(
-            "/api/v1/drives/{name}/stop",
-            command::to_drive::<Stop>,
-            "Stops a motor",
-        ),
+        Route::command::<_, _, Stop>("/api/v1/drives/{name}/stop", command::stop_drive, "Stops a motor"),
         Route::command::<_, _, NewSetpoint>(
             "/api/v1/drives/{name}/setpoint",
             command::to_drive::<NewSetpoint>,
@@ -301,7 +297,7 @@ fn commands() -> Vec<Route> {
         ),
         Route::command::<_, _, Stop>(
             "/api/v1/groups/{name}/stop",
-            command::to_group::<Stop>,
+            command::stop_group,
             "Stops every drive of a group",
         ),
         Route::command::<_, _, NewSetpoint>(

@@ -79,7 +79,7 @@ pub(super) fn collect_commands(line: &str, drives: &[DriveHandle], counts: &Coun
     for (command, count) in &counts.commands {
         if drives.iter().any(|drive| **drive.name() == *command.drive) {
             let outcome = command.outcome.to_string();
-            let labels = [line, &command.drive, command.action, &outcome, &command.face];
+            let labels = [line, &command.drive, command.action.name(), &outcome, &command.face];
             samples.count(Id::Commands, &labels, *count);
         }
     }

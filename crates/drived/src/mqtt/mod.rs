@@ -1,12 +1,11 @@
 //! The plant on an MQTT v5 broker: what it is like, what is asked of it there, and how Home Assistant finds it.
 //!
 //! Everything stands on [`broker`](crate::broker), which never holds up anybody. State is retained and expires, so that
-//! nothing of a daemon that is gone looks alive; commands are judged in [`commanding`] before the plant hears of them.
+//! nothing of a daemon that is gone looks alive; commands are judged by the [desk](crate::desk) before the plant hears of them.
 
 mod commanding;
 mod counts;
 mod discovery;
-mod pace;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -21,12 +20,8 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
+pub(crate) use self::topics::topic_id;
 use self::{commanding::Commanding, discovery::Discovered, telling::Teller, topics::Topics};
-pub(crate) use self::{
-    commanding::{SAME_STOP, is_id, is_open},
-    pace::Pace,
-    topics::topic_id,
-};
 use crate::{
     broker::{
         Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,

@@ -10,6 +10,7 @@ use super::*;
 use crate::{
     broker::testing::{Conduct, TestBroker, publish},
     config::Address,
+    desk::testing::{NO_OBJECTS, REFUSED, STOPS},
     doors::Role,
     plant::testing::TestPlant,
 };
@@ -344,7 +345,61 @@ async fn a_command_lives_as_long_as_its_message_and_no_longer_than_ten_seconds()
         json!({ "id": "e", "action": "start", "issued_unix_ms": crate::json::unix(Instant::now()) - 1_500 });
     bench.command(&old);
     a_while().await;
-    assert_eq!((bench.runs(0), &bench.answers().last().unwrap()["outcome"]), (false, &"refused".into()));
+    assert_eq!((bench.runs(0), &bench.answers().last().unwrap()["outcome"]), (false, &"expired".into()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_unclear_moves_no_motor_and_the_key_is_named() {
+    let bench = Bench::of(1).await;
+    for (text, outcome, reason, key) in REFUSED {
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(3)).await;
+        let told = bench.answers().pop().unwrap();
+        assert_eq!((&told["outcome"], &told["reason"]), (&outcome.into(), &reason.into()), "{text}: {told}");
+        assert!(told["text"].as_str().unwrap().contains(key), "{text}: {told}");
+        let is_no_stop = told["text"].as_str().unwrap().contains("no stop and no start");
+        assert_eq!(is_no_stop, reason == "ambiguous", "{text}: {told}");
+        assert_eq!(told["id"], serde_json::from_str::<Value>(text).unwrap()["id"], "{text}");
+        assert!(!bench.runs(0), "{text}");
+    }
+    for text in NO_OBJECTS {
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(3)).await;
+        let told = bench.answers().pop().unwrap();
+        assert_eq!(told["reason"], "malformed", "{text}: {told}");
+        assert!(!bench.runs(0), "{text}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_taken_whatever_else_it_says_and_under_its_id() {
+    let bench = Bench::of(1).await;
+    for (number, text) in STOPS.into_iter().enumerate() {
+        bench.command(&start(&format!("start-{number}")));
+        a_while().await;
+        assert!(bench.runs(0), "{text}");
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(20)).await;
+        assert!(!bench.runs(0), "{text}");
+        let told = bench.answers().pop().unwrap();
+        assert_eq!((&told["id"], &told["outcome"]), (&"s".into(), &"confirmed".into()), "{text}: {told}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_that_says_when_it_was_issued_is_the_same_whenever_it_comes() {
+    let bench = Bench::of(1).await;
+    let mut again = start("same");
+    again["issued_unix_ms"] = crate::json::unix(Instant::now()).into();
+    again["expires_in_ms"] = 10_000.into();
+    bench.command(&again);
+    sleep(Duration::from_secs(2)).await;
+    let first = bench.answers().pop().unwrap();
+    bench.command(&again);
+    sleep(Duration::from_secs(3)).await;
+    let second = bench.answers().pop().unwrap();
+    assert_eq!((&second["outcome"], &second["reason"]), (&first["outcome"], &first["reason"]), "{second}");
+    assert!(bench.runs(0));
 }
 
 #[tokio::test(start_paused = true)]

@@ -6,7 +6,10 @@ use std::{
     time::Duration,
 };
 
-use super::{commands::OutcomeWord, views::CommandView};
+use super::{
+    commands::{ActionWord, OutcomeWord},
+    views::CommandView,
+};
 
 /// The bounds by which the time of stops is counted: from one answer to a long ramp.
 pub(crate) const STOP_BOUNDS: [Duration; 8] = {
@@ -38,7 +41,7 @@ pub(crate) struct Counts {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Ended {
     pub(crate) drive: String,
-    pub(crate) action: &'static str,
+    pub(crate) action: ActionWord,
     pub(crate) outcome: OutcomeWord,
     /// The face that it came by: the first word of its origin.
     pub(crate) face: String,
@@ -51,7 +54,7 @@ impl Tally {
         let (drive, action) = (command.drive.clone().unwrap_or_default(), command.action);
         let mut counts = self.lock();
         *counts.commands.entry(Ended { drive, action, outcome: command.outcome, face }).or_default() += 1;
-        if action == "stop" && command.outcome == OutcomeWord::Confirmed {
+        if action == ActionWord::Stop && command.outcome == OutcomeWord::Confirmed {
             let took = Duration::from_millis(command.took_ms.unwrap_or_default());
             let at = STOP_BOUNDS.partition_point(|bound| *bound < took);
             if let Some(count) = counts.stops.get_mut(at) {

@@ -7,6 +7,7 @@ use tokio::time::sleep;
 use super::*;
 use crate::{
     broker::testing::{TestBroker, publish},
+    desk::testing::{NO_OBJECTS, REFUSED, STOPS},
     doors::Role,
     plant::testing::TestPlant,
 };
@@ -184,6 +185,67 @@ async fn a_drive_that_is_only_read_is_not_moved_and_says_so() {
     assert_eq!(pump["Control/Allowed"].value, Some(Raw::Boolean(false)));
     assert_eq!(pump["Control/LastCommand/Outcome"].value, Some(Raw::String("refused".to_owned())));
     assert_eq!(pump["Control/LastCommand/Reason"].value, Some(Raw::String("read_only".to_owned())));
+}
+
+/// What is told of the last command of a drive: its id, outcome, reason and text.
+fn last(bench: &Bench) -> [String; 4] {
+    let metrics = bench.metrics("pump 1");
+    ["Id", "Outcome", "Reason", "Text"].map(|what| {
+        match metrics[&format!("Control/LastCommand/{what}")].value.clone() {
+            Some(Raw::String(text)) => text,
+            _ => String::new(),
+        }
+    })
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_unclear_moves_no_motor_and_the_key_is_named() {
+    let bench = Bench::of(1, config("unclear")).await;
+    let command = |text: &str| bench.write("pump 1", "Control/Command", Raw::String(text.to_owned()));
+    for (text, outcome, reason, key) in REFUSED {
+        command(text);
+        sleep(Duration::from_secs(3)).await;
+        let told = last(&bench);
+        let [id, was, why, words] = &told;
+        assert_eq!((was.as_str(), why.as_str()), (outcome, reason), "{text}: {told:?}");
+        assert!(words.contains(key), "{text}: {told:?}");
+        assert_eq!(words.contains("no stop and no start"), reason == "ambiguous", "{text}: {told:?}");
+        assert_eq!(*id, serde_json::from_str::<Json>(text).unwrap()["id"], "{text}: {told:?}");
+        assert!(!bench.plant.machines[0].observe().running, "{text}");
+    }
+    for text in NO_OBJECTS {
+        command(text);
+        sleep(Duration::from_secs(3)).await;
+        assert_eq!(last(&bench)[2], "malformed", "{text}");
+        assert!(!bench.plant.machines[0].observe().running, "{text}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_taken_whatever_else_it_says_and_under_its_id() {
+    let bench = Bench::of(1, config("stops")).await;
+    let command = |text: &str| bench.write("pump 1", "Control/Command", Raw::String(text.to_owned()));
+    for (number, text) in STOPS.into_iter().enumerate() {
+        command(&format!(
+            r#"{{"id": "start-{number}", "action": "start", "setpoint": {{"frequency_hz": 20}}}}"#
+        ));
+        sleep(Duration::from_secs(10)).await;
+        assert!(bench.plant.machines[0].observe().running, "{text}");
+        command(text);
+        sleep(Duration::from_secs(20)).await;
+        assert!(!bench.plant.machines[0].observe().running, "{text}");
+        let told = last(&bench);
+        assert_eq!([&told[0], &told[1]], ["s", "confirmed"], "{text}: {told:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_rejected_is_told_under_its_id() {
+    let bench = Bench::of(1, SparkplugConfig { commands: Some(Role::View), ..config("view") }).await;
+    bench.write("pump 1", "Control/Command", Raw::String(r#"{"id": "s-1", "action": "stop"}"#.to_owned()));
+    sleep(Duration::from_secs(3)).await;
+    let told = last(&bench);
+    assert_eq!([&told[0], &told[1], &told[2]], ["s-1", "refused", "no_right"], "{told:?}");
 }
 
 #[tokio::test(start_paused = true)]

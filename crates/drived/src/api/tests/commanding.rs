@@ -49,7 +49,7 @@ async fn every_verb_is_carried_out_and_its_outcome_told() {
 
     plant.machines[0].trip(9);
     sleep(Duration::from_secs(3)).await;
-    let (status, refused) = command(&plant.plant, RUN, &Value::Null).await;
+    let (status, refused) = command(&plant.plant, RUN, &json!({})).await;
     assert_eq!((status, &refused["reason"]), (StatusCode::CONFLICT, &"fault".into()), "{refused}");
     let (status, reset) = command(&plant.plant, "/api/v1/drives/pump%201/reset", &json!({})).await;
     assert_eq!((status, &reset["outcome"]), (StatusCode::OK, &"confirmed".into()), "{reset}");
@@ -372,6 +372,48 @@ async fn what_is_no_command_is_a_problem_document_and_moves_nothing() {
     }
     sleep(Duration::from_secs(5)).await;
     assert!(!is_running(&plant, 0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_body_that_says_two_things_starts_no_motor_and_the_key_is_named() {
+    let plant = TestPlant::of(1).await;
+    let raw = |path: &str, body: &str| {
+        let request = Request::post(path).header("content-type", "application/json");
+        request.body(Body::from(body.to_owned())).unwrap()
+    };
+    for (body, key) in [
+        (r#"{"setpoint": {"frequency_hz": 10, "frequency_hz": 50}}"#, "setpoint.frequency_hz"),
+        (r#"{"direction": "forward", "direction": "reverse"}"#, "direction"),
+        (r#"{"setpoint": null}"#, "setpoint"),
+        (r#"{"stop": true}"#, "no stop and no start"),
+        (r#"{"action": "stop"}"#, "no stop and no start"),
+        ("null", "null"),
+    ] {
+        let (status, told) = send(api(&plant.plant, "operator", ALL), raw(RUN, body)).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{body}: {told}");
+        assert!(told["detail"].as_str().unwrap().contains(key), "{body}: {told}");
+        sleep(Duration::from_secs(5)).await;
+        assert!(!is_running(&plant, 0), "{body}");
+    }
+    let register = "/api/v1/drives/pump%201/parameters/ACC";
+    let twice = Request::put(register).header("content-type", "application/json");
+    let twice = twice.body(Body::from(r#"{"value": "5.0", "value": "50.0"}"#)).unwrap();
+    let (status, told) = send(api(&plant.plant, "operator", ALL), twice).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{told}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_stops_whatever_its_body_says() {
+    let plant = TestPlant::of(1).await;
+    for body in ["", "null", "{", "[1]", r#"{"id": 7}"#, r#"{"mode": "gently"}"#, r#"{"action": "start"}"#] {
+        let start = json!({"setpoint": {"frequency_hz": 30.0}});
+        assert_eq!(command(&plant.plant, RUN, &start).await.0, StatusCode::OK);
+        let stop = Request::post(format!("{STOP}?wait=20s")).header("content-type", "application/json");
+        let stop = stop.body(Body::from(body)).unwrap();
+        let (status, told) = send(api(&plant.plant, "operator", ALL), stop).await;
+        assert_eq!((status, &told["command"]), (StatusCode::OK, &"ramp stop".into()), "{body}: {told}");
+        assert!(!is_running(&plant, 0), "{body}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -88,7 +88,9 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                 if !is_read {
                     assert_eq!(held(plant, &document, path, request(&asked, "text/plain", body)).await, 415);
                     let odd = request(&asked, json, json!({"id": 7}));
-                    assert_eq!(held(plant, &document, path, odd).await, 422, "{asked}");
+                    let told = held(plant, &document, path, odd).await;
+                    // A stop is one whatever its body says.
+                    assert_eq!(told == 422, !path.ends_with("/stop"), "{asked}: {told}");
                     if method == Method::POST {
                         let waits = request(&format!("{asked}?wait=1h"), json, json!({}));
                         assert_eq!(held(plant, &document, path, waits).await, 400, "{asked}");

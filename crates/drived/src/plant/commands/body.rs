@@ -41,7 +41,6 @@ impl Asked {
         }
         match action {
             "start" => read::<Start>(members),
-            "stop" => read::<Stop>(members),
             "setpoint" => read::<NewSetpoint>(members),
             "reset" => read::<Reset>(members),
             "release" => read::<Release>(members),
@@ -58,9 +57,7 @@ impl Asked {
     /// What is wrong with its id or its expiry, in words.
     pub(crate) fn of(self, target: Target, arrived: Instant) -> Result<Request, String> {
         let Self { id, expires_in_ms, action } = self;
-        if let Some(id) = &id
-            && (id.is_empty() || id.len() > LONGEST_ID || !id.bytes().all(|byte| byte.is_ascii_graphic()))
-        {
+        if id.as_ref().is_some_and(|id| !is_id(id)) {
             return Err(format!("id: expected 1 to {LONGEST_ID} printable ASCII characters without spaces"));
         }
         let lifetime = expires_in_ms.map_or(LIFETIME, Duration::from_millis);
@@ -69,6 +66,11 @@ impl Asked {
         }
         Ok(Request { id, target, action, lifetime, arrived })
     }
+}
+
+/// Whether a text may be the name of a command.
+pub(crate) fn is_id(text: &str) -> bool {
+    (1..=LONGEST_ID).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
 /// Starts the motor.
@@ -89,8 +91,9 @@ pub(crate) struct Start {
     until: Option<Until>,
 }
 
-/// Stops the motor. It never expires, and is carried out each time it arrives.
-#[derive(Debug, Deserialize, JsonSchema)]
+/// Stops the motor. It never expires, and is carried out each time it arrives, whatever else its body says.
+#[derive(Debug, JsonSchema)]
+#[expect(dead_code, reason = "it is described here, and read as whatever stops is read")]
 pub(crate) struct Stop {
     /// The caller's name of the command, by which its outcome is found. It need not be new.
     #[schemars(length(min = 1, max = LONGEST_ID))]
@@ -146,13 +149,6 @@ impl Asks for Start {
         let Self { id, expires_in_ms, direction, setpoint, until } = self;
         let (direction, until) = (direction.unwrap_or(Direction::Forward), until.unwrap_or_default());
         Asked { id, expires_in_ms, action: Action::Start { direction, setpoint, until } }
-    }
-}
-
-impl Asks for Stop {
-    fn asked(self) -> Asked {
-        let action = Action::Stop(self.mode.unwrap_or(StopMode::Ramp));
-        Asked { id: self.id, expires_in_ms: None, action }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Carrying out: what is asked of the fleet, and how the answer is told.
 
 use std::{
+    borrow::Cow,
     pin::Pin,
     sync::{Arc, Mutex, PoisonError},
     task::{Context, Waker},
@@ -16,7 +17,7 @@ use tokio::{
 };
 
 use super::{
-    Action, OutcomeWord, Request, Target,
+    Action, ActionWord, OutcomeWord, Request, Target,
     log::Command,
     outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, told},
     settle::settled,
@@ -57,11 +58,12 @@ impl Work {
             id: request.id.clone().unwrap_or_else(new_id),
             drive: None,
             group: None,
-            action: request.action.name(),
+            action: request.action.word(),
             command: request.action.text(),
             caller: caller.name.clone(),
             origin: caller.origin.clone(),
             outcome: OutcomeWord::Pending,
+            open: true,
             reason: None,
             text: None,
             time_unix_ms: unix(request.arrived),
@@ -94,13 +96,14 @@ impl Work {
         if let (Target::Drive(_), Some(part)) = (&self.0.request.target, parts.first()) {
             return part.clone();
         }
-        let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason)));
+        let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref())));
         let silent = |part: &CommandView| {
             let member = self.0.members.iter().find(|member| part.drive.as_deref() == Some(member.name()));
             member.is_some_and(|member| member.snapshot().link != Link::Connected)
         };
         CommandView {
             outcome,
+            open: parts.iter().any(|part| part.open),
             took_ms: parts.iter().filter_map(|part| part.took_ms).max(),
             several: Some(SeveralView::of(parts, silent)),
             ..self.0.head.clone()
@@ -231,9 +234,7 @@ impl Work {
     /// Whether it may still turn out what became of a part.
     fn is_open_at(&self, number: usize) -> bool {
         let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        let outcome = parts.get(number).map(|part| part.outcome);
-        let is_stop = matches!(self.0.request.action, Action::Stop(_));
-        outcome == Some(OutcomeWord::Unknown) || is_stop && outcome == Some(OutcomeWord::NotConfirmed)
+        parts.get(number).is_some_and(|part| part.open)
     }
 
     fn end_of(&self, name: &str, outcome: &Outcome) {
@@ -293,7 +294,13 @@ impl CommandView {
         let now = Instant::now();
         let status = Some(Shown(member.snapshot()));
         let took_ms = Some(milliseconds(now.saturating_duration_since(arrived)));
-        Self { outcome, reason, text, status, took_ms, ..self }
+        // A stop goes on until it is confirmed.
+        let open = match outcome {
+            OutcomeWord::Pending | OutcomeWord::Unknown => true,
+            OutcomeWord::NotConfirmed => self.action == ActionWord::Stop,
+            _ => false,
+        };
+        Self { outcome, open, reason: reason.map(Cow::from), text, status, took_ms, ..self }
     }
 }
 

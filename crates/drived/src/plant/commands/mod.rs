@@ -5,7 +5,9 @@
 mod body;
 mod carry;
 mod log;
+mod object;
 mod outcome;
+mod said;
 mod settle;
 
 use std::{
@@ -16,13 +18,16 @@ use std::{
 
 use drive_core::{Direction, Setpoint, StopMode};
 use drive_fleet::{DriveHandle, Until};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout};
 
 pub(super) use self::log::Log;
 pub(crate) use self::{
-    body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
     log::Told,
     outcome::OutcomeWord,
+    said::{Said, Unclear, body},
 };
 use self::{carry::Work, log::Found};
 use super::{Plant, views::CommandView};
@@ -45,7 +50,7 @@ pub(crate) struct Request {
 }
 
 /// Who is meant.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) enum Target {
     Drive(String),
     Group(String),
@@ -98,15 +103,40 @@ impl Rejected {
     }
 }
 
-impl Action {
-    pub(crate) const fn name(&self) -> &'static str {
+/// What is to be done, in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ActionWord {
+    Start,
+    Stop,
+    Setpoint,
+    Reset,
+    Release,
+    Save,
+}
+
+impl ActionWord {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
-            Self::Start { .. } => "start",
-            Self::Stop(_) => "stop",
-            Self::Setpoint { .. } => "setpoint",
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::Setpoint => "setpoint",
             Self::Reset => "reset",
             Self::Release => "release",
             Self::Save => "save",
+        }
+    }
+}
+
+impl Action {
+    pub(crate) const fn word(&self) -> ActionWord {
+        match self {
+            Self::Start { .. } => ActionWord::Start,
+            Self::Stop(_) => ActionWord::Stop,
+            Self::Setpoint { .. } => ActionWord::Setpoint,
+            Self::Reset => ActionWord::Reset,
+            Self::Release => ActionWord::Release,
+            Self::Save => ActionWord::Save,
         }
     }
 

@@ -66,7 +66,7 @@ pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Opt
 
 /// What becomes of a command for several drives: confirmed when all are that may be commanded, pending while one is, else
 /// the worst of them.
-pub(super) fn of_all(outcomes: impl Iterator<Item = (OutcomeWord, Option<&'static str>)>) -> OutcomeWord {
+pub(super) fn of_all<'a>(outcomes: impl Iterator<Item = (OutcomeWord, Option<&'a str>)>) -> OutcomeWord {
     let rank = |word| match word {
         OutcomeWord::Confirmed => 0,
         OutcomeWord::Superseded => 1,

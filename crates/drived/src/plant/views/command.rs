@@ -1,10 +1,12 @@
 //! One command and what became of it.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Shown;
-use crate::plant::commands::OutcomeWord;
+use crate::plant::commands::{ActionWord, OutcomeWord};
 
 /// A command: for one drive, or with one entry for each of several.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -16,17 +18,18 @@ pub(crate) struct CommandView {
     /// The group; absent where a drive, or all, are meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) group: Option<String>,
-    /// `start`, `stop`, `setpoint`, `reset`, `release` or `save`.
-    pub(crate) action: &'static str,
+    pub(crate) action: ActionWord,
     /// The action in words.
     pub(crate) command: String,
     pub(crate) caller: String,
     /// Where it came from.
     pub(crate) origin: String,
     pub(crate) outcome: OutcomeWord,
+    /// Whether something else may still become of it, which is told under the same id.
+    pub(crate) open: bool,
     /// Why, in one word.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) reason: Option<&'static str>,
+    pub(crate) reason: Option<Cow<'static, str>>,
     /// The reason in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) text: Option<String>,

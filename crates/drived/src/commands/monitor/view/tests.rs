@@ -511,7 +511,8 @@ proptest! {
         ])]);
         let screen = monitor.screen(width, 24);
         let rows: Vec<&str> = screen.lines().collect();
-        let upper = |hertz: f64| ((hertz * 10.0 - 1e-6).ceil() / 10.0).max(0.0);
+        // Nothing is added, so that no zero is negative.
+        let upper = |hertz: f64| ((hertz * 10.0 - 1e-6).ceil() / 10.0).max(0.0) + 0.0;
         let mut whole = numbers(&name);
         whole.extend([format!("{:.1}", upper(output)), format!("{:.1}", upper(setpoint)), format!("{current:.1}")]);
         whole.extend(numbers(&super::words::time(Duration::from_millis(age))));

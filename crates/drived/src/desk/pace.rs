@@ -10,18 +10,18 @@ const ONE_MORE: Duration = Duration::from_millis(20);
 
 /// Lets as many through as may come.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pace {
+pub(super) struct Pace {
     room: u32,
     filled: Instant,
 }
 
 impl Pace {
-    pub(crate) const fn new(now: Instant) -> Self {
+    pub(super) const fn new(now: Instant) -> Self {
         Self { room: AT_ONCE, filled: now }
     }
 
     /// Whether one more may come now.
-    pub(crate) fn allows(&mut self, now: Instant) -> bool {
+    pub(super) fn allows(&mut self, now: Instant) -> bool {
         let steps = now.saturating_duration_since(self.filled).as_millis() / ONE_MORE.as_millis();
         let steps = u32::try_from(steps).unwrap_or(AT_ONCE).min(AT_ONCE);
         self.room = (self.room + steps).min(AT_ONCE);
