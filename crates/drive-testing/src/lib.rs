@@ -5,6 +5,7 @@
 //! - [`words`]: a drive that is nothing but words, behind a plain port: what is asked of it, and what becomes of writes.
 //! - [`babble`]: a drive that answers any word to anything.
 //! - [`bench`](mod@bench), [`rig`]: one simulated drive on a line in virtual time.
+//! - [`referee`]: who may move a motor and what stops it, by the manuals alone.
 //! - [`Contract`]: what every family promises of itself, for a family from anywhere to run on itself.
 //!
 //! This crate is for tests: its functions panic when what they check is not so.
@@ -15,6 +16,7 @@ pub mod babble;
 pub mod bench;
 pub mod contract;
 pub mod frames;
+pub mod referee;
 pub mod rig;
 pub mod words;
 
