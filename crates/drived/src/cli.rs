@@ -142,7 +142,7 @@ impl Command {
             Self::Watch(args) => watch::run(args).await,
             Self::Monitor(args) => monitor::run(args).await,
             Self::Reload(args) => reload::run(args).await,
-            Self::Token(command) => token::run(command),
+            Self::Token(command) => token::run(command).await,
             Self::Audit(command) => audit::run(command),
         }
     }

@@ -259,6 +259,36 @@ fn a_command_is_audited_with_its_caller_and_a_token_names_the_commander() {
 }
 
 #[test]
+fn a_running_daemon_makes_and_removes_its_tokens_itself_and_keeps_all_in_one_folder() {
+    let folder = path("one-folder-state");
+    let mut daemon =
+        Daemon::start("one-folder", &format!("state = {:?}", folder.to_str().expect("the path is text")));
+    let config = File::new(
+        "one-folder-unsaid",
+        "[lines.a]\nport = \"/dev/nowhere\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n",
+    );
+    let socket = daemon.socket().to_owned();
+    let tokens = |words: &[&str]| {
+        run(&[&["token"], words, &["--config", config.path(), "--socket", &socket]].concat())
+    };
+    let secret = tokens(&["add", "panel", "--role", "operate"]).assert_done().trim().to_owned();
+    tokens(&["add", "panel", "--role", "view"]).assert_refused(2, "there is a token panel already");
+    assert!(tokens(&["list"]).assert_done().contains("panel  operate"));
+    let token = folder.join("token");
+    std::fs::write(&token, &secret).expect("the daemon has made it");
+    let token = token.to_str().expect("the path is text");
+    daemon.ask(&["stop", "pump 2", "--token-file", token]).assert_done();
+    assert_eq!(tokens(&["remove", "panel"]).assert_done().trim(), "panel is removed");
+    daemon.ask(&["stop", "pump 2", "--token-file", token]).assert_refused(1, "the token is wrong");
+    daemon.end();
+    let log = std::fs::read_to_string(folder.join("audit")).expect("it is kept there");
+    for told in ["token panel added", "token panel removed", "\"caller\":\"panel\"", "socket uid "] {
+        assert!(log.contains(told), "{told}: {log}");
+    }
+    std::fs::remove_dir_all(&folder).expect("it can be removed");
+}
+
+#[test]
 fn a_second_daemon_on_one_socket_is_refused_and_what_is_no_socket_is_never_replaced() {
     let mut daemon = Daemon::start("second", "");
     let text = "[http]\nlisten = \"off\"\n[lines.a]\nport = \"/dev/nowhere\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";

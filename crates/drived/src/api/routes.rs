@@ -13,7 +13,9 @@ use super::{
     parameter::{self, NewValue},
     read, reload, stream,
 };
-use crate::doors::{LOGIN, LOGOUT, LoginBody, SessionView};
+use crate::doors::{
+    LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, SessionView, TOKENS, TokensView,
+};
 use crate::plant::{
     Plant,
     commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
@@ -181,7 +183,29 @@ pub(super) fn door_routes() -> Vec<Route> {
         .or_problem(429)
         .or_problem(503);
     login.body = Some(SchemaGenerator::subschema_for::<LoginBody>);
-    vec![login, post(LOGOUT, "Ends the session of the cookie")]
+    let on_socket = |mut route: Route| {
+        route.problems.extend([404, 413, 415, 422, 503]);
+        route
+    };
+    let mut new = on_socket(
+        Route::elsewhere(Method::POST, TOKENS, "Makes a token, over the control socket")
+            .answers::<MadeToken>(200, "what it is, told this once"),
+    );
+    new.body = Some(SchemaGenerator::subschema_for::<NewToken>);
+    let removed = "/api/v1/tokens/{name}";
+    vec![
+        login,
+        post(LOGOUT, "Ends the session of the cookie"),
+        on_socket(
+            Route::elsewhere(Method::GET, TOKENS, "All tokens, over the control socket")
+                .answers::<TokensView>(200, "their names and roles"),
+        ),
+        new,
+        on_socket(
+            Route::elsewhere(Method::DELETE, removed, "Removes a token, over the control socket")
+                .answers::<RemovedToken>(200, "it is no more"),
+        ),
+    ]
 }
 
 /// What a program with a configuration has besides.

@@ -156,6 +156,11 @@ impl Daemon {
         self.ask("PUT", path, Some(body)).await
     }
 
+    /// Asks for something to be removed.
+    pub(crate) async fn delete(&mut self, path: &str) -> Result<Answer, Failure> {
+        self.ask("DELETE", path, Some(&Value::Null)).await
+    }
+
     async fn ask(&mut self, method: &str, path: &str, body: Option<&Value>) -> Result<Answer, Failure> {
         let (parts, body) = self.send(method, path, body).await?.into_parts();
         let read = timeout(READ_WITHIN, Limited::new(body, LONGEST).collect()).await;

@@ -33,7 +33,7 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
     let Command::Verify { file, config, json } = command;
     let file = match file {
         Some(file) => file,
-        None => config.named("audit", config.doors()?.audit)?,
+        None => config.named("audit", config.doors()?.state.audit)?,
     };
     let verdict = verify(&file)
         .map_err(|error| Failure::Input(format!("{}: cannot be read: {error}", file.display())))?;

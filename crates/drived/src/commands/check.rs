@@ -75,6 +75,7 @@ fn object(file: &Path, config: &Config) -> Value {
         "gateways": config.gateways.iter().map(gateway).collect::<Vec<_>>(),
         "mqtt": config.mqtt.as_ref().map(of_mqtt),
         "sparkplug": config.sparkplug.as_ref().map(of_sparkplug),
+        "state": config.doors.state.folder,
         "timeout_stop_s": (config.shutdown + CLOSING).as_secs(),
     })
 }
@@ -109,6 +110,10 @@ fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
     }
     if let Some(sparkplug) = &config.sparkplug {
         output::say(format_args!("sparkplug: {}", of_sparkplug(sparkplug)))?;
+    }
+    if let Some(folder) = &config.doors.state.folder {
+        let audit = if config.doors.state.audit.is_some() { "" } else { "; no audit log is kept" };
+        output::say(format_args!("kept in {}{audit}", folder.display()))?;
     }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::{
+    client::Daemon,
     config::{Config, DoorsConfig},
     doors::{
-        Caller, Rights, Role,
+        Caller, Rights, Role, TOKENS,
         audit::{self, Kind, Record},
         tokens::Tokens,
     },
@@ -17,7 +18,8 @@ use crate::{
 
 /// Add, list and remove the tokens of those who command over HTTP
 ///
-/// The file of the tokens is named by `tokens` in the configuration. A running daemon takes each change at once.
+/// A running daemon does it itself, over its control socket. Where none runs, the file that the configuration names is changed,
+/// which the next daemon reads.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
     /// Make a token and print it, once: only its SHA-256 is kept
@@ -29,14 +31,14 @@ pub(crate) enum Command {
         #[arg(long, value_enum)]
         role: Role,
         #[command(flatten)]
-        config: ConfigArgs,
+        place: PlaceArgs,
         #[command(flatten)]
         json: JsonArgs,
     },
     /// List the tokens by their names
     List {
         #[command(flatten)]
-        config: ConfigArgs,
+        place: PlaceArgs,
         #[command(flatten)]
         json: JsonArgs,
     },
@@ -46,10 +48,20 @@ pub(crate) enum Command {
         #[arg(value_name = "NAME")]
         name: String,
         #[command(flatten)]
-        config: ConfigArgs,
+        place: PlaceArgs,
         #[command(flatten)]
         json: JsonArgs,
     },
+}
+
+/// Whose tokens they are.
+#[derive(Debug, clap::Args)]
+pub(crate) struct PlaceArgs {
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// The control socket of the daemon, if not where the configuration says or where it usually is
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
 }
 
 /// `--config` of those who need its files.
@@ -67,65 +79,123 @@ impl ConfigArgs {
         Ok(config.doors)
     }
 
-    /// One of the files that it may name.
+    /// One of the files that are kept.
     pub(crate) fn named(&self, key: &str, file: Option<PathBuf>) -> Result<PathBuf, Failure> {
         let config = self.config.display();
         file.ok_or_else(|| {
-            Failure::Input(format!("{config} names no file for it: expected {key} = \"FILE\""))
+            let expected = format!("expected {key} = \"FILE\", or state = \"FOLDER\"");
+            Failure::Input(format!("{config} names no place where it is kept: {expected}"))
         })
     }
 }
 
-pub(crate) fn run(command: Command) -> Result<(), Failure> {
-    let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Add { name, role, config, json } => {
-            let (tokens, audit) = open(&config)?;
-            let secret = tokens.add(&name, role).map_err(|error| input(&error))?;
-            let what = format!("token {name} added, role {}", role.name());
-            if let Err(failure) = tell(audit.as_deref(), what) {
-                tokens.remove(&name).map_err(|error| input(&error))?;
-                return Err(failure);
-            }
-            let object = || json!({ "name": name, "role": role.name(), "token": secret });
-            json.say(object, || output::say_as_it_is(&secret))
+        Command::Add { name, role, place, json } => {
+            let made = match open(&place).await? {
+                Way::Daemon(mut daemon) => {
+                    let asked = json!({ "name": name, "role": role.name() });
+                    daemon.post(TOKENS, &asked).await?.done()?
+                }
+                Way::Files(files) => files.add(&name, role)?,
+            };
+            json.say(|| made.clone(), || output::say_as_it_is(made["token"].as_str().unwrap_or_default()))
         }
-        Command::List { config, json } => list(&open(&config)?.0, json),
-        Command::Remove { name, config, json } => {
-            let (tokens, audit) = open(&config)?;
-            tokens.remove(&name).map_err(|error| input(&error))?;
-            // What is closed stays closed, whatever the log says.
-            tell(audit.as_deref(), format!("token {name} removed"))?;
+        Command::List { place, json } => {
+            let tokens = match open(&place).await? {
+                Way::Daemon(mut daemon) => daemon.get(TOKENS).await?.done()?["tokens"].take(),
+                Way::Files(Files { tokens, .. }) => json!(tokens.views().map_err(input)?),
+            };
+            list(tokens.as_array().map_or(&[], Vec::as_slice), json)
+        }
+        Command::Remove { name, place, json } => {
+            match open(&place).await? {
+                Way::Daemon(mut daemon) => {
+                    daemon.delete(&format!("{TOKENS}/{name}")).await?.done()?;
+                }
+                Way::Files(files) => files.remove(&name)?,
+            }
             let object = || json!({ "name": name, "removed": true });
             json.say(object, || output::say(format_args!("{name} is removed")))
         }
     }
 }
 
-fn open(config: &ConfigArgs) -> Result<(Tokens, Option<PathBuf>), Failure> {
-    let doors = config.doors()?;
-    let file = config.named("tokens", doors.tokens)?;
-    let tokens = Tokens::open(&file).map_err(|error| Failure::Input(error.to_string()))?;
-    Ok((tokens, doors.audit))
+fn input(error: impl std::fmt::Display) -> Failure {
+    Failure::Input(error.to_string())
 }
 
-fn list(tokens: &Tokens, json: JsonArgs) -> Result<(), Failure> {
-    let all = tokens.all().map_err(|error| Failure::Input(error.to_string()))?;
-    if json.is_json() {
-        return all.iter().try_for_each(|token| {
-            let object = json!({ "name": token.name, "role": token.role.name(), "made_unix_s": token.made });
-            output::say_as_it_is(object)
-        });
+/// Who changes them.
+enum Way {
+    /// The daemon whose tokens they are.
+    Daemon(Daemon),
+    /// This program: no daemon runs.
+    Files(Files),
+}
+
+struct Files {
+    tokens: Tokens,
+    audit: Option<PathBuf>,
+}
+
+async fn open(place: &PlaceArgs) -> Result<Way, Failure> {
+    let DoorsConfig { state, socket, .. } = place.config.doors()?;
+    let socket = place.socket.clone().or_else(|| socket.and_then(|socket| socket.path));
+    if let Ok(mut daemon) = Daemon::connect(socket.as_deref(), None).await {
+        let told = daemon.get(TOKENS).await?;
+        let theirs = told.body["file"].as_str().map(Path::new);
+        let own = state.tokens.as_deref().filter(|_| state.has_tokens);
+        // Where the configuration does not say it, the daemon has it from its own environment.
+        let is_it = |theirs: &Path| own.is_none_or(|own| whole(own) == whole(theirs));
+        if told.status.is_success() && theirs.is_some_and(is_it) {
+            return Ok(Way::Daemon(daemon));
+        }
     }
-    if all.is_empty() {
+    let file = place.config.named("tokens", state.tokens)?;
+    Ok(Way::Files(Files { tokens: Tokens::open(&file).map_err(input)?, audit: state.audit }))
+}
+
+/// A file by the one way to its folder.
+fn whole(file: &Path) -> PathBuf {
+    let folder = file.parent().and_then(|folder| folder.canonicalize().ok());
+    match (folder, file.file_name()) {
+        (Some(folder), Some(name)) => folder.join(name),
+        _ => file.to_owned(),
+    }
+}
+
+impl Files {
+    fn add(&self, name: &str, role: Role) -> Result<Value, Failure> {
+        let secret = self.tokens.add(name, role).map_err(input)?;
+        if let Err(failure) = tell(self.audit.as_deref(), format!("token {name} added, role {}", role.name()))
+        {
+            self.tokens.remove(name).map_err(input)?;
+            return Err(failure);
+        }
+        Ok(json!({ "name": name, "role": role.name(), "token": secret }))
+    }
+
+    fn remove(&self, name: &str) -> Result<(), Failure> {
+        self.tokens.remove(name).map_err(input)?;
+        // What is closed stays closed, whatever the log says.
+        tell(self.audit.as_deref(), format!("token {name} removed"))
+    }
+}
+
+fn list(tokens: &[Value], json: JsonArgs) -> Result<(), Failure> {
+    if json.is_json() {
+        return tokens.iter().try_for_each(output::say_as_it_is);
+    }
+    if tokens.is_empty() {
         return output::say("there is no token: drived token add NAME --role ROLE");
     }
     let mut table = Table::new(["name", "role", "made"]);
-    for token in all {
-        let made = i64::try_from(token.made).ok().and_then(|made| chrono::DateTime::from_timestamp(made, 0));
+    for token in tokens {
+        let text = |key: &str| token[key].as_str().unwrap_or_default().to_owned();
+        let made = token["made_unix_s"].as_i64().and_then(|made| chrono::DateTime::from_timestamp(made, 0));
         let made =
             output::or_dash(made.map(|made| made.with_timezone(&chrono::Local).format("%Y-%m-%d %H:%M")));
-        table.row([token.name, token.role.name().to_owned(), made]);
+        table.row([text("name"), text("role"), made]);
     }
     output::say_table(table)
 }

@@ -1,4 +1,4 @@
-//! `[http]`, `[socket]`, `tokens`, `audit`: who may come in, and by which door.
+//! `[http]` and `[socket]`: who may come in, and by which door.
 
 use std::{
     fmt,
@@ -12,6 +12,7 @@ use toml::Spanned;
 
 use super::{
     place::{ConfigError, Source},
+    state::State,
     values::Parsed,
 };
 use crate::{
@@ -26,10 +27,8 @@ pub(crate) struct DoorsConfig {
     pub(crate) socket: Option<SocketConfig>,
     /// Without it there is no HTTP server.
     pub(crate) http: Option<HttpConfig>,
-    /// The file of the tokens.
-    pub(crate) tokens: Option<PathBuf>,
-    /// The file of the audit log.
-    pub(crate) audit: Option<PathBuf>,
+    /// Where tokens and the audit log are kept, and what else outlives the daemon.
+    pub(crate) state: State,
 }
 
 /// The control socket.
@@ -72,7 +71,7 @@ impl HttpConfig {
         match (self.listen.ip().is_loopback(), has_tokens, self.tls.is_some() || self.plain) {
             (true, ..) | (_, true, true) => None,
             (_, false, _) => Some(
-                "others than this machine can reach it: expected tokens = \"FILE\", which drived token add fills",
+                "others than this machine can reach it: expected tokens = \"FILE\" or state = \"FOLDER\", where drived token add keeps them",
             ),
             (_, _, false) => Some(
                 "tokens would cross the network in clear: expected tls = { certificate = \"FILE\", key = \"FILE\" }, \
@@ -194,8 +193,7 @@ impl DoorsConfig {
         source: Source<'_>,
         http: Option<&HttpEntry>,
         socket: Option<&SocketEntry>,
-        tokens: Option<&Path>,
-        audit: Option<&Path>,
+        state: State,
     ) -> Result<Self, ConfigError> {
         let folder = source.file.parent().unwrap_or(Path::new(""));
         let socket = SocketConfig {
@@ -204,17 +202,16 @@ impl DoorsConfig {
         };
         let http = match http {
             None => Some(HttpConfig::at(LISTEN)),
-            Some(http) => http.checked(source, folder, tokens.is_some())?,
+            Some(http) => http.checked(source, folder, state.has_tokens)?,
         };
-        let beside = |path: &Path| folder.join(path);
-        Ok(Self { socket: Some(socket), http, tokens: tokens.map(beside), audit: audit.map(beside) })
+        Ok(Self { socket: Some(socket), http, state })
     }
 
     /// The doors of a demo: everybody who is on this machine may move its simulated drives.
     pub(crate) fn of_demo(socket: Option<PathBuf>) -> Self {
         let http = HttpConfig { demo: true, ..HttpConfig::at(LISTEN) };
         let socket = socket.map(|path| SocketConfig { path: Some(path), mode: MODE });
-        Self { socket, http: Some(http), tokens: None, audit: None }
+        Self { socket, http: Some(http), state: State::default() }
     }
 
     /// The same with what the command line says instead.
@@ -225,7 +222,7 @@ impl DoorsConfig {
             Some(Http::At(listen)) => {
                 let http = self.http.unwrap_or_else(|| HttpConfig::at(listen));
                 let http = HttpConfig { listen, ..http };
-                if let Some(missing) = http.missing(self.tokens.is_some()) {
+                if let Some(missing) = http.missing(self.state.has_tokens) {
                     return Err(Failure::Input(format!("--http {listen}: {missing}")));
                 }
                 Some(http)

@@ -15,12 +15,7 @@ mod sparkplug;
 mod state;
 mod values;
 
-use std::{
-    collections::BTreeMap,
-    ops::Range,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{collections::BTreeMap, ops::Range, path::Path, time::Duration};
 
 use drive_bus::{LineConfig, Protocol};
 use drive_core::{StopMode, WatchdogCapability};
@@ -37,6 +32,7 @@ pub(crate) use self::{
     mqtt::{Address, Discovery, MqttConfig},
     place::{ConfigError, Source as Place},
     sparkplug::SparkplugConfig,
+    state::State,
 };
 use self::{
     place::Source,
@@ -67,8 +63,6 @@ pub(crate) struct Config {
     pub(crate) snapshots: Duration,
     /// How long the exit may take.
     pub(crate) shutdown: Duration,
-    /// The file that keeps what each watchdog was before it was armed; `None`: nothing keeps it.
-    pub(crate) watchdogs: Option<PathBuf>,
     /// Who may come in, and by which door.
     pub(crate) doors: DoorsConfig,
     pub(crate) lines: Vec<LinePart>,
@@ -138,6 +132,13 @@ impl Config {
             Some(span) => source.error(span, error.message()),
             None => source.error_of_file(error.message()),
         })?;
+        let said = state::Said {
+            state: raw.state.as_deref(),
+            watchdogs: raw.watchdogs.as_deref(),
+            tokens: raw.tokens.as_deref(),
+            audit: raw.audit.as_deref(),
+        };
+        let state = State::of(source, said, &state::Environment::of_process());
         let members = Members::of(source, &raw)?;
         let mut lines = Vec::new();
         for (name, entry) in &raw.lines {
@@ -160,13 +161,12 @@ impl Config {
         let sparkplug = raw.mqtt.as_ref().and_then(|entry| entry.sparkplug.as_ref()).map(|entry| {
             let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
             let drives = drives.map(|drive| drive.settings.name.as_str());
-            SparkplugConfig::read(source, entry, drives, lines.iter().map(|line| line.name.as_str()))
+            let lines = lines.iter().map(|line| line.name.as_str());
+            SparkplugConfig::read(source, entry, drives, lines, &state)
         });
-        let (tokens, audit) = (raw.tokens.as_deref(), raw.audit.as_deref());
-        let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), tokens, audit)?;
+        let doors = DoorsConfig::read(source, raw.http.as_ref(), raw.socket.as_ref(), state)?;
         let gateways = gateway::gateways(source, &raw.gateways, &lines)?;
         Ok(Self {
-            watchdogs: state::file(source, raw.watchdogs.as_deref(), state::WATCHDOGS),
             doors,
             gateways,
             snapshots: checks::snapshots(source, raw.snapshots.as_ref())?.unwrap_or(SNAPSHOTS),

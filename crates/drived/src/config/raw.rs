@@ -27,6 +27,8 @@ pub(super) struct File {
     /// How long the exit may take.
     pub(super) shutdown: Option<Spanned<Parsed<Time>>>,
     pub(super) socket: Option<SocketEntry>,
+    /// The folder of what is kept.
+    pub(super) state: Option<PathBuf>,
     /// The file of the tokens.
     pub(super) tokens: Option<PathBuf>,
     /// The file of the audit log.

@@ -8,13 +8,11 @@ use toml::Spanned;
 
 use super::{
     place::{ConfigError, Source},
-    state,
+    state::State,
     values::Parsed,
 };
 use crate::{doors::Role, duration::Time, plant::commands::LONGEST_LIFETIME};
 
-/// The name of the file beside which systemd keeps the state of the daemon.
-const STATE: &str = "sparkplug-bd-seq";
 /// How old a command may be, by the clock of the host that has sent it, unless it says so itself.
 const LIFETIME: Duration = Duration::from_secs(1);
 /// Between two births that a host asks for.
@@ -72,6 +70,7 @@ impl SparkplugConfig {
         entry: &SparkplugEntry,
         drives: impl Iterator<Item = &'a str>,
         lines: impl Iterator<Item = &'a str>,
+        kept: &State,
     ) -> Result<Self, ConfigError> {
         let id = |said: &Spanned<String>| {
             Id::new(said.get_ref().as_str()).map_err(|error| source.error(said.span(), error))
@@ -105,8 +104,8 @@ impl SparkplugConfig {
             let problem = format_args!("{lifetime:?}: expected up to {LONGEST_LIFETIME:?}");
             return Err(source.error(said.span(), problem));
         }
-        let state = state::file(source, entry.state.as_deref(), STATE).ok_or_else(|| {
-            let problem = "bdSeq has to outlive the daemon: expected state = \"FILE\", or a STATE_DIRECTORY";
+        let state = kept.bd_seq(source, entry.state.as_deref()).ok_or_else(|| {
+            let problem = "bdSeq has to outlive the daemon: expected state = \"FOLDER\" at the top level";
             source.error(entry.group.span(), problem)
         })?;
         Ok(Self {

@@ -3,7 +3,7 @@
 
 use std::{
     net::IpAddr,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
@@ -34,6 +34,7 @@ use super::{
     refusal::Refusal,
     rights::{Caller, Rights},
     sessions::{self, Sessions},
+    token_desk,
     tokens::{self, Token, TokenError, Tokens},
 };
 use crate::json::line;
@@ -93,7 +94,7 @@ impl Peer {
 /// The checks, and what lies behind them.
 pub(super) struct Gate {
     pub(super) router: Router,
-    pub(super) tokens: Option<Tokens>,
+    pub(super) tokens: Option<Arc<Tokens>>,
     pub(super) audit: Audit,
     pub(super) sessions: Mutex<Sessions>,
     pub(super) failures: Mutex<Failures>,
@@ -165,6 +166,10 @@ impl Gate {
             true => freely(door, peer, &parts.headers),
             false => self.caller(door, peer, &parts.headers, stops)?,
         };
+        if let Some(name) = token_desk::named(&path) {
+            let body = if reads { Bytes::new() } else { read(body).await? };
+            return self.tokens_for(peer, &caller, (&parts.method, name), &body).await;
+        }
         if reads {
             parts.extensions.insert(caller);
             return self.route(Request::from_parts(parts, Body::empty())).await;
@@ -223,6 +228,26 @@ impl Gate {
         let Outcome { id, outcome } = serde_json::from_slice(&body).unwrap_or_default();
         self.audit.record(Record { id, outcome, status: Some(parts.status.as_u16()), ..record }).whenever();
         Ok(Response::from_parts(parts, Body::from(body)))
+    }
+
+    /// Tokens are made where those stand who have every right without one.
+    async fn tokens_for(
+        &self,
+        peer: Peer,
+        caller: &Caller,
+        what: (&Method, Option<&str>),
+        body: &[u8],
+    ) -> Result<Response, Refusal> {
+        if peer.address().is_some() || !caller.rights.engineer {
+            return Err(Refusal::new(
+                StatusCode::FORBIDDEN,
+                "tokens are made and removed over the control socket",
+            ));
+        }
+        let Some(tokens) = &self.tokens else {
+            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
+        };
+        token_desk::answer(Arc::clone(tokens), &self.audit, caller, what, body).await
     }
 
     /// Who asks. A token that is wrong is never taken for none.

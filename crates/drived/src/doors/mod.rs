@@ -17,9 +17,10 @@ mod sessions;
 #[cfg(unix)]
 mod socket;
 mod tls;
+mod token_desk;
 pub(crate) mod tokens;
 
-use std::{fs, io, net::SocketAddr, path::Path, sync::Arc, time::Duration};
+use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use axum::Router;
 use drive_fleet::Events;
@@ -47,6 +48,7 @@ use self::{
 pub(crate) use self::{
     rights::{Caller, Rights, Role},
     tls::{identity, private},
+    token_desk::{MadeToken, NewToken, RemovedToken, TOKENS, TokensView},
 };
 use crate::{
     config::{DoorsConfig, HttpConfig, SocketConfig},
@@ -74,7 +76,7 @@ pub(crate) struct Doors {
 
 /// Doors that only have to be opened: what they need has been found.
 pub(crate) struct Prepared {
-    tokens: Option<Tokens>,
+    tokens: Option<Arc<Tokens>>,
     audit: Audit,
     #[cfg(unix)]
     socket: Option<Entrance>,
@@ -97,14 +99,19 @@ impl Doors {
     ///
     /// A certificate, the tokens or the audit log cannot be read or written, or the control socket is somebody else's.
     pub(crate) fn prepare(config: DoorsConfig) -> Result<Prepared, Failure> {
-        let tokens = config.tokens.as_deref().map(Tokens::open).transpose();
-        let tokens = tokens.map_err(|error| Failure::Input(error.to_string()))?;
+        let tokens = match config.state.tokens.as_deref().map(Tokens::open).transpose() {
+            Err(error) if !config.state.has_tokens => {
+                tracing::warn!("{error}: nobody comes by a token: name a folder by state = \"FOLDER\"");
+                None
+            }
+            tokens => tokens.map_err(|error| Failure::Input(error.to_string()))?.map(Arc::new),
+        };
         let http = config.http.map(|http| {
             let tls = http.tls.as_ref().map(Tls::open).transpose().map_err(Failure::Input)?;
             Ok((http, tls))
         });
         let http = http.transpose()?;
-        let audit = config.audit.as_deref().map(Audit::open).transpose().map_err(Failure::Input)?;
+        let audit = config.state.audit.as_deref().map(Audit::open).transpose().map_err(Failure::Input)?;
         #[cfg(unix)]
         let socket = config.socket.as_ref().map(Entrance::of_socket).transpose()?.flatten();
         Ok(Prepared {
@@ -318,24 +325,5 @@ async fn serve(shared: Shared, door: Arc<Door>, stream: Stream, peer: Peer, plac
     }
 }
 
-/// Opens a file that nobody else reads; where there is none it is made. What root makes belongs to whoever has its folder,
-/// so that the daemon's own user can use what was made for him.
-fn private_file(path: &Path, options: &mut fs::OpenOptions) -> io::Result<fs::File> {
-    let is_new = !path.exists();
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(options, 0o600);
-    let file = options.create(true).open(path)?;
-    #[cfg(unix)]
-    if is_new
-        && let Some(folder) = path.parent()
-        && let Ok(known) = fs::metadata(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
-    {
-        use std::os::unix::fs::{MetadataExt as _, fchown};
-        // Nobody but root may, and nobody but root has to.
-        let _ = fchown(&file, Some(known.uid()), Some(known.gid()));
-    }
-    Ok(file)
-}
-
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,6 +1,6 @@
 //! The doors before a router that only says who came.
 
-use std::{convert::Infallible, path::PathBuf};
+use std::{convert::Infallible, fs, path::PathBuf};
 
 use axum::{
     Extension, Router,
@@ -87,7 +87,7 @@ impl Rig {
         };
         let (end, ended) = watch::channel(false);
         let (sessions, failures) = Default::default();
-        let tokens = Some(Tokens::open(&folder.file("tokens")).unwrap());
+        let tokens = Some(Arc::new(Tokens::open(&folder.file("tokens")).unwrap()));
         let audit = Audit::open(&folder.file("audit")).unwrap();
         let gate = Arc::new(Gate { router: router(), tokens, audit, sessions, failures, end: ended });
         Self { gate, door, crowd: Crowd::new(true), end, folder }
@@ -99,7 +99,17 @@ impl Rig {
 
     /// Asks from an address.
     async fn ask_from(&self, address: [u8; 4], request: &Asked<'_>) -> Answer {
-        let place = self.crowd.enter(Some(address.into()), Instant::now()).unwrap();
+        self.ask_as(&self.door, Peer::Address(address.into()), request).await
+    }
+
+    /// Asks as root does on the control socket.
+    async fn ask_on_socket(&self, request: &Asked<'_>) -> Answer {
+        let door = Door { freely: Rights::ALL, ..self.door.clone() };
+        self.ask_as(&door, Peer::User(Some(0)), request).await
+    }
+
+    async fn ask_as(&self, door: &Door, peer: Peer, request: &Asked<'_>) -> Answer {
+        let place = self.crowd.enter(peer.address(), Instant::now()).unwrap();
         let mut builder = Request::builder().method(request.method).uri(request.path);
         let usual = [("host", "localhost:7580"), ("content-type", "application/json")];
         let kept = usual.iter().filter(|(name, _)| !request.headers.iter().any(|(other, _)| other == name));
@@ -107,7 +117,7 @@ impl Rig {
             builder = builder.header(*name, *value);
         }
         let request = builder.body(Full::new(Bytes::copy_from_slice(request.body.as_bytes()))).unwrap();
-        let answer = self.gate.answer(&self.door, Peer::Address(address.into()), request, place.ask()).await;
+        let answer = self.gate.answer(door, peer, request, place.ask()).await;
         let (parts, body) = answer.into_parts();
         let body = body.collect().await.unwrap().to_bytes();
         Answer {
@@ -123,9 +133,14 @@ impl Rig {
 
     /// A connection to the door.
     fn connect(&self) -> DuplexStream {
+        self.connect_from([127, 0, 0, 1]).unwrap()
+    }
+
+    /// A connection from an address, if there is room for it.
+    fn connect_from(&self, address: [u8; 4]) -> Option<DuplexStream> {
         let (near, far) = duplex(4_096);
-        let address = std::net::IpAddr::from([127, 0, 0, 1]);
-        let place = self.crowd.enter(Some(address), Instant::now()).unwrap();
+        let address = std::net::IpAddr::from(address);
+        let place = self.crowd.enter(Some(address), Instant::now())?;
         let (gate, door) = (Arc::clone(&self.gate), self.door.clone());
         let end = self.end.subscribe();
         tokio::spawn(async move {
@@ -135,7 +150,7 @@ impl Rig {
             };
             connection::serve(near, place, end, answer).await;
         });
-        far
+        Some(far)
     }
 
     /// What the audit log has of it, kind and outcome, once all is written.
@@ -455,4 +470,34 @@ async fn login_and_logout_are_answered_as_the_document_says() {
         &serde_json::from_str(&right).unwrap(),
         "the body",
     );
+}
+
+#[tokio::test]
+async fn tokens_are_made_and_removed_over_the_socket_and_by_no_door_that_others_reach() {
+    let rig = Rig::new("token-desk");
+    let bearer = format!("Bearer {}", rig.token("boss", Role::Engineer));
+    let new = Asked { path: TOKENS, body: r#"{"name":"panel","role":"operate"}"#, ..START };
+    rig.ask(&Asked { headers: &[("authorization", &bearer)], ..new }).await.assert_refused(403);
+    let made = rig.ask_on_socket(&new).await;
+    let told: serde_json::Value = serde_json::from_str(&made.body).unwrap();
+    let document = crate::api::described();
+    let schema =
+        &document["paths"][TOKENS]["post"]["responses"]["200"]["content"]["application/json"]["schema"];
+    crate::api::tests::described::validate(&document, schema, &told, TOKENS);
+    let secret = &told["token"];
+    let bearer = format!("Bearer {}", secret.as_str().unwrap());
+    let asked = Asked { headers: &[("authorization", &bearer)], ..STATE };
+    assert_eq!(rig.ask(&asked).await.body, "panel http 127.0.0.1 vso");
+    rig.ask_on_socket(&new).await.assert_refused(422);
+    let listed = rig.ask_on_socket(&Asked { path: TOKENS, ..STATE }).await.body;
+    assert!(
+        listed.contains(r#""name":"panel","role":"operate""#) && !listed.contains(&bearer[11..]),
+        "{listed}"
+    );
+    let remove = Asked { method: "DELETE", path: "/api/v1/tokens/panel", body: "", headers: &[] };
+    assert_eq!(rig.ask_on_socket(&remove).await.status, StatusCode::OK);
+    rig.ask(&asked).await.assert_refused(401);
+    rig.ask_on_socket(&remove).await.assert_refused(404);
+    let audited = rig.audited().await;
+    assert_eq!(audited.iter().filter(|line| *line == "token local -").count(), 2, "{audited:?}");
 }

@@ -1,18 +1,19 @@
 //! The file of tokens: for each its name, its role and the SHA-256 of it, never the token.
 
 use std::{
-    fmt, fs,
-    io::Write as _,
+    fmt,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
     time::SystemTime,
 };
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
 use super::rights::Role;
+use crate::kept::{Kept, Readers, Stamp};
 
 /// By which a token is known as one of ours, in a file or in a log where it should not be.
 const PREFIX: &str = "drv_";
@@ -50,6 +51,14 @@ pub(crate) struct Token {
     pub(crate) made: u64,
 }
 
+/// A token as it is told.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct TokenView {
+    name: String,
+    role: Role,
+    made_unix_s: u64,
+}
+
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Content {
@@ -76,25 +85,11 @@ pub(crate) enum TokenError {
     Unknown { name: String, there: Vec<String> },
 }
 
-impl TokenError {
-    fn file(file: &Path, what: &'static str, reason: impl fmt::Display) -> Self {
-        Self::File { file: file.to_owned(), what, reason: reason.to_string() }
-    }
-}
-
 /// The tokens of a file, read again when it has changed, so that a removed token ends at once.
 #[derive(Debug)]
 pub(crate) struct Tokens {
-    file: PathBuf,
+    kept: Kept,
     read: Mutex<Option<(Stamp, Vec<Token>)>>,
-}
-
-/// By what a file is known to be the same still.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Stamp {
-    changed: Option<SystemTime>,
-    length: u64,
-    inode: u64,
 }
 
 impl Tokens {
@@ -104,29 +99,45 @@ impl Tokens {
     ///
     /// The file cannot be read, is none of tokens, or can be read by others than its owner.
     pub(crate) fn open(file: &Path) -> Result<Self, TokenError> {
-        let tokens = Self { file: file.to_owned(), read: Mutex::new(None) };
+        let tokens = Self { kept: Kept::at(file), read: Mutex::new(None) };
         tokens.all()?;
         Ok(tokens)
+    }
+
+    /// Where they are kept.
+    pub(crate) fn file(&self) -> &Path {
+        self.kept.path()
     }
 
     /// All of them.
     pub(crate) fn all(&self) -> Result<Vec<Token>, TokenError> {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(stamp) = stamp(&self.file)? else {
+        let Some(stamp) = self.kept.stamp().map_err(|error| self.failed("read", error))? else {
             *read = None;
             return Ok(Vec::new());
         };
+        if !stamp.is_private {
+            return Err(TokenError::Open(self.file().to_owned()));
+        }
         if let Some((known, tokens)) = &*read
             && *known == stamp
         {
             return Ok(tokens.clone());
         }
-        let text =
-            fs::read_to_string(&self.file).map_err(|error| TokenError::file(&self.file, "read", error))?;
-        let content: Content = toml::from_str(&text)
-            .map_err(|error| TokenError::file(&self.file, "understood", error.message().to_owned()))?;
-        *read = Some((stamp, content.tokens.clone()));
+        let (text, stamp) = match self.kept.read().map_err(|error| self.failed("read", error))? {
+            Some((text, stamp)) => (text, Some(stamp)),
+            None => (Vec::new(), None),
+        };
+        let content: Content =
+            toml::from_slice(&text).map_err(|error| self.failed("understood", error.message()))?;
+        *read = stamp.map(|stamp| (stamp, content.tokens.clone()));
         Ok(content.tokens)
+    }
+
+    /// All of them, as they are told.
+    pub(crate) fn views(&self) -> Result<Vec<TokenView>, TokenError> {
+        let view = |Token { name, role, made, .. }: Token| TokenView { name, role, made_unix_s: made };
+        Ok(self.all()?.into_iter().map(view).collect())
     }
 
     /// The token that this secret is, each compared in the same time whether it is right or wrong.
@@ -149,6 +160,7 @@ impl Tokens {
         if ["local", "anonymous"].contains(&name) {
             return Err(TokenError::Reserved(name.to_owned()));
         }
+        let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
         let mut tokens = self.all()?;
         if tokens.iter().any(|token| token.name == name) {
             return Err(TokenError::Taken(name.to_owned()));
@@ -163,6 +175,7 @@ impl Tokens {
 
     /// Removes a token; whoever uses it is refused from now on.
     pub(crate) fn remove(&self, name: &str) -> Result<(), TokenError> {
+        let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
         let mut tokens = self.all()?;
         let there: Vec<String> = tokens.iter().map(|token| token.name.clone()).collect();
         tokens.retain(|token| token.name != name);
@@ -172,45 +185,21 @@ impl Tokens {
         self.write(tokens)
     }
 
-    /// Replaces the file in one step, so that nobody reads half of it.
     fn write(&self, tokens: Vec<Token>) -> Result<(), TokenError> {
-        let failed = |error: &dyn fmt::Display| TokenError::file(&self.file, "written", error);
-        let text = toml::to_string(&Content { tokens }).map_err(|error| failed(&error))?;
-        let mut beside = self.file.clone().into_os_string();
-        beside.push(".new");
-        let beside = PathBuf::from(beside);
-        let write = || {
-            let mut file = super::private_file(&beside, fs::OpenOptions::new().write(true).truncate(true))?;
-            file.write_all(text.as_bytes())?;
-            file.sync_all()?;
-            fs::rename(&beside, &self.file)
-        };
-        write().map_err(|error| failed(&error))
+        let text = toml::to_string(&Content { tokens }).map_err(|error| self.failed("written", error))?;
+        let written = self.kept.replace(text.as_bytes(), Readers::Owner);
+        written.map_err(|error| self.failed("written", error))
     }
-}
 
-/// Nothing where there is no file.
-fn stamp(file: &Path) -> Result<Option<Stamp>, TokenError> {
-    let known = match fs::metadata(file) {
-        Ok(known) => known,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(TokenError::file(file, "read", error)),
-    };
-    #[cfg(unix)]
-    let inode = {
-        use std::os::unix::fs::MetadataExt as _;
-        if known.mode() & 0o077 != 0 {
-            return Err(TokenError::Open(file.to_owned()));
-        }
-        known.ino()
-    };
-    #[cfg(not(unix))]
-    let inode = 0;
-    Ok(Some(Stamp { changed: known.modified().ok(), length: known.len(), inode }))
+    fn failed(&self, what: &'static str, reason: impl fmt::Display) -> TokenError {
+        TokenError::File { file: self.file().to_owned(), what, reason: reason.to_string() }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -239,6 +228,26 @@ mod tests {
             assert!(tokens.add(name, Role::View).is_err(), "{name:?}");
         }
         assert!(matches!(tokens.remove("gone"), Err(TokenError::Unknown { .. })));
+    }
+
+    /// As the user of a service would set a trap for root, who adds a token in the folder of the service.
+    #[cfg(unix)]
+    #[test]
+    fn no_link_in_their_folder_is_followed() {
+        use std::os::unix::fs::symlink;
+        let folder = crate::doors::tests::Folder::new("links");
+        let (file, precious) = (folder.file("tokens"), folder.file("precious"));
+        fs::write(&precious, "precious").unwrap();
+        for name in ["tokens.new", ".tokens.new"] {
+            symlink(&precious, folder.file(name)).unwrap();
+        }
+        Tokens::open(&file).unwrap().add("panel", Role::View).unwrap();
+        assert_eq!(fs::read_to_string(&precious).unwrap(), "precious");
+        assert!(fs::symlink_metadata(&file).unwrap().is_file());
+        fs::remove_file(&file).unwrap();
+        symlink(&precious, &file).unwrap();
+        let told = Tokens::open(&file).unwrap_err().to_string();
+        assert!(told.contains("is a link") && told.contains("precious"), "{told}");
     }
 
     #[cfg(unix)]

@@ -42,10 +42,11 @@ pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAd
     let mut written = std::pin::pin!(write(output, outbox));
     let mut carried = std::pin::pin!(carry_out(&desk, peer, waiting, answers.clone()));
     let read = read(input, &desk, peer, queue, answers);
-    let ended = tokio::select! {
-        ended = read => ended,
-        () = &mut carried => None,
-        ended = &mut written => ended,
+    let (ended, takes_more) = tokio::select! {
+        ended = read => (ended, true),
+        // Whoever takes no answer any more asks nothing more.
+        ended = &mut written => (ended, false),
+        () = &mut carried => (None, false),
     };
     if let Some(why) = ended {
         let count = desk.counters.end(why);
@@ -53,6 +54,8 @@ pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAd
             let name = &desk.config.name;
             tracing::warn!("gateway {name}: {peer} was put out ({}), {count} of these in all", why.name());
         }
+    }
+    if ended.is_some() || !takes_more {
         return;
     }
     // Whoever closes his side after the last request gets its answer all the same.

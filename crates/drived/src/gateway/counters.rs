@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     sync::{
-        Mutex, PoisonError,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
     time::Duration,
@@ -82,13 +82,21 @@ pub(crate) struct Counts {
     pub(crate) refused_writes: BTreeMap<u8, u64>,
 }
 
-impl Counters {
-    pub(super) fn enter(&self) {
-        self.clients.fetch_add(1, Ordering::Relaxed);
-    }
+/// A client that is connected.
+#[derive(Debug)]
+pub(super) struct Present(Arc<Counters>);
 
-    pub(super) fn leave(&self) {
-        self.clients.fetch_sub(1, Ordering::Relaxed);
+impl Drop for Present {
+    fn drop(&mut self) {
+        self.0.clients.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+impl Counters {
+    /// Counts a client, however its task ends, until what this gives is dropped.
+    pub(super) fn enter(self: &Arc<Self>) -> Present {
+        self.clients.fetch_add(1, Ordering::Relaxed);
+        Present(Arc::clone(self))
     }
 
     /// How many are connected.
@@ -169,7 +177,7 @@ impl Counters {
 /// The counters of a gateway and its name.
 pub(super) struct Counted {
     pub(super) name: String,
-    pub(super) counters: std::sync::Arc<Counters>,
+    pub(super) counters: Arc<Counters>,
 }
 
 impl Source for Counted {

@@ -130,12 +130,11 @@ async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::
         hurry(&stream);
         let (desk, mut ended) = (Arc::clone(desk), ended.clone());
         tokio::spawn(async move {
-            desk.counters.enter();
+            let _present = desk.counters.enter();
             tokio::select! {
                 () = client::serve(stream, peer, Arc::clone(&desk)) => {}
                 _ = ended.changed() => {}
             }
-            desk.counters.leave();
             drop(place);
         });
     }

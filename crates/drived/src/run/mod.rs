@@ -76,7 +76,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let notify = Notify::start();
     let mut wishes = Wishes::listen()?;
     let lines = start_lines(&config)?;
-    let watchdogs = Watchdogs::open(config.watchdogs.as_deref());
+    let watchdogs = Watchdogs::open(config.doors.state.watchdogs.as_deref());
     let fleet =
         build(&config, &lines, &watchdogs).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.

@@ -1,21 +1,17 @@
 //! What each watchdog was before this program armed it, kept beyond the life of the program: one that is killed puts
 //! nothing back, and the next finds the drive armed.
 
-use std::{
-    collections::BTreeMap,
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, io, path::Path};
 
 use drive_fleet::{Event, EventKind, Events, Received, WatchdogBefore};
 use tokio::task::{JoinHandle, spawn_blocking};
 
-use crate::replaced_file;
+use crate::kept::{self, Readers};
 
 /// The watchdogs that are to be put back, by drive, in a file.
 #[derive(Debug, Default)]
 pub(super) struct Kept {
-    file: Option<PathBuf>,
+    file: Option<kept::Kept>,
     drives: BTreeMap<String, WatchdogBefore>,
 }
 
@@ -23,15 +19,15 @@ impl Kept {
     /// Reads the file. One that cannot be read keeps no motor from being watched: what it said stays armed, which is told
     /// at the exit.
     pub(super) fn open(file: Option<&Path>) -> Self {
-        let drives = file.map_or_else(BTreeMap::new, |file| {
-            match fs::read(file).map(|text| serde_json::from_slice(&text)) {
-                Ok(Ok(drives)) => drives,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => BTreeMap::new(),
-                Ok(Err(error)) => not_read(file, &error),
-                Err(error) => not_read(file, &error),
+        let file = file.map(kept::Kept::at);
+        let drives = file.as_ref().map_or_else(BTreeMap::new, |file| match file.read() {
+            Ok(Some((text, _))) => {
+                serde_json::from_slice(&text).unwrap_or_else(|error| not_read(file.path(), &error))
             }
+            Ok(None) => BTreeMap::new(),
+            Err(error) => not_read(file.path(), &error),
         });
-        Self { file: file.map(Path::to_owned), drives }
+        Self { file, drives }
     }
 
     /// What a drive's watchdog was before an earlier run armed it.
@@ -59,7 +55,7 @@ impl Kept {
 
     fn write(&self) -> io::Result<()> {
         let Some(file) = &self.file else { return Ok(()) };
-        replaced_file::write(file, &serde_json::to_vec_pretty(&self.drives)?)
+        file.replace(&serde_json::to_vec_pretty(&self.drives)?, Readers::Owner)
     }
 }
 
@@ -84,7 +80,7 @@ async fn follow(mut kept: Kept, mut events: Events) {
         let Ok((written, back)) = written else { return };
         kept = back;
         if let (Err(error), false) = (&written, failing) {
-            let file = kept.file.as_deref().unwrap_or(Path::new("")).display();
+            let file = kept.file.as_ref().map_or(Path::new(""), kept::Kept::path).display();
             tracing::warn!(
                 "{file}: {error}: if this program is killed, watchdogs stay armed at the next exit"
             );
@@ -95,7 +91,7 @@ async fn follow(mut kept: Kept, mut events: Events) {
 
 #[cfg(test)]
 mod tests {
-    use std::{sync::Arc, time::Duration};
+    use std::{fs, sync::Arc, time::Duration};
 
     use drive_core::{Reaction, Watchdog};
 

@@ -1,18 +1,15 @@
 //! The number of the connections, which outlives the program.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 use drive_sparkplug::BdSeq;
 
-use crate::replaced_file;
+use crate::kept::{Kept as File, Readers};
 
 /// The number that is kept in a file.
 #[derive(Debug)]
 pub(super) struct Kept {
-    file: PathBuf,
+    file: File,
     /// Of the last connection that may have been made.
     last: Option<BdSeq>,
     is_failing: bool,
@@ -25,15 +22,17 @@ impl Kept {
     /// It is none of this, or cannot be written.
     pub(super) fn open(file: &Path) -> Result<Self, String> {
         let failed = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-        let last = match fs::read_to_string(file) {
-            Ok(text) => Some(text.parse().map_err(|_| failed(&"expected a number from 0 to 255"))?),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-            Err(error) => return Err(failed(&error)),
-        };
+        let number = |text: &[u8]| str::from_utf8(text).ok()?.parse().ok();
+        let kept = File::at(file);
+        let last = kept
+            .read()
+            .map_err(|error| failed(&error))?
+            .map(|(text, _)| number(&text).ok_or_else(|| failed(&"expected a number from 0 to 255")));
+        let last = last.transpose()?;
         if let Some(last) = last {
-            write(file, last).map_err(|error| failed(&error))?;
+            write(&kept, last).map_err(|error| failed(&error))?;
         }
-        Ok(Self { file: file.to_owned(), last, is_failing: false })
+        Ok(Self { file: kept, last, is_failing: false })
     }
 
     /// The number of the next connection, which stands in the file when this returns. A disk that is full ends no connection.
@@ -44,19 +43,21 @@ impl Kept {
         if let Err(error) = &written
             && !self.is_failing
         {
-            tracing::error!("Sparkplug: {}: {error}: bdSeq is not kept", self.file.display());
+            tracing::error!("Sparkplug: {}: {error}: bdSeq is not kept", self.file.path().display());
         }
         self.is_failing = written.is_err();
         next
     }
 }
 
-fn write(file: &Path, number: BdSeq) -> io::Result<()> {
-    replaced_file::write(file, format!("{number}\n").as_bytes())
+fn write(file: &File, number: BdSeq) -> std::io::Result<()> {
+    file.replace(format!("{number}\n").as_bytes(), Readers::Owner)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -17,6 +17,8 @@ pub(crate) fn drived(arguments: &[&str]) -> Command {
     command.args(arguments).env_remove("DRIVED_LOG").env("RUST_BACKTRACE", "1");
     // Its daemon's socket is its own, where the test names none.
     command.env_remove("RUNTIME_DIRECTORY").env("XDG_RUNTIME_DIR", runtime_folder());
+    // And so is what it keeps.
+    command.env_remove("STATE_DIRECTORY").env("XDG_STATE_HOME", path("states"));
     command
 }
 

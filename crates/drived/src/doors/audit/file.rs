@@ -2,13 +2,16 @@
 //! on from what stands there.
 
 use std::{
-    fs::{self, OpenOptions},
+    fs,
     io::{self, Read as _, Seek as _, SeekFrom, Write as _},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use super::{Line, Record, unix_ms};
-use crate::doors::{private_file, tokens::sha256};
+use crate::{
+    doors::tokens::sha256,
+    kept::{Kept, is_at},
+};
 
 /// A file of this size is put aside.
 const LARGEST: u64 = 8 * 1024 * 1024;
@@ -18,23 +21,15 @@ pub(super) const KEPT: u32 = 20;
 pub(super) const FIRST: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 pub(super) struct File {
-    path: PathBuf,
+    kept: Kept,
     largest: u64,
 }
 
 impl File {
     /// The file at a path, made if there is none.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
-        let file = Self { path: path.to_owned(), largest: LARGEST };
-        file.appendable().map(|_| file)
-    }
-
-    fn appendable(&self) -> io::Result<fs::File> {
-        let file = private_file(&self.path, OpenOptions::new().read(true).append(true))?;
-        match file.metadata()?.is_file() {
-            true => Ok(file),
-            false => Err(io::Error::other("it is no file")),
-        }
+        let kept = Kept::at(path);
+        kept.open_to_append().map(|_| Self { kept, largest: LARGEST })
     }
 
     /// Appends a record and waits until the disk has it. What was written of a record that failed is taken back.
@@ -50,10 +45,9 @@ impl File {
         let mut line =
             if last.as_ref().is_some_and(|last| !last.is_whole) { "\n".to_owned() } else { String::new() };
         let before = match last {
-            None => match fs::File::open(aside(&self.path, 1)) {
-                Ok(mut aside) => last_line(&mut aside)?,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-                Err(error) => return Err(error),
+            None => match aside(&self.kept, 1).open()? {
+                Some(mut aside) => last_line(&mut aside)?,
+                None => None,
             },
             last => last,
         };
@@ -71,9 +65,9 @@ impl File {
     /// The file that stands at the path when its lock has been taken.
     fn locked(&self) -> io::Result<fs::File> {
         loop {
-            let file = self.appendable()?;
+            let file = self.kept.open_to_append()?;
             file.lock()?;
-            if is_at(&file, &self.path)? {
+            if is_at(&file, &self.kept)? {
                 return Ok(file);
             }
         }
@@ -81,32 +75,15 @@ impl File {
 
     fn rotate(&self) -> io::Result<()> {
         for number in (1..KEPT).rev() {
-            match fs::rename(aside(&self.path, number), aside(&self.path, number + 1)) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
+            aside(&self.kept, number).rename(&aside(&self.kept, number + 1))?;
         }
-        fs::rename(&self.path, aside(&self.path, 1))
+        self.kept.rename(&aside(&self.kept, 1)).map(drop)
     }
 }
 
-/// The name of a file that was put aside; 1 is the newest.
-pub(super) fn aside(path: &Path, number: u32) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(format!(".{number}"));
-    PathBuf::from(name)
-}
-
-#[cfg(unix)]
-fn is_at(file: &fs::File, path: &Path) -> io::Result<bool> {
-    use std::os::unix::fs::MetadataExt as _;
-    let (open, there) = (file.metadata()?, fs::metadata(path));
-    Ok(there.is_ok_and(|there| (there.dev(), there.ino()) == (open.dev(), open.ino())))
-}
-
-#[cfg(not(unix))]
-fn is_at(_: &fs::File, _: &Path) -> io::Result<bool> {
-    Ok(true)
+/// A file that was put aside; 1 is the newest.
+pub(super) fn aside(log: &Kept, number: u32) -> Kept {
+    log.beside(&format!(".{number}"))
 }
 
 /// The last line of a file.
@@ -142,6 +119,8 @@ fn last_line(file: &mut fs::File) -> io::Result<Option<Last>> {
 
 #[cfg(test)]
 mod tests {
+    use std::{fs::OpenOptions, path::PathBuf};
+
     use super::*;
     use crate::doors::{
         audit::{Kind, Verdict, verify},
@@ -153,6 +132,10 @@ mod tests {
         let caller =
             Caller { name: "panel".to_owned(), origin: "http 10.0.0.7".to_owned(), rights: Rights::ALL };
         Record::new(Kind::Command, &caller, what)
+    }
+
+    fn aside(path: &Path, number: u32) -> PathBuf {
+        super::aside(&Kept::at(path), number).path().to_owned()
     }
 
     fn lines(path: &Path) -> Vec<String> {
@@ -218,6 +201,16 @@ mod tests {
             let verdict = verify(&path).unwrap();
             assert!(matches!(verdict, Verdict::Broken { .. }), "{verdict:?}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_link_in_its_folder_is_followed() {
+        let folder = Folder::new("audit-links");
+        let (path, elsewhere) = (folder.file("audit"), folder.file("elsewhere"));
+        std::os::unix::fs::symlink(&elsewhere, &path).unwrap();
+        assert!(File::open(&path).is_err());
+        assert!(!elsewhere.exists(), "nothing was made behind the link");
     }
 
     #[test]

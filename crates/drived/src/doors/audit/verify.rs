@@ -1,7 +1,6 @@
 //! Whether the chain of an audit log is whole.
 
 use std::{
-    fs,
     io::{self, BufRead as _, BufReader},
     path::{Path, PathBuf},
 };
@@ -9,7 +8,7 @@ use std::{
 use serde::Deserialize;
 
 use super::file::{KEPT, aside};
-use crate::doors::tokens::sha256;
+use crate::{doors::tokens::sha256, kept::Kept};
 
 /// What the chain of a log says.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,19 +38,21 @@ struct Link {
 ///
 /// A file cannot be read.
 pub(crate) fn verify(path: &Path) -> io::Result<Verdict> {
-    let aside = (1..=KEPT).rev().map(|number| aside(path, number)).filter(|file| file.exists());
+    let log = Kept::at(path);
+    let aside = (1..=KEPT).rev().map(|number| aside(&log, number)).filter(|file| file.path().exists());
     let mut last: Option<String> = None;
     let (mut records, mut torn) = (0, 0);
     // A torn line cannot say what stands before it; the line behind it says what it is.
     let mut unsure = None;
-    for file in aside.chain([path.to_owned()]) {
-        for (index, line) in BufReader::new(fs::File::open(&file)?).split(b'\n').enumerate() {
+    for file in aside.chain([log.clone()]) {
+        let Some(open) = file.open()? else { return Err(io::ErrorKind::NotFound.into()) };
+        for (index, line) in BufReader::new(open).split(b'\n').enumerate() {
             let line = line?;
             let number = u64::try_from(index).unwrap_or(u64::MAX).saturating_add(1);
             match serde_json::from_slice::<Link>(&line) {
                 Ok(link) => {
                     if last.as_ref().is_some_and(|last| *last != link.previous) {
-                        return Ok(Verdict::Broken { file, line: number });
+                        return Ok(Verdict::Broken { file: file.path().to_owned(), line: number });
                     }
                     records += 1;
                     unsure = None;
@@ -60,7 +61,7 @@ pub(crate) fn verify(path: &Path) -> io::Result<Verdict> {
                     torn += 1;
                     unsure = Some(number);
                 }
-                Err(_) => return Ok(Verdict::Broken { file, line: number }),
+                Err(_) => return Ok(Verdict::Broken { file: file.path().to_owned(), line: number }),
             }
             last = Some(sha256(&line));
         }

@@ -264,3 +264,49 @@ async fn the_virtual_unit_has_all_drives_in_one_read_and_marks_what_is_old() {
     assert_eq!(peer.ask(247, &read(overview + 31 * stride, 1)).await, [0x83, 0x02]);
     assert_eq!(peer.ask(247, &[0x06, 0, 0, 0, 0]).await, [0x86, 0x01], "nothing is written there");
 }
+
+/// A client whose side takes nothing any more, as after a reset that only its writes have noticed.
+struct Deaf(tokio::io::DuplexStream);
+
+impl tokio::io::AsyncRead for Deaf {
+    fn poll_read(
+        mut self: std::pin::Pin<&mut Self>,
+        context: &mut std::task::Context<'_>,
+        buffer: &mut tokio::io::ReadBuf<'_>,
+    ) -> std::task::Poll<std::io::Result<()>> {
+        std::pin::Pin::new(&mut self.0).poll_read(context, buffer)
+    }
+}
+
+impl tokio::io::AsyncWrite for Deaf {
+    fn poll_write(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+        _: &[u8],
+    ) -> std::task::Poll<std::io::Result<usize>> {
+        std::task::Poll::Ready(Err(std::io::ErrorKind::BrokenPipe.into()))
+    }
+
+    fn poll_flush(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<std::io::Result<()>> {
+        std::task::Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<std::io::Result<()>> {
+        std::task::Poll::Ready(Ok(()))
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_task_of_a_client_that_takes_no_answer_any_more_ends_without_a_panic() {
+    let (_plant, desk) = plant(1, |_| ()).await;
+    let (mut near, theirs) = tokio::io::duplex(4_096);
+    let served = tokio::spawn(super::client::serve(Deaf(theirs), "127.0.0.1".parse().unwrap(), desk));
+    near.write_all(&mbap::frame(1, 1, &read(ETA, 1))).await.unwrap();
+    served.await.unwrap();
+}

@@ -155,9 +155,9 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         (old.shutdown != new.shutdown, "shutdown"),
         (old.doors.http != new.doors.http, "[http]"),
         (old.doors.socket != new.doors.socket, "[socket]"),
-        (old.watchdogs != new.watchdogs, "another file of watchdogs"),
-        (old.doors.tokens != new.doors.tokens, "another file of tokens"),
-        (old.doors.audit != new.doors.audit, "another audit log"),
+        (old.doors.state.watchdogs != new.doors.state.watchdogs, "another file of watchdogs"),
+        (old.doors.state.tokens != new.doors.state.tokens, "another file of tokens"),
+        (old.doors.state.audit != new.doors.state.audit, "another audit log"),
         (old.gateways != new.gateways, "gateways"),
         (old.mqtt != new.mqtt || old.sparkplug != new.sparkplug, "mqtt"),
         (

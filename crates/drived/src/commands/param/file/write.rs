@@ -9,7 +9,11 @@ use std::{
 use drive_core::registers::Part;
 
 use super::{Backup, Entry};
-use crate::{commands::param::factory, failure::Failure, replaced_file};
+use crate::{
+    commands::param::factory,
+    failure::Failure,
+    kept::{Kept, Readers},
+};
 
 /// How a backup begins. Only a file that begins so is overwritten by the next one.
 pub(super) const FIRST_LINE: &str = "# The parameters of a drive, kept by drived param backup.";
@@ -71,7 +75,8 @@ impl Backup {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(failed(&error)),
         }
-        replaced_file::write(path, self.to_string().as_bytes()).map_err(|error| failed(&error))
+        let written = Kept::at(path).replace(self.to_string().as_bytes(), Readers::Others);
+        written.map_err(|error| failed(&error))
     }
 }
 

@@ -1,0 +1,134 @@
+//! `/api/v1/tokens`: whoever has every right on the control socket makes, lists and removes tokens. The daemon does it itself, so that
+//! nobody with more rights than it has writes in its folder.
+
+use std::{path::PathBuf, sync::Arc};
+
+use axum::{
+    body::Body,
+    http::{HeaderValue, Method, StatusCode, header},
+    response::Response,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tokio::task::spawn_blocking;
+
+use super::{
+    audit::{Audit, Kind, Record},
+    refusal::Refusal,
+    rights::{Caller, Role},
+    tokens::{TokenError, TokenView, Tokens},
+};
+use crate::json::line;
+
+/// Where tokens are made, listed and, with the name of one behind it, removed.
+pub(crate) const TOKENS: &str = "/api/v1/tokens";
+
+/// The tokens, and where they are kept.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct TokensView {
+    file: PathBuf,
+    tokens: Vec<TokenView>,
+}
+
+/// A token that is wished for.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NewToken {
+    name: String,
+    role: Role,
+}
+
+/// A token that was made: what it is itself is told this once.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct MadeToken {
+    name: String,
+    role: Role,
+    token: String,
+}
+
+/// A token that is no more.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct RemovedToken {
+    name: String,
+    removed: bool,
+}
+
+/// Whether a path is one of tokens, and the name that it has.
+pub(super) fn named(path: &str) -> Option<Option<&str>> {
+    match path.strip_prefix(TOKENS)? {
+        "" => Some(None),
+        name => name.strip_prefix('/').map(Some),
+    }
+}
+
+/// Does what is asked for. Of a token that nobody could keep in the log of who did what, none is made; one that was removed stays
+/// removed.
+pub(super) async fn answer(
+    tokens: Arc<Tokens>,
+    audit: &Audit,
+    caller: &Caller,
+    (method, name): (&Method, Option<&str>),
+    body: &[u8],
+) -> Result<Response, Refusal> {
+    let record = |what: String| audit.record(Record::new(Kind::Token, caller, what));
+    match (method, name) {
+        (&Method::GET, None) => {
+            let file = tokens.file().to_owned();
+            Ok(told(&TokensView { file, tokens: tokens.views().map_err(refused)? }))
+        }
+        (&Method::POST, None) => {
+            let NewToken { name, role } = serde_json::from_slice(body).map_err(|error| {
+                Refusal::new(
+                    StatusCode::BAD_REQUEST,
+                    format!("expected {{\"name\": …, \"role\": …}}: {error}"),
+                )
+            })?;
+            let token = changed(&tokens, name.clone(), move |tokens, name| tokens.add(name, role)).await?;
+            let written = record(format!("token {name} added, role {}", role.name())).done().await;
+            if let Err(error) = written {
+                changed(&tokens, name, Tokens::remove).await?;
+                return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()));
+            }
+            Ok(told(&MadeToken { name, role, token }))
+        }
+        (&Method::DELETE, Some(name)) => {
+            let name = name.to_owned();
+            changed(&tokens, name.clone(), Tokens::remove).await?;
+            record(format!("token {name} removed")).whenever();
+            Ok(told(&RemovedToken { name, removed: true }))
+        }
+        _ => Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "tokens are listed, made and removed")),
+    }
+}
+
+/// What changes a file waits for the disk, and no task for that.
+async fn changed<T: Send + 'static>(
+    tokens: &Arc<Tokens>,
+    name: String,
+    change: impl FnOnce(&Tokens, &str) -> Result<T, TokenError> + Send + 'static,
+) -> Result<T, Refusal> {
+    let tokens = Arc::clone(tokens);
+    match spawn_blocking(move || change(&tokens, &name)).await {
+        Ok(changed) => changed.map_err(refused),
+        Err(_) => Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "the daemon ends")),
+    }
+}
+
+fn refused(error: TokenError) -> Refusal {
+    let status = match error {
+        TokenError::Name(_) | TokenError::Reserved(_) | TokenError::Taken(_) => {
+            StatusCode::UNPROCESSABLE_ENTITY
+        }
+        TokenError::Unknown { .. } => StatusCode::NOT_FOUND,
+        TokenError::Random(_) | TokenError::File { .. } | TokenError::Open(_) => {
+            StatusCode::SERVICE_UNAVAILABLE
+        }
+    };
+    Refusal::new(status, error.to_string())
+}
+
+fn told(what: &impl Serialize) -> Response {
+    let mut answer = Response::new(Body::from(line(what)));
+    answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
+    answer
+}
