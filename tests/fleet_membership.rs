@@ -160,7 +160,7 @@ async fn a_line_is_exchanged_under_a_reader_of_events_who_notices_nothing_of_it(
     });
     assert_eq!(added, Ok(()));
     let ends = plant.events_so_far().await;
-    assert!(ends.iter().any(|kind| matches!(kind, EventKind::Exit(_))));
+    assert!(ends.iter().any(|kind| matches!(kind, EventKind::Removed(_))));
     plant.event("the new connection", |kind| matches!(kind, EventKind::Connected(_))).await;
     let _ = plant.fleet.shutdown(60 * SECOND).await;
     while !matches!(plant.events.recv().await, Received::End) {}

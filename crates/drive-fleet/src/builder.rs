@@ -16,7 +16,7 @@ use tokio::{
 };
 
 use crate::{
-    event::Event,
+    event::Teller,
     fleet::{Fleet, LineEntry, Members},
     handle::Entry,
     plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
@@ -270,16 +270,13 @@ impl FleetBuilder {
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
     pub fn start(self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(EVENTS);
+        let events = Teller::new(events);
         let members = self.enlist(&Members::default(), &events)?;
         Ok(Fleet::new(members, events, first))
     }
 
     /// Starts the drives that are added to those that are there, if all of it can work.
-    pub(crate) fn enlist(
-        self,
-        standing: &Members,
-        events: &broadcast::Sender<Event>,
-    ) -> Result<Members, FleetError> {
+    pub(crate) fn enlist(self, standing: &Members, events: &Teller) -> Result<Members, FleetError> {
         let (lines, added) = self.check()?;
         let mut all = Members { lines, entries: standing.entries.clone() };
         for member in added {
@@ -427,7 +424,7 @@ fn check_watchdog(
     Ok(())
 }
 
-fn spawn(member: Member, events: &broadcast::Sender<Event>, line: Arc<LineEntry>) -> Arc<Entry> {
+fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     let Member { settings, mut drive, .. } = member;
     let (slave, capabilities) = (drive.slave(), drive.capabilities());
     let broadcasts = StopMode::ALL

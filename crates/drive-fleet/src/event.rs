@@ -1,13 +1,19 @@
 //! What happens to the drives of a fleet, as it happens.
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{
+    fmt,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, SystemTime},
+};
 
 use drive_core::{
-    Command, Control, Current, Error, Identity, Percent, SelfRestart, State, Status, StopMode, Watchdog,
+    Command, Control, Current, Error, Identity, Percent, SelfRestart, Setpoint, State, Status, StopMode,
+    Watchdog,
 };
-use tokio::time::Instant;
+use tokio::{sync::broadcast, time::Instant};
 
 use crate::{
+    cause::{Cause, ChangedWord},
     outcome::{Outcome, Tenths},
     settings::WatchdogBefore,
     snapshot::Trip,
@@ -18,10 +24,71 @@ use crate::{
 pub struct Event {
     /// The drive.
     pub drive: Arc<str>,
+    /// Its place among all events of the fleet, from 1: no two have the same, and what was told later has a higher one,
+    /// whatever the wall's clock says.
+    pub order: u64,
     /// When.
     pub at: Instant,
+    /// When by the wall's clock, as that stood then.
+    pub wall: SystemTime,
     /// What.
     pub kind: EventKind,
+    /// Why.
+    pub cause: Cause,
+    /// The words of the drive that changed with it.
+    pub words: Arc<[ChangedWord]>,
+}
+
+impl Event {
+    /// Something that happens now, outside of every order.
+    #[must_use]
+    pub fn now(drive: impl Into<Arc<str>>, kind: EventKind, cause: Cause) -> Self {
+        let words = Arc::default();
+        Self {
+            drive: drive.into(),
+            order: 0,
+            at: Instant::now(),
+            wall: SystemTime::now(),
+            kind,
+            cause,
+            words,
+        }
+    }
+}
+
+/// What is told, before it has its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Happened {
+    pub(crate) kind: EventKind,
+    pub(crate) cause: Cause,
+    pub(crate) words: Arc<[ChangedWord]>,
+}
+
+/// Where the events of a fleet are told, one after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Teller {
+    events: broadcast::Sender<Event>,
+    last: Arc<Mutex<u64>>,
+}
+
+impl Teller {
+    pub(crate) fn new(events: broadcast::Sender<Event>) -> Self {
+        Self { events, last: Arc::default() }
+    }
+
+    pub(crate) fn subscribe(&self) -> broadcast::Receiver<Event> {
+        self.events.subscribe()
+    }
+
+    pub(crate) fn tell(&self, drive: Arc<str>, happened: Happened) {
+        let Happened { kind, cause, words } = happened;
+        // Told under the lock, so that every reader gets them in their order.
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last += 1;
+        let event = Event { order: *last, words, ..Event::now(drive, kind, cause) };
+        // Without a reader there is nobody to tell.
+        let _ = self.events.send(event);
+    }
 }
 
 /// What happened.
@@ -64,8 +131,12 @@ pub enum EventKind {
     },
     /// Panel, terminals or another bus have control now.
     ControlTaken(Control),
+    /// Somebody else has control, who has not taken it: it was found so when the drive was seen again, or it was given back.
+    ControlElsewhere(Control),
     /// This bus has control again.
     ControlReturned,
+    /// Somebody else had control until a start of this side took it, which is how some drives are commanded.
+    StartTookCommand(Control),
     /// **Alarm**: somebody else has control, and the run command of this side still stands in the drive. When control is
     /// given back it may start the motor.
     RunCommandStands(Error),
@@ -111,6 +182,8 @@ pub enum EventKind {
     Command {
         /// Which.
         command: Command,
+        /// The setpoint that a start was given with.
+        setpoint: Option<Setpoint>,
         /// By whom.
         commander: Arc<str>,
         /// How.
@@ -138,8 +211,13 @@ pub enum EventKind {
     },
     /// A stop is confirmed: the drive shows standstill.
     StopConfirmed,
+    /// Other settings hold from now on: these.
+    Reconfigured(Vec<&'static str>),
     /// What was done to it when the fleet shut down.
     Exit(ExitAction),
+    /// What was done to it when it was taken out of the fleet, such as by a reload. What has the same name afterwards is
+    /// another drive, or the same under other settings.
+    Removed(ExitAction),
 }
 
 impl EventKind {
@@ -156,7 +234,9 @@ impl EventKind {
             Self::Warning { .. } => "warning",
             Self::Limit { .. } => "limit",
             Self::ControlTaken(_) => "control taken",
+            Self::ControlElsewhere(_) => "control elsewhere",
             Self::ControlReturned => "control returned",
+            Self::StartTookCommand(_) => "start took command",
             Self::RunCommandStands(_) => "run command stands",
             Self::RestartsItself { .. } => "restarts itself",
             Self::Identified(_) => "identified",
@@ -171,7 +251,9 @@ impl EventKind {
             Self::StopTookCommand(_) => "stop took command",
             Self::StopUnconfirmed { .. } => "stop unconfirmed",
             Self::StopConfirmed => "stop confirmed",
+            Self::Reconfigured(_) => "reconfigured",
             Self::Exit(_) => "exit",
+            Self::Removed(_) => "removed",
         }
     }
 
@@ -179,7 +261,7 @@ impl EventKind {
     #[must_use]
     pub const fn is_alarm(&self) -> bool {
         match self {
-            Self::Exit(action) => action.is_alarm(),
+            Self::Exit(action) | Self::Removed(action) => action.is_alarm(),
             other => other.is_always_alarm(),
         }
     }
@@ -217,6 +299,9 @@ impl fmt::Display for EventKind {
                 write!(f, ": {limit}, {}", if *exceeded { "exceeded" } else { "kept again" })
             }
             Self::ControlTaken(control) => write!(f, " by {control}"),
+            Self::ControlElsewhere(control) => write!(f, ": with {control}"),
+            Self::StartTookCommand(other) => write!(f, " from {other}"),
+            Self::Reconfigured(settings) => write!(f, ": {}", settings.join(", ")),
             Self::Identified(identity) => write!(f, ": {}", identity),
             Self::IdentityChanged { remembered, found } => {
                 write!(f, ": {} instead of {}", found, remembered)
@@ -238,7 +323,10 @@ impl fmt::Display for EventKind {
             Self::WatchdogStays { timeout, why } => {
                 write!(f, ", it acts {timeout:?} after the last message: {why}")
             }
-            Self::Command { command, commander, outcome } => {
+            Self::Command { command, setpoint: Some(setpoint), commander, outcome } => {
+                write!(f, ": {command} at {setpoint} by {commander}: {outcome}")
+            }
+            Self::Command { command, setpoint: None, commander, outcome } => {
                 write!(f, ": {command} by {commander}: {outcome}")
             }
             Self::RunCommandStands(error) => {
@@ -257,13 +345,16 @@ impl fmt::Display for EventKind {
             Self::StopUnconfirmed { since, attempts, outcome } => {
                 write!(f, " since {} after {attempts} attempts: {outcome}", Tenths(*since))
             }
-            Self::Exit(action) => write!(f, ": {action}"),
+            Self::Exit(action) | Self::Removed(action) => write!(f, ": {action}"),
             Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed => Ok(()),
         }
     }
 }
 
 fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
+    if trip.found {
+        f.write_str(", found so")?;
+    }
     match trip.watchdog_after {
         Some(silence) if trip.by_watchdog => {
             write!(f, " by its communication watchdog after {} without a message", Tenths(silence))?;
@@ -280,29 +371,40 @@ fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
     }
 }
 
-/// An identity in one line.
 /// A measured value that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(tag = "of", rename_all = "snake_case")
+)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Limit {
     /// The motor current.
     Current {
         /// Measured.
+        #[cfg_attr(feature = "serde", serde(rename = "measured_a"))]
         measured: Current,
         /// Its limit.
+        #[cfg_attr(feature = "serde", serde(rename = "limit_a"))]
         limit: Current,
     },
     /// The thermal state of the drive.
     DriveThermal {
         /// Measured.
+        #[cfg_attr(feature = "serde", serde(rename = "measured_percent"))]
         measured: Percent,
         /// Its limit.
+        #[cfg_attr(feature = "serde", serde(rename = "limit_percent"))]
         limit: Percent,
     },
     /// The thermal state of the motor.
     MotorThermal {
         /// Measured.
+        #[cfg_attr(feature = "serde", serde(rename = "measured_percent"))]
         measured: Percent,
         /// Its limit.
+        #[cfg_attr(feature = "serde", serde(rename = "limit_percent"))]
         limit: Percent,
     },
 }
@@ -324,8 +426,6 @@ impl fmt::Display for Limit {
 /// What was done to a drive when the fleet shut down.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[must_use = "only a confirmed stop is known to have been carried out"]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "action", rename_all = "snake_case"))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum ExitAction {
     /// It was left as it was: it stands, or its policy says so, or nothing may be written to it.
     Left,

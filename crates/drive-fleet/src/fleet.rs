@@ -4,7 +4,10 @@ use std::{
     fmt,
     future::poll_fn,
     pin::Pin,
-    sync::{Arc, Mutex, PoisonError, RwLock},
+    sync::{
+        Arc, Mutex, PoisonError, RwLock,
+        atomic::{AtomicU64, Ordering},
+    },
     task::{Context, Poll, ready},
     time::Duration,
 };
@@ -21,7 +24,8 @@ use tokio::{
 };
 
 use crate::{
-    event::{Event, ExitAction},
+    cause::Policy,
+    event::{Event, ExitAction, Teller},
     handle::{DriveHandle, Entry},
     plan::{LineBudget, LinePlan},
     task::Urgent,
@@ -91,7 +95,9 @@ pub(crate) struct Inner {
     /// One change of the members at a time.
     pub(crate) changing: Mutex<()>,
     /// Gone when the fleet has shut down, so that readers see its end.
-    events: Mutex<Option<broadcast::Sender<Event>>>,
+    events: Mutex<Option<Teller>>,
+    /// How many acts of groups there were.
+    acts: AtomicU64,
     /// For the first reader, which misses nothing of the start.
     first: Mutex<Option<broadcast::Receiver<Event>>>,
 }
@@ -105,15 +111,12 @@ impl fmt::Debug for Fleet {
 }
 
 impl Fleet {
-    pub(crate) fn new(
-        members: Members,
-        events: broadcast::Sender<Event>,
-        first: broadcast::Receiver<Event>,
-    ) -> Self {
+    pub(crate) fn new(members: Members, events: Teller, first: broadcast::Receiver<Event>) -> Self {
         let inner = Inner {
             members: RwLock::new(Arc::new(members)),
             changing: Mutex::default(),
             events: Mutex::new(Some(events)),
+            acts: AtomicU64::new(0),
             first: Mutex::new(Some(first)),
         };
         Self { inner: Arc::new(inner) }
@@ -164,9 +167,14 @@ impl Fleet {
     /// a drive that is still stopping then has [`ExitAction::TimeOver`].
     #[must_use = "a drive that was not stopped may run"]
     pub async fn shutdown(&self, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
-        let actions = end(&self.members().entries, limit).await;
+        let actions = end(&self.members().entries, Policy::Exit, limit).await;
         self.inner.events.lock().unwrap_or_else(PoisonError::into_inner).take();
         actions
+    }
+
+    /// An id for an act that has none.
+    pub(crate) fn new_act(&self) -> String {
+        format!("group-{}", self.inner.acts.fetch_add(1, Ordering::Relaxed) + 1)
     }
 
     pub(crate) fn members(&self) -> Arc<Members> {
@@ -179,25 +187,25 @@ impl Fleet {
     }
 
     /// Where events are told; `None` after the shut-down.
-    pub(crate) fn sender(&self) -> Option<broadcast::Sender<Event>> {
+    pub(crate) fn sender(&self) -> Option<Teller> {
         self.inner.events.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
 /// Has the policies of these drives act. What is not done after `limit` is given up.
-pub(crate) async fn end(entries: &[Arc<Entry>], limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
-    let tell = |message: fn() -> Urgent| {
+pub(crate) async fn end(entries: &[Arc<Entry>], why: Policy, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
+    let tell = |message: &dyn Fn() -> Urgent| {
         for entry in entries {
             // A task that is gone has its action in the watch.
             let _ = entry.urgent.send(message());
         }
     };
     let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
-    tell(|| Urgent::Exit);
+    tell(&|| Urgent::Exit(why));
     let actions = match tokio::time::timeout(limit, all_done()).await {
         Ok(actions) => actions,
         Err(_) => {
-            tell(|| Urgent::ExitTimeOver);
+            tell(&|| Urgent::ExitTimeOver);
             all_done().await
         }
     };

@@ -17,6 +17,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
+    cause::Act,
     fleet::{Fleet, LineEntry, Members},
     handle::{DriveHandle, Entry},
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
@@ -70,8 +71,8 @@ pub struct StopReport {
     /// Drives that show standstill.
     pub confirmed: Vec<Arc<str>>,
     /// Drives that do not, and why. Their stops go on being repeated.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::json::by_drive"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "Vec<crate::json::OfDrive<'static>>"))]
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::view::by_drive"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "Vec<crate::view::OfDrive>"))]
     pub unconfirmed: Vec<(Arc<str>, Outcome)>,
     /// Drives that are only read: nothing was sent to them.
     pub read_only: Vec<Arc<str>>,
@@ -157,9 +158,20 @@ impl Group {
 
     /// This group, commanded under a name.
     #[must_use]
-    pub fn commanded_by(&self, commander: &str) -> Self {
-        let members = self.members.iter().map(|member| member.commanded_by(commander)).collect();
+    pub fn commanded_by(&self, act: impl Into<Act>) -> Self {
+        let act = Arc::new(act.into());
+        let members = self.members.iter().map(|member| member.in_act(&act)).collect();
         Self { fleet: self.fleet.clone(), members }
+    }
+
+    /// The same group for one act: behind all of its commands stands one id.
+    fn in_one_act(&self) -> Self {
+        let id = self.fleet.new_act();
+        let with_id = |member: &DriveHandle| match member.act().id {
+            Some(_) => member.clone(),
+            None => member.in_act(&Arc::new(Act::clone(member.act()).with_id(&id))),
+        };
+        Self { fleet: self.fleet.clone(), members: self.members.iter().map(with_id).collect() }
     }
 
     /// Its drives.
@@ -175,13 +187,13 @@ impl Group {
     /// The report comes when every drive stands or its time is over; a drive that does not answer is named after the time
     /// that its line's plan gives. Stops that are not confirmed go on being repeated.
     pub async fn stop(&self, mode: StopMode) -> StopReport {
-        self.stop_each(mode, false, &|_, _| ()).await
+        self.in_one_act().stop_each(mode, false, &|_, _| ()).await
     }
 
     /// The same, and tells the outcome of each drive as soon as it is known. Every stop is on its way to its drive when
     /// this has been polled for the first time.
     pub async fn stop_telling(&self, mode: StopMode, told: impl Fn(&str, &Outcome)) -> StopReport {
-        self.stop_each(mode, false, &told).await
+        self.in_one_act().stop_each(mode, false, &told).await
     }
 
     /// Stops every drive of the group; `anyhow`: a stop in another mode that is under way does as well, and no broadcast
@@ -253,6 +265,10 @@ impl Group {
     /// # Cancellation
     /// When the future is dropped no further drive is begun. Those that were begun go on.
     pub async fn start(&self, start: GroupStart) -> Result<(), GroupFailure> {
+        self.in_one_act().start_each(start).await
+    }
+
+    async fn start_each(&self, start: GroupStart) -> Result<(), GroupFailure> {
         let GroupStart { direction, setpoint, spacing, until } = start;
         let asked = join_all(self.members.iter().map(|member| member.ask(setpoint))).await;
         let (mut leaves, mut unready) = (Vec::new(), Vec::new());
@@ -284,8 +300,9 @@ impl Group {
     #[must_use = "only a confirmed setpoint is known to be in force"]
     pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Vec<(Arc<str>, Outcome)> {
         let order = Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce };
-        let commands = self.members.iter().map(|member| async move {
-            let outcome = self.on_line(member, async || member.order(order).await).await;
+        let this = &self.in_one_act();
+        let commands = this.members.iter().map(|member| async move {
+            let outcome = this.on_line(member, async || member.order(order).await).await;
             (Arc::clone(member.name()), outcome)
         });
         join_all(commands).await

@@ -18,6 +18,7 @@ use tokio::{
 };
 
 use crate::{
+    cause::Act,
     event::ExitAction,
     fleet::LineEntry,
     outcome::{Order, Outcome, Refused, Until},
@@ -71,27 +72,37 @@ impl Entry {
 #[derive(Clone)]
 pub struct DriveHandle {
     pub(crate) entry: Arc<Entry>,
-    commander: Arc<str>,
+    act: Arc<Act>,
 }
 
 impl fmt::Debug for DriveHandle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("DriveHandle")
             .field("name", &self.entry.name)
-            .field("commander", &self.commander)
+            .field("act", &self.act)
             .finish_non_exhaustive()
     }
 }
 
 impl DriveHandle {
     pub(crate) fn new(entry: Arc<Entry>) -> Self {
-        Self { entry, commander: Arc::from("program") }
+        Self { entry, act: Arc::new(Act::of("program")) }
     }
 
-    /// This drive, commanded under a name: for the settings that say who may command it, and for the events.
+    /// This drive, commanded under a name: for the settings that say who may command it, and for the events. An [`Act`] says
+    /// besides through which door, and which act it is of which the command is a part.
     #[must_use]
-    pub fn commanded_by(&self, commander: &str) -> Self {
-        Self { entry: Arc::clone(&self.entry), commander: Arc::from(commander) }
+    pub fn commanded_by(&self, act: impl Into<Act>) -> Self {
+        self.in_act(&Arc::new(act.into()))
+    }
+
+    /// This drive, commanded as a part of an act.
+    pub(crate) fn in_act(&self, act: &Arc<Act>) -> Self {
+        Self { entry: Arc::clone(&self.entry), act: Arc::clone(act) }
+    }
+
+    pub(crate) const fn act(&self) -> &Arc<Act> {
+        &self.act
     }
 
     /// Its name.
@@ -194,7 +205,7 @@ impl DriveHandle {
     /// The leave to start later, or why a start would be refused now.
     pub(crate) async fn ask(&self, setpoint: Option<Setpoint>) -> Result<Leave, Refused> {
         let (reply, answer) = oneshot::channel();
-        let name = Arc::clone(&self.commander);
+        let name = Arc::clone(&self.act.commander);
         self.post(Message::Ask { name, setpoint, reply })?;
         answer.await.unwrap_or(Err(Refused::ShutDown))
     }
@@ -238,8 +249,8 @@ impl DriveHandle {
         patience: Option<Duration>,
     ) -> Outcome {
         let (reply, outcome) = oneshot::channel();
-        let name = Arc::clone(&self.commander);
-        if self.entry.urgent.send(Urgent::Stop { mode, anyhow, name, patience, reply }).is_err() {
+        let act = Arc::clone(&self.act);
+        if self.entry.urgent.send(Urgent::Stop { mode, anyhow, act, patience, reply }).is_err() {
             return Outcome::Refused(Refused::ShutDown);
         }
         outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown))
@@ -285,8 +296,8 @@ impl DriveHandle {
         order: Order,
     ) -> Outcome {
         let (reply, outcome) = oneshot::channel();
-        let name = Arc::clone(&self.commander);
-        match self.post(Message::Order { order, leave, expires, name, reply }) {
+        let act = Arc::clone(&self.act);
+        match self.post(Message::Order { order, leave, expires, act, reply }) {
             Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
             Err(refused) => Outcome::Refused(refused),
         }
@@ -328,7 +339,7 @@ impl DriveHandle {
 
     async fn question(&self, question: Question) -> Result<Told, Refused> {
         let (reply, told) = oneshot::channel();
-        let name = Arc::clone(&self.commander);
+        let name = Arc::clone(&self.act.commander);
         self.post(Message::Question { question, name, reply })?;
         told.await.unwrap_or(Err(Refused::ShutDown))
     }

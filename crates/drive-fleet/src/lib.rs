@@ -35,7 +35,8 @@
 //! control is only read.
 //!
 //! With the feature `serde` a [`Snapshot`], an [`Event`], an [`Outcome`] and the settings are written as JSON, ready for
-//! a service of your own, and the settings are read from it. The feature `schemars` adds the JSON schemas.
+//! a service of your own, and read from it: the settings as they are, the others as their `view`. The feature `schemars`
+//! adds the JSON schemas.
 //!
 //! # Inside
 //! One task for each drive owns the conversation with it. What it does next is decided by a supervisor that is a pure
@@ -44,12 +45,12 @@
 #![forbid(unsafe_code)]
 
 mod builder;
+mod cause;
+mod concern;
 mod event;
 mod fleet;
 mod group;
 mod handle;
-#[cfg(feature = "serde")]
-mod json;
 mod limits;
 mod membership;
 mod outcome;
@@ -60,14 +61,18 @@ mod supervisor;
 mod task;
 #[cfg(test)]
 mod testing;
+#[cfg(feature = "serde")]
+pub mod view;
 
 pub use builder::{FleetBuilder, FleetError, SettingProblem, check_settings};
+pub use cause::{Act, Cause, ChangedWord, Policy};
+pub use concern::{Concern, ConcernKind, Severity};
 pub use event::{Event, EventKind, ExitAction, Limit};
 pub use fleet::{Events, Fleet, Received};
 pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
-pub use outcome::{LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
+pub use outcome::{Became, LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
 pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
 pub use settings::{
     Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,

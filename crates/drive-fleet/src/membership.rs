@@ -9,6 +9,7 @@ use drive_bus::Line;
 
 use crate::{
     builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
+    cause::Policy,
     event::ExitAction,
     fleet::{Fleet, LineEntry, Members, end},
     plan::forecast,
@@ -80,7 +81,7 @@ impl Fleet {
         let is_meant = |name: &str| drives.contains(&name);
         let leaving: Vec<_> =
             self.members().entries.iter().filter(|entry| is_meant(&entry.name)).cloned().collect();
-        let actions = end(&leaving, limit).await;
+        let actions = end(&leaving, Policy::Removal, limit).await;
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
         let mut members = Members::clone(&self.members());
         members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));

@@ -53,6 +53,14 @@ impl Order {
         matches!(self, Self::Start { .. } | Self::Setpoint { .. })
     }
 
+    /// The setpoint that a start is given with.
+    pub(crate) const fn start_setpoint(&self) -> Option<Setpoint> {
+        match *self {
+            Self::Start { setpoint, .. } => setpoint,
+            _ => None,
+        }
+    }
+
     /// How events and logs name it.
     #[must_use]
     pub const fn command(&self) -> Command {
@@ -65,6 +73,25 @@ impl Order {
             Self::Persist => Command::Persist,
         }
     }
+}
+
+/// What an outcome comes to, for whoever does not ask why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub enum Became {
+    /// The drive's own words show it.
+    Confirmed,
+    /// It was sent, and they do not show it.
+    NotConfirmed,
+    /// It was sent, or may have been, and the drive could not be asked.
+    Unknown,
+    /// Nothing moved because of it.
+    Refused,
+    /// It was not sent in time.
+    Expired,
+    /// A later command, or a stop, took its place.
+    Superseded,
 }
 
 /// What became of a command.
@@ -92,18 +119,31 @@ impl Outcome {
         matches!(self, Self::Confirmed)
     }
 
+    /// What it comes to.
+    #[must_use]
+    pub const fn became(&self) -> Became {
+        match self {
+            Self::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
+            | Self::Refused(Refused::Superseded | Refused::Stopped) => Became::Superseded,
+            Self::Confirmed => Became::Confirmed,
+            Self::NotConfirmed(_) => Became::NotConfirmed,
+            Self::Expired => Became::Expired,
+            Self::OutcomeUnknown(_) => Became::Unknown,
+            Self::Refused(_) => Became::Refused,
+        }
+    }
+
     /// Its word for programs: `confirmed`, `not_confirmed`, `unknown`, `refused`, `expired`, or `superseded` where a later
     /// command or a stop took its place.
     #[must_use]
     pub const fn word(&self) -> &'static str {
-        match self {
-            Self::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
-            | Self::Refused(Refused::Superseded | Refused::Stopped) => "superseded",
-            Self::Confirmed => "confirmed",
-            Self::NotConfirmed(_) => "not_confirmed",
-            Self::Expired => "expired",
-            Self::OutcomeUnknown(_) => "unknown",
-            Self::Refused(_) => "refused",
+        match self.became() {
+            Became::Confirmed => "confirmed",
+            Became::NotConfirmed => "not_confirmed",
+            Became::Unknown => "unknown",
+            Became::Refused => "refused",
+            Became::Expired => "expired",
+            Became::Superseded => "superseded",
         }
     }
 

@@ -66,6 +66,27 @@ pub struct DriveSettings {
 }
 
 impl DriveSettings {
+    /// The names of the settings that others have otherwise.
+    pub(crate) fn differ(&self, other: &Self) -> Vec<&'static str> {
+        let pairs = [
+            ("control", self.control != other.control),
+            ("commanders", self.commanders != other.commanders),
+            ("periods", self.periods != other.periods),
+            ("times", self.times != other.times),
+            ("limits", self.limits != other.limits),
+            ("alarms", self.alarms != other.alarms),
+            ("watchdog", self.watchdog != other.watchdog),
+            ("on_exit", self.on_exit != other.on_exit),
+            ("on_exit_adopted", self.on_exit_adopted != other.on_exit_adopted),
+            ("on_exit_watchdog", self.on_exit_watchdog != other.on_exit_watchdog),
+            ("on_loss", self.on_loss != other.on_loss),
+            ("on_fault", self.on_fault != other.on_fault),
+            ("on_control_taken", self.on_control_taken != other.on_control_taken),
+            ("accept_self_restart", self.accept_self_restart != other.accept_self_restart),
+        ];
+        pairs.into_iter().filter_map(|(name, differs)| differs.then_some(name)).collect()
+    }
+
     /// Settings of a drive that is only read.
     #[must_use]
     pub fn watched(name: impl Into<String>) -> Self {
@@ -263,6 +284,7 @@ pub struct WatchdogContract {
 /// It is put back only where the drive says that it is the same one and still has the watchdog that was set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct WatchdogBefore {
     /// Which drive it was, as [`Identity`] is displayed.
     pub identity: String,

@@ -3,12 +3,16 @@
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use drive_core::{
-    Error, Fault, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status, StopMode,
-    Watchdog,
+    Control, Error, Fault, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status,
+    StopMode, Watchdog,
 };
 use tokio::time::Instant;
 
-use crate::outcome::{LastSeen, Refused};
+use crate::{
+    concern::ConcernKind,
+    event::Limit,
+    outcome::{LastSeen, Refused},
+};
 
 /// How far the output may be from a setpoint that it has reached by its frequency alone.
 const NEAR: Frequency = Frequency::from_centihertz(50);
@@ -60,7 +64,7 @@ impl Timed<Status> {
 
 /// Whether a drive answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Link {
     /// It has not answered yet.
@@ -80,7 +84,7 @@ drive_core::named! { Link {
 
 /// The verdict on a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Freshness {
     /// The drive answers and the status is young enough.
@@ -101,7 +105,11 @@ drive_core::named! { Freshness {
 
 /// What is known of which drive it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "check", rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(tag = "check", rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum IdentityCheck {
     /// Not asked since it was connected.
@@ -123,13 +131,17 @@ pub enum IdentityCheck {
 
 /// What is known of the drive's communication watchdog.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "check", rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(tag = "check", rename_all = "snake_case")
+)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum WatchdogCheck {
     /// The settings have no contract for it. As it was found it is fed all the same.
     NoContract {
         /// As it was found; `None` where it has not been read, or cannot be.
-        #[cfg_attr(feature = "serde", serde(flatten))]
+        #[cfg_attr(feature = "serde", serde(flatten, deserialize_with = "crate::view::watchdog"))]
         found: Option<Watchdog>,
     },
     /// Not read since the drive was connected.
@@ -140,8 +152,8 @@ pub enum WatchdogCheck {
     Verified(Watchdog),
     /// It cannot be brought to what the contract says.
     Broken(
-        #[cfg_attr(feature = "serde", serde(serialize_with = "crate::json::why"))]
-        #[cfg_attr(feature = "schemars", schemars(with = "crate::json::Why<'static>"))]
+        #[cfg_attr(feature = "serde", serde(with = "crate::view::why"))]
+        #[cfg_attr(feature = "schemars", schemars(with = "crate::view::Why"))]
         String,
     ),
 }
@@ -155,16 +167,16 @@ impl WatchdogCheck {
 
 /// A stop that is not confirmed yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct PendingStop {
     /// By which mode: the one that was asked for, or the one that took its place.
     pub mode: StopMode,
     /// Since when.
-    #[cfg_attr(feature = "serde", serde(rename = "since_ms", serialize_with = "drive_core::serialize::age"))]
+    #[cfg_attr(feature = "serde", serde(rename = "since_ms", with = "drive_core::serialize::age_ms"))]
     #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub since: Instant,
-    /// How often it was sent, or may have been.
+    /// How often it was sent, or may have been, the attempt that is under way included.
     pub attempts: u32,
     /// Whether the drive has shown that no run command is in force; what is missing then is standstill.
     pub taken: bool,
@@ -177,6 +189,8 @@ pub struct PendingStop {
 pub struct Trip {
     /// When it was seen.
     pub at: Instant,
+    /// Whether it was found so when the drive was seen first or again: it tripped at some time before.
+    pub found: bool,
     /// The last status before it; `None` when the drive was already tripped when it was first seen.
     pub before: Option<Timed<Status>>,
     /// The first status that shows it.
@@ -202,7 +216,7 @@ impl Trip {
 /// What was counted for a drive since the fleet started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Counters {
     /// Statuses that were due.
@@ -242,6 +256,14 @@ pub struct Snapshot {
     pub watchdog: WatchdogCheck,
     /// Which settings start its motor again by themselves; `None` where they have not been read yet.
     pub self_restarts: Option<Arc<[SelfRestart]>>,
+    /// Whether the settings of this fleet accept all of them.
+    pub restarts_accepted: bool,
+    /// Who has taken control from this bus, until it is back.
+    pub control_taken: Option<Control>,
+    /// Why the run command of this side still stands though somebody else has control.
+    pub run_command_stands: Option<Error>,
+    /// The measured values that are above their limits.
+    pub exceeded: Vec<Limit>,
     /// A stop that is not confirmed yet.
     pub stop: Option<PendingStop>,
     /// Whether this fleet started the motor and has not seen it stand since.
@@ -252,6 +274,8 @@ pub struct Snapshot {
     pub trips: Arc<VecDeque<Trip>>,
     /// Counters.
     pub counters: Counters,
+    /// Since when something [troubles](Self::concerns) it, of what does not say so itself.
+    pub since: Vec<(ConcernKind, Instant)>,
     /// The age beyond which a status is stale.
     pub max_age: Duration,
     /// The age beyond which measurements are stale.

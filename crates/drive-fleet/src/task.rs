@@ -9,12 +9,13 @@ use std::{
 
 use drive_core::{Drive, Setpoint, StopMode, Withdrawn};
 use tokio::{
-    sync::{AcquireError, OwnedSemaphorePermit, Semaphore, broadcast, mpsc, oneshot, watch},
+    sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
 };
 
 use crate::{
-    event::{Event, ExitAction},
+    cause::{Act, Policy},
+    event::{ExitAction, Teller},
     outcome::{Order, Outcome, Refused},
     settings::DriveSettings,
     snapshot::Snapshot,
@@ -30,7 +31,7 @@ pub(crate) enum Message {
         leave: Option<Leave>,
         /// When it may not be sent any more; `None`: as the settings say.
         expires: Option<Instant>,
-        name: Arc<str>,
+        act: Arc<Act>,
         reply: oneshot::Sender<Outcome>,
     },
     /// A question.
@@ -47,15 +48,15 @@ pub(crate) enum Urgent {
         mode: StopMode,
         /// A stop in another mode that is under way does as well.
         anyhow: bool,
-        name: Arc<str>,
+        act: Arc<Act>,
         /// Until its lack of confirmation is an alarm; `None`: as the settings say.
         patience: Option<Duration>,
         reply: oneshot::Sender<Outcome>,
     },
     /// Other settings.
     Settings(Arc<DriveSettings>),
-    /// The fleet shuts down, or the drive leaves it.
-    Exit,
+    /// The fleet shuts down, or the drive leaves it: by which policy it ends.
+    Exit(Policy),
     /// The time for shutting down is over.
     ExitTimeOver,
 }
@@ -182,7 +183,7 @@ where
 /// The supervisor and those who wait for its words.
 pub(crate) struct Desk {
     pub(crate) supervisor: Supervisor,
-    pub(crate) events: broadcast::Sender<Event>,
+    pub(crate) events: Teller,
     pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
     pub(crate) exit: watch::Sender<Option<ExitAction>>,
     pub(crate) callers: BTreeMap<CallId, oneshot::Sender<Outcome>>,
@@ -196,8 +197,8 @@ impl Desk {
     fn handle_message(&mut self, message: Message) -> bool {
         let now = Instant::now();
         match message {
-            Message::Order { order, leave, expires, name, reply } => {
-                let asker = self.caller(name, reply);
+            Message::Order { order, leave, expires, act, reply } => {
+                let asker = self.caller(act, reply);
                 self.supervisor.handle_order(now, asker, order, leave, expires)
             }
             Message::Question { question, name, reply } => {
@@ -220,12 +221,12 @@ impl Desk {
     fn handle_urgent(&mut self, message: Urgent) -> bool {
         let now = Instant::now();
         match message {
-            Urgent::Stop { mode, anyhow, name, patience, reply } => {
+            Urgent::Stop { mode, anyhow, act, patience, reply } => {
                 // A stop may be pending for hours; only those who still wait for it are kept.
                 self.callers.retain(|_, caller| !caller.is_closed());
                 let callers = &self.callers;
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
-                let asker = self.caller(name, reply);
+                let asker = self.caller(act, reply);
                 self.supervisor.handle_stop(now, asker, mode, anyhow, patience)
             }
             Urgent::Settings(settings) => {
@@ -233,7 +234,7 @@ impl Desk {
                 self.supervisor.handle_settings(now, &settings);
                 false
             }
-            Urgent::Exit => self.supervisor.handle_exit(now),
+            Urgent::Exit(why) => self.supervisor.handle_exit(now, why),
             Urgent::ExitTimeOver => {
                 self.supervisor.handle_exit_time_over();
                 true
@@ -241,10 +242,10 @@ impl Desk {
         }
     }
 
-    fn caller(&mut self, name: Arc<str>, reply: oneshot::Sender<Outcome>) -> Asker {
+    fn caller(&mut self, act: Arc<Act>, reply: oneshot::Sender<Outcome>) -> Asker {
         let id = self.new_call();
         self.callers.insert(id, reply);
-        Asker::Caller { id, name }
+        Asker::Caller { id, act }
     }
 
     const fn new_call(&mut self) -> CallId {
@@ -259,11 +260,10 @@ impl Desk {
         }
         while let Some(output) = self.supervisor.poll_output() {
             match output {
-                Output::Event(kind) => {
+                Output::Event(happened) => {
                     let drive = self.supervisor.name();
-                    tracing::debug!(%drive, "{kind}");
-                    // Without a reader there is nobody to tell.
-                    let _ = self.events.send(Event { drive, at: Instant::now(), kind });
+                    tracing::debug!(%drive, "{}", happened.kind);
+                    self.events.tell(drive, happened);
                 }
                 Output::Told(id, told) => {
                     if let Some(asker) = self.askers.remove(&id) {

@@ -277,6 +277,12 @@ impl Checks {
         self.restarts.as_ref()
     }
 
+    /// Whether the settings accept all of them.
+    pub(crate) fn restarts_accepted(&self) -> bool {
+        let accepts = |restart: &SelfRestart| self.accepted_restarts.iter().any(|code| code == restart.code);
+        self.restarts.iter().flat_map(|by| by.iter()).all(accepts)
+    }
+
     pub(crate) fn handle_restarts(
         &mut self,
         now: Instant,
@@ -285,8 +291,7 @@ impl Checks {
         self.restarts_at = matches!(result, Err(Error::Port { .. })).then_some(now + AGAIN);
         let by: Arc<[SelfRestart]> = result.ok()?.into();
         self.restarts = Some(Arc::clone(&by));
-        let accepted =
-            by.iter().all(|restart| self.accepted_restarts.iter().any(|code| code == restart.code));
+        let accepted = self.restarts_accepted();
         (!by.is_empty()).then_some(EventKind::RestartsItself { by, accepted })
     }
 

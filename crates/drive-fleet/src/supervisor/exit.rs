@@ -5,6 +5,7 @@ use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor};
 use crate::{
+    cause::{Cause, Policy},
     event::{EventKind, ExitAction},
     outcome::{Order, Outcome},
     settings::{OnExit, OnExitAdopted, OnExitWatchdog},
@@ -41,11 +42,12 @@ pub(super) enum Exit {
 }
 
 impl Supervisor {
-    /// The fleet shuts down. Gives whether the job in flight has to be dropped for it.
-    pub(crate) fn handle_exit(&mut self, now: Instant) -> bool {
+    /// The fleet shuts down, or the drive is removed from it. Gives whether the job in flight has to be dropped for it.
+    pub(crate) fn handle_exit(&mut self, now: Instant, why: Policy) -> bool {
         if self.exit != Exit::No {
             return false;
         }
+        self.exits_by = why;
         self.refuse_queue();
         let started = self.started_here || self.is_starting();
         // Rule 1 ends with its confirmation, whatever the policy.
@@ -72,7 +74,7 @@ impl Supervisor {
 
     fn exit_by_stop(&mut self, now: Instant, mode: StopMode, release: bool) {
         self.exit = Exit::Stopping { release };
-        self.stop_by_policy(now, Asker::Exit, mode);
+        self.stop_by_policy(now, Asker::Policy(self.exits_by), mode);
     }
 
     /// The time for shutting down is over.
@@ -104,7 +106,7 @@ impl Supervisor {
     pub(super) fn advance_exit(&mut self, now: Instant) {
         if self.exit == Exit::Release {
             self.exit = Exit::Releasing;
-            self.enqueue(now, Asker::Exit, Order::Release, None);
+            self.enqueue(now, Asker::Policy(self.exits_by), Order::Release, None);
         }
     }
 
@@ -142,7 +144,7 @@ impl Supervisor {
         let why = match result {
             Ok(watchdog) if watchdog.timeout == found.timeout => {
                 let action = action.clone();
-                self.emit(EventKind::WatchdogRestored(watchdog));
+                self.emit_by(EventKind::WatchdogRestored(watchdog), Cause::policy(self.exits_by));
                 return self.exit_done(action);
             }
             Err(Error::Port { .. }) if *attempts > 0 => return,
@@ -158,12 +160,16 @@ impl Supervisor {
     /// Tells that the drive trips by its watchdog once nobody speaks to it any more.
     fn watchdog_stays(&mut self, why: &'static str) {
         if let Some(timeout) = self.checks.set_to() {
-            self.emit(EventKind::WatchdogStays { timeout, why });
+            self.emit_by(EventKind::WatchdogStays { timeout, why }, Cause::policy(self.exits_by));
         }
     }
 
     fn exit_done(&mut self, action: ExitAction) {
-        self.emit(EventKind::Exit(action.clone()));
+        let kind = match self.exits_by {
+            Policy::Removal => EventKind::Removed(action.clone()),
+            _ => EventKind::Exit(action.clone()),
+        };
+        self.emit_by(kind, Cause::policy(self.exits_by));
         self.exit = Exit::Done(action);
     }
 }

@@ -20,12 +20,12 @@ mod verdict;
 mod withdraw;
 
 use std::{
-    collections::{BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     sync::Arc,
     time::Duration,
 };
 
-use drive_core::{Error, ErrorKind, Measurements, PortError, Status, WatchdogCapability};
+use drive_core::{Control, Error, ErrorKind, Measurements, PortError, Status, WatchdogCapability};
 use tokio::time::Instant;
 
 use self::{
@@ -43,7 +43,9 @@ pub(crate) use self::{
     questions::{Question, Told},
 };
 use crate::{
-    event::{EventKind, ExitAction},
+    cause::{Act, Cause, ChangedWord, Policy},
+    concern::{self, ConcernKind},
+    event::{EventKind, ExitAction, Happened, Limit},
     limits::Given,
     outcome::{Outcome, Refused, Unknown},
     settings::DriveSettings,
@@ -58,20 +60,29 @@ pub(crate) struct CallId(pub(crate) u64);
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Asker {
     /// Somebody who waits for the outcome.
-    Caller { id: CallId, name: Arc<str> },
+    Caller { id: CallId, act: Arc<Act> },
     /// A policy of the settings.
-    Policy(&'static str),
-    /// The exit of the fleet.
-    Exit,
+    Policy(Policy),
 }
 
 impl Asker {
     fn name(&self) -> Arc<str> {
         match self {
-            Self::Caller { name, .. } => Arc::clone(name),
-            Self::Policy(name) => Arc::from(*name),
-            Self::Exit => Arc::from("exit"),
+            Self::Caller { act, .. } => Arc::clone(&act.commander),
+            Self::Policy(policy) => Arc::from(policy.to_string()),
         }
+    }
+
+    fn cause(&self) -> Cause {
+        match self {
+            Self::Caller { act, .. } => Cause::Command(Act::clone(act)),
+            Self::Policy(policy) => Cause::policy(*policy),
+        }
+    }
+
+    /// Whether the drive ends, with the fleet or without it.
+    const fn is_exit(&self) -> bool {
+        matches!(self, Self::Policy(Policy::Exit | Policy::Removal))
     }
 }
 
@@ -79,7 +90,7 @@ impl Asker {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Output {
     /// To everybody.
-    Event(EventKind),
+    Event(Happened),
     /// To one caller.
     Answer(CallId, Outcome),
     /// To one who asked a question.
@@ -110,8 +121,18 @@ pub(crate) struct Supervisor {
     stops: u64,
     withdrawal: Option<Withdrawal>,
     exit: Exit,
+    /// Why it ends.
+    exits_by: Policy,
     started_here: bool,
-    exceeded: BTreeSet<&'static str>,
+    exceeded: BTreeMap<&'static str, Limit>,
+    /// Who has taken control, until it is back.
+    control_taken: Option<Control>,
+    /// The last job that was sent to change what the motor does, and why.
+    acted: Option<(Job, Cause)>,
+    /// The words that changed with the status that is looked at.
+    words: Arc<[ChangedWord]>,
+    /// Since when something troubles the drive.
+    since: Vec<(ConcernKind, Instant)>,
     trips: Arc<VecDeque<Trip>>,
     /// How often the last trip's explanation may still be asked for.
     explanations: u8,
@@ -154,8 +175,13 @@ impl Supervisor {
             stops: 0,
             withdrawal: None,
             exit: Exit::No,
+            exits_by: Policy::Exit,
             started_here: false,
-            exceeded: BTreeSet::new(),
+            exceeded: BTreeMap::new(),
+            control_taken: None,
+            acted: None,
+            words: Arc::default(),
+            since: Vec::new(),
             trips: Arc::default(),
             explanations: 0,
             counters: Counters::default(),
@@ -173,6 +199,10 @@ impl Supervisor {
 
     /// Other settings hold from now on. The motor, the orders and the stops under way go on.
     pub(crate) fn handle_settings(&mut self, now: Instant, settings: &DriveSettings) {
+        let changed = self.settings.differ(settings);
+        if !changed.is_empty() {
+            self.emit_by(EventKind::Reconfigured(changed), Cause::policy(Policy::Settings));
+        }
         self.checks.reconfigure(now, settings);
         self.pace.reconfigure(now, settings.periods);
         self.settings = settings.clone();
@@ -200,6 +230,7 @@ impl Supervisor {
             // A new run command takes the place of the one that was to be withdrawn.
             self.withdrawal = None;
         }
+        self.note_act(job);
         self.in_flight = Some(job);
         self.changed = true;
         Step::Do { job, on_turn, lifetime, until }
@@ -325,7 +356,7 @@ impl Supervisor {
             Reply::Faults(result) => self.handle_faults(now, result),
             Reply::Identity(result) => {
                 if let Some(event) = self.checks.handle_identity(now, result) {
-                    self.emit(event);
+                    self.emit_by(event, Cause::Found);
                 }
             }
             Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {
@@ -335,13 +366,14 @@ impl Supervisor {
                 let armed = matches!(job, Some(Job::ArmWatchdog(..)));
                 let control = self.settings.control;
                 if let Some(event) = self.checks.handle_watchdog(now, armed, control, result) {
-                    self.emit(event);
+                    let cause = if armed { Cause::policy(Policy::Watchdog) } else { Cause::Found };
+                    self.emit_by(event, cause);
                 }
                 self.tell_watchdog();
             }
             Reply::SelfRestarts(result) => {
                 if let Some(event) = self.checks.handle_restarts(now, result) {
-                    self.emit(event);
+                    self.emit_by(event, Cause::Found);
                 }
             }
             Reply::Told(told) => self.handle_told(told),
@@ -382,7 +414,13 @@ impl Supervisor {
 
     /// The snapshot, if anything changed since this was last asked.
     pub(crate) fn take_snapshot(&mut self, now: Instant) -> Option<Snapshot> {
-        std::mem::take(&mut self.changed).then(|| self.snapshot(now))
+        if !std::mem::take(&mut self.changed) {
+            return None;
+        }
+        let mut snapshot = self.snapshot(now);
+        concern::note(&mut self.since, &snapshot.concerns(now), now);
+        snapshot.since.clone_from(&self.since);
+        Some(snapshot)
     }
 
     /// What is known now.
@@ -397,6 +435,11 @@ impl Supervisor {
             identity: self.checks.identity().clone(),
             watchdog: self.checks.watchdog().clone(),
             self_restarts: self.checks.restarts().cloned(),
+            restarts_accepted: self.checks.restarts_accepted(),
+            control_taken: self.control_taken,
+            run_command_stands: self.withdrawal.as_ref().and_then(Withdrawal::stands).cloned(),
+            exceeded: self.exceeded.values().copied().collect(),
+            since: self.since.clone(),
             stop: self.stopping.as_ref().map(Stopping::pending),
             started_here: self.started_here,
             start_refused: self.start_refused(now),
@@ -415,9 +458,31 @@ impl Supervisor {
         }
     }
 
+    /// Tells what the drive does by itself, as far as this side knows.
     fn emit(&mut self, kind: EventKind) {
+        self.emit_by(kind, Cause::Drive);
+    }
+
+    fn emit_by(&mut self, kind: EventKind, cause: Cause) {
         self.changed = true;
-        self.outputs.push_back(Output::Event(kind));
+        self.outputs.push_back(Output::Event(Happened { kind, cause, words: Arc::default() }));
+    }
+
+    /// Tells what a status shows, with the words that changed with it.
+    fn emit_shown(&mut self, kind: EventKind, cause: Cause) {
+        self.changed = true;
+        self.outputs.push_back(Output::Event(Happened { kind, cause, words: Arc::clone(&self.words) }));
+    }
+
+    /// A job is sent: what changes the motor is remembered with its cause, until it shows.
+    fn note_act(&mut self, job: Job) {
+        let cause = match job {
+            Job::Stop(_) => self.begin_attempt(),
+            Job::Withdraw => self.withdrawal.as_ref().map(|withdrawal| withdrawal.asker().cause()),
+            Job::Start(_) | Job::ResetFaults | Job::Release => self.active.as_ref().map(Active::cause),
+            _ => return,
+        };
+        self.acted = cause.map(|cause| (job, cause));
     }
 
     /// Whether the drive's words show that the motor is not driven.

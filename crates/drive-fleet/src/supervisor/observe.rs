@@ -5,8 +5,9 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 use drive_core::{Control, Error, Faults, Measurements, PortError, Result, State, Status};
 use tokio::time::Instant;
 
-use super::{Asker, Supervisor};
+use super::{Asker, Job, Supervisor};
 use crate::{
+    cause::{Cause, ChangedWord, Policy},
     event::{EventKind, Limit},
     outcome::Refused,
     settings::{OnFault, OnLoss},
@@ -24,6 +25,16 @@ const EXPLANATIONS: u8 = 3;
 /// Who has control of a drive, where that is somebody else. Some drives tell it only then.
 fn somebody_else(status: &Status) -> Option<Control> {
     status.control.filter(|control| *control != Control::Bus)
+}
+
+/// The words that a status shows otherwise than the one before.
+fn changed_words(before: Option<&Status>, status: &Status) -> Arc<[ChangedWord]> {
+    let Some(earlier) = before else { return Arc::default() };
+    let changed = status.raw.iter().filter_map(|word| {
+        let before = earlier.raw(word.address);
+        (before != Some(word.value)).then_some(ChangedWord { word: *word, before })
+    });
+    changed.collect()
 }
 
 impl Supervisor {
@@ -51,6 +62,9 @@ impl Supervisor {
         let before = self.status.take();
         let status = Timed::<Status>::new(status, now);
         let silent_for = status.at.saturating_duration_since(self.silent_since);
+        // After a silence what it shows was not seen happening.
+        let found = was != Link::Connected || self.doubtful && silent_for >= SWITCHED_OFF;
+        self.words = changed_words(before.as_ref().map(|before| &*before.value), &status.value);
         self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
         self.last_error = None;
@@ -60,12 +74,12 @@ impl Supervisor {
             self.given = None;
             self.checks.connected(now);
             self.pace.reconnected(now);
-            self.emit(EventKind::Connected(Arc::clone(&status.value)));
+            self.emit_shown(EventKind::Connected(Arc::clone(&status.value)), Cause::Found);
         } else if self.doubtful && silent_for >= SWITCHED_OFF {
             self.checks.connected(now);
         }
         self.doubtful = false;
-        self.compare(now, before.as_ref().map(|before| &*before.value), &status.value);
+        self.compare(now, before.as_ref().map(|before| &*before.value), &status.value, found);
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
             let unheard = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
@@ -79,7 +93,7 @@ impl Supervisor {
             let status = status.clone();
             self.record_trip(
                 now,
-                Trip { at: now, before, status, faults: None, by_watchdog, watchdog_after },
+                Trip { at: now, found, before, status, faults: None, by_watchdog, watchdog_after },
             );
         }
         if status.value.is_standstill() && !self.is_starting() {
@@ -97,7 +111,7 @@ impl Supervisor {
             && self.settings.control
             && let OnLoss::Stop(mode) = self.settings.on_loss
         {
-            self.stop_by_policy(now, Asker::Policy("on loss"), mode);
+            self.stop_by_policy(now, Asker::Policy(Policy::OnLoss), mode);
         }
         self.tell_watchdog();
         self.judge_stop(now);
@@ -107,32 +121,54 @@ impl Supervisor {
         }
     }
 
-    fn compare(&mut self, now: Instant, before: Option<&Status>, status: &Status) {
+    fn compare(&mut self, now: Instant, before: Option<&Status>, status: &Status, found: bool) {
+        let cause = if found { Cause::Found } else { Cause::Drive };
         if let Some(before) = before {
-            if before.state != status.state {
-                self.emit(EventKind::StateChanged { from: before.state, to: status.state });
-            }
-            if before.is_fault() && !status.is_fault() {
-                self.emit(EventKind::FaultCleared);
+            let (from, to) = (before.state, status.state);
+            if from != to {
+                let cause = if found { Cause::Found } else { self.cause_of(from, to) };
+                self.emit_shown(EventKind::StateChanged { from, to }, cause.clone());
+                if before.is_fault() && !status.is_fault() {
+                    self.emit_shown(EventKind::FaultCleared, cause);
+                }
             }
         }
         let warned = before.and_then(|before| before.warning).unwrap_or(false);
         if let Some(present) = status.warning
             && present != warned
         {
-            self.emit(EventKind::Warning { present });
+            self.emit_shown(EventKind::Warning { present }, cause.clone());
         }
         let Some(before) = before else { return };
         match (somebody_else(before), somebody_else(status)) {
             (was, is) if was == is => {}
-            (_, None) => {
-                self.emit(EventKind::ControlReturned);
+            (Some(was), None) => {
+                let start = self.acted.as_ref().filter(|(job, _)| matches!(job, Job::Start(_)));
+                match start.map(|(_, cause)| cause.clone()).filter(|_| self.control_taken.is_none()) {
+                    // It was not taken from this bus: so some drives stand until they are started.
+                    Some(start) => self.emit_shown(EventKind::StartTookCommand(was), start),
+                    None => self.emit_shown(EventKind::ControlReturned, cause),
+                }
+                self.control_taken = None;
                 self.control_returned(now);
             }
+            (None, None) => {}
             (was, Some(is)) => {
                 // Whoever has control now may give another reference.
                 self.given = None;
-                self.emit(EventKind::ControlTaken(is));
+                let given = self.acted.as_ref().filter(|(job, _)| *job == Job::Release);
+                match given.map(|(_, cause)| cause.clone()) {
+                    _ if found => self.emit_shown(EventKind::ControlElsewhere(is), Cause::Found),
+                    // It was given, not taken.
+                    Some(release) => {
+                        self.acted = None;
+                        self.emit_shown(EventKind::ControlElsewhere(is), release);
+                    }
+                    None => {
+                        self.control_taken = Some(is);
+                        self.emit_shown(EventKind::ControlTaken(is), cause);
+                    }
+                }
                 if was.is_none() && (self.started_here || before.state == State::Running) {
                     self.control_taken(now);
                 }
@@ -140,11 +176,23 @@ impl Supervisor {
         }
     }
 
+    /// Why a state became another: by what was last written, if that does it; else the drive did it by itself.
+    fn cause_of(&self, from: State, to: State) -> Cause {
+        let Some((job, cause)) = &self.acted else { return Cause::Drive };
+        let does_it = match job {
+            Job::Start(_) => !from.is_fault() && !to.is_fault() && from != State::Running,
+            Job::Stop(_) | Job::Withdraw => to != State::Running && !to.is_fault(),
+            Job::ResetFaults => from.is_fault() && !to.is_fault(),
+            _ => false,
+        };
+        if does_it { cause.clone() } else { Cause::Drive }
+    }
+
     /// A motor that turns without the watchdog of its contract is an alarm.
     pub(super) fn tell_watchdog(&mut self) {
         let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
         if let Some(why) = self.checks.not_in_force(moving && self.link == Link::Connected) {
-            self.emit(EventKind::WatchdogNotInForce(why));
+            self.emit_shown(EventKind::WatchdogNotInForce(why), Cause::Found);
         }
     }
 
@@ -156,7 +204,9 @@ impl Supervisor {
             self.run_ended_by_trip(now);
         }
         self.explanations = EXPLANATIONS;
-        self.emit(EventKind::Tripped(Box::new(trip.clone())));
+        let cause = if trip.found { Cause::Found } else { Cause::Drive };
+        self.emit_shown(EventKind::Tripped(Box::new(trip.clone())), cause);
+        self.acted = None;
         let by_watchdog = trip.by_watchdog;
         let trips: &mut VecDeque<Trip> = Arc::make_mut(&mut self.trips);
         if trips.len() == TRIPS {
@@ -190,7 +240,8 @@ impl Supervisor {
         trip.watchdog_after = trip.watchdog_after.filter(|_| trip.by_watchdog);
         let explained = trip.clone();
         let present = self.status.as_ref().is_some_and(|status| status.value.is_fault());
-        self.emit(EventKind::TripExplained(Box::new(explained)));
+        let cause = if explained.found { Cause::Found } else { Cause::Drive };
+        self.emit_by(EventKind::TripExplained(Box::new(explained)), cause);
         if by_watchdog && present {
             self.reset_watchdog_trip(now);
         }
@@ -219,8 +270,8 @@ impl Supervisor {
 
     fn check_limit(&mut self, name: &'static str, measured: Option<(Limit, bool)>) {
         let Some((limit, exceeded)) = measured else { return };
-        let changed = if exceeded { self.exceeded.insert(name) } else { self.exceeded.remove(name) };
-        if changed {
+        let was = if exceeded { self.exceeded.insert(name, limit) } else { self.exceeded.remove(name) };
+        if was.is_some() != exceeded {
             self.emit(EventKind::Limit { limit, exceeded });
         }
     }
@@ -232,6 +283,7 @@ impl Supervisor {
         let silent_for = now.saturating_duration_since(self.silent_since);
         self.emit(EventKind::Lost { silent_for, error: self.last_error.clone() });
         self.given = None;
+        self.acted = None;
         self.explanations = 0;
         self.end_orders_by_loss();
         self.end_questions(&Refused::NotConnected);

@@ -6,7 +6,10 @@ use drive_core::Error;
 use tokio::time::Instant;
 
 use super::{Asker, Job, Leave, Supervisor, permission::Blocked};
-use crate::outcome::{Order, Outcome, Refused, Unconfirmed};
+use crate::{
+    cause::{Cause, Policy},
+    outcome::{Order, Outcome, Refused, Unconfirmed},
+};
 
 /// An order that waits.
 #[derive(Debug)]
@@ -55,6 +58,10 @@ impl Active {
         }
     }
 
+    pub(super) fn cause(&self) -> Cause {
+        self.asker.cause()
+    }
+
     /// How it ends when something comes in between.
     fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
         match &self.phase {
@@ -77,7 +84,7 @@ impl Supervisor {
     ) -> bool {
         self.changed = true;
         if let Some(refused) = self.refuse_at_once(&asker, &order, leave) {
-            self.conclude(asker, order.command(), Outcome::Refused(refused));
+            self.conclude_order(asker, &order, Outcome::Refused(refused));
             return false;
         }
         if matches!(order, Order::Setpoint { .. }) {
@@ -97,14 +104,14 @@ impl Supervisor {
             std::mem::take(&mut self.queue).into_iter().partition(|queued| is_setpoint(&queued.order));
         self.queue = rest;
         for queued in older {
-            self.conclude(queued.asker, queued.order.command(), Outcome::Refused(Refused::Superseded));
+            self.conclude_order(queued.asker, &queued.order, Outcome::Refused(Refused::Superseded));
         }
         let replaced = self.active.take_if(|active| {
             is_setpoint(&active.order) && matches!(active.phase, Phase::Prepare | Phase::Verifying { .. })
         });
         if let Some(active) = replaced {
             let outcome = active.ended_by(Refused::Superseded, Unconfirmed::Superseded);
-            self.conclude(active.asker, active.order.command(), outcome);
+            self.conclude_order(active.asker, &active.order, outcome);
         }
     }
 
@@ -114,7 +121,7 @@ impl Supervisor {
     }
 
     pub(super) fn enqueue_reset(&mut self, now: Instant) {
-        self.enqueue(now, Asker::Policy("on fault"), Order::ResetFaults, None);
+        self.enqueue(now, Asker::Policy(Policy::OnFault), Order::ResetFaults, None);
     }
 
     /// Whether a start is being carried out.
@@ -138,7 +145,7 @@ impl Supervisor {
                 self.active.take_if(|active| next_waits && matches!(active.phase, Phase::Awaiting { .. }))
             {
                 let outcome = Outcome::NotConfirmed(Unconfirmed::Superseded);
-                self.conclude(active.asker, active.order.command(), outcome);
+                self.conclude_order(active.asker, &active.order, outcome);
             }
             if self.active.is_none() {
                 let Queued { asker, order, expires } = self.queue.pop_front()?;
@@ -162,8 +169,10 @@ impl Supervisor {
             }
             let (order, expires) = (active.order, active.expires);
             if expires <= now {
-                let blocked = active.blocked.clone();
-                self.end_order(blocked.map_or(Outcome::Expired, Outcome::Refused));
+                let waited = active.blocked.is_some();
+                // What it has waited for may have come just now, and then something else is in the way, or nothing.
+                let blocked = self.allow(now, order, self.active.as_ref()).err().filter(|_| waited);
+                self.end_order(blocked.map_or(Outcome::Expired, |by| Outcome::Refused(by.reason())));
                 continue;
             }
             match self.allow(now, order, self.active.as_ref()) {
@@ -199,6 +208,10 @@ impl Supervisor {
         }
     }
 
+    fn conclude_order(&mut self, asker: Asker, order: &Order, outcome: Outcome) {
+        self.conclude(asker, order.command(), order.start_setpoint(), outcome);
+    }
+
     pub(super) fn set_phase(&mut self, phase: Phase) {
         if let Some(active) = &mut self.active {
             active.phase = phase;
@@ -214,7 +227,7 @@ impl Supervisor {
 
     pub(super) fn end_order(&mut self, outcome: Outcome) {
         if let Some(active) = self.active.take() {
-            self.conclude(active.asker, active.order.command(), outcome);
+            self.conclude_order(active.asker, &active.order, outcome);
         }
     }
 
@@ -261,7 +274,7 @@ impl Supervisor {
 
     fn end_queue(&mut self, refused: &Refused) {
         for queued in std::mem::take(&mut self.queue) {
-            self.conclude(queued.asker, queued.order.command(), Outcome::Refused(refused.clone()));
+            self.conclude_order(queued.asker, &queued.order, Outcome::Refused(refused.clone()));
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) enum Blocked {
 }
 
 impl Blocked {
-    fn reason(self) -> Refused {
+    pub(super) fn reason(self) -> Refused {
         let (Self::For(reason) | Self::Until(_, reason) | Self::Meanwhile(reason)) = self;
         reason
     }
@@ -96,8 +96,8 @@ impl Supervisor {
         leave: Option<Leave>,
     ) -> Option<Refused> {
         let name = match asker {
-            Asker::Caller { name, .. } => Some(&**name),
-            Asker::Policy(_) | Asker::Exit => None,
+            Asker::Caller { act, .. } => Some(&*act.commander),
+            Asker::Policy(_) => None,
         };
         if let Some(refused) = self.refuse_commander(name, order) {
             return Some(refused);

@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Frequency, Result, State, Status, StopMode, Stopped};
+use drive_core::{Command, Error, ErrorKind, Frequency, Result, Setpoint, State, Status, StopMode, Stopped};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
 use crate::{
+    cause::Cause,
     event::EventKind,
     outcome::{Outcome, Refused, Unconfirmed},
     snapshot::{Link, PendingStop},
@@ -26,7 +27,12 @@ pub(super) struct Stopping {
     /// The mode by which the drive says that it stops; that which is sent until it has said so.
     used: StopMode,
     since: Instant,
+    /// Attempts that have ended.
     attempts: u32,
+    /// Attempts that have begun.
+    begun: u32,
+    /// Whose act it is, the last.
+    asker: Asker,
     /// The drive has shown that no run command is in force.
     taken: bool,
     /// When it is sent next; `None` while the drive has taken it.
@@ -50,7 +56,7 @@ impl Stopping {
         PendingStop {
             mode: self.used,
             since: self.since,
-            attempts: self.attempts,
+            attempts: self.begun,
             taken: self.taken,
             alarm: self.alarm_at.is_none(),
         }
@@ -78,7 +84,7 @@ impl Supervisor {
         patience: Option<Duration>,
     ) -> bool {
         if !self.settings.control {
-            self.conclude(asker, Command::Stop(mode), Outcome::Refused(Refused::ReadOnly));
+            self.conclude(asker, Command::Stop(mode), None, Outcome::Refused(Refused::ReadOnly));
             return false;
         }
         let mode = self.stopping.as_ref().filter(|_| anyhow).map_or(mode, |stopping| stopping.mode);
@@ -104,8 +110,8 @@ impl Supervisor {
         // A stop takes the run command back as well.
         self.withdrawal = None;
         // The exit has its own limit; until then the stop is repeated.
-        let until = if asker == Asker::Exit { now + EXIT } else { now + patience };
-        let waiter = Waiter { asker, asked: mode, until };
+        let until = if asker.is_exit() { now + EXIT } else { now + patience };
+        let waiter = Waiter { asker: asker.clone(), asked: mode, until };
         match &mut self.stopping {
             Some(stopping) => {
                 if stopping.mode != mode {
@@ -117,6 +123,7 @@ impl Supervisor {
                     stopping.pause = REPEAT.0;
                 }
                 stopping.waiters.push(waiter);
+                stopping.asker = asker;
             }
             None => {
                 self.stopping = Some(Stopping {
@@ -124,6 +131,8 @@ impl Supervisor {
                     used: mode,
                     since: now,
                     attempts: 0,
+                    begun: 0,
+                    asker,
                     taken: false,
                     next_try: Some(now),
                     pause: REPEAT.0,
@@ -154,6 +163,8 @@ impl Supervisor {
         // What never left for the line was no attempt.
         let sent = result.as_ref().err().is_none_or(|error| error.kind() != ErrorKind::NotSent);
         stopping.attempts = stopping.attempts.saturating_add(u32::from(sent));
+        stopping.begun = stopping.begun.saturating_sub(u32::from(!sent));
+        let cause = stopping.asker.cause();
         let status = match result {
             Ok(Stopped { status, mode: used, instead: why, taken_from }) => {
                 let asked = stopping.mode;
@@ -170,10 +181,10 @@ impl Supervisor {
                     }
                 }
                 if let Some(other) = taken_from {
-                    self.emit(EventKind::StopTookCommand(other));
+                    self.emit_by(EventKind::StopTookCommand(other), cause.clone());
                 }
                 if used != asked && used != told {
-                    self.emit(EventKind::StopModeReplaced { asked, used, why });
+                    self.emit_by(EventKind::StopModeReplaced { asked, used, why }, cause);
                 }
                 Some(status)
             }
@@ -209,9 +220,9 @@ impl Supervisor {
             let Some(stopping) = self.stopping.take() else { return };
             self.given = None;
             for waiter in stopping.waiters {
-                self.conclude(waiter.asker, Command::Stop(waiter.asked), Outcome::Confirmed);
+                self.conclude(waiter.asker, Command::Stop(waiter.asked), None, Outcome::Confirmed);
             }
-            self.emit(EventKind::StopConfirmed);
+            self.emit_shown(EventKind::StopConfirmed, stopping.asker.cause());
         } else if runs && stopping.taken {
             stopping.taken = false;
             stopping.next_try = Some(now);
@@ -227,13 +238,14 @@ impl Supervisor {
         if !alarm && over.is_empty() {
             return;
         }
-        let (since, attempts) = (now.saturating_duration_since(stopping.since), stopping.attempts);
+        let (since, attempts) = (now.saturating_duration_since(stopping.since), stopping.begun);
+        let cause = stopping.asker.cause();
         let outcome = self.unconfirmed_stop(now);
         if alarm {
-            self.emit(EventKind::StopUnconfirmed { since, attempts, outcome: outcome.clone() });
+            self.emit_by(EventKind::StopUnconfirmed { since, attempts, outcome: outcome.clone() }, cause);
         }
         for waiter in over {
-            self.conclude(waiter.asker, Command::Stop(waiter.asked), outcome.clone());
+            self.conclude(waiter.asker, Command::Stop(waiter.asked), None, outcome.clone());
         }
     }
 
@@ -260,13 +272,26 @@ impl Supervisor {
     }
 
     /// Tells everybody how a command ended, and its caller first.
-    pub(super) fn conclude(&mut self, asker: Asker, command: Command, outcome: Outcome) {
-        let commander = asker.name();
+    pub(super) fn conclude(
+        &mut self,
+        asker: Asker,
+        command: Command,
+        setpoint: Option<Setpoint>,
+        outcome: Outcome,
+    ) {
+        let (commander, cause) = (asker.name(), asker.cause());
         match asker {
             Asker::Caller { id, .. } => self.outputs.push_back(Output::Answer(id, outcome.clone())),
+            Asker::Policy(_) if asker.is_exit() => self.exit_concluded(&outcome),
             Asker::Policy(_) => {}
-            Asker::Exit => self.exit_concluded(&outcome),
         }
-        self.emit(EventKind::Command { command, commander, outcome });
+        self.emit_by(EventKind::Command { command, setpoint, commander, outcome }, cause);
+    }
+
+    /// An attempt is on its way; whose.
+    pub(super) fn begin_attempt(&mut self) -> Option<Cause> {
+        let stopping = self.stopping.as_mut()?;
+        stopping.begun = stopping.begun.saturating_add(1);
+        Some(stopping.asker.cause())
     }
 }

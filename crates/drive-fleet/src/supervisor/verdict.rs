@@ -12,6 +12,7 @@ use super::{
     orders::{Active, Phase},
 };
 use crate::{
+    cause::Policy,
     limits::Given,
     outcome::{Order, Outcome, Refused, Unconfirmed, Until},
     snapshot::has_reached,
@@ -192,7 +193,7 @@ impl Supervisor {
     /// A run command whose effect has not shown may still stand in the drive, or on its way there, and turn the motor when
     /// nobody expects it any more. A stop takes it back.
     fn withdraw_start(&mut self, now: Instant) {
-        let by = Asker::Policy("start not confirmed");
+        let by = Asker::Policy(Policy::StartNotConfirmed);
         self.begin_stop(now, by, StopMode::Ramp, self.settings.times.stop_alarm);
     }
 }

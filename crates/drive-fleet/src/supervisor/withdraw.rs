@@ -7,11 +7,11 @@ use drive_core::{Command, Error, ErrorKind, Result, Status, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, stopping::REPEAT};
-use crate::{event::EventKind, outcome::Outcome, settings::OnControlTaken};
+use crate::{cause::Policy, event::EventKind, outcome::Outcome, settings::OnControlTaken};
 
 /// Who withdraws and stops here, as events name it.
-const TAKEN: Asker = Asker::Policy("control taken");
-const TRIPPED: Asker = Asker::Policy("tripped");
+const TAKEN: Asker = Asker::Policy(Policy::ControlTaken);
+const TRIPPED: Asker = Asker::Policy(Policy::Tripped);
 
 /// A run command that is to be withdrawn.
 #[derive(Debug)]
@@ -22,11 +22,21 @@ pub(super) struct Withdrawal {
     pause: Duration,
     /// When it becomes an alarm that it still stands; `None` when it has.
     alarm_at: Option<Instant>,
+    /// Why it still stands, once that is an alarm.
+    stands: Option<Error>,
 }
 
 impl Withdrawal {
     pub(super) const fn wake_at(&self) -> Option<Instant> {
         self.next_try
+    }
+
+    pub(super) const fn asker(&self) -> &Asker {
+        &self.asker
+    }
+
+    pub(super) const fn stands(&self) -> Option<&Error> {
+        self.stands.as_ref()
     }
 }
 
@@ -49,7 +59,8 @@ impl Supervisor {
         // A stop that is under way ends the run command anyhow.
         if self.settings.control && self.stopping.is_none() && self.withdrawal.is_none() {
             let alarm_at = Some(now + self.settings.times.stop_alarm);
-            self.withdrawal = Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at });
+            self.withdrawal =
+                Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at, stands: None });
         }
     }
 
@@ -72,7 +83,7 @@ impl Supervisor {
                 let asker = withdrawal.asker.clone();
                 self.withdrawal = None;
                 self.started_here = false;
-                self.conclude(asker, Command::Withdraw, Outcome::Confirmed);
+                self.conclude(asker, Command::Withdraw, None, Outcome::Confirmed);
                 self.accept_status(now, status);
             }
             Err(error) => {
@@ -80,6 +91,9 @@ impl Supervisor {
                 withdrawal.next_try = (!lacks).then_some(now + withdrawal.pause);
                 withdrawal.pause = (withdrawal.pause * 2).min(REPEAT.1);
                 let alarm = withdrawal.alarm_at.take_if(|at| lacks || *at <= now).is_some();
+                if withdrawal.alarm_at.is_none() {
+                    withdrawal.stands = Some(error.clone());
+                }
                 let status = match &error {
                     Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
                     _ => None,

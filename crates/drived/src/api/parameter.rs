@@ -9,7 +9,7 @@ use axum::{
     response::Response,
 };
 use drive_core::{Refusal, Row, registers::Storage};
-use drive_fleet::{DriveHandle, Order, Outcome, Refused, Snapshot};
+use drive_fleet::{Act, DriveHandle, Order, Outcome, Refused, Snapshot};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use tokio::time::{Instant, timeout};
@@ -89,7 +89,7 @@ pub(super) async fn write(
     if !caller.rights.engineer {
         return Err(Problem::lacks_right(&caller, "change parameters"));
     }
-    let drive = find(&plant, &name)?.commanded_by(&caller.name);
+    let drive = find(&plant, &name)?.commanded_by(Act::of(&caller.name).through(&caller.origin));
     let row = row(&drive, &register)?;
     let text = match value {
         Value::Number(number) => number.to_string(),

@@ -103,7 +103,12 @@ impl Outcomes {
     pub(super) async fn follow(self, mut events: Events) {
         loop {
             match events.recv().await {
-                Received::Event(Event { drive, at, kind: EventKind::Command { command, outcome, .. } }) => {
+                Received::Event(Event {
+                    drive,
+                    at,
+                    kind: EventKind::Command { command, outcome, .. },
+                    ..
+                }) => {
                     let command = match command.action() {
                         "start" => 1,
                         "stop" => 2,

@@ -378,7 +378,7 @@ impl Desk {
             }
             writes.push((row, word));
         }
-        let drive = drive.commanded_by(&self.config.name);
+        let drive = drive.commanded_by(&*self.config.name);
         for (row, word) in writes {
             let what = format!("{}: {} = {word}", drive.name(), row.code);
             let record = self.audit.record(Record::new(Kind::Command, caller, what));

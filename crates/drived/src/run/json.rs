@@ -43,21 +43,19 @@ pub(super) fn missed(events: u64) -> String {
 #[cfg(test)]
 mod tests {
     use drive_core::{Command, Direction};
-    use drive_fleet::{EventKind, Outcome};
+    use drive_fleet::{Cause, EventKind, Outcome};
 
     use super::*;
 
     #[test]
     fn an_outcome_is_an_object_that_names_command_commander_and_outcome() {
-        let told = event(&Event {
-            drive: "pump 1".into(),
-            at: Instant::now(),
-            kind: EventKind::Command {
-                command: Command::Start(Direction::Forward),
-                commander: "operator".into(),
-                outcome: Outcome::Expired,
-            },
-        });
+        let command = EventKind::Command {
+            command: Command::Start(Direction::Forward),
+            setpoint: None,
+            commander: "operator".into(),
+            outcome: Outcome::Expired,
+        };
+        let told = event(&Event::now("pump 1", command, Cause::Command("operator".into())));
         let object: serde_json::Value = serde_json::from_str(&told).unwrap();
         assert_eq!((&object["kind"], &object["event"]), (&"event".into(), &"command".into()));
         assert_eq!(object["command"]["command"], "start forward");

@@ -59,7 +59,7 @@ fn a_drive_that_is_only_read_is_never_written() {
     rig.pass(2_000 * MS);
     let start = rig.order(START);
     let stop = rig.stop(StopMode::Ramp);
-    rig.machine.handle_exit(rig.now);
+    rig.machine.handle_exit(rig.now, Policy::Exit);
     rig.pass(2_000 * MS);
     assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::ReadOnly)));
     assert_eq!(rig.outcome(stop), Some(&Outcome::Refused(Refused::ReadOnly)));

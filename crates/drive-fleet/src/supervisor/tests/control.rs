@@ -109,7 +109,7 @@ fn a_drive_that_starts_again_by_itself_is_told_at_each_connect_and_is_an_alarm_u
         rig.pass(2_000 * MS);
         let told = EventKind::RestartsItself { by: [restart].into(), accepted };
         assert_eq!(told.is_alarm(), !accepted);
-        assert_eq!(rig.outputs.iter().filter(|output| **output == Output::Event(told.clone())).count(), 1);
+        assert_eq!(rig.times_told(&told), 1);
         assert_eq!(rig.snapshot().self_restarts.as_deref(), Some(&[restart][..]));
     }
 }

@@ -284,7 +284,7 @@ impl Rig {
 
     fn asker(&mut self) -> Asker {
         self.next_call += 1;
-        Asker::Caller { id: CallId(self.next_call), name: Arc::from("tester") }
+        Asker::Caller { id: CallId(self.next_call), act: Arc::new(Act::of("tester")) }
     }
 
     fn order(&mut self, order: Order) -> CallId {
@@ -308,12 +308,20 @@ impl Rig {
         })
     }
 
-    fn events(&self) -> Vec<&'static str> {
-        let names = self.outputs.iter().filter_map(|output| match output {
-            Output::Event(kind) => Some(kind.name()),
+    fn happened(&self) -> impl Iterator<Item = &Happened> {
+        self.outputs.iter().filter_map(|output| match output {
+            Output::Event(happened) => Some(happened),
             Output::Answer(..) | Output::Told(..) => None,
-        });
-        names.collect()
+        })
+    }
+
+    fn events(&self) -> Vec<&'static str> {
+        self.happened().map(|happened| happened.kind.name()).collect()
+    }
+
+    /// How often this was told.
+    fn times_told(&self, kind: &EventKind) -> usize {
+        self.happened().filter(|happened| happened.kind == *kind).count()
     }
 }
 

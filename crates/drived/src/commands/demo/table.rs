@@ -176,7 +176,7 @@ mod tests {
     use std::time::Duration;
 
     use drive_core::{Control, Current, Frequency, State, Status};
-    use drive_fleet::{EventKind, Outcome};
+    use drive_fleet::{Cause, EventKind, Outcome};
     use ratatui::{Terminal, backend::TestBackend};
 
     use super::*;
@@ -202,11 +202,7 @@ mod tests {
             }),
             ..View::default()
         };
-        let events = VecDeque::from([Event {
-            at: Instant::now(),
-            drive: "atv312@1".into(),
-            kind: EventKind::ControlReturned,
-        }]);
+        let events = VecDeque::from([Event::now("atv312@1", EventKind::ControlReturned, Cause::Drive)]);
         let picture = Picture {
             began: Instant::now(),
             waited_for: None,

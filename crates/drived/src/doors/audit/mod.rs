@@ -178,11 +178,15 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
             Received::Missed(_) => continue,
             Received::End => return,
         };
+        let name = kind.name();
         let (caller, what, outcome) = match kind {
-            EventKind::Command { command, commander, outcome } => {
-                (commander.to_string(), format!("{drive}: {command}"), outcome.kind().to_owned())
+            EventKind::Command { command, setpoint, commander, outcome } => {
+                let at = setpoint.map(|setpoint| format!(" at {setpoint}")).unwrap_or_default();
+                (commander.to_string(), format!("{drive}: {command}{at}"), outcome.kind().to_owned())
             }
-            EventKind::Exit(action) => ("drived".to_owned(), format!("{drive}: exit"), action.to_string()),
+            EventKind::Exit(action) | EventKind::Removed(action) => {
+                ("drived".to_owned(), format!("{drive}: {name}"), action.to_string())
+            }
             _ => continue,
         };
         let caller = Caller { name: caller, origin: "fleet".to_owned(), rights: Rights::ALL };

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_core::{Command, Error, PortError, Status};
-use drive_fleet::{ExitAction, Outcome, Snapshot, Trip};
+use drive_fleet::{Cause, ExitAction, Outcome, Policy, Snapshot, Trip};
 use tokio::time::Instant;
 use tracing::Level;
 
@@ -115,8 +115,10 @@ impl Teller {
         drive: &Arc<str>,
         command: &Command,
         commander: &str,
+        cause: &Cause,
         outcome: &Outcome,
     ) {
+        let at_exit = matches!(cause, Cause::Policy { policy: Policy::Exit | Policy::Removal });
         let mine = |what: &What| match (what, command) {
             (What::FaultCleared, Command::ResetFaults) => outcome.is_confirmed(),
             (What::StopUnconfirmed { .. }, Command::Stop(_)) => !outcome.is_confirmed(),
@@ -124,13 +126,13 @@ impl Teller {
         };
         let index = self.held.iter().position(|held| held.drive == *drive && mine(&held.what));
         let held = index.map(|index| self.held.remove(index));
-        if let (Some(Held { what: What::StopUnconfirmed { .. }, .. }), true) = (&held, commander != "exit") {
+        if let (Some(Held { what: What::StopUnconfirmed { .. }, .. }), true) = (&held, !at_exit) {
             let text = format!("STOP NOT CONFIRMED, the motor may turn: {command} by {commander}: {outcome}");
             self.say(now, drive, Level::ERROR, "stop", text);
             return;
         }
         // What was done at the exit is told as that, and a run command that stands although it is to be withdrawn.
-        if commander == "exit" || *command == Command::Withdraw && outcome.is_confirmed() {
+        if at_exit || *command == Command::Withdraw && outcome.is_confirmed() {
             self.held.extend(held);
             return;
         }

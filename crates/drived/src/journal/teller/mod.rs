@@ -197,8 +197,8 @@ impl Teller {
                     );
                 }
             }
-            EventKind::Command { command, commander, outcome } => {
-                self.commanded(now, drive, command, commander, outcome);
+            EventKind::Command { command, commander, outcome, .. } => {
+                self.commanded(now, drive, command, commander, &event.cause, outcome);
             }
             EventKind::Identified(_) => {
                 let text = event.kind.to_string();
@@ -214,11 +214,15 @@ impl Teller {
             }
             EventKind::RestartsItself { by, .. } if by.is_empty() => {}
             // Whoever commands is told the outcome, and what happens without a command is told as what it is.
-            EventKind::StateChanged { .. } => {}
+            EventKind::StateChanged { .. } | EventKind::StartTookCommand(_) => {}
             EventKind::WatchdogRestored(_) | EventKind::WatchdogStays { .. } => {
                 self.share(now, drive, Fate::AtExit, Level::INFO, Duration::ZERO, event.kind.to_string());
             }
             EventKind::Exit(action) => self.exited(now, drive, action),
+            EventKind::Removed(action) => {
+                let level = if action.is_alarm() { Level::ERROR } else { Level::INFO };
+                self.say(now, drive, level, "removed", event.kind.to_string());
+            }
             kind => {
                 let level = match kind {
                     EventKind::RunCommandStands(_) | EventKind::IdentityChanged { .. } => Level::ERROR,

@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_core::StopMode;
-use drive_fleet::{DriveHandle, Group, GroupFailure, GroupStart, Link, Order, Outcome};
+use drive_fleet::{Act, DriveHandle, Group, GroupFailure, GroupStart, Link, Order, Outcome};
 use futures_util::future::join_all;
 use tokio::{
     sync::Notify,
@@ -54,8 +54,11 @@ struct Inner {
 
 impl Work {
     pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, members: Vec<DriveHandle>) -> Self {
+        let id = request.id.clone().unwrap_or_else(new_id);
+        let act = Act::of(&caller.name).through(&caller.origin).with_id(&id);
+        let members: Vec<_> = members.iter().map(|member| member.commanded_by(act.clone())).collect();
         let head = CommandView {
-            id: request.id.clone().unwrap_or_else(new_id),
+            id,
             drive: None,
             group: None,
             action: request.action.word(),

@@ -202,7 +202,7 @@ impl Plant {
         let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
         for name in self.named(&groups, &request.target)? {
             match fleet.drive(&name) {
-                Some(drive) => members.push(drive.commanded_by(&caller.name)),
+                Some(drive) => members.push(drive),
                 // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
                 None if may_be_less => {}
                 None => return Err(Rejected::NoDrive(name)),

@@ -8,16 +8,18 @@ use std::{
 
 use drive_core::{
     Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Identity,
-    Measurements, Percent, PortError, Reaction, Refusal, SelfRestart, SlaveAddress, Speed, State, Status,
-    StopMode, Watchdog,
+    Measurements, Percent, PortError, RawWord, Reaction, Refusal, SelfRestart, SlaveAddress, Speed, State,
+    Status, StopMode, Watchdog,
 };
 use serde_json::{Value, from_value, json, to_value};
 use tokio::time::{Instant, advance};
 
 use crate::{
-    Alarms, Band, Commanders, Counters, DriveSettings, Event, EventKind, ExitAction, FrequencyLimits,
-    IdentityCheck, LimitProblem, Link, OnExit, OnFault, OnLoss, Outcome, PendingStop, Periods, Refused,
-    Snapshot, StopReport, Timed, Trip, Unconfirmed, Unknown, WatchdogCheck, WatchdogContract,
+    Act, Alarms, Band, Cause, ChangedWord, Commanders, Counters, DriveSettings, Event, EventKind, ExitAction,
+    FrequencyLimits, IdentityCheck, LastSeen, Limit, LimitProblem, Link, OnExit, OnFault, OnLoss, Outcome,
+    PendingStop, Periods, Policy, Refused, Snapshot, StopReport, Timed, Trip, Unconfirmed, Unknown,
+    WatchdogBefore, WatchdogCheck, WatchdogContract,
+    view::{EventView, Happened, SnapshotView},
 };
 
 static OLF: FaultEntry = FaultEntry::new(9, "OLF", "motor overload", "let the motor cool");
@@ -42,6 +44,11 @@ fn nothing_known() -> Snapshot {
         identity: IdentityCheck::Unchecked,
         watchdog: WatchdogCheck::NoContract { found: None },
         self_restarts: None,
+        restarts_accepted: true,
+        control_taken: None,
+        run_command_stands: None,
+        exceeded: Vec::new(),
+        since: Vec::new(),
         stop: None,
         started_here: false,
         start_refused: Some(Refused::NotConnected),
@@ -59,6 +66,8 @@ fn a_drive_that_was_never_seen_has_no_value() {
         json!({
             "name": "pump 1", "link": "connecting", "status": {"quality": "missing"},
             "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"},
+            "concerns": [{"kind": "never_seen", "severity": "note", "wakes": false, "text": "not seen yet",
+                "remedy": "wait, or look at its supply, its address and its cable"}],
             "watchdog": {"check": "no_contract"}, "start_refused": "the drive does not answer",
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
         }),
@@ -99,6 +108,9 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
             "setpoint": {"frequency_hz": 30.0}, "reached": true,
             "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false, "alarm": true},
             "started_here": true, "starts_by_itself": ["Atr"],
+            "concerns": [{"kind": "stop_unconfirmed", "severity": "alarm", "wakes": true, "since_ms": 10_120,
+                "text": "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent 2 times",
+                "remedy": "use the emergency stop, then look at the drive; the stop is repeated"}],
             "identity": {"check": "same", "model": "ATV312HU15N4", "codes": []},
             "watchdog": {"check": "verified", "time_ms": 10_000, "reaction": "ramp"},
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
@@ -116,6 +128,7 @@ fn a_fault_is_told_as_long_as_the_drive_shows_it_with_the_statuses_around_it() {
     let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
     let trip = Trip {
         at: Instant::now(),
+        found: false,
         before: Some(status(State::Running)),
         status: status(State::Fault),
         faults: Some(Arc::new(faults)),
@@ -201,9 +214,10 @@ fn an_outcome_is_one_of_six_words_with_its_reason() {
 
 #[tokio::test(start_paused = true)]
 async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
-    let told = |kind| to_value(Event { drive: "pump 1".into(), at: Instant::now(), kind }).unwrap();
+    let told = |kind| to_value(Event::now("pump 1", kind, Cause::Drive)).unwrap();
     let command = EventKind::Command {
         command: Command::Start(Direction::Forward),
+        setpoint: Some(Frequency::from_hertz(30).into()),
         commander: "operator".into(),
         outcome: Outcome::Expired,
     };
@@ -212,8 +226,12 @@ async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
     assert_eq!(
         event,
         json!({
-            "drive": "pump 1", "event": "command", "alarm": false, "text": "command: start forward by operator: expired",
-            "command": {"action": "start", "command": "start forward", "commander": "operator", "outcome": "expired"}
+            "order": 0, "drive": "pump 1", "event": "command", "alarm": false, "cause": {"by": "drive"},
+            "text": "command: start forward at 30.00 Hz by operator: expired",
+            "command": {
+                "action": "start", "command": "start forward", "direction": "forward", "given": {"frequency_hz": 30.0},
+                "commander": "operator", "outcome": "expired"
+            }
         })
     );
     let exit = told(EventKind::Exit(ExitAction::Stopped(Outcome::Confirmed)));
@@ -221,12 +239,149 @@ async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
     assert_eq!(told(EventKind::Exit(ExitAction::TimeOver))["exit"], json!({"action": "time_over"}));
     assert_eq!(told(EventKind::WatchdogBroken("not kept".to_owned()))["event"], "watchdog_broken");
 
-    let event = Event { drive: "pump 1".into(), at: Instant::now(), kind: EventKind::StopConfirmed };
+    let hour = Duration::from_secs(3_600);
+    let event = Event {
+        wall: SystemTime::UNIX_EPOCH + hour,
+        ..Event::now("pump 1", EventKind::StopConfirmed, Cause::Drive)
+    };
     advance(Duration::from_secs(10)).await;
-    let wall = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_millis() as u64;
-    let before = wall();
-    let told = to_value(event).unwrap()["time_unix_ms"].as_u64().unwrap();
-    assert!((before - 10_000..=wall() - 10_000).contains(&told), "{told}");
+    assert_eq!(to_value(event).unwrap()["time_unix_ms"], 3_600_000, "the wall's clock as it stood then");
+}
+
+/// One of every kind, with everything that it may carry.
+fn every_kind() -> Vec<EventKind> {
+    let slave = SlaveAddress::try_from(7).unwrap();
+    let exchange = drive_core::Exchange { function: 6, register: Some(8_601) };
+    let error = || Error::Port { slave, exchange, problem: PortError::Closed };
+    let identity = |model: &str| Arc::new(Identity { model: Some(model.to_owned()), ..Identity::default() });
+    let watchdog = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
+    let before = WatchdogBefore { identity: "one".to_owned(), set: watchdog, found: watchdog };
+    let seen = LastSeen { status: status(State::Running).value, age: Duration::from_millis(120) };
+    let over =
+        Unconfirmed::TimeOver { after: Duration::from_secs(2), last: Some(seen.clone()), because: None };
+    let unknown = Outcome::OutcomeUnknown(Unknown { error: Some(error()), last: Some(seen) });
+    let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
+    let trip = Box::new(Trip {
+        at: Instant::now(),
+        found: true,
+        before: Some(status(State::Running)),
+        status: status(State::Fault),
+        faults: Some(Arc::new(faults)),
+        by_watchdog: true,
+        watchdog_after: Some(Duration::from_secs(3)),
+    });
+    let amperes = Current::from_deciamperes;
+    vec![
+        EventKind::Connected(status(State::Ready).value),
+        EventKind::Lost { silent_for: Duration::from_secs(3), error: Some(error()) },
+        EventKind::Lost { silent_for: Duration::from_secs(3), error: None },
+        EventKind::StateChanged { from: State::Ready, to: State::Running },
+        EventKind::Tripped(trip.clone()),
+        EventKind::TripExplained(trip),
+        EventKind::FaultCleared,
+        EventKind::Warning { present: true },
+        EventKind::Limit {
+            limit: Limit::Current { measured: amperes(39), limit: amperes(35) },
+            exceeded: true,
+        },
+        EventKind::Limit {
+            limit: Limit::MotorThermal {
+                measured: Percent::from_percent(101),
+                limit: Percent::from_percent(95),
+            },
+            exceeded: false,
+        },
+        EventKind::ControlTaken(Control::Panel),
+        EventKind::ControlElsewhere(Control::Local),
+        EventKind::ControlReturned,
+        EventKind::StartTookCommand(Control::OtherBus),
+        EventKind::RunCommandStands(error()),
+        EventKind::RestartsItself {
+            by: [SelfRestart { code: "Atr", meaning: "starts the motor again" }].into(),
+            accepted: false,
+        },
+        EventKind::Identified(identity("A")),
+        EventKind::IdentityChanged { remembered: identity("A"), found: identity("B") },
+        EventKind::WatchdogVerified { watchdog, written: true, before: Some(Arc::new(before)) },
+        EventKind::WatchdogBroken("not kept".to_owned()),
+        EventKind::WatchdogNotInForce("off".to_owned()),
+        EventKind::WatchdogRestored(watchdog),
+        EventKind::WatchdogStays { timeout: Duration::from_secs(10), why: "the motor turns" },
+        EventKind::Command {
+            command: Command::Start(Direction::Forward),
+            setpoint: Some(Frequency::from_hertz(30).into()),
+            commander: "operator".into(),
+            outcome: Outcome::NotConfirmed(over),
+        },
+        EventKind::Command {
+            command: Command::Setpoint(Speed::from_rpm(900).into()),
+            setpoint: None,
+            commander: "operator".into(),
+            outcome: Outcome::Refused(Refused::Drive(error())),
+        },
+        EventKind::StopModeReplaced { asked: StopMode::Ramp, used: StopMode::Freewheel, why: Some("Stt") },
+        EventKind::StopTookCommand(Control::Terminals),
+        EventKind::StopUnconfirmed { since: Duration::from_secs(2), attempts: 3, outcome: unknown.clone() },
+        EventKind::StopConfirmed,
+        EventKind::Reconfigured(vec!["periods"]),
+        EventKind::Exit(ExitAction::Stopped(unknown)),
+        EventKind::Exit(ExitAction::TimeOver),
+        EventKind::Removed(ExitAction::Left),
+    ]
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_of_every_kind_reads_back_as_it_was_told_with_its_fields_and_its_cause() {
+    let act = Act::of("operator").through("page").with_id("c-12");
+    let causes = [Cause::Command(act), Cause::Policy { policy: Policy::Removal }, Cause::Drive, Cause::Found];
+    let word = RawWord { address: 3_201, code: "ETA", value: 0x27 };
+    for (order, kind) in (1..).zip(every_kind()) {
+        let cause = causes[order as usize % causes.len()].clone();
+        let words = [ChangedWord { word, before: Some(0x23) }, ChangedWord { word, before: None }].into();
+        let name = kind.name().replace(' ', "_");
+        let event = Event { order, words, ..Event::now("pump 1", kind, cause) };
+        let told = to_value(&event).unwrap();
+        assert_eq!(told["event"], name, "the name of a kind is the same in the log and in JSON");
+        let fields = ["order", "time_unix_ms", "drive", "event", "alarm", "text", "cause", "words"];
+        let others = told.as_object().unwrap().keys().filter(|key| !fields.contains(&key.as_str()));
+        let has_none = matches!(
+            event.kind,
+            EventKind::FaultCleared | EventKind::ControlReturned | EventKind::StopConfirmed
+        );
+        assert_eq!(others.count() == 0, has_none, "{told}");
+        let read: EventView = from_value(told.clone()).unwrap_or_else(|error| panic!("{error}: {told}"));
+        assert_eq!(read, EventView::from(&event));
+        assert_eq!(to_value(&read).unwrap(), told);
+    }
+    let told = to_value(Event::now("pump 1", EventKind::FaultCleared, causes[0].clone())).unwrap();
+    assert_eq!(
+        told["cause"],
+        json!({"by": "command", "commander": "operator", "door": "page", "act": "c-12"})
+    );
+    let read: EventView = from_value(told).unwrap();
+    assert_eq!(read.what, Happened::FaultCleared);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_snapshot_reads_back_as_it_was_told() {
+    let nothing = nothing_known();
+    let now = Instant::now();
+    let whole = Snapshot {
+        link: Link::Connected,
+        status: Some(status(State::Running)),
+        setpoint: Some(Speed::from_rpm(900).into()),
+        identity: IdentityCheck::CannotSay,
+        watchdog: WatchdogCheck::Broken("not kept".to_owned()),
+        stop: Some(PendingStop { mode: StopMode::Fast, since: now, attempts: 1, taken: true, alarm: false }),
+        since: vec![(crate::ConcernKind::WatchdogBroken, now)],
+        ..nothing_known()
+    };
+    for snapshot in [nothing, whole] {
+        let told = to_value(&snapshot).unwrap();
+        let read: SnapshotView = from_value(told.clone()).unwrap();
+        assert_eq!(read, SnapshotView::of(&snapshot, now));
+        assert_eq!(to_value(&read).unwrap(), told);
+    }
 }
 
 #[test]
@@ -245,7 +400,8 @@ fn a_stop_of_several_drives_names_each_that_is_not_confirmed() {
         report,
         json!({
             "confirmed": ["pump 1"], "read_only": [], "broadcasts": [],
-            "unconfirmed": [{"drive": "pump 2", "outcome": "refused", "reason": "drive", "text": "slave 2, function 06h: the line is closed"}]
+            "unconfirmed": [{"drive": "pump 2", "outcome": "refused", "reason": "drive", "text": "slave 2, function 06h: the line is closed",
+                "error": {"kind": "not_sent", "text": "slave 2, function 06h: the line is closed"}}]
         }),
     );
 }

@@ -1,0 +1,300 @@
+//! What troubles a drive: [`Concern`]. **One table** says how badly, in which words, what to do, and whether it wakes
+//! somebody; every face, every log and every rule of a monitoring system shows this and decides nothing of its own.
+
+use std::{fmt, time::Duration};
+
+use tokio::time::Instant;
+
+use crate::{
+    outcome::Tenths,
+    snapshot::{Freshness, IdentityCheck, Link, Snapshot, WatchdogCheck},
+};
+
+/// How badly something troubles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub enum Severity {
+    /// Somebody should go there now.
+    Alarm,
+    /// Somebody should see to it.
+    Warning,
+    /// It should be known, and is often over by itself.
+    Note,
+}
+
+drive_core::named! { Severity {
+    Alarm => "alarm",
+    Warning => "warning",
+    Note => "note",
+} }
+
+/// A row of the table.
+struct Row {
+    word: &'static str,
+    words: &'static str,
+    remedy: &'static str,
+    severity: Severity,
+    wakes: bool,
+}
+
+macro_rules! table {
+    ($($(#[$doc:meta])* $kind:ident: $word:literal, $words:literal, $severity:ident, $wakes:literal, $remedy:literal;)*) => {
+        /// What it is that troubles a drive. **In the order of its rank**: the worst comes first.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+        #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+        pub enum ConcernKind {
+            $($(#[$doc])* $kind,)*
+        }
+
+        impl ConcernKind {
+            /// All of them, the worst first.
+            pub const ALL: &'static [Self] = &[$(Self::$kind),*];
+
+            const fn row(self) -> Row {
+                match self {
+                    $(Self::$kind => Row {
+                        word: $word,
+                        words: $words,
+                        remedy: $remedy,
+                        severity: Severity::$severity,
+                        wakes: $wakes,
+                    },)*
+                }
+            }
+        }
+    };
+}
+
+table! {
+    /// A stop goes without a confirmation for longer than the settings allow: [`PendingStop::alarm`](crate::PendingStop).
+    StopUnconfirmed: "stop_unconfirmed", "STOP NOT CONFIRMED, the motor may turn", Alarm, true,
+        "use the emergency stop, then look at the drive; the stop is repeated";
+    /// Somebody else has control and the run command of this side still stands in the drive.
+    RunCommandStands: "run_command_stands", "a run command stands, the motor may start when control is given back", Alarm, true,
+        "stop the drive at its panel before control is given back";
+    /// It does not answer, and its motor turned when it was last seen.
+    LostRunning: "lost_running", "lost while it was running, the motor may turn", Alarm, true,
+        "look at the motor, then at the drive's supply and its cable";
+    /// It has tripped.
+    Tripped: "tripped", "tripped", Alarm, false,
+        "remove the cause, then reset it";
+    /// Another drive than before answers at its address.
+    IdentityChanged: "identity_changed", "another drive than before answers at its address", Alarm, false,
+        "see which drive it is, then accept its identity";
+    /// Its communication watchdog cannot be brought to what the contract says.
+    WatchdogBroken: "watchdog_broken", "its watchdog is not as the contract says", Alarm, false,
+        "set it at the drive, or change the contract";
+    /// Its motor turns, and its communication watchdog is not as the contract says.
+    WatchdogNotInForce: "watchdog_not_in_force", "its motor turns without the watchdog of its contract", Alarm, false,
+        "stop the motor: it is set up at standstill";
+    /// It does not answer.
+    Lost: "lost", "does not answer", Alarm, false,
+        "look at its supply, its address and its cable";
+    /// It answers, and what it showed last is old.
+    Stale: "stale", "what it shows is old", Warning, false,
+        "see how busy its line is";
+    /// Settings of the drive start its motor again by themselves, and nobody has accepted that.
+    RestartsItself: "restarts_itself", "its own settings start the motor again by themselves", Warning, false,
+        "switch them off at the drive, or accept them by name";
+    /// A measured value is above its limit.
+    LimitExceeded: "limit_exceeded", "above its limit", Warning, false,
+        "look at load, fan and filters";
+    /// It shows an alarm that does not trip.
+    Warning: "warning", "the drive shows an alarm", Warning, false,
+        "read its faults: they name the alarm";
+    /// Panel, terminals or another bus have taken control.
+    ControlTaken: "control_taken", "somebody else has taken control", Warning, false,
+        "give control back there";
+    /// A stop is on its way and not confirmed yet.
+    StopPending: "stop_pending", "a stop is on its way, not confirmed yet", Note, false,
+        "wait until it is confirmed";
+    /// It has not been seen yet.
+    NeverSeen: "never_seen", "not seen yet", Note, false,
+        "wait, or look at its supply, its address and its cable";
+}
+
+impl ConcernKind {
+    /// Its place: 0 is the worst.
+    #[must_use]
+    pub const fn rank(self) -> usize {
+        self as usize
+    }
+
+    /// Its word for programs.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        self.row().word
+    }
+
+    /// The same in words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        self.row().words
+    }
+
+    /// What to do first.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        self.row().remedy
+    }
+
+    /// How badly it troubles.
+    #[must_use]
+    pub const fn severity(self) -> Severity {
+        self.row().severity
+    }
+
+    /// Whether somebody is woken for it.
+    #[must_use]
+    pub const fn wakes(self) -> bool {
+        self.row().wakes
+    }
+}
+
+impl fmt::Display for ConcernKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.words())
+    }
+}
+
+/// Something that troubles a drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Concern {
+    /// What.
+    pub kind: ConcernKind,
+    /// Since when, as this side saw it; of a drive that does not answer since it did last.
+    pub since: Option<Instant>,
+    /// What is known of it besides, such as the fault or the error.
+    pub detail: Option<String>,
+}
+
+/// It in a sentence.
+impl fmt::Display for Concern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.kind.words())?;
+        self.detail.as_ref().map_or(Ok(()), |detail| write!(f, ": {detail}"))
+    }
+}
+
+impl Concern {
+    /// For how long.
+    #[must_use]
+    pub fn lasts(&self, now: Instant) -> Option<Duration> {
+        self.since.map(|since| now.saturating_duration_since(since))
+    }
+}
+
+impl Snapshot {
+    /// The worst that troubles the drive at `now`; `None` where nothing does.
+    #[must_use]
+    pub fn concern(&self, now: Instant) -> Option<Concern> {
+        self.concerns(now).into_iter().next()
+    }
+
+    /// All that troubles the drive at `now`, the worst first.
+    #[must_use]
+    pub fn concerns(&self, now: Instant) -> Vec<Concern> {
+        ConcernKind::ALL.iter().filter_map(|kind| self.concern_of(*kind, now)).collect()
+    }
+
+    fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
+        let status = self.status.as_ref();
+        let was_moving = self.started_here || status.is_some_and(|status| status.value.state.is_moving());
+        let heard = status.map(|status| status.at);
+        let error = || self.error.as_ref().map(ToString::to_string);
+        let (since, detail) = match kind {
+            ConcernKind::StopUnconfirmed => {
+                let stop = self.stop.filter(|stop| stop.alarm)?;
+                let tries = if stop.attempts == 1 { "time" } else { "times" };
+                (Some(stop.since), Some(format!("{} stop, sent {} {tries}", stop.mode, stop.attempts)))
+            }
+            ConcernKind::RunCommandStands => (None, Some(self.run_command_stands.as_ref()?.to_string())),
+            ConcernKind::LostRunning => (heard, (self.link == Link::Lost && was_moving).then(error)?),
+            ConcernKind::Tripped => {
+                let shown = status.filter(|status| status.value.is_fault())?;
+                let trip = self.present_trip();
+                let fault = trip.and_then(|trip| trip.fault());
+                let unread = || shown.value.fault_code.map(|code| format!("fault {code}"));
+                let told = fault.map(|fault| match fault.entry {
+                    Some(_) => fault.to_string(),
+                    None => format!("fault {}", fault.code),
+                });
+                (trip.map(|trip| trip.at), told.or_else(unread))
+            }
+            ConcernKind::IdentityChanged => match &self.identity {
+                IdentityCheck::Changed { remembered, found } => {
+                    (None, Some(format!("{found} instead of {remembered}")))
+                }
+                _ => return None,
+            },
+            ConcernKind::WatchdogBroken => match &self.watchdog {
+                WatchdogCheck::Broken(why) => (None, Some(why.clone())),
+                _ => return None,
+            },
+            ConcernKind::WatchdogNotInForce => {
+                let waits = matches!(self.watchdog, WatchdogCheck::WaitsForStandstill(_));
+                let turns = status.is_some_and(|status| !status.value.is_standstill());
+                (None, (waits && turns && self.link == Link::Connected).then_some(None)?)
+            }
+            ConcernKind::Lost => (heard, (self.link == Link::Lost && !was_moving).then(error)?),
+            ConcernKind::Stale => {
+                let is_old = self.link == Link::Connected && self.freshness(now) == Freshness::Stale;
+                (heard.filter(|_| is_old).map(Some)?, error())
+            }
+            ConcernKind::RestartsItself => {
+                let by =
+                    self.self_restarts.as_ref().filter(|by| !by.is_empty() && !self.restarts_accepted)?;
+                let codes: Vec<&str> = by.iter().map(|restart| restart.code).collect();
+                (None, Some(codes.join(", ")))
+            }
+            ConcernKind::LimitExceeded => {
+                let limits: Vec<String> = self.exceeded.iter().map(ToString::to_string).collect();
+                (None, (!limits.is_empty()).then(|| Some(limits.join(", ")))?)
+            }
+            ConcernKind::Warning => {
+                (None, status.filter(|status| status.value.warning == Some(true)).map(|_| None)?)
+            }
+            ConcernKind::ControlTaken => (None, Some(self.control_taken?.to_string())),
+            ConcernKind::StopPending => {
+                let stop = self.stop.filter(|stop| !stop.alarm)?;
+                let lasts = Tenths(now.saturating_duration_since(stop.since));
+                let how = if stop.taken { "the drive is stopping" } else { "it is repeated" };
+                (Some(stop.since), Some(format!("{} stop for {lasts}, {how}", stop.mode)))
+            }
+            ConcernKind::NeverSeen => (None, (self.link == Link::Connecting).then(error)?),
+        };
+        let noted = || self.since.iter().find(|(noted, _)| *noted == kind).map(|(_, since)| *since);
+        Some(Concern { kind, since: since.or_else(noted), detail })
+    }
+}
+
+/// Keeps since when there is what there is now: what was there before keeps its time.
+pub(crate) fn note(since: &mut Vec<(ConcernKind, Instant)>, concerns: &[Concern], now: Instant) {
+    since.retain(|(kind, _)| concerns.iter().any(|concern| concern.kind == *kind));
+    for concern in concerns {
+        if !since.iter().any(|(kind, _)| *kind == concern.kind) {
+            since.push((concern.kind, now));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_in_the_order_of_its_ranks_and_no_worse_thing_is_told_more_mildly() {
+        for (rank, kind) in ConcernKind::ALL.iter().enumerate() {
+            assert_eq!(kind.rank(), rank);
+        }
+        for pair in ConcernKind::ALL.windows(2) {
+            assert!(pair[0].severity() <= pair[1].severity(), "{pair:?}");
+            assert!(pair[0].wakes() || !pair[1].wakes(), "{pair:?}");
+        }
+        let words: std::collections::BTreeSet<_> = ConcernKind::ALL.iter().map(|kind| kind.word()).collect();
+        assert_eq!(words.len(), ConcernKind::ALL.len());
+    }
+}
