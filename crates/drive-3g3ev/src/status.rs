@@ -52,7 +52,7 @@ impl FastWords {
             verdict: None,
             motion: Motion::NotKnown,
             raw: self.raw,
-            at: None,
+            ..Status::default()
         }
     }
 

@@ -1,7 +1,7 @@
 //! Reading the mapped words, and what they say.
 
 use drive_core::{
-    Calls, Control, Current, Direction, Frequency, Measurements, Motion, Percent, Port, RawWord, Result, Row,
+    Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
     Setpoint, State, Status, Voltage, drivecom::ChartState,
 };
 
@@ -93,7 +93,6 @@ impl Words {
                 .at(map.output_frequency)
                 .map(|word| Frequency::from_decihertz(word.cast_signed().unsigned_abs())),
             current: self.at(map.current).map(|word| Current::from_deciamperes(u32::from(word))),
-            current_share: None,
             at_reference: self.flag(map, map.at_reference),
             warning: self.flag(map, map.alarm),
             fault_code: self
@@ -101,10 +100,8 @@ impl Words {
                 .filter(|_| self.is_tripped(map))
                 .and_then(|word| FaultRegister(word).bits().next()),
             control: self.control(map),
-            verdict: None,
-            motion: Motion::NotKnown,
             raw: self.words.clone(),
-            at: None,
+            ..Status::default()
         }
     }
 

@@ -98,8 +98,16 @@ pub trait Drive: Send {
         Recognised::CannotTell
     }
 
-    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs. While a
-    /// [`lease`](Self::lease) stands, what proves it takes turns: one exchange more at the most.
+    /// How long the motor coasts at the most when its output is cut, as its owner says; `None`: nobody knows, and a motor that
+    /// was cut [may coast](crate::Motion::Coasting) until it is driven again. Nothing is sent.
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        let _ = time;
+    }
+
+    /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs. Of a drive
+    /// with a lease, or whose watchdog was armed by this value, one more behind every
+    /// [twentieth](crate::STATUSES_PER_TURN), and at once one more where its words speak against what was known of it: in all
+    /// never more than one.
     async fn status(&mut self) -> Result<Status>;
 
     /// Reads the slow set.
@@ -162,10 +170,12 @@ pub trait Drive: Send {
     /// of setpoint that the family does not take.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()>;
 
-    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start. Some
-    /// drives forget their setpoint by it; give it again before a start.
+    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start: a reset is
+    /// sent only where it is proved that nobody's run command becomes active by it. Some drives forget their setpoint by it;
+    /// give it again before a start.
     ///
     /// # Errors
+    /// [`Error::Refused`] with the input, channel or parameter by which the motor might start, or command would change hands.
     /// [`Error::NotConfirmed`] when the drive still shows a fault: its cause is not gone.
     async fn reset_faults(&mut self) -> Result<Status>;
 
@@ -266,18 +276,20 @@ pub trait Drive: Send {
     /// [`Error::AccessForbidden`] for a register that can only be written.
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16>;
 
-    /// Writes the register of a row, unless the drive holds the value already, and reads it back.
+    /// Writes the register of a row, unless the drive holds the value already, and reads it back. One that moves control is
+    /// written only where it is proved that nobody's run command becomes active by it.
     ///
     /// # Errors
+    /// [`Error::Refused`] while the motor runs, where that is not to be changed then, and with what might start it.
     /// [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`] before anything is sent; [`Error::NotConfirmed`] when
     /// it reads back otherwise.
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written>;
 
     /// Saves the drive's parameters to EEPROM, if one was changed since the last save. Returns how many saves this
-    /// value has made.
+    /// value has made. The motor stands: some drives take no stop while their EEPROM is written.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for families without such a command;
+    /// [`Error::Unsupported`] for families without such a command; [`Error::Refused`] while the motor runs;
     /// [`Refusal::NothingToSave`](crate::Refusal::NothingToSave) when nothing was changed.
     async fn persist(&mut self) -> Result<u32> {
         Err(Error::Unsupported { what: "saving parameters", reason: "the family has no command for it" })

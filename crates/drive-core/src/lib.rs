@@ -15,6 +15,7 @@
 
 #![forbid(unsafe_code)]
 
+mod absent;
 mod access;
 mod capabilities;
 mod confirm;
@@ -27,6 +28,7 @@ mod intent;
 mod lease;
 mod motion;
 mod named;
+mod own_run;
 pub mod port;
 mod reconnecting;
 pub mod registers;
@@ -36,11 +38,13 @@ pub mod serialize;
 mod setpoint;
 mod status;
 mod stopped;
+mod turns;
 mod units;
 
 pub use async_trait::async_trait;
 pub use tokio_modbus;
 
+pub use absent::Absent;
 pub use access::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
@@ -55,6 +59,7 @@ pub use intent::Intent;
 pub use lease::{Ground, Lack, Lease, Recognised, Verdict, Withdrawn};
 pub use motion::{Motion, Output, Shaft};
 pub use named::{NameError, is_name};
+pub use own_run::{Evidence, OwnRun, RunWord, Told};
 pub use port::{Class, Effect, Port, PortError, Terms};
 pub use reconnecting::Reconnecting;
 pub use registers::{Row, Written};
@@ -62,4 +67,5 @@ pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
 pub use status::{Control, Measurements, RawWord, State, Status};
 pub use stopped::Stopped;
+pub use turns::{STATUSES_PER_TURN, Turns};
 pub use units::{Current, Frequency, Percent, Power, Speed, UnitError, Voltage};

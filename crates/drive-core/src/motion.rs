@@ -69,14 +69,28 @@ pub enum Output {
     NotKnown,
 }
 
-/// The shaft behind the output, from status to status. Pure: time is an argument.
+/// What was last seen of the shaft, or is to be taken for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Past {
+    /// It was never seen.
+    #[default]
+    Unseen,
+    /// It stood.
+    AtRest,
+    /// It was driven. Of one that was at zero in two statuses behind each other nothing is to be expected when the output goes.
+    Driven { zero: bool, still: bool },
+    /// It was braked.
+    Braked { still: bool },
+    /// It coasts since then.
+    Coasts(Instant),
+}
+
+/// The shaft behind the output, from status to status. Pure: time is an argument. It is not forgotten when a line is lost: a
+/// motor that turned then may coast when the line is back.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Shaft {
-    /// The last output that was seen, while the motor may turn by it.
-    output: Option<Frequency>,
-    /// Since when it coasts.
-    coasts_since: Option<Instant>,
-    /// Since when direct current flows.
+    past: Past,
+    /// Since when direct current flows into a motor that may turn.
     injected_since: Option<Instant>,
     /// How long the motor coasts at the most, where its owner says so.
     coast_time: Option<Duration>,
@@ -88,13 +102,7 @@ impl Shaft {
     /// A shaft that was never seen to turn.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            output: None,
-            coasts_since: None,
-            injected_since: None,
-            coast_time: None,
-            injection_time: None,
-        }
+        Self { past: Past::Unseen, injected_since: None, coast_time: None, injection_time: None }
     }
 
     /// How long it coasts at the most, as its owner says; `None`: nobody knows.
@@ -107,54 +115,72 @@ impl Shaft {
         self.injection_time = time;
     }
 
+    /// Whether the last status showed it being brought down.
+    #[must_use]
+    pub const fn was_braked(&self) -> bool {
+        matches!(self.past, Past::Braked { .. })
+    }
+
     /// What a status shows at `at`, with the output frequency that the drive tells.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
+        if shown != Output::NotKnown && shown != Output::Injection {
+            self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
+        }
         match shown {
             Output::NotKnown => Motion::NotKnown,
-            Output::Driven | Output::Braking(_) => {
-                self.output = match shown {
-                    Output::Braking(at) => Some(at),
-                    // A motor that is driven turns, or is about to.
-                    _ => frequency.or(self.output).or(Some(Frequency::ZERO)),
-                };
-                (self.coasts_since, self.injected_since) = (None, None);
-                if shown == Output::Driven { Motion::Driven } else { Motion::Braking }
+            Output::Driven => {
+                let zero = frequency == Some(Frequency::ZERO);
+                let still = zero && matches!(self.past, Past::Driven { zero: true, .. });
+                self.past = Past::Driven { zero, still };
+                Motion::Driven
             }
+            Output::Braking(output) => {
+                self.past = Past::Braked { still: output == Frequency::ZERO };
+                Motion::Braking
+            }
+            Output::Injection if self.past == Past::AtRest => Motion::Held,
             Output::Injection => {
                 let since = *self.injected_since.get_or_insert(at);
-                let turned = self.output.is_some_and(|output| output != Frequency::ZERO)
-                    || self.coasts_since.is_some();
-                let over =
-                    self.injection_time.is_some_and(|time| at.saturating_duration_since(since) >= time);
-                if turned && !over { Motion::Braking } else { Motion::Held }
+                if !self.is_injected_for_long(at, since) {
+                    return Motion::Braking;
+                }
+                (self.past, self.injected_since) = (Past::AtRest, None);
+                Motion::Held
             }
             Output::None | Output::Cut if turns => {
                 // It tells an output all the same: it comes down.
-                self.output = frequency;
+                self.past = Past::Braked { still: false };
                 Motion::Braking
             }
-            Output::None | Output::Cut => self.without_output(at, shown),
+            Output::None | Output::Cut => self.without_output(at, shown == Output::Cut),
         }
     }
 
-    fn without_output(&mut self, at: Instant, shown: Output) -> Motion {
-        if let Some(since) = self.injected_since.take() {
-            // What was injected for long enough stands; else it coasts on.
-            let over = self.injection_time.is_some_and(|time| at.saturating_duration_since(since) >= time);
-            let turned = self.output.take().is_some_and(|output| output != Frequency::ZERO);
-            self.coasts_since = (turned && !over).then_some(at);
+    fn is_injected_for_long(&self, at: Instant, since: Instant) -> bool {
+        self.injection_time.is_some_and(|time| at.saturating_duration_since(since) >= time)
+    }
+
+    /// What was injected for long enough stands; else it coasts on.
+    fn end_injection(&mut self, at: Instant, is_fed: bool) {
+        let Some(since) = self.injected_since.take() else { return };
+        if !is_fed {
+            let over = self.is_injected_for_long(at, since);
+            self.past = if over { Past::AtRest } else { Past::Coasts(at) };
         }
-        let turned = self.output.take().is_some_and(|output| output != Frequency::ZERO);
-        if turned && shown == Output::Cut {
-            self.coasts_since = Some(at);
-        }
-        let Some(since) = self.coasts_since else { return Motion::AtRest };
-        if self.coast_time.is_some_and(|time| at.saturating_duration_since(since) >= time) {
-            self.coasts_since = None;
-            return Motion::AtRest;
-        }
-        Motion::Coasting
+    }
+
+    fn without_output(&mut self, at: Instant, cut: bool) -> Motion {
+        self.past = match self.past {
+            Past::Driven { still: false, .. } | Past::Braked { still: false } if cut => Past::Coasts(at),
+            coasts @ Past::Coasts(since)
+                if self.coast_time.is_none_or(|time| at.saturating_duration_since(since) < time) =>
+            {
+                coasts
+            }
+            _ => Past::AtRest,
+        };
+        if self.past == Past::AtRest { Motion::AtRest } else { Motion::Coasting }
     }
 }
 
@@ -195,5 +221,28 @@ mod tests {
         let late = begun + Duration::from_secs(2);
         assert_eq!(shaft.see(late, Output::Injection, Some(Frequency::ZERO)), Motion::Held);
         assert_eq!(shaft.see(late, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn direct_current_in_a_motor_that_was_never_seen_to_stand_brakes_it_until_its_time_is_over() {
+        let (mut shaft, begun) = (Shaft::new(), Instant::now());
+        shaft.set_injection_time(Some(Duration::from_secs(2)));
+        assert_eq!(shaft.see(begun, Output::Injection, Some(Frequency::ZERO)), Motion::Braking);
+        let late = begun + Duration::from_secs(2);
+        assert_eq!(shaft.see(late, Output::Injection, Some(Frequency::ZERO)), Motion::Held);
+        let mut resting = Shaft::new();
+        resting.see(begun, Output::None, Some(Frequency::ZERO));
+        assert_eq!(resting.see(begun, Output::Injection, Some(Frequency::ZERO)), Motion::Held);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_whose_output_was_cut_as_it_began_to_turn_may_coast_and_one_at_zero_speed_stands() {
+        let (mut shaft, now) = (Shaft::new(), Instant::now());
+        shaft.see(now, Output::None, Some(Frequency::ZERO));
+        shaft.see(now, Output::Driven, Some(Frequency::ZERO));
+        let mut at_zero = shaft;
+        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
+        at_zero.see(now, Output::Driven, Some(Frequency::ZERO));
+        assert_eq!(at_zero.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
     }
 }

@@ -131,6 +131,9 @@ pub struct Status {
         serde(rename = "current_percent", skip_serializing_if = "Option::is_none")
     )]
     pub current_share: Option<Percent>,
+    /// The reference that the drive follows, or will with a start, where the fast set holds it: how fast, whoever gives it.
+    #[cfg_attr(feature = "serde", serde(rename = "reference_hz", skip_serializing_if = "Option::is_none"))]
+    pub reference: Option<Frequency>,
     /// Whether the output has reached the reference.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub at_reference: Option<bool>,
@@ -188,17 +191,19 @@ impl Status {
         self.state.is_fault()
     }
 
-    /// Whether the drive itself shows that the motor is not driven: a state without motion, and an output of zero
-    /// where the drive tells one. A quick stop drives the motor until its output is told to be zero.
+    /// Whether the motor stands: at rest, or held there by direct current. A reading of [`motion`](Self::motion); of a drive
+    /// that tells none, of its state and its output: a quick stop drives the motor until its output is told to be zero.
     #[must_use]
     pub fn is_standstill(&self) -> bool {
         let output = self.output_frequency;
-        match self.state {
-            State::NotReady | State::Disabled | State::Ready | State::Fault => {
+        match (self.motion, self.state) {
+            (Motion::AtRest | Motion::Held, _) => true,
+            (Motion::Driven | Motion::Braking | Motion::Coasting, _) => false,
+            (Motion::NotKnown, State::NotReady | State::Disabled | State::Ready | State::Fault) => {
                 output.is_none_or(|output| output == Frequency::ZERO)
             }
-            State::QuickStop => output == Some(Frequency::ZERO),
-            _ => false,
+            (Motion::NotKnown, State::QuickStop) => output == Some(Frequency::ZERO),
+            (Motion::NotKnown, _) => false,
         }
     }
 }
@@ -393,6 +398,18 @@ mod tests {
         assert!(!of(None).is_standstill());
         assert!(!of(Some(Frequency::from_hertz(3))).is_standstill());
         assert!(of(Some(Frequency::ZERO)).is_standstill());
+    }
+
+    #[test]
+    fn a_motor_that_may_coast_or_is_braked_without_an_output_is_not_at_standstill() {
+        let of = |state, motion| {
+            let output_frequency = Some(Frequency::ZERO);
+            Status { state, motion, output_frequency, ..Status::default() }.is_standstill()
+        };
+        assert!(!of(State::Fault, Motion::Coasting));
+        assert!(!of(State::Stopping, Motion::Braking));
+        assert!(of(State::Stopping, Motion::Held), "direct current holds it");
+        assert!(of(State::Disabled, Motion::AtRest));
     }
 
     #[test]

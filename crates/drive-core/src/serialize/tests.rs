@@ -27,6 +27,7 @@ async fn a_status_is_told_in_the_units_of_its_keys_with_its_age_when_it_is_told(
         output_frequency: Some(Frequency::from_centihertz(3_005)),
         current: Some(Current::from_deciamperes(32)),
         current_share: Some(Percent::from_percent(41)),
+        reference: Some(Frequency::from_hertz(35)),
         at_reference: Some(true),
         warning: Some(false),
         fault_code: Some(5),
@@ -41,7 +42,7 @@ async fn a_status_is_told_in_the_units_of_its_keys_with_its_age_when_it_is_told(
         status,
         json!({
             "state": "quick_stop", "direction": "reverse", "output_frequency_hz": 30.05, "current_a": 3.2,
-            "current_percent": 41.0, "at_reference": true, "warning": false, "fault_code": 5,
+            "current_percent": 41.0, "reference_hz": 35.0, "at_reference": true, "warning": false, "fault_code": 5,
             "control": "other_bus", "motion": "at_rest",
             "run_command": {
                 "verdict": "not_in_force", "lacks": "output",

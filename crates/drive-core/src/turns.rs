@@ -1,0 +1,57 @@
+//! What no ordinary status carries and a run command rests on: it takes [`Turns`].
+
+/// Behind every so many statuses of a drive of which a run command stands, or whose watchdog was armed, one thing more is read:
+/// on a line of many drives that is less than 5 % of a sweep.
+pub const STATUSES_PER_TURN: u16 = 20;
+
+/// Whose turn it is. Each of `n` things is read within `n` times [`STATUSES_PER_TURN`] statuses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Turns {
+    statuses: u16,
+    next: usize,
+}
+
+impl Turns {
+    /// Counts a status. The number of the thing whose turn has come, of so many `things`.
+    pub const fn pass(&mut self, things: usize) -> Option<usize> {
+        self.statuses += 1;
+        if self.statuses < STATUSES_PER_TURN || things == 0 {
+            return None;
+        }
+        self.statuses = 0;
+        let turn = self.next % things;
+        self.next = turn + 1;
+        Some(turn)
+    }
+
+    /// The thing whose turn had come was not read: it comes again with the next status.
+    pub const fn again(&mut self) {
+        self.statuses = STATUSES_PER_TURN - 1;
+        self.next = self.next.saturating_sub(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_thing_has_its_turn_once_in_so_many_statuses() {
+        let mut turns = Turns::default();
+        let mut read = [0; 3];
+        for _ in 0..3 * usize::from(STATUSES_PER_TURN) {
+            if let Some(thing) = turns.pass(3) {
+                read[thing] += 1;
+            }
+        }
+        assert_eq!(read, [1; 3]);
+    }
+
+    #[test]
+    fn a_turn_that_was_lost_comes_again_at_once() {
+        let mut turns = Turns::default();
+        let first = (0..STATUSES_PER_TURN).find_map(|_| turns.pass(3));
+        turns.again();
+        assert_eq!((first, turns.pass(3)), (Some(0), Some(0)));
+    }
+}
