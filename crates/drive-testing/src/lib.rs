@@ -21,3 +21,8 @@ pub mod rig;
 pub mod words;
 
 pub use contract::Contract;
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -35,10 +35,17 @@ const E: u16 = 0x11;
 
 pub(super) struct Atv21;
 
-/// Whether an input with this function is on; F110 is a function that is always on.
+/// Whether an input with this function is on.
 fn on(world: &World, function: u16) -> bool {
-    world.word(F110, 0) == function
-        || INPUT_FUNCTIONS.iter().any(|&(word, bit)| world.word(word, 0) == function && world.input(bit))
+    INPUT_FUNCTIONS.iter().any(|&(word, bit)| world.word(word, 0) == function && world.input(bit))
+}
+
+/// A function that overrides the bus in a way that is not said.
+fn forced(world: &World) -> Option<&'static Silence> {
+    if on(world, 52) || on(world, 53) {
+        return Some(&FORCED_FUNCTIONS);
+    }
+    matches!(world.word(F110, 0), 48 | 52 | 53).then_some(&F110_TERMINAL)
 }
 
 fn assigned(world: &World, function: u16) -> bool {
@@ -107,8 +114,8 @@ impl Manual for Atv21 {
         if world.panel.local {
             return Answer::Says(Who::Keypad, &LOC_REM);
         }
-        if on(world, 52) || on(world, 53) {
-            return Answer::Silent(&FORCED_FUNCTIONS);
+        if let Some(silence) = forced(world) {
+            return Answer::Silent(silence);
         }
         if on(world, 48) {
             return Answer::Says(Who::Terminals, &FORCED_LOCAL_INPUT);
@@ -135,8 +142,8 @@ impl Manual for Atv21 {
         if world.panel.local {
             return Answer::Says(from(Origin::Keypad), &LOC_REM);
         }
-        if on(world, 52) || on(world, 53) {
-            return Answer::Silent(&FORCED_FUNCTIONS);
+        if let Some(silence) = forced(world) {
+            return Answer::Silent(silence);
         }
         if on(world, 48) {
             return Answer::Says(from(Origin::Analog(1)), &FORCED_LOCAL_INPUT);

@@ -146,6 +146,9 @@ impl Manual for Atv28 {
         after.note(change);
         match *change {
             Change::Write { address: CMD, value } | Change::Broadcast { address: CMD, value } => {
+                if world.unsure == Some(&MAINS) {
+                    after.unsure = None; // what stands in W400 is known again
+                }
                 let broadcast = matches!(change, Change::Broadcast { .. });
                 if broadcast && self.commander(world).said() != Some(Who::Bus) {
                     after.unsure = Some(&BROADCAST);
@@ -174,7 +177,7 @@ impl Manual for Atv28 {
             Change::Wait if world.tripped.is_some() => after.unsure = Some(&RESTART),
             Change::Trip(_) => after.state = State::Fault,
             Change::Mains(on) => {
-                after.unsure = on.then_some(()).and(world.command.map(|_| &MAINS));
+                after.unsure = if on { world.unsure } else { world.command.map(|_| &MAINS) };
                 after.forget_bus();
                 after.latched = None;
                 if on {

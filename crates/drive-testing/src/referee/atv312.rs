@@ -230,6 +230,12 @@ impl Manual for Atv312 {
                 Some(Answer::Says(Start::MayStart, &LOW_SPEED_TIME))
             }
             Change::Mains(true) if world.word(at::TUN, 0) == 115 => Some(Answer::Silent(&TUNING)),
+            Change::Input { bit, closed: true }
+                if !world.input(*bit) && world.word(at::TUN, 0) == 129 + u16::from(*bit) =>
+            {
+                Some(Answer::Silent(&TUNING))
+            }
+            Change::Write { address: at::TUN, .. } => Some(Answer::Silent(&TUNING)),
             _ => None,
         }
     }

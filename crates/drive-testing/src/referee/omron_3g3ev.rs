@@ -122,7 +122,7 @@ impl Manual for Omron3g3ev {
         match *change {
             Change::Write { address: COMMAND, value } => {
                 after.take_command(value, false);
-                if value & FUNCTIONS != 0 {
+                if value & FUNCTIONS != 0 && world.tripped.is_some() {
                     after.unsure = Some(&FUNCTION_BITS);
                 }
             }

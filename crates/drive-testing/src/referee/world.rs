@@ -6,7 +6,8 @@ use super::drivecom::State;
 use super::{Family, Silence, Who};
 
 /// Everything that a manual says decides over the motor. [`World::factory`] and `Default` are a drive as delivered, switched
-/// on, with nothing written and no input closed.
+/// on, with nothing written and no input closed. Whoever reads the drive's status may correct what it shows, and then
+/// clear [`unsure`](Self::unsure).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct World {
     /// Whose manual is asked.

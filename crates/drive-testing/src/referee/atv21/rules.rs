@@ -34,6 +34,7 @@ silences! { Atv21 SILENCES
     TERMINAL_RUN "S0 §8.8 p.38 (F111 to F113, F118)" "which function F, R, RES and VIA have as delivered, level or edge: so whether the terminals ask for motion, and what ends it";
     KEYPAD_RUN "S0 §6.2 p.12" "what the keys of the keypad do, and whether a motor goes on when LOC/REM is pressed";
     FORCED_FUNCTIONS "S0 §8.4 p.31, §8.5 p.33" "what functions 52 (forced operation) and 53 (forced run) do to the motor, at which reference, and what stops it then";
+    F110_TERMINAL "S0 §8.4 p.31, §8.5 p.33, against §8.8 p.38" "which input F110 belongs to: it may carry functions 48, 52 and 53, but FD06 has no terminal for it";
     SWITCHED_BY_INPUT "S0 §6.2 p.14 against p.15" "F112 = 48 with R off and CMOD = 0: p.15 gives control to Modbus, p.14 wants FA00 bits 15 and 14 for that";
     FCHG_AND_PRIORITY "S0 §6.2 p.16 against §8.5 p.33" "which reference counts with FCHG on and FA00 bit 14 set";
     TWO_REFERENCES "S0 §8.5 p.33" "which of FA01 and FA13 counts when both are written";

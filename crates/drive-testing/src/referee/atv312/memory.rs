@@ -81,7 +81,10 @@ fn reset(world: &mut World) {
         if inputs::by_edge(world) {
             world.latched = None;
         }
-        if !channel::is_l3(world) && inputs::asks(world) {
+        let terminals = channel::commander(world).said() == Some(Who::Terminals);
+        if terminals && inputs::by_level(world) && !channel::is_l3(world) {
+            world.state = State::OperationEnabled; // p.52: a run that is kept through the reset starts again
+        } else if terminals && inputs::asks(world) && !inputs::by_level(world) {
             world.unsure = Some(&RESTART_AFTER_RESET);
         }
     }
@@ -99,6 +102,9 @@ fn spend(world: &mut World) {
 
 fn command(world: &World, after: &mut World, word: u16) {
     let before = world.command.unwrap_or(0);
+    if world.unsure == Some(&WORDS_OVER_POWER) {
+        after.unsure = None;
+    }
     after.take_command(word, false);
     after.state = drivecom::after(world.state, before, word, world.cause);
     if world.state == State::Fault && after.state != State::Fault {
@@ -294,9 +300,12 @@ pub(super) fn step(world: &World, change: &Change) -> World {
             }
         }
         Change::Mains(on) => {
+            after.unsure = match world.unsure {
+                Some(silence) if on && silence == &WORDS_OVER_POWER => Some(silence),
+                _ => (!on && !channel::is_l3(world) && channel::run_word(world)).then_some(&WORDS_OVER_POWER),
+            };
             after.forget_bus();
             after.latched = None;
-            after.unsure = None;
             if on {
                 after.tripped = None;
                 let by_chart = channel::is_l3(world);
@@ -342,6 +351,7 @@ pub(super) fn said_of(world: &World, change: &Change) -> Vec<Answer<Effect>> {
             all.push(Answer::Says(Effect::Restores, &LAC_L3));
             all.push(Answer::Silent(&L3_AND_INPUTS));
         }
+        at::TUN => all.push(Answer::Silent(&TUNING)),
         at::TCC if !world.turning => all.push(Answer::Says(Effect::Restores, &TCC_WRITTEN)),
         address if CONFIGURATION_WORDS.contains(&address) => {
             all.push(Answer::Says(Effect::Nothing, &CONFIGURATION));

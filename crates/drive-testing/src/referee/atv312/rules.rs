@@ -58,7 +58,7 @@ rules! { Atv312 RULES
     TCC_WRITTEN A "BBV p.33 (tCC)" "a change of tCC puts rrS, tCt and every function assigned to a logic input back to factory settings";
     FACTORY A "BBV p.20 (CMI bit 0), p.32 (FCS, CFG), p.55" "factory settings, at standstill only; communication, FLO, FLOC, LCC and bFr stay";
     SAVE A "BBV p.20 (CMI bit 1)" "the parameters are stored in the EEPROM";
-    FLYING A "BBV p.52 (FLr, OPL)" "flying restart after mains, reset or freewheel: from the speed of the motor, with 2-wire level or OPL = OAC";
+    FLYING A "BBV p.52 (FLr, OPL)" "a run command kept through a loss of the mains, a reset or a freewheel starts again; by 2-wire level; with FLr or OPL = OAC from the speed of the motor";
     NO_WATCH A "BBV p.20 (CMI bit 14), p.53 (SLL)" "NTO = 1 or SLL = 0: no watch, a motor that runs goes on without its master";
 }
 
@@ -84,7 +84,7 @@ silences! { Atv312 SILENCES
     ASSIGNED_BITS "BBV p.19 (CMD bits 11, 12)" "L3: whether bits 11 and 12 keep reverse and stop when they are assigned too";
     LIMIT_SWITCHES "BBV p.50 (LAF, LAr)" "at which level a limit switch stops, and whether the motor goes on when it is left";
     RESTART_BY_BUS "BBV p.51 (Atr)" "automatic restart under bus control: the chart is in fault and then in switch on disabled, yet Atr restarts";
-    RESTART_AFTER_RESET "BBV p.52 (FLr)" "whether a run at terminals with 2-wire level starts at the reset of a fault: only FLr speaks of it";
+    RESTART_AFTER_RESET "BBV p.52 (FLr)" "whether a run at terminals in 3-wire control starts again at the reset of a fault: FLr speaks of 2-wire level only";
     AFTER_FACTORY "BBV p.20, p.32, p.35" "state and commander right after factory settings, by which L3 becomes L1 and terminals command";
     L3_AND_INPUTS "BBV p.35 against p.33" "whether LAC = L3, which puts tCC back, also unassigns the stop inputs as every change of tCC does";
     WORDS_OVER_POWER "BBV p.11" "L1 and L2: whether CMD and LFr are 0 after a power cycle, where operation is enabled at once";

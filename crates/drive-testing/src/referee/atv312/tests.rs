@@ -251,6 +251,28 @@ fn a_fault_is_reset_into_switch_on_disabled_once_its_cause_is_gone() {
 }
 
 #[test]
+fn a_run_kept_at_the_terminals_starts_at_the_reset_of_a_fault_by_level_only() {
+    // p.52: FLr smooths the restart "if the run command is maintained" after the reset of the detected fault
+    let reset = write(at::CMD, 0x0080);
+    for (tct, start) in [(0, Start::MayStart), (1, Start::MayNot)] {
+        let world = World::switched_on(Family::Atv312, [(at::LAC, 2), (at::TCT, tct)].into());
+        let tripped = world.after(&[input(1, true), Change::Trip(18), Change::CauseGone]);
+        assert_eq!(starts_by(&tripped, &reset), start, "tCt = {tct}");
+    }
+}
+
+#[test]
+fn what_stands_in_cmd_after_a_power_cycle_with_l1_is_left_open_until_it_is_written() {
+    // p.11: operation is enabled at once there
+    let run = World::factory(Family::Atv312).after(&[write(at::LFR, 300), write(at::CMD, 0x000F)]);
+    let cycled = run.after(&[Change::Mains(false), Change::Mains(true)]);
+    assert!(order(&cycled).is_silent());
+    assert_eq!(order(&cycled.after(&[write(at::CMD, 0x0006)])).said(), Some(Order::Locked));
+    let by_l3 = running(&[]).after(&[Change::Mains(false), Change::Mains(true)]);
+    assert_eq!(order(&by_l3).said(), Some(Order::Locked));
+}
+
+#[test]
 fn automatic_restart_starts_terminals_by_level_and_is_left_open_for_the_bus() {
     // p.51
     let level = World::switched_on(Family::Atv312, [(at::TCT, 0), (at::ATR, 1)].into());
