@@ -39,7 +39,7 @@ silences! { Atv28 SILENCES
     BOTH_SIGNS "S2 p.12" "reverse command with a negative reference";
     STOP_MODE "BBV p.57" "how a normal stop comes down: Stt has no address";
     EXTENDED "BBV p.57 (402 CMI)" "which bits CMI has on an ATV28";
-    BROADCAST "S2 p.10" "whether a broadcast command reaches a drive that the terminals command";
+    BROADCAST "S2 p.9, p.11" "whether a broadcast command reaches a drive that the terminals command";
 }
 
 pub(super) struct Atv28;

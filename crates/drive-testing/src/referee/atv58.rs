@@ -25,7 +25,7 @@ silences! { Atv58 SILENCES
     TERMINAL_RUN "S3 p.34" "what terminals, keypad and forced local do";
     HIGH_BITS "S3 p.34" "what bits 4 to 15 of W400 mean: reverse, stops, reset";
     UNITS "S3 p.10, p.34 (W401)" "the unit of W401, and what its sign does to the direction";
-    LIMITS "S3 p.20, p.44 (W250 to W253 are read)" "the lowest and the highest frequency, and whether a run at 0 turns the motor";
+    LIMITS "S3 p.12, p.36 (W250 to W253 are read)" "the lowest and the highest frequency, and whether a run at 0 turns the motor";
     STOP_MODE "S3 p.34" "how the motor stops at a disable operation, a shutdown and a quick stop";
     TIME_OUT "S3 p.24, p.48 (note on the lamps)" "10 s without a message, 1 s in ASCII, is a communication fault of the card: what the motor does, and whether it goes on when messages come back";
     MAINS "S3 p.33" "the state at switching on, and what stands in W400 then";
