@@ -1,6 +1,10 @@
 //! What a fleet knows of a drive: [`Snapshot`], with the time of each value and a verdict on its age.
 
-use std::{collections::VecDeque, sync::Arc, time::Duration};
+use std::{
+    collections::VecDeque,
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
 
 use drive_core::{
     Control, Error, Fault, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status,
@@ -189,6 +193,8 @@ pub struct PendingStop {
 pub struct Trip {
     /// When it was seen.
     pub at: Instant,
+    /// When it was seen, by the wall's clock as that stood then.
+    pub wall: SystemTime,
     /// Whether it was found so when the drive was seen first or again: it tripped at some time before.
     pub found: bool,
     /// The last status before it; `None` when the drive was already tripped when it was first seen.

@@ -201,7 +201,7 @@ impl From<&Trip> for TripView {
             by_watchdog: trip.by_watchdog,
             watchdog_after_ms: trip.watchdog_after.map(whole_ms),
             found: trip.found,
-            time_unix_ms: unix_ms(wall(trip.at)),
+            time_unix_ms: unix_ms(trip.wall),
             before: trip.before.as_ref().map(|before| Status::clone(&before.value)),
             at_trip: Status::clone(&trip.status.value),
         }
@@ -640,12 +640,6 @@ written_as! {
     Event as EventView;
     Outcome as OutcomeView;
     ExitAction as ExitView;
-}
-
-/// A moment of the runtime's clock on the wall's, as that stands now.
-fn wall(at: Instant) -> SystemTime {
-    let now = SystemTime::now();
-    now.checked_sub(at.elapsed()).unwrap_or(now)
 }
 
 fn unix_ms(at: SystemTime) -> u64 {

@@ -1,6 +1,10 @@
 //! What a status tells: events, trips with their freeze-frame, loss and return.
 
-use std::{collections::VecDeque, sync::Arc, time::Duration};
+use std::{
+    collections::VecDeque,
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
 
 use drive_core::{Control, Error, Faults, Measurements, PortError, Result, State, Status};
 use tokio::time::Instant;
@@ -93,7 +97,16 @@ impl Supervisor {
             let status = status.clone();
             self.record_trip(
                 now,
-                Trip { at: now, found, before, status, faults: None, by_watchdog, watchdog_after },
+                Trip {
+                    at: now,
+                    wall: SystemTime::now(),
+                    found,
+                    before,
+                    status,
+                    faults: None,
+                    by_watchdog,
+                    watchdog_after,
+                },
             );
         }
         if status.value.is_standstill() && !self.is_starting() {

@@ -128,6 +128,7 @@ fn a_fault_is_told_as_long_as_the_drive_shows_it_with_the_statuses_around_it() {
     let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
     let trip = Trip {
         at: Instant::now(),
+        wall: SystemTime::now(),
         found: false,
         before: Some(status(State::Running)),
         status: status(State::Fault),
@@ -263,6 +264,7 @@ fn every_kind() -> Vec<EventKind> {
     let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
     let trip = Box::new(Trip {
         at: Instant::now(),
+        wall: SystemTime::now(),
         found: true,
         before: Some(status(State::Running)),
         status: status(State::Fault),

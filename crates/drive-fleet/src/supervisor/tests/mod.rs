@@ -1,5 +1,6 @@
 //! The machine alone: a made-up drive answers what it is asked, time is a number.
 
+mod causes;
 mod connection;
 mod control;
 mod orders;
@@ -317,6 +318,12 @@ impl Rig {
 
     fn events(&self) -> Vec<&'static str> {
         self.happened().map(|happened| happened.kind.name()).collect()
+    }
+
+    /// Why the last event of this name happened.
+    fn cause_of(&self, name: &str) -> Option<Cause> {
+        let last = self.happened().filter(|happened| happened.kind.name() == name).last();
+        last.map(|happened| happened.cause.clone())
     }
 
     /// How often this was told.

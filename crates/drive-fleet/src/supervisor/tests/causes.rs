@@ -1,0 +1,180 @@
+//! Why something happened, as its event says it, and what troubles the drive meanwhile.
+
+use drive_core::RawWord;
+
+use super::*;
+use crate::ConcernKind;
+
+fn word(value: u16) -> Vec<RawWord> {
+    vec![RawWord { address: 3_201, code: "ETA", value }, RawWord { address: 3_202, code: "RFR", value: 7 }]
+}
+
+fn by_policy(policy: Policy) -> Option<Cause> {
+    Some(Cause::Policy { policy })
+}
+
+fn by_the_tester() -> Option<Cause> {
+    Some(Cause::Command(Act::of("tester")))
+}
+
+fn worst(rig: &Rig) -> Option<ConcernKind> {
+    rig.snapshot().concern(rig.now).map(|concern| concern.kind)
+}
+
+#[test]
+fn what_the_drive_does_by_a_command_names_the_command_and_what_it_does_by_itself_does_not() {
+    let mut rig = Rig::ready();
+    rig.drive.status.raw = word(0x23);
+    rig.pass(1_000 * MS);
+    rig.order(run_at(30));
+    rig.drive.status.raw = word(0x27);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.cause_of("state changed"), by_the_tester(), "{:?}", rig.outputs);
+    let start = rig.happened().find_map(|happened| match &happened.kind {
+        EventKind::Command { setpoint, .. } => Some(*setpoint),
+        _ => None,
+    });
+    assert_eq!(start, Some(Some(Frequency::from_hertz(30).into())));
+    rig.outputs.clear();
+    rig.drive.stand();
+    rig.drive.status.raw = word(0x23);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.cause_of("state changed"), Some(Cause::Drive), "it came to a stop by itself");
+    let changed: Vec<_> = rig.happened().flat_map(|happened| happened.words.to_vec()).collect();
+    assert_eq!(changed.len(), 1, "only the word that changed: {changed:?}");
+    assert_eq!((changed[0].word.value, changed[0].before), (0x23, Some(0x27)));
+}
+
+#[test]
+fn a_stop_says_who_stopped_and_a_removal_is_no_exit() {
+    for (policy, name) in [(Policy::Exit, "exit"), (Policy::Removal, "removed")] {
+        let mut rig = Rig::ready();
+        rig.order(START);
+        rig.pass(1_000 * MS);
+        rig.outputs.clear();
+        rig.machine.handle_exit(rig.now, policy);
+        rig.pass(2_000 * MS);
+        for event in ["state changed", "stop confirmed", "command", name] {
+            assert_eq!(rig.cause_of(event), by_policy(policy), "{event}: {:?}", rig.outputs);
+        }
+        assert_eq!(rig.events().iter().filter(|event| ["exit", "removed"].contains(event)).count(), 1);
+    }
+}
+
+#[test]
+fn what_is_seen_after_a_silence_is_found_and_not_seen_happening() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(5_000 * MS);
+    assert_eq!(worst(&rig), Some(ConcernKind::LostRunning));
+    rig.outputs.clear();
+    rig.drive.failing = None;
+    rig.drive.trip(9);
+    rig.drive.status.control = Some(Control::Local);
+    rig.pass(500 * MS);
+    for event in ["connected", "state changed", "tripped", "control elsewhere"] {
+        assert_eq!(rig.cause_of(event), Some(Cause::Found), "{event}: {:?}", rig.outputs);
+    }
+    let trips = rig.snapshot().trips;
+    assert!(trips.back().is_some_and(|trip| trip.found), "{trips:?}");
+    assert!(!rig.events().contains(&"control taken"), "nobody was seen taking it");
+    assert_eq!(worst(&rig), Some(ConcernKind::Tripped));
+}
+
+#[test]
+fn a_trip_that_is_seen_happening_is_not_found() {
+    let mut rig = Rig::ready();
+    rig.drive.trip(9);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.cause_of("tripped"), Some(Cause::Drive));
+    assert!(rig.snapshot().trips.back().is_some_and(|trip| !trip.found));
+}
+
+#[test]
+fn a_start_that_takes_the_command_is_not_told_as_control_that_comes_back() {
+    let mut rig = Rig::controlled();
+    // So an Altivar 21 stands until it is started.
+    rig.drive.status.control = Some(Control::Local);
+    rig.pass(2_000 * MS);
+    rig.outputs.clear();
+    rig.order(START);
+    rig.pass(20 * MS);
+    rig.drive.status.control = Some(Control::Bus);
+    rig.pass(1_000 * MS);
+    assert!(!rig.events().contains(&"control returned"), "{:?}", rig.outputs);
+    assert_eq!(rig.cause_of("start took command"), by_the_tester());
+    assert_eq!(worst(&rig), None);
+    // The panel takes it and gives it back.
+    rig.drive.status.control = Some(Control::Panel);
+    rig.pass(1_000 * MS);
+    assert_eq!(worst(&rig), Some(ConcernKind::ControlTaken));
+    rig.drive.status.control = Some(Control::Bus);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.cause_of("control returned"), Some(Cause::Drive));
+}
+
+#[test]
+fn other_settings_are_told_with_their_names_and_the_same_are_not() {
+    let mut rig = Rig::ready();
+    rig.machine.handle_settings(rig.now, &settings());
+    rig.collect();
+    assert_eq!(rig.events(), Vec::<&str>::new());
+    let other = DriveSettings { on_loss: OnLoss::Stop(StopMode::Ramp), ..settings() };
+    rig.machine.handle_settings(rig.now, &other);
+    rig.collect();
+    assert_eq!(rig.times_told(&EventKind::Reconfigured(vec!["on_loss"])), 1);
+    assert_eq!(rig.cause_of("reconfigured"), by_policy(Policy::Settings));
+}
+
+#[test]
+fn a_stop_whose_first_attempt_is_under_way_was_sent_once() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.stop(StopMode::Ramp);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    let later = rig.now + 2_500 * MS;
+    rig.machine.handle_stop_alarm(later);
+    let snapshot = rig.machine.snapshot(later);
+    assert_eq!(snapshot.stop.map(|stop| (stop.attempts, stop.alarm)), Some((1, true)));
+    let concern = snapshot.concern(later).unwrap();
+    assert_eq!(concern.kind, ConcernKind::StopUnconfirmed);
+    assert_eq!(concern.lasts(later), Some(2_500 * MS));
+    assert_eq!(concern.to_string(), "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent 1 time");
+}
+
+#[test]
+fn what_troubles_a_drive_keeps_the_time_since_when_it_does() {
+    let mut rig = Rig::ready();
+    rig.drive.status.warning = Some(true);
+    rig.pass(1_100 * MS);
+    let since = |rig: &mut Rig| {
+        rig.machine.changed = true;
+        let now = rig.now;
+        rig.machine.take_snapshot(now).unwrap().concern(now).unwrap().since
+    };
+    let first = since(&mut rig);
+    assert!(first.is_some());
+    rig.pass(3_000 * MS);
+    assert_eq!(since(&mut rig), first);
+}
+
+#[test]
+fn an_order_that_waited_is_refused_for_what_is_in_its_way_when_its_time_is_over() {
+    let mut rig = Rig::ready();
+    rig.machine.active = None;
+    let id = rig.order(START);
+    // It waits for a watchdog that is not checked yet; the check comes just too late.
+    rig.machine.checks.connected(rig.now);
+    rig.machine.checks.handle_identity(rig.now, Ok(rig.drive.identity.clone()));
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Watchdog, .. }));
+    rig.now += 1_100 * MS;
+    let watchdog = rig.drive.watchdog;
+    rig.machine.handle_reply(rig.now, Reply::Watchdog(Ok(watchdog)));
+    rig.machine.accept_status(rig.now, rig.drive.status.clone());
+    let _ = rig.machine.next(rig.now);
+    rig.collect();
+    assert_eq!(rig.outcome(id), Some(&Outcome::Expired), "{:?}", rig.outputs);
+}
