@@ -1,21 +1,25 @@
 //! What moves the motor and what stops it.
 
 use drive_core::{
-    Class, Command, Confirming, Control, Direction, Error, ErrorKind, Frequency, Port, Refusal, Result,
-    SETTLED_WITHIN, Setpoint, State, Status, StopMode, Stopped,
+    Class, Command, Confirming, Control, Direction, Error, ErrorKind, Frequency, Lease, Port, Refusal,
+    Result, SETTLED_WITHIN, Setpoint, State, Status, StopMode, Stopped,
 };
 use tokio::time::Instant;
 
 use crate::{
     Atv21, Authority,
     blocks::{WRITE_BLOCK, WriteSlot, command_and_reference},
-    control::{commanded_by_other, is_falling, other_reference, source, status_word, who},
+    control::{
+        BY_SERIAL_LINK, REFERENCE_BY_SERIAL_LINK, commanded_by_other, is_falling, other_reference, source,
+        status_word, who,
+    },
+    proof::withheld,
     registers as map,
     setpoint::is_same,
     words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
 };
 
-const ST_OFF: Refusal = Refusal::Overridden {
+pub(crate) const ST_OFF: Refusal = Refusal::Overridden {
     by: "a freewheel stop that the bus has not ordered (ST = OFF, FD01 bit 11)",
     remedy: "see to the input or the setting that holds it",
 };
@@ -24,7 +28,7 @@ pub(crate) const OTHER_WORD: Refusal = Refusal::Overridden {
     remedy: "see who else writes to this drive",
 };
 pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
-    by: "another reference than that of FA01 (FE02 shows it)",
+    by: "another reference than the one that was given (FE02 shows it)",
     remedy: "give the setpoint again, and see to the drive's lower limit",
 };
 
@@ -56,10 +60,12 @@ impl<P: Port> Atv21<P> {
         block: Option<([WriteSlot; 2], u16)>,
     ) -> Result<Status> {
         let command = Command::Start(direction);
+        self.check_own(command)?;
         let (status, held) = self.check_start(command).await?;
         let word = self.run_word(direction, held);
         self.take_command(command, status, held, word).await?;
-        self.given = Some(word);
+        self.run.give(Lease::new(direction, word.bits()));
+        self.proof.word = None;
         let both = block.and_then(|(slots, reference)| command_and_reference(slots, word.bits(), reference));
         let mut calls = self.registers.at(Class::Command);
         let sent = match both {
@@ -67,14 +73,19 @@ impl<P: Port> Atv21<P> {
             None => calls.write(map::COMMAND_WORD, word.bits()).await,
         };
         match sent {
-            Ok(()) => {}
+            Ok(()) => self.run.was_written(),
             // What was refused may be a repetition of what was carried out, and a block in doubt is read back.
             Err(error @ Error::Exception { .. }) => {
                 if self.command_word(Class::Command).await.map_err(Error::after_write)? != word {
+                    self.run.was_not_written();
                     return Err(error);
                 }
             }
             Err(error) if both.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
+            Err(error) if error.kind() == ErrorKind::NotSent => {
+                self.run.was_not_written();
+                return Err(error);
+            }
             Err(error) => return Err(error),
         }
         self.see_start(direction, word).await.map_err(Error::after_write)
@@ -100,6 +111,11 @@ impl<P: Port> Atv21<P> {
             return Err(self.refused(command, Refusal::NotInControl(who(word, source(&status)))));
         }
         let held = self.command_word(Class::Command).await?;
+        if self.authority == Authority::Priority
+            && (self.modes.is_none() || source(&status) != CommandSource::Serial)
+        {
+            self.read_modes(Class::Command).await?;
+        }
         if word.contains(StatusWord::FREEWHEEL) && !held.contains(CommandWord::FREEWHEEL) {
             return Err(self.refused(command, ST_OFF));
         }
@@ -144,7 +160,7 @@ impl<P: Port> Atv21<P> {
 
     /// Writes FA00, but for a stop; what may stand there then is remembered.
     pub(crate) async fn write_command_word(&mut self, word: CommandWord) -> Result<()> {
-        self.held = None;
+        (self.held, self.proof.word) = (None, None);
         self.registers.at(Class::Command).write(map::COMMAND_WORD, word.bits()).await?;
         self.held = Some(word);
         Ok(())
@@ -165,11 +181,15 @@ impl<P: Port> Atv21<P> {
             };
             let directed = status.direction == Some(direction) || is_falling(first, status.output_frequency);
             if because.is_none() && runs && directed {
-                return Ok(status);
+                let verdict = self.verdict(&status);
+                return Ok(Status { verdict, ..status });
             }
             first = first.or(status.output_frequency);
             let over = because.is_some() && (status.is_fault() || Instant::now() >= settled);
             if over || !confirming.again().await {
+                let because = because.or_else(|| withheld(status_word(&status)));
+                let verdict = self.verdict(&status);
+                let status = Status { verdict, ..status };
                 return Err(self.not_confirmed(Command::Start(direction), status, because));
             }
         }
@@ -178,7 +198,7 @@ impl<P: Port> Atv21<P> {
     /// What the drive shows of the run command `word`: its status, what decides instead, and whether it runs. FA00 is read
     /// after all else, so that no stop of somebody else's is hidden.
     async fn look_at_start(&mut self, word: CommandWord) -> Result<(Status, Option<Refusal>, bool)> {
-        let status = self.read_status(Class::Command).await?;
+        let mut status = self.read_status(Class::Command).await?;
         let shown = status_word(&status);
         let runs = shown.contains(StatusWord::RUN | StatusWord::STANDBY_RUN);
         let mut because = commanded_by_other(&status);
@@ -186,7 +206,7 @@ impl<P: Port> Atv21<P> {
             because = not_in_force(word, self.active_reference().await?);
         }
         if because.is_none() && runs && word.preset_speed() == 0 {
-            because = self.other_than_fa01().await?;
+            because = self.other_than_fa01(&mut status).await?;
         }
         if status.is_fault() {
             because = Some(Refusal::Tripped);
@@ -198,17 +218,31 @@ impl<P: Port> Atv21<P> {
         Ok((status, because, runs))
     }
 
-    /// Whether the reference before the ramp is another one than that of FA01, and none that FA13 explains.
-    async fn other_than_fa01(&mut self) -> Result<Option<Refusal>> {
+    /// Whether the reference before the ramp is another one than that of FA01, and none that FA13 explains. The status is
+    /// told the one that the motor follows.
+    async fn other_than_fa01(&mut self, status: &mut Status) -> Result<Option<Refusal>> {
         let mut calls = self.registers.at(Class::Command);
         let in_force = calls.read(map::REFERENCE_BEFORE_RAMP).await?;
-        if self.setpoint.is_some_and(|setpoint| is_same(in_force, setpoint)) {
+        status.reference = Some(Frequency::from_centihertz(in_force.into()));
+        if let Some(agreed @ (register, word)) = self.proof.agreed
+            && register.address() == map::FREQUENCY_REFERENCE.address()
+            && is_same(in_force, word)
+        {
+            self.proof.agree(agreed, in_force);
             return Ok(None);
         }
         let frequency = calls.read(map::FREQUENCY_REFERENCE).await?;
-        let same = is_same(in_force, frequency);
-        let explained = same || (frequency == 0 && calls.read(map::SPEED_REFERENCE).await? != 0);
-        Ok((!explained).then_some(OTHER_REFERENCE))
+        if is_same(in_force, frequency) {
+            self.proof.agree((map::FREQUENCY_REFERENCE, frequency), in_force);
+            return Ok(None);
+        }
+        let speed = if frequency == 0 { calls.read(map::SPEED_REFERENCE).await? } else { 0 };
+        if speed == 0 {
+            self.proof.agree((map::FREQUENCY_REFERENCE, frequency), in_force);
+            return Ok(Some(OTHER_REFERENCE));
+        }
+        self.proof.agree((map::SPEED_REFERENCE, speed), speed);
+        Ok(None)
     }
 
     pub(crate) async fn stop_motor(&mut self, asked: StopMode) -> Result<Stopped> {
@@ -249,12 +283,16 @@ impl<P: Port> Atv21<P> {
                 }
                 because = force.flatten();
             }
+            if !held.contains(CommandWord::RUN) {
+                self.run.end();
+            }
             let comes_down = output == Some(Frequency::ZERO) || is_falling(first, output);
             if because.is_none() && (!runs || comes_down) {
                 if status.state == State::Running {
                     status.state = State::Stopping;
                 }
                 let taken_from = taken_from.filter(|_| source(&status) == CommandSource::Serial);
+                status.verdict = None;
                 return Ok(Stopped { status, mode, instead, taken_from });
             }
             first = first.or(output);
@@ -282,7 +320,7 @@ impl<P: Port> Atv21<P> {
         {
             return sent.map(Ok);
         }
-        (self.held, self.given) = (Some(word), None);
+        (self.held, self.proof.word) = (Some(word), None);
         Ok(sent)
     }
 
@@ -307,11 +345,17 @@ impl<P: Port> Atv21<P> {
         self.priorities() | chosen | CommandWord::run(direction)
     }
 
-    const fn priorities(&self) -> CommandWord {
-        match self.authority {
-            Authority::Priority => CommandWord::PRIORITIES,
-            Authority::Settings => CommandWord::empty(),
+    /// What makes the bus command the drive: nothing where CMOD and FMOD do so already. A priority that is not needed would
+    /// override the plant's own switch of the reference (§6.2 p. 16).
+    fn priorities(&self) -> CommandWord {
+        if self.authority == Authority::Settings {
+            return CommandWord::empty();
         }
+        let [command, reference] = self.modes.unwrap_or_default();
+        let mut priorities = CommandWord::PRIORITIES;
+        priorities.set(CommandWord::COMMAND_PRIORITY, command != Some(BY_SERIAL_LINK));
+        priorities.set(CommandWord::REFERENCE_PRIORITY, reference != Some(REFERENCE_BY_SERIAL_LINK));
+        priorities
     }
 
     fn holds_priority(&self) -> bool {
@@ -325,7 +369,7 @@ impl<P: Port> Atv21<P> {
 }
 
 /// What gives the reference instead of what this word asks for: a preset speed where it chooses one, else the bus.
-fn not_in_force(word: CommandWord, active: ReferenceSource) -> Option<Refusal> {
+pub(crate) fn not_in_force(word: CommandWord, active: ReferenceSource) -> Option<Refusal> {
     let preset = active == ReferenceSource::PresetSpeed && word.preset_speed() != 0;
     if preset { None } else { other_reference(active) }
 }

@@ -3,21 +3,33 @@
 
 use drive_core::{
     Class, Control, Frequency, Port, Refusal, Result, Status,
-    registers::{Register, access::ReadWrite},
+    registers::{
+        Register,
+        access::{ReadWrite, Readable},
+    },
 };
 
 use crate::{
-    Atv21, registers as map,
+    Atv21, Authority, registers as map,
     words::{CommandSource, CommandWord, LogicInputs, ReferenceSource, StatusWord},
 };
 
 /// CMOD: the serial link commands.
 pub(crate) const BY_SERIAL_LINK: u16 = 2;
+/// FMOD: the serial link gives the reference.
+pub(crate) const REFERENCE_BY_SERIAL_LINK: u16 = 4;
 /// Functions of inputs that give no run command: none, FCHG, forced local.
 const HARMLESS: [u16; 3] = [0, 38, FORCES[0]];
 /// Functions of inputs by which the terminals decide whatever the bus says (§8.4, §8.5): forced local, forced operation,
 /// forced run.
 const FORCES: [u16; 3] = [48, 52, 53];
+
+/// The function of F110 that keeps ST on, as the VF-S11 is delivered: a release, and no run command.
+const ALWAYS_RELEASED: u16 = 1;
+const INPUTS_UNKNOWN: Refusal = Refusal::Overridden {
+    by: "an input that cannot be read, for the drive has no FD06, and that may be on,",
+    remedy: "set CMOD = 2, so that the inputs command nothing",
+};
 
 /// An input: its bit in FD06 (`None`: always on), the parameter of its function, and its names in a refusal.
 struct Input {
@@ -55,7 +67,7 @@ const INPUTS: [Input; 5] = [
 
 /// The settings that say who commands and what the inputs do: while the motor runs or an input is on, a change of one may
 /// start it, stop it or change its speed.
-pub(crate) const DECIDE: [Register<ReadWrite>; 8] = [
+pub(crate) const DECIDE: [Register<ReadWrite>; 9] = [
     map::COMMAND_MODE,
     map::REFERENCE_MODE,
     map::SECOND_REFERENCE,
@@ -64,34 +76,43 @@ pub(crate) const DECIDE: [Register<ReadWrite>; 8] = [
     map::INPUT_R_FUNCTION,
     map::INPUT_RES_FUNCTION,
     map::INPUT_VIA_FUNCTION,
+    map::VIA_IS_LOGIC,
 ];
 
-/// The terminals as they stand: FD06, CMOD, and F110 to F113 and F118.
+/// The terminals as they stand: FD06, CMOD, and F110 to F113 and F118, as far as this drive has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Terminals {
-    inputs: LogicInputs,
-    pub(crate) command_mode: u16,
-    functions: [u16; 5],
+    inputs: Option<LogicInputs>,
+    pub(crate) command_mode: Option<u16>,
+    functions: [Option<u16>; 5],
 }
 
 impl Terminals {
     /// The same with another value in one of the parameters that say what they do.
     pub(crate) fn with(mut self, parameter: u16, value: u16) -> Self {
         if parameter == map::COMMAND_MODE.address() {
-            self.command_mode = value;
+            self.command_mode = Some(value);
         }
         for (function, input) in self.functions.iter_mut().zip(&INPUTS) {
             if input.function.address() == parameter {
-                *function = value;
+                *function = Some(value);
             }
+        }
+        if parameter == map::VIA_IS_LOGIC.address() {
+            // What stands at VIA counts from then on, and nothing tells it before.
+            self.inputs = self.inputs.map(|inputs| inputs | LogicInputs::VIA);
         }
         self
     }
 
-    fn on(&self) -> impl Iterator<Item = (&'static Input, u16)> {
+    /// The inputs that are on, or may be, each with its function; `None`: one that this drive does not have.
+    fn on(&self) -> impl Iterator<Item = (&'static Input, Option<u16>)> {
         let inputs = self.inputs;
         let all = INPUTS.iter().zip(self.functions);
-        all.filter(move |(input, _)| input.bit.is_none_or(|bit| inputs.contains(bit)))
+        all.filter(move |(input, function)| match input.bit {
+            None => function.is_some(),
+            Some(bit) => inputs.is_none_or(|inputs| inputs.contains(bit)),
+        })
     }
 
     /// The input by which the terminals decide whatever the bus says.
@@ -101,20 +122,28 @@ impl Terminals {
 
     fn forces(&self, functions: &[u16]) -> Option<Refusal> {
         self.on().find_map(|(input, function)| {
-            let index = FORCES.iter().position(|force| *force == function && functions.contains(force))?;
+            let forces = |force: &u16| Some(*force) == function && functions.contains(force);
+            let index = FORCES.iter().position(forces)?;
             Some(Refusal::Overridden { by: input.forces[index], remedy: input.remedy })
         })
     }
 
-    /// What would give a run command if FA00 were 0. The manual lists few functions of inputs, so any other that is on
-    /// counts as one.
+    /// What would give a run command if FA00 were 0, or may. The manual lists few functions of inputs, so any other that is
+    /// on counts as one; of a drive without FD06 every input is on.
     pub(crate) fn would_start(&self) -> Option<Refusal> {
         let forced = self.forces(&FORCES[1..]);
-        let command = !matches!(self.command_mode, 1 | BY_SERIAL_LINK) || self.forces(&FORCES[..1]).is_some();
+        let by_terminals = !matches!(self.command_mode, Some(1 | BY_SERIAL_LINK));
+        let command = by_terminals || self.forces(&FORCES[..1]).is_some();
         forced.or_else(|| {
-            let starts = |input: &&(&Input, u16)| input.0.bit.is_some() && !HARMLESS.contains(&input.1);
-            let on: Vec<_> = self.on().collect();
-            let (input, _) = on.iter().find(starts).filter(|_| command)?;
+            let starts = |(input, function): &(&Input, Option<u16>)| match (input.bit, *function) {
+                (None, Some(ALWAYS_RELEASED)) => false,
+                (_, Some(function)) => !HARMLESS.contains(&function),
+                (_, None) => true,
+            };
+            let (input, _) = self.on().find(starts).filter(|_| command)?;
+            if self.inputs.is_none() && input.bit.is_some() {
+                return Some(INPUTS_UNKNOWN);
+            }
             Some(Refusal::Overridden { by: input.on, remedy: "switch it off first, or set CMOD = 2" })
         })
     }
@@ -182,38 +211,64 @@ pub(crate) fn is_falling(from: Option<Frequency>, to: Option<Frequency>) -> bool
 }
 
 impl<P: Port> Atv21<P> {
-    /// The terminals as they stand, read anew: eight exchanges.
+    /// The terminals as they stand, read anew: seven exchanges.
     pub(crate) async fn terminals(&mut self) -> Result<Terminals> {
-        let mut calls = self.registers.at(Class::Command);
-        let inputs = LogicInputs::from_bits_retain(calls.read(map::LOGIC_INPUTS).await?);
-        let command_mode = calls.read(map::COMMAND_MODE).await?;
-        let mut functions = [0; 5];
+        let inputs = self.optional(Class::Command, map::LOGIC_INPUTS).await?;
+        let command_mode = self.optional(Class::Command, map::COMMAND_MODE).await?;
+        let mut functions = [None; 5];
         for (function, input) in functions.iter_mut().zip(&INPUTS) {
-            *function = calls.read(input.function).await?;
+            *function = self.optional(Class::Command, input.function).await?;
         }
-        Ok(Terminals { inputs, command_mode, functions })
+        Ok(Terminals { inputs: inputs.map(LogicInputs::from_bits_retain), command_mode, functions })
     }
 
     /// FA00 as the drive holds it, remembered for the next stop.
     pub(crate) async fn command_word(&mut self, class: Class) -> Result<CommandWord> {
         let word = self.registers.at(class).read(map::COMMAND_WORD).await?;
         let word = CommandWord::from_bits_retain(word);
-        self.held = Some(word);
+        (self.held, self.proof.word) = (Some(word), Some(word));
         Ok(word)
     }
 
     /// FE46.
     pub(crate) async fn active_reference(&mut self) -> Result<ReferenceSource> {
-        self.registers.at(Class::Command).read(map::REFERENCE_SOURCE).await.map(ReferenceSource::from)
+        let word = self.registers.at(Class::Command).read(map::REFERENCE_SOURCE).await?;
+        let active = ReferenceSource::from(word);
+        self.proof.source = Some(active);
+        Ok(active)
     }
 
     /// Reads FA00, where this status shows that it may be another one than is remembered: then the next stop needs no
-    /// reading before its word is written. What cannot be read now, a later status tells.
-    pub(crate) async fn keep_stop_ready(&mut self, status: &Status) {
+    /// reading before its word is written. What cannot be read now, a later status tells. False: there was no need.
+    pub(crate) async fn keep_stop_ready(&mut self, status: &Status) -> bool {
         let shown = (status_word(status).intersection(CHOSEN_OR_ORDERED), source(status));
-        if self.held.is_none() || self.shown != Some(shown) {
-            self.shown = self.command_word(Class::Status).await.is_ok().then_some(shown);
+        let unproved = self.run.lease().is_some() && self.proof.word.is_none();
+        if self.held.is_some() && self.shown == Some(shown) && !unproved {
+            return false;
         }
+        self.shown = self.command_word(Class::Status).await.is_ok().then_some(shown);
+        if self.modes.is_none() && self.authority == Authority::Priority {
+            self.read_modes(Class::Status).await.ok();
+        }
+        true
+    }
+
+    /// CMOD and FMOD, which are not in the drive's own manual.
+    pub(crate) async fn read_modes(&mut self, class: Class) -> Result<()> {
+        let command = self.optional(class, map::COMMAND_MODE).await?;
+        self.modes = Some([command, self.optional(class, map::REFERENCE_MODE).await?]);
+        Ok(())
+    }
+
+    /// A register that this drive may lack.
+    pub(crate) async fn optional(
+        &mut self,
+        class: Class,
+        register: Register<impl Readable>,
+    ) -> Result<Option<u16>> {
+        let mut calls = self.registers.at(class);
+        let words = self.absent.read(&mut calls, register.address(), 1).await?;
+        Ok(words.first().copied().flatten())
     }
 }
 
@@ -230,7 +285,12 @@ mod tests {
     use super::*;
 
     const fn terminals(inputs: u16, command_mode: u16, functions: [u16; 5]) -> Terminals {
-        Terminals { inputs: LogicInputs::from_bits_retain(inputs), command_mode, functions }
+        let [always, f, r, res, via] = functions;
+        Terminals {
+            inputs: Some(LogicInputs::from_bits_retain(inputs)),
+            command_mode: Some(command_mode),
+            functions: [Some(always), Some(f), Some(r), Some(res), Some(via)],
+        }
     }
 
     #[test]

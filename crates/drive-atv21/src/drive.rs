@@ -4,29 +4,44 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Lease, Measurements, Port,
-    Reaction, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
+    Absent, BroadcastWrite, Class, Direction, Drive, Error, Faults, Ground, Identity, Intent, Lease,
+    Measurements, Port, Reaction, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
+    Withdrawn, Written,
 };
 
-use crate::{Atv21, CommandWord, registers};
+use crate::{Atv21, CommandWord, model, proof::Proof, registers};
 
 #[async_trait]
 impl<P: Port> Drive for Atv21<P> {
     drive_core::told_by!(registers);
 
     fn lease(&self) -> Option<Lease> {
-        self.lease
+        self.run.lease()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.lease = Some(lease);
+        self.run.adopt(lease);
+        (self.shown, self.proof) = (None, Proof::of_unknown());
     }
 
     fn forget(&mut self) {
         self.forget_blocks();
-        (self.held, self.shown, self.given) = (None, None, None);
-        (self.setpoint, self.references) = (None, None);
-        self.upper_limit = None;
+        self.proof.forget();
+        (self.held, self.shown, self.references) = (None, None, None);
+        (self.upper_limit, self.modes, self.other_drive) = (None, None, None);
+        (self.absent, self.was_lost) = (Absent::default(), true);
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        self.proof.changed.take()
+    }
+
+    fn recognise(&self, identity: &Identity) -> Recognised {
+        model::recognise(identity)
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.shaft.set_coast_time(time);
     }
 
     /// Reads the fast set: from the block of the drive, in one exchange, where it is known to hold FD01, FD00 and FE03;
@@ -39,8 +54,11 @@ impl<P: Port> Drive for Atv21<P> {
     ///
     /// [`Status::at_reference`] and [`Status::fault_code`] are always `None`: no word of the fast set tells them.
     async fn status(&mut self) -> Result<Status> {
-        let status = self.read_status(Class::Status).await?;
-        self.keep_stop_ready(&status).await;
+        let mut status = self.read_status(Class::Status).await?;
+        if !self.keep_stop_ready(&status).await {
+            self.prove(&mut status).await;
+        }
+        self.judge(&mut status);
         Ok(status)
     }
 

@@ -26,6 +26,7 @@ mod faults;
 mod in_effect;
 mod intent;
 mod model;
+mod proof;
 mod reading;
 pub mod registers;
 mod release;
@@ -39,11 +40,11 @@ mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, Command, Error, ExceptionMeaning, Frequency, Lease, Port, Reaction, Refusal, Registers,
-    SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, OwnRun, Port, Reaction, Refusal,
+    Registers, Result, Shaft, SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
-use crate::{blocks::WriteSlot, in_effect::ReadBlock};
+use crate::{blocks::WriteSlot, in_effect::ReadBlock, proof::Proof};
 pub use crate::{
     faults::{ALARMS, FAULTS},
     model::{Enclosure, MODELS, ModelEntry, VoltageClass},
@@ -130,7 +131,16 @@ enum WriteBlock {
 pub struct Atv21<P> {
     registers: Registers<P>,
     /// The run command of this side that stands, or may.
-    lease: Option<Lease>,
+    run: OwnRun,
+    proof: Proof,
+    shaft: Shaft,
+    /// The line was lost since the shaft was last seen.
+    was_lost: bool,
+    absent: Absent,
+    /// CMOD and FMOD, where the drive has them; `None`: not read.
+    modes: Option<[Option<u16>; 2]>,
+    /// What the drive has said it is, where that is no Altivar 21.
+    other_drive: Option<&'static str>,
     authority: Authority,
     /// What its owner has chosen; `None`: what the drive holds is kept.
     selections: Option<CommandWord>,
@@ -138,10 +148,6 @@ pub struct Atv21<P> {
     held: Option<CommandWord>,
     /// What FD01 and FE45 showed when FA00 was last read for a status.
     shown: Option<(StatusWord, CommandSource)>,
-    /// The run command that this value has given and not taken back.
-    given: Option<CommandWord>,
-    /// What was last seen in FA01, where nobody has changed it since through this value.
-    setpoint: Option<u16>,
     /// FA01 and FA13 before the first setpoint of this value.
     references: Option<[u16; 2]>,
     read_block: ReadBlock,
@@ -159,13 +165,17 @@ impl<P: Port> Atv21<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            lease: None,
+            run: OwnRun::new(),
+            proof: Proof::default(),
+            shaft: Shaft::new(),
+            was_lost: false,
+            absent: Absent::default(),
+            modes: None,
+            other_drive: None,
             authority: Authority::default(),
             selections: None,
             held: None,
             shown: None,
-            given: None,
-            setpoint: None,
             references: None,
             read_block: ReadBlock::default(),
             write_block: WriteBlock::Unused,
@@ -210,6 +220,14 @@ impl<P: Port> Atv21<P> {
     #[must_use]
     pub fn into_port(self) -> P {
         self.registers.into_port()
+    }
+
+    /// Refuses to write to a drive that has said that it is another one.
+    fn check_own(&self, command: Command) -> Result<()> {
+        match self.other_drive {
+            None => Ok(()),
+            Some(it_is) => Err(self.refused(command, Refusal::Settings(it_is))),
+        }
     }
 
     const fn refused(&self, command: Command, reason: Refusal) -> Error {

@@ -1,6 +1,8 @@
 //! The models of the Altivar 21 (Altivar 21 Modbus §8.9, p. 40, 41).
 
-use drive_core::Power;
+use drive_core::{Identity, Power, Recognised};
+
+use crate::registers as map;
 
 /// Bit 7 of FB72: the class B variant, whose reference ends in C.
 const CLASS_B: u16 = 1 << 7;
@@ -69,6 +71,42 @@ impl ModelEntry {
         self.decawatts.iter().copied().map(Power::from_decawatts)
     }
 }
+
+/// Whether what says this of itself is an Altivar 21: by the reference of 43/14 (§7.9), else by FB05 and FB72.
+pub(crate) fn recognise(identity: &Identity) -> Recognised {
+    if let Some(model) = identity.model.as_deref().map(str::trim).filter(|model| !model.is_empty()) {
+        let is = |family: &&(&str, &str)| {
+            model.get(..family.0.len()).is_some_and(|own| own.eq_ignore_ascii_case(family.0))
+        };
+        return match RELATIVES.iter().find(is) {
+            Some((OWN, _)) => Recognised::Mine,
+            Some((_, it_is)) => Recognised::NotMine { it_is },
+            None => Recognised::NotMine { it_is: STRANGER },
+        };
+    }
+    let code =
+        |register: u16| identity.codes.iter().find(|word| word.address == register).map(|word| word.value);
+    let codes = code(map::MODEL_CODE.address()).zip(code(map::MODEL_CLASS.address()));
+    match codes.and_then(|(code, class)| ModelEntry::lookup(code, class)) {
+        Some(_) => Recognised::Mine,
+        None => Recognised::CannotTell,
+    }
+}
+
+const OWN: &str = "ATV21";
+/// How the references of 43/14 begin, and what is to be done about those of others. The longer of two comes first.
+const RELATIVES: &[(&str, &str)] = &[
+    (
+        "ATV212",
+        "it says that it is an Altivar 212: no family here fits, and nothing but a stop is written to it",
+    ),
+    (OWN, ""),
+    ("ATV312", "it says that it is an Altivar 312: set it up as one of the family atv312"),
+    ("ATV28", "it says that it is an Altivar 28: set it up as one of the family atv28"),
+    ("ATV58", "it says that it is an Altivar 58: set it up as one of the family atv58"),
+];
+const STRANGER: &str =
+    "its identification (43/14) names no Altivar 21: see what it is, for nothing but a stop is written to it";
 
 use Enclosure::{Ip54, Ip54ClassB, Standard};
 use VoltageClass::{V200, V400};

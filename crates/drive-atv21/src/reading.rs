@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power, RawWord, Result,
-    Setpoint, Speed, State, Status,
+    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power, RawWord,
+    Recognised, Result, Setpoint, Speed, State, Status,
     registers::{Register, access::Read},
 };
 use tokio_modbus::prelude::ReadCode;
@@ -14,7 +14,7 @@ use crate::{
     blocks::{self, Blocks, READ_BLOCK, ReadSlot, WriteSlot},
     faults::{FAULTS, alarms},
     in_effect::{self, ReadBlock},
-    model::ModelEntry,
+    model::{self, ModelEntry},
     registers as map,
     status::{self, FAST_SET},
     words::{
@@ -91,7 +91,8 @@ impl<P: Port> Atv21<P> {
             None => self.read_each(class, &FAST_SET).await?,
         };
         words.extend(self.read_each(class, &[map::COMMAND_SOURCE]).await?);
-        let status = Status { at: self.registers.snapshot_time(), ..status::status(words) };
+        let mut status = Status { at: self.registers.snapshot_time(), ..status::status(words) };
+        self.tell(&mut status);
         if status.is_fault() || status.state == State::NotReady {
             // It may be reset and started up anew by somebody else.
             self.forget_blocks();
@@ -150,13 +151,14 @@ impl<P: Port> Atv21<P> {
     }
 
     pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
-        let mut calls = self.registers.at(Class::Background);
-        let present = fault(calls.read(map::FAULT_CODE).await?);
+        let present = fault(self.fault_code(Class::Background).await?);
         let mut history = Vec::with_capacity(HISTORY.len());
         for register in HISTORY {
-            history.extend(fault(calls.read(register).await?));
+            let code = self.optional(Class::Background, register).await?;
+            history.extend(code.and_then(fault));
         }
-        let warnings = alarms(Alarms::from_bits_retain(calls.read(map::ALARM_CODE).await?));
+        let alarm = self.optional(Class::Background, map::ALARM_CODE).await?.unwrap_or(0);
+        let warnings = alarms(Alarms::from_bits_retain(alarm));
         Ok(Faults { present: present.into_iter().collect(), history, warnings, reset_allowed: None })
     }
 
@@ -217,7 +219,7 @@ impl<P: Port> Atv21<P> {
     /// As every read.
     pub async fn model(&mut self) -> Result<Option<&'static ModelEntry>> {
         let [code, class] = self.model_codes().await?;
-        Ok(ModelEntry::lookup(code, class))
+        Ok(code.zip(class).and_then(|(code, class)| ModelEntry::lookup(code, class)))
     }
 
     /// Reads how the indirect blocks are set up. What stands there is in effect only if the drive was reset since it
@@ -230,15 +232,26 @@ impl<P: Port> Atv21<P> {
         Ok(Blocks { read: self.read_slots(class).await?, write: self.configured_write_slots(class).await? })
     }
 
+    /// What 43/14 says, and FB05 and FB72 where the drive has them.
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
-        let identity = self.registers.at(Class::Background).identification(ReadCode::Basic).await?;
+        let told = self.registers.at(Class::Background).identification(ReadCode::Basic).await;
         let [code, class] = self.model_codes().await?;
-        let raw = |register: Register<Read>, value| RawWord {
-            address: register.address(),
-            code: register.row().code,
-            value,
+        let raw = |register: Register<Read>, value: Option<u16>| {
+            value.map(|value| RawWord { address: register.address(), code: register.row().code, value })
         };
-        Ok(Identity { codes: vec![raw(map::MODEL_CODE, code), raw(map::MODEL_CLASS, class)], ..identity })
+        let codes: Vec<_> =
+            [raw(map::MODEL_CODE, code), raw(map::MODEL_CLASS, class)].into_iter().flatten().collect();
+        let identity = match told {
+            Ok(identity) => Identity { codes, ..identity },
+            // Its codes tell what it is as well.
+            Err(Error::Exception { .. }) if !codes.is_empty() => Identity { codes, ..Identity::default() },
+            Err(error) => return Err(error),
+        };
+        self.other_drive = match model::recognise(&identity) {
+            Recognised::NotMine { it_is } => Some(it_is),
+            _ => None,
+        };
+        Ok(identity)
     }
 
     /// The present fault in a form for a refusal: FC90, 0 for none.
@@ -263,9 +276,9 @@ impl<P: Port> Atv21<P> {
         Ok([calls.read(first).await?.into(), calls.read(second).await?.into()])
     }
 
-    async fn model_codes(&mut self) -> Result<[u16; 2]> {
-        let mut calls = self.registers.at(Class::Background);
-        Ok([calls.read(map::MODEL_CODE).await?, calls.read(map::MODEL_CLASS).await?])
+    async fn model_codes(&mut self) -> Result<[Option<u16>; 2]> {
+        let code = self.optional(Class::Background, map::MODEL_CODE).await?;
+        Ok([code, self.optional(Class::Background, map::MODEL_CLASS).await?])
     }
 
     /// Reads the fast set from the block, where that is known to hold it; `None` where it is not. A drive that refuses
@@ -282,13 +295,13 @@ impl<P: Port> Atv21<P> {
         }
     }
 
-    /// Reads registers one by one.
+    /// Reads registers one by one, those left out that this drive does not have.
     async fn read_each(&mut self, class: Class, registers: &[Register<Read>]) -> Result<Vec<RawWord>> {
-        let mut calls = self.registers.at(class);
         let mut words = Vec::with_capacity(registers.len());
         for &register in registers {
-            let value = calls.read(register).await?;
-            words.push(RawWord { address: register.address(), code: register.row().code, value });
+            if let Some(value) = self.optional(class, register).await? {
+                words.push(RawWord { address: register.address(), code: register.row().code, value });
+            }
         }
         Ok(words)
     }

@@ -19,8 +19,9 @@ impl<P: Port> Atv21<P> {
         if status.state.is_moving() {
             return Err(self.refused(Command::Release, Refusal::MotorRunning));
         }
+        self.check_own(Command::Release)?;
         let terminals = self.terminals().await?;
-        if terminals.command_mode == BY_SERIAL_LINK {
+        if terminals.command_mode == Some(BY_SERIAL_LINK) {
             let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus: set CMOD to 0 or 1");
             return Err(self.refused(Command::Release, reason));
         }
@@ -31,7 +32,7 @@ impl<P: Port> Atv21<P> {
         let held = self.command_word(Class::Command).await?;
         let chosen = if self.selections.is_some() { CommandWord::empty() } else { CommandWord::SELECTIONS };
         self.write_command_word(held & chosen & CommandWord::KEPT).await?;
-        self.given = None;
+        self.run.end();
         let mut settling = Confirming::within(SETTLED_WITHIN);
         loop {
             let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
@@ -44,14 +45,20 @@ impl<P: Port> Atv21<P> {
         }
     }
 
-    /// Ends the run command in FA00, if this side gave it or it is not in force: what another master has written there is
+    /// Ends the run command in FA00, if this side gave it or it is not in force, also where the drive has tripped: what another master has written there is
     /// his.
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = self.command_word(Class::Command).await?;
-        let ours = self.given == Some(held) || commanded_by_other(&status).is_some();
-        if !held.contains(CommandWord::RUN) || !ours {
-            return Ok(Withdrawn::Nothing(status));
+        let lease = self.run.lease();
+        let stands = held.contains(CommandWord::RUN);
+        let ours =
+            lease.is_some_and(|lease| lease.word == held.bits()) || commanded_by_other(&status).is_some();
+        // One that was not seen to arrive may come late: what stands is written again, and read after it.
+        let may_come = !stands && lease.is_some();
+        if !may_come && !(stands && ours) {
+            self.run.end();
+            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
         let word = held - CommandWord::RUN - CommandWord::EDGES;
         self.write_command_word(word).await?;
@@ -60,8 +67,8 @@ impl<P: Port> Atv21<P> {
         if now.contains(CommandWord::RUN) {
             return Err(self.not_confirmed(Command::Withdraw, status, Some(OTHER_WORD)));
         }
-        self.given = None;
-        Ok(Withdrawn::Ended(status))
+        self.run.end();
+        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 
     /// Writes the references that stood in the drive before the first setpoint of this value: the terminals' next run
@@ -74,7 +81,8 @@ impl<P: Port> Atv21<P> {
         for (register, word) in both {
             self.registers.at(Class::Command).write(register, word).await?;
         }
-        (self.setpoint, self.references) = (None, None);
+        self.proof.disagree();
+        self.references = None;
         Ok(())
     }
 }

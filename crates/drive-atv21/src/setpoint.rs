@@ -23,6 +23,7 @@ pub(crate) type Reference = (Register<ReadWrite>, u16);
 
 impl<P: Port> Atv21<P> {
     pub(crate) async fn write_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.check_own(Command::Setpoint(setpoint))?;
         let reference @ (register, word) = self.reference(setpoint).await?;
         self.check_reference(Command::Setpoint(setpoint)).await?;
         self.clear_other_reference(register).await?;
@@ -36,7 +37,7 @@ impl<P: Port> Atv21<P> {
     pub(crate) async fn clear_other_reference(&mut self, register: Register<ReadWrite>) -> Result<()> {
         let hertz = register.address() == map::FREQUENCY_REFERENCE.address();
         let other = if hertz { map::SPEED_REFERENCE } else { map::FREQUENCY_REFERENCE };
-        self.setpoint = None;
+        self.proof.disagree();
         let mut calls = self.registers.at(Class::Command);
         let held = calls.read(other).await?;
         if self.references.is_none() {
@@ -107,6 +108,8 @@ impl<P: Port> Atv21<P> {
                 Err(error) => return Err(error),
             };
             if kept && because.is_none() {
+                self.proof.agreed = Some((register, word));
+                self.proof.reference = self.proof.reference.or(Some(word));
                 return Ok(());
             }
             if !kept || Instant::now() >= settled || !confirming.again().await {
@@ -127,7 +130,6 @@ impl<P: Port> Atv21<P> {
         let mut in_force = 0;
         if hertz && ours {
             in_force = self.registers.at(Class::Command).read(map::REFERENCE_BEFORE_RAMP).await?;
-            self.setpoint = Some(word).filter(|_| kept);
         }
         if kept && ours && (!hertz || is_same(in_force, word)) {
             return Ok((kept, Status::default(), None));

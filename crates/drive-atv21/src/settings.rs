@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Confirming, Error, Port, Reaction, Refusal, Result, Row, Watchdog, Written,
+    Class, Command, Confirming, Error, ExceptionMeaning, Port, Reaction, Refusal, Result, Row, Watchdog,
+    Written,
     registers::{Register, Storage, access::ReadWrite, refuse_commands},
 };
 
@@ -37,6 +38,12 @@ pub enum StallLevel {
     /// OC2, the parameter F185.
     Oc2,
 }
+
+/// The drive refuses its watchdog though nothing runs: waiting for standstill does not help.
+const NOT_NOW_AT_REST: Refusal = Refusal::Settings(
+    "the drive refuses its watchdog (exception 04) though the motor stands: see to the supply of its power part and to a lock \
+     of its parameters",
+);
 
 /// Whether it chooses what a place of a block holds: F870, F871, F875 to F879.
 fn is_slot(row: &Row) -> bool {
@@ -151,6 +158,7 @@ impl<P: Port> Atv21<P> {
     }
 
     pub(crate) async fn write_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        self.check_own(Command::ArmWatchdog)?;
         let reaction_word = match reaction {
             Reaction::Ignore => None,
             Reaction::Freewheel => Some(0),
@@ -169,6 +177,7 @@ impl<P: Port> Atv21<P> {
             self.change_parameter(map::TIME_OUT_REACTION.row(), word, Command::ArmWatchdog).await?;
         }
         self.change_parameter(map::TIME_OUT.row(), seconds, Command::ArmWatchdog).await?;
+        self.proof.armed = seconds != 0;
         self.read_watchdog().await
     }
 
@@ -183,9 +192,12 @@ impl<P: Port> Atv21<P> {
             });
         }
         let command = Command::WriteParameter(row.address);
+        self.check_own(command)?;
         if DECIDE.iter().any(|register| register.address() == row.address) {
             self.check_value(row, word)?;
-            if self.read_status(Class::Command).await?.state.is_moving() {
+            let moves = self.read_status(Class::Command).await?.state.is_moving();
+            if moves || self.command_word(Class::Command).await?.contains(CommandWord::RUN) {
+                // A run command that stands and does not act, of this side or another, may act by it.
                 return Err(self.refused(command, Refusal::MotorRunning));
             }
             if let Some(reason) = self.terminals().await?.with(row.address, word).would_start() {
@@ -212,18 +224,26 @@ impl<P: Port> Atv21<P> {
             self.read_block = ReadBlock::Unused;
             self.write_block = WriteBlock::Unused;
         }
-        // UL may be another one then.
-        self.upper_limit = None;
+        // UL, CMOD and FMOD may be others then.
+        (self.upper_limit, self.modes) = (None, None);
         if row.storage == Storage::Eeprom {
             // Counted before the answer: the EEPROM may wear by a write whose answer is lost.
             self.eeprom_writes = self.eeprom_writes.saturating_add(1);
         }
         let sent = calls.write_row(row, word).await;
         match sent {
+            Err(Error::Exception { meaning: ExceptionMeaning::NotNow, .. })
+                if command == Command::ArmWatchdog
+                    && !self.read_status(Class::Background).await?.state.is_moving() =>
+            {
+                return Err(self.refused(command, NOT_NOW_AT_REST));
+            }
             Err(error) if error.kind() != drive_core::ErrorKind::OutcomeUnknown => return Err(error),
             _ => {}
         }
+        let mut calls = self.registers.at(Class::Background);
         if calls.read_row(row).await.map_err(Error::after_write)? == word {
+            self.proof.knows(row.address, word);
             return Ok(Written { changed: true, storage: row.storage });
         }
         sent?;
@@ -261,7 +281,9 @@ impl<P: Port> Atv21<P> {
     }
 
     async fn read_background(&mut self, register: Register<ReadWrite>) -> Result<u16> {
-        self.registers.at(Class::Background).read(register).await
+        let word = self.registers.at(Class::Background).read(register).await?;
+        self.proof.knows(register.address(), word);
+        Ok(word)
     }
 
     /// Whether FD42 comes to show these bits set or clear.

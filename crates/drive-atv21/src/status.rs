@@ -26,7 +26,9 @@ pub(crate) fn state(word: StatusWord, output: Option<Frequency>) -> State {
     if word.contains(StatusWord::EMERGENCY_STOP) {
         return State::QuickStop;
     }
-    if word.contains(StatusWord::RUN) {
+    // A run command without an output is none: ST = OFF or MOFF stands against it.
+    let cut = word.contains(StatusWord::FREEWHEEL) && !turning;
+    if word.contains(StatusWord::RUN) && !cut && !word.contains(StatusWord::UNDERVOLTAGE) {
         return State::Running;
     }
     if turning || word.contains(StatusWord::DC_BRAKING) {
@@ -82,6 +84,8 @@ mod tests {
             (0x4000, Some(Frequency::from_hertz(60)), State::Stopping),
             (0x4080, STOPPED, State::Stopping),
             (0x4800, STOPPED, State::Disabled),
+            (0x4C00, STOPPED, State::Disabled),
+            (0x0408, STOPPED, State::NotReady),
             (0x0000, STOPPED, State::NotReady),
             (0x4008, STOPPED, State::NotReady),
             (0x1000, STOPPED, State::QuickStop),

@@ -4,7 +4,7 @@ use drive_core::{
     Class, Command, Confirming, Error, ErrorKind, Exchange, Port, PortError, Result, State, Status, StopMode,
 };
 
-use crate::{Atv21, registers as map, words::CommandWord};
+use crate::{Atv21, control::BY_SERIAL_LINK, registers as map, words::CommandWord};
 
 impl<P: Port> Atv21<P> {
     /// Gives the drive's emergency stop (FA00 bit 12) once, then a word without it. The drive trips with fault E,
@@ -39,12 +39,19 @@ impl<P: Port> Atv21<P> {
         if !is_tripped(&status) {
             return Ok(status);
         }
+        self.check_own(Command::ResetFaults)?;
         // The reset sets FA00 to 0, the priorities included: whoever gives a run command then starts the motor.
-        if let Some(reason) = self.terminals().await?.would_start() {
+        let terminals = self.terminals().await?;
+        if let Some(reason) = terminals.would_start() {
             return Err(self.refused(Command::ResetFaults, reason));
         }
         let clear = self.command_word(Class::Command).await? & CommandWord::KEPT;
-        let edge = (clear | CommandWord::PRIORITIES | CommandWord::FAULT_RESET).bits();
+        // It may act only while the bus commands (§8.4 does not say).
+        let mut edge = clear | CommandWord::FAULT_RESET;
+        if terminals.command_mode != Some(BY_SERIAL_LINK) {
+            edge |= CommandWord::COMMAND_PRIORITY;
+        }
+        let edge = edge.bits();
         let sent = self.registers.at(Class::Command).edge().write(map::COMMAND_WORD, edge).await;
         match &sent {
             Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return sent.map(|()| status),
@@ -52,10 +59,14 @@ impl<P: Port> Atv21<P> {
         }
         // A drive that starts up anew takes other blocks into effect, if they were changed, and its references are 0.
         self.forget_blocks();
-        (self.given, self.setpoint, self.references) = (None, None, None);
+        self.proof.disagree();
+        self.references = None;
         // The edge is cleared whether or not the drive is already starting up again and hears nothing: then it clears
         // the word by itself.
         let cleared = self.write_command_word(clear).await;
+        if cleared.is_ok() {
+            self.run.end();
+        }
         let mut confirming = Confirming::begin();
         let mut last = None;
         loop {

@@ -34,6 +34,8 @@ pub struct Words {
     pub deaf: bool,
     /// Registers that answer this exception.
     pub refused: BTreeMap<u16, u8>,
+    /// The exception that every write is answered by.
+    pub refuses_writes: Option<u8>,
     /// What function 08 answers, where that is not its request.
     pub loop_back: Option<Vec<u8>>,
     capabilities: &'static Capabilities,
@@ -50,6 +52,7 @@ impl Words {
             writes: VecDeque::new(),
             deaf: false,
             refused: BTreeMap::new(),
+            refuses_writes: None,
             loop_back: None,
             capabilities,
             terms: Terms::default(),
@@ -80,6 +83,9 @@ impl Words {
     fn write(&mut self, first: u16, values: &[u16], answer: Response) -> tokio_modbus::Result<Response> {
         assert!(values.len() <= usize::from(self.capabilities.write_words), "{} words", values.len());
         self.asked.push(Asked::Write(self.terms.class, first, values.to_vec()));
+        if let Some(code) = self.refuses_writes {
+            return Ok(Err(ExceptionCode::new(code)));
+        }
         let fate = self.writes.pop_front().flatten();
         if !self.deaf && fate.as_ref().is_none_or(|(_, arrives)| *arrives) {
             self.words.extend((first..).zip(values.iter().copied()));

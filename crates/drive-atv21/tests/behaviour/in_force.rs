@@ -275,11 +275,17 @@ async fn a_fault_reset_is_refused_where_the_terminals_would_start_the_motor() {
 
 #[tokio::test(start_paused = true)]
 async fn a_fault_reset_leaves_the_priorities_as_they_were() {
-    for (held, left) in [(0x0000, 0x0000), (0xC450, 0xC050)] {
-        let mut drive = driver(words(&[(0xFA00, held), (0xFD01, 0x0003), (0x0003, 2)]));
+    // Bit 15 goes along only where CMOD does not give the bus the command.
+    for (held, mode, edge, left) in [
+        (0x0000, 2, 0x2000, 0x0000),
+        (0x0000, 0, 0xA000, 0x0000),
+        (0xC450, 2, 0xE050, 0xC050),
+        (0x0450, 0, 0xA050, 0x0050),
+    ] {
+        let mut drive = driver(words(&[(0xFA00, held), (0xFD01, 0x0003), (0x0003, mode)]));
         drive.reset_faults().await.unwrap_err();
         let written = drive.into_port().written();
-        assert_eq!(written, [(0xFA00, 0xE000 | left), (0xFA00, left)]);
+        assert_eq!(written, [(0xFA00, edge), (0xFA00, left)]);
     }
 }
 

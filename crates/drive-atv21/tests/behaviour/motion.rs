@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use drive_atv21::{Alarms, Atv21, Authority, CAPABILITIES, CommandWord, ROWS};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, Frequency, PortError, Refusal, Row, SetpointProblem, Speed,
-    State, StopMode,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Motion, PortError, Refusal, Row, SetpointProblem,
+    Speed, State, StopMode,
 };
 use drive_sim::{Panel, models::atv21::Atv21 as Model};
 use drive_testing::{bench, words::Words};
@@ -51,7 +51,11 @@ async fn freewheel_and_dc_injection_hold_until_the_next_command() {
     rig.until(|seen| seen.shaft_frequency == 0).await;
     assert!(rig.machine.observe().running, "the injection goes on at rest");
     drive.stop(StopMode::Ramp).await.unwrap();
-    assert!(drive.status().await.unwrap().is_standstill());
+    // How long an injection takes to bring it to rest nobody has said.
+    assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
+    drive.set_coast_time(Some(SECOND));
+    tokio::time::sleep(SECOND).await;
+    assert_eq!(drive.status().await.unwrap().motion, Motion::AtRest);
 }
 
 #[tokio::test(start_paused = true)]

@@ -2,7 +2,7 @@
 
 use drive_atv21::{Alarms, Atv21, CAPABILITIES, MaintenanceAlarms, ModelEntry, ROWS, StatusWord};
 use drive_core::{
-    Control, Direction, Drive, Fault, Frequency, Percent, Row, Setpoint, Speed, State, StopMode,
+    Control, Direction, Drive, Fault, Frequency, Percent, Row, Setpoint, Speed, State, StopMode, Verdict,
 };
 use drive_sim::{Exception, Panel};
 use drive_testing::bench;
@@ -18,17 +18,32 @@ async fn a_status_takes_two_exchanges_when_the_block_is_set_up_and_four_when_not
     assert_eq!(rig.count() - before, u64::from(CAPABILITIES.status_exchanges));
 
     let (rig, mut drive) = Rig::with_blocks_shown().await;
-    for state in [State::Running, State::Ready] {
-        // What FD01 shows anew may come from another FA00, which is read once.
-        drive.status().await.unwrap();
-        let before = rig.count();
-        let status = drive.status().await.unwrap();
-        assert_eq!(rig.count() - before, 2);
-        assert_eq!((status.state, status.control, status.raw.len()), (state, Some(Control::Bus), 4));
-        rig.at_rest(&mut drive).await;
-    }
+    rig.at_rest(&mut drive).await;
+    // What FD01 shows anew may come from another FA00, which is read once.
+    drive.status().await.unwrap();
+    let before = rig.count();
+    let status = drive.status().await.unwrap();
+    assert_eq!(rig.count() - before, 2);
+    assert_eq!((status.state, status.control, status.raw.len()), (State::Ready, Some(Control::Bus), 4));
     rig.machine.panel(Panel::TakeControl);
     assert_eq!(drive.status().await.unwrap().control, Some(Control::Panel));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_proves_a_run_command_costs_a_tenth_of_the_statuses_and_one_exchange_of_each_at_most() {
+    for (mut rigged, of_a_status) in [(Rig::factory(), 4), (Rig::with_blocks_shown().await, 2)] {
+        let (rig, drive) = (&rigged.0, &mut rigged.1);
+        rig.at_speed(drive).await;
+        drive.status().await.unwrap();
+        let begun = rig.count();
+        for _ in 0..120 {
+            let before = rig.count();
+            assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::InForce));
+            assert!(rig.count() - before <= of_a_status + 1);
+        }
+        let exchanges = rig.count() - begun;
+        assert!(exchanges <= 120 * of_a_status * 110 / 100 + 1, "{exchanges} of 120 statuses");
+    }
 }
 
 #[tokio::test(start_paused = true)]
@@ -44,14 +59,14 @@ async fn a_status_of_a_turning_motor_takes_what_the_capabilities_say_and_one_for
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_start_takes_eleven_exchanges_with_the_block_and_a_stop_four() {
+async fn a_start_takes_ten_exchanges_with_the_block_and_a_stop_four() {
     let (rig, mut drive) = Rig::with_blocks_shown().await;
     rig.at_rest(&mut drive).await;
     let before = rig.count();
     drive.start(Direction::Forward).await.unwrap();
-    assert_eq!(rig.count() - before, 11);
+    assert_eq!(rig.count() - before, 10);
     drive.stop(StopMode::Ramp).await.unwrap();
-    assert_eq!(rig.count() - before, 15);
+    assert_eq!(rig.count() - before, 14);
 }
 
 #[tokio::test(start_paused = true)]
@@ -87,7 +102,8 @@ async fn a_block_that_is_configured_and_not_in_effect_is_never_read_as_a_status(
     }
     let before = rig.count();
     let status = drive.status().await.unwrap();
-    assert_eq!((rig.count() - before, status.output_frequency), (2, Some(HALF_SPEED)), "as it was in effect");
+    assert_eq!(status.output_frequency, Some(HALF_SPEED), "as it was in effect");
+    assert!(rig.count() - before <= 3, "by the block");
     // A daemon that starts, or that was reconnected, knows nothing of it.
     drive.forget();
     for _ in 0..5 {
@@ -124,18 +140,21 @@ async fn a_reset_that_takes_a_changed_block_into_effect_changes_no_value() {
         drive.write_parameter(Row::find(ROWS, code).unwrap(), choice).await.unwrap();
     }
     let status = drive.status().await.unwrap();
-    assert_eq!((status.output_frequency, status.raw.len()), (Some(HALF_SPEED), 4));
-    assert_eq!(status.control, Some(Control::Bus), "word by word");
+    assert_eq!((status.output_frequency, status.control), (Some(HALF_SPEED), Some(Control::Bus)));
     rig.machine.trip(1);
     assert_eq!(drive.status().await.unwrap().state, State::Fault);
     drive.reset_faults().await.unwrap();
     tokio::time::sleep(15 * SECOND).await;
     rig.at_speed(&mut drive).await;
-    for exchanges in [4 + 1, 2] {
+    for exchanges in [4, 2] {
         let before = rig.count();
         let status = drive.status().await.unwrap();
         assert_eq!((status.state, status.output_frequency), (State::Running, Some(HALF_SPEED)));
-        assert_eq!(rig.count() - before, exchanges, "word by word, then the block that is in effect now");
+        let took = rig.count() - before;
+        assert!(
+            (exchanges..=exchanges + 1).contains(&took),
+            "word by word, then the block that is in effect now"
+        );
         drive.measurements().await.unwrap();
     }
 }

@@ -110,13 +110,17 @@ impl Contract {
     }
 }
 
-/// Exchanges of one status and of the measurements.
+/// Exchanges of one status and of the measurements. What proves a run command takes turns: of some statuses the least counts.
 async fn exchanges(rig: &mut Rig) -> (u64, u64) {
-    let before = rig.machine.all_requests();
-    rig.drive.status().await.expect("it answers");
+    let mut least = u64::MAX;
+    for _ in 0..3 {
+        let before = rig.machine.all_requests();
+        rig.drive.status().await.expect("it answers");
+        least = least.min(rig.machine.all_requests() - before);
+    }
     let between = rig.machine.all_requests();
     rig.drive.measurements().await.expect("it measures");
-    (between - before, rig.machine.all_requests() - between)
+    (least, rig.machine.all_requests() - between)
 }
 
 /// Resets the present fault. Some drives do not communicate for a while after it, so that nothing can confirm it yet.
