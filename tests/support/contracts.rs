@@ -41,13 +41,19 @@ const fn control(family: Family) -> (ControlWord, &'static [u16]) {
         ControlWord { register, words, others: |_| 0, unseen: &[] }
     }
     match family {
-        // Guide d'exploitation §8.4: the priorities with run, reverse, freewheel, DC braking, fault reset; 0 to release. Bits
-        // that belong to others are kept as they were read; no run command, edge or reserved bit is among them.
+        // Guide d'exploitation §8.4: the priorities, as far as CMOD and FMOD do not give the bus command, with run, reverse,
+        // freewheel, DC braking, fault reset; 0 to release. Bits that belong to others are kept as they were read; no run
+        // command, edge or reserved bit is among them.
         Family::Atv21 => {
-            let words = &[0x0000, 0xC000, 0xC080, 0xC400, 0xC600, 0xC800, 0xE000];
+            let words = &[
+                0x0000, 0xC000, 0xC080, 0xC400, 0xC600, 0xC800, 0x2000, 0x6000, 0xA000, 0xE000, 0x0400,
+                0x0600, 0x4400, 0x4600, 0x8400, 0x8600,
+            ];
             let plausible = &[0x4000, 0x4000, 0x4000, 0x6400, 0x6600, 2, 2, 2, 4, 4, 4, 0, 0, 1, 8_000];
             let others = |written| if written & 0x3508 == 0 { 0xCAF7 } else { 0x0070 };
-            (ControlWord { others, ..control(0xFA00, words) }, plausible)
+            // Words that answer anything seldom name the bus and run in reverse.
+            let unseen = &[0x0600, 0x4600, 0x8600];
+            (ControlWord { others, unseen, ..control(0xFA00, words) }, plausible)
         }
         Family::Atv28 => {
             let words = &[0x0000, 0x0006, 0x0007, 0x000F, 0x0080, 0x080F, 0x100F, 0x200F, 0x400F];

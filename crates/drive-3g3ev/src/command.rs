@@ -1,13 +1,14 @@
 //! Start, stop and withdrawal: what is written to 0001h, and how it is seen to be in force.
 
 use drive_core::{
-    Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Port, RawWord, Refusal,
+    Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Lease, Port, RawWord, Refusal,
     Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
 };
 use tokio::time::Instant;
 
 use crate::{
     Drive3g3ev,
+    proof::withheld,
     registers::address,
     words::{Command, DriveState, Signals},
 };
@@ -28,9 +29,9 @@ const OTHER_WORD: Refusal = Refusal::Overridden {
     by: "another command word in 0001h than was written",
     remedy: "see who else writes to this drive",
 };
-const OUTPUT_OFF: Refusal = Refusal::Overridden {
+pub(crate) const OUTPUT_OFF: Refusal = Refusal::Overridden {
     by: "something that keeps the output off (bit 8 of 002Ch)",
-    remedy: "see to the inputs (n06 to n08)",
+    remedy: "see to the inputs (n06 to n08) and to the panel's STOP key",
 };
 
 impl<P: Port> Drive3g3ev<P> {
@@ -46,20 +47,26 @@ impl<P: Port> Drive3g3ev<P> {
             return Err(self.refused(order, reason));
         }
         if status.state == State::NotReady {
-            return Err(self.refused(order, Refusal::State(State::NotReady)));
+            let cut = withheld(&status).filter(|_| is_run(&status));
+            return Err(self.refused(order, cut.unwrap_or(Refusal::State(State::NotReady))));
         }
         if self.command.is_none() {
             self.read_command(Class::Command).await?;
         }
         let word = Command::run(direction) | self.inputs();
-        self.given = Some(word);
+        self.run.give(Lease::new(direction, word.bits()));
         match self.write_command(word).await {
-            Ok(()) => {}
+            Ok(()) => self.run.was_written(),
             // What was refused may be a repetition of what was carried out.
             Err(error @ Error::Exception { .. }) => {
                 if self.read_command(Class::Command).await.map_err(Error::after_write)?.value != word.bits() {
+                    self.run.was_not_written();
                     return Err(error);
                 }
+            }
+            Err(error) if error.kind() == ErrorKind::NotSent => {
+                self.run.was_not_written();
+                return Err(error);
             }
             Err(error) => return Err(error),
         }
@@ -82,11 +89,15 @@ impl<P: Port> Drive3g3ev<P> {
             let output = status.raw(address::OUTPUT_FREQUENCY);
             let directed = status.direction == Some(direction) || output < first;
             if because.is_none() && is_run(&status) && directed {
-                return Ok(status);
+                let verdict = self.verdict(&status);
+                return Ok(Status { verdict, ..status });
             }
             first = first.or(output);
             let over = because.is_some() && (status.is_fault() || Instant::now() >= settled);
             if over || !confirming.again().await {
+                let because = because.or_else(|| withheld(&status));
+                let verdict = self.verdict(&status);
+                let status = Status { verdict, ..status };
                 return Err(self.not_confirmed(Order::Start(direction), status, because));
             }
         }
@@ -120,6 +131,7 @@ impl<P: Port> Drive3g3ev<P> {
     async fn not_in_force(&mut self, status: &Status) -> Result<Option<Refusal>> {
         let reference = self.registers.at(Class::Command).read_word(address::REFERENCE).await?;
         let seen = status.raw(address::REFERENCE_SEEN).unwrap_or(0);
+        self.proof.agree(reference);
         if !self.is_same_reference(seen, reference).await? {
             return Ok(Some(OTHER_REFERENCE));
         }
@@ -142,6 +154,9 @@ impl<P: Port> Drive3g3ev<P> {
                 Err(error) => return Err(error.after_write()),
             };
             let revoked = self.command.is_none_or(|held| held.contains(Command::RUN));
+            if !revoked {
+                self.run.end();
+            }
             let runs = is_run(&status) && !status.is_fault();
             let local = status.control != Some(Control::Bus);
             let output = status.raw(address::OUTPUT_FREQUENCY);
@@ -160,6 +175,7 @@ impl<P: Port> Drive3g3ev<P> {
                 if status.state == State::Running {
                     status.state = State::Stopping;
                 }
+                status.verdict = None;
                 return Ok(Stopped { instead, ..Stopped::by(mode, status) });
             }
             first = first.or(output);
@@ -175,22 +191,28 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
-        let ours = self.given == Some(held) || commanded_by_other(&status) == Some(OTHER_COMMAND);
-        if !held.contains(Command::RUN) || !ours {
-            return Ok(Withdrawn::Nothing(status));
+        let lease = self.run.lease();
+        let stands = held.contains(Command::RUN);
+        let ours = lease.is_some_and(|lease| lease.word == held.bits())
+            || commanded_by_other(&status) == Some(OTHER_COMMAND);
+        // One that was not seen to arrive may come late: what stands is written again, and read after it.
+        let may_come = !stands && lease.is_some();
+        if !(may_come || stands && ours) {
+            self.run.end();
+            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
         self.write_command(held - Command::RUN).await?;
         let status = self.status_and_command().await.map_err(Error::after_write)?;
         if self.command.is_none_or(|held| held.contains(Command::RUN)) {
             return Err(self.not_confirmed(Order::Withdraw, status, Some(OTHER_WORD)));
         }
-        self.given = None;
-        Ok(Withdrawn::Ended(status))
+        self.run.end();
+        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 
     /// Writes 0001h and remembers the word; while the outcome is not known, none is.
     pub(crate) async fn write_command(&mut self, command: Command) -> Result<()> {
-        self.command = None;
+        (self.command, self.proof.word) = (None, None);
         self.registers.at(Class::Command).write(crate::registers::COMMAND, command.bits()).await?;
         self.command = Some(command);
         Ok(())
@@ -206,7 +228,7 @@ impl<P: Port> Drive3g3ev<P> {
         {
             return sent.map(Ok);
         }
-        (self.command, self.given) = (Some(word), None);
+        (self.command, self.proof.word) = (Some(word), None);
         Ok(sent)
     }
 
@@ -219,7 +241,8 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn read_command(&mut self, class: Class) -> Result<RawWord> {
         let row = crate::registers::COMMAND.row();
         let value = self.registers.at(class).read_word(row.address).await?;
-        self.command = Some(Command::from_bits_retain(value));
+        let held = Some(Command::from_bits_retain(value));
+        (self.command, self.proof.word) = (held, held);
         Ok(RawWord { address: row.address, code: row.code, value })
     }
 

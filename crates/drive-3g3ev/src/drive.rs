@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Intent, Lease, Measurements, Port, Reaction, Result,
-    Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
+    BroadcastWrite, Class, Direction, Drive, Faults, Ground, Intent, Lease, Measurements, Port, Reaction,
+    Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
 };
 
-use crate::{CAPABILITIES, Drive3g3ev, broadcast, settings::Settings};
+use crate::{CAPABILITIES, Drive3g3ev, broadcast, proof::Proof, settings::Settings};
 
 /// What loop-backs carry: the data of the manual's sample (§4.1.2).
 const LOOP_BACK: u16 = 0xA537;
@@ -18,25 +18,38 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     drive_core::told_by!(registers);
 
     fn lease(&self) -> Option<Lease> {
-        self.lease
+        self.run.lease()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.lease = Some(lease);
+        self.run.adopt(lease);
+        (self.shown, self.proof) = (None, Proof::of_unknown(None));
     }
 
     fn forget(&mut self) {
         self.settings = Settings::default();
-        (self.command, self.shown, self.given) = (None, None, None);
+        (self.command, self.shown, self.was_lost) = (None, None, true);
+        self.proof = Proof::of_unknown(self.proof.agreed());
         self.skips_reserved = false;
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        self.proof.changed.take()
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.shaft.set_coast_time(time);
     }
 
     /// Two exchanges, and one more for n39 the first time, for 0001h the first time and where the drive runs, turns or is
     /// commanded otherwise than before, or while RUN stands after a stop.
     /// `output_frequency` is `None` when n39 counts it in percent.
     async fn status(&mut self) -> Result<Status> {
-        let status = self.read_status(Class::Status).await?;
-        self.keep_stop_ready(&status).await;
+        let mut status = self.read_status(Class::Status).await?;
+        if !self.keep_stop_ready(&status).await {
+            self.prove().await;
+        }
+        self.judge(&mut status);
         Ok(status)
     }
 

@@ -7,7 +7,9 @@ use drive_core::{
 
 use crate::{
     Drive3g3ev,
-    registers::{COMMAND, ENTER, REFERENCE},
+    command::is_run,
+    registers::{COMMAND, ENTER, N02, N06, N07, N08, REFERENCE, STATE},
+    words::{Command, DriveState},
 };
 
 /// Saves that the EEPROM takes in its life (§4.5).
@@ -15,6 +17,9 @@ pub const EEPROM_LIFE: u32 = 100_000;
 
 /// What the sample of §4.5 writes to ENTER.
 const ENTER_WORD: u16 = 0;
+
+/// Who commands, and what the inputs do: n02, n06 to n08.
+const MOVE_CONTROL: [u16; 4] = [N02.address(), N06.address(), N07.address(), N08.address()];
 
 /// What is known of the EEPROM.
 #[derive(Debug, Clone, Copy, Default)]
@@ -40,6 +45,13 @@ impl<P: Port> Drive3g3ev<P> {
                 reason: "a save to EEPROM is counted and refused when nothing changed; use it",
             });
         }
+        if MOVE_CONTROL.contains(&row.address) {
+            let stands = Command::from_bits_retain(self.read_command(Class::Background).await?.value);
+            if stands.contains(Command::RUN) || is_run(&self.read_status(Class::Background).await?) {
+                // A run command that stands and does not act may act by it.
+                return Err(self.refused(Order::WriteParameter(row.address), Refusal::MotorRunning));
+            }
+        }
         let outcome = self.registers.at(Class::Background).change_row(row, word).await;
         // Whatever was read before may be another now, also when it is not known whether the write arrived.
         let may_have_changed = match &outcome {
@@ -50,6 +62,7 @@ impl<P: Port> Drive3g3ev<P> {
         };
         if may_have_changed && row.storage == Storage::RamUntilSaved {
             self.settings.written(row);
+            self.proof.settings = [None; 3];
             self.eeprom.changed = true;
         }
         outcome
@@ -65,6 +78,10 @@ impl<P: Port> Drive3g3ev<P> {
         }
         if self.eeprom.saves >= EEPROM_LIFE {
             return Err(self.refused(Order::Persist, Refusal::EepromLife));
+        }
+        let state = DriveState::from_bits_retain(self.registers.at(Class::Background).read(STATE).await?);
+        if state.contains(DriveState::RUN) {
+            return Err(self.refused(Order::Persist, Refusal::MotorRunning));
         }
         let outcome = self.registers.at(Class::Background).edge().write(ENTER, ENTER_WORD).await;
         let may_have_saved = match &outcome {

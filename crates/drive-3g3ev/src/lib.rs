@@ -9,6 +9,7 @@ mod eeprom;
 mod faults;
 mod frequency;
 mod intent;
+mod proof;
 mod reading;
 pub mod registers;
 mod reset;
@@ -21,8 +22,8 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Lease, Port, Reaction, Registers,
-    Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, OwnRun, Port, Reaction, Registers,
+    Row, SerialSettings, Shaft, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -31,7 +32,7 @@ pub use crate::{
     frequency::FrequencyUnit,
     registers::ROWS,
 };
-use crate::{eeprom::Eeprom, registers::COMMAND, settings::Settings, words::Command};
+use crate::{eeprom::Eeprom, proof::Proof, registers::COMMAND, settings::Settings, words::Command};
 
 /// The time without a message after which n40 = 0 trips (VS-606V7 manual p. 10, 38; the 3G3EV's own does not print it).
 pub const TIME_OVER: Duration = Duration::from_secs(2);
@@ -107,7 +108,11 @@ pub const fn turnaround(baud: u32) -> Duration {
 pub struct Drive3g3ev<P> {
     registers: Registers<P>,
     /// The run command of this side that stands, or may.
-    lease: Option<Lease>,
+    run: OwnRun,
+    proof: Proof,
+    shaft: Shaft,
+    /// The line was lost since the shaft was last seen.
+    was_lost: bool,
     settings: Settings,
     eeprom: Eeprom,
     /// The number of "fault reset" in n06 to n08, as its owner gave it.
@@ -116,8 +121,6 @@ pub struct Drive3g3ev<P> {
     command: Option<Command>,
     /// Whether the drive ran, in which direction, and who commanded it, when 0001h was last read for a status.
     shown: Option<(bool, Option<Direction>, Option<Control>)>,
-    /// The run command that this value has given and not taken back.
-    given: Option<Command>,
     /// Whether the drive has refused to read its reserved registers along.
     skips_reserved: bool,
 }
@@ -133,13 +136,15 @@ impl<P: Port> Drive3g3ev<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            lease: None,
+            run: OwnRun::new(),
+            proof: Proof::default(),
+            shaft: Shaft::new(),
+            was_lost: false,
             settings: Settings::default(),
             eeprom: Eeprom::default(),
             fault_reset: None,
             command: None,
             shown: None,
-            given: None,
             skips_reserved: false,
         }
     }

@@ -33,19 +33,24 @@ impl<P: Port> Drive3g3ev<P> {
             words.extend(held.address, &[held.value]);
             status = FastWords::of(words).status(unit, self.command);
         }
-        Ok(Status { at: self.registers.snapshot_time(), ..status })
+        status.at = self.registers.snapshot_time();
+        self.tell(&mut status);
+        Ok(status)
     }
 
     /// Reads 0001h, where this status shows that it may be another word than is known: the next stop keeps its inputs
-    /// without reading it. What cannot be read now, a later status tells.
-    pub(crate) async fn keep_stop_ready(&mut self, status: &Status) {
+    /// without reading it. What cannot be read now, a later status tells. False: there was no need.
+    pub(crate) async fn keep_stop_ready(&mut self, status: &Status) -> bool {
         let shown = (is_run(status), status.direction, status.control);
-        let stale = self.command.is_none() || self.shown != Some(shown);
-        if !stale || status.raw(COMMAND.address()).is_some() {
+        let unproved = self.run.lease().is_some() && self.proof.word.is_none();
+        let stale = self.command.is_none() || self.shown != Some(shown) || unproved;
+        let was_read = status.raw(COMMAND.address()).is_some();
+        if !stale || was_read {
             self.shown = Some(shown);
-        } else {
-            self.shown = self.read_command(Class::Status).await.is_ok().then_some(shown);
+            return was_read;
         }
+        self.shown = self.read_command(Class::Status).await.is_ok().then_some(shown);
+        true
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {

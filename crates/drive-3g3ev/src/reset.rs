@@ -30,7 +30,7 @@ impl<P: Port> Drive3g3ev<P> {
         if held.contains(input) {
             self.write_command(clear).await?;
         }
-        (self.command, self.given) = (None, None);
+        (self.command, self.proof.word) = (None, None);
         // Sent once; whatever becomes of it, the bit is cleared again.
         let pulse = self.registers.at(Class::Command).edge().write(COMMAND, (clear | input).bits()).await;
         match pulse {
@@ -54,7 +54,11 @@ impl<P: Port> Drive3g3ev<P> {
                 if pulse.is_err() && self.read_command(Class::Command).await?.value != clear.bits() {
                     self.write_command(clear).await?;
                 }
-                return Ok(shown);
+                if self.run.lease().is_some() {
+                    self.read_command(Class::Command).await?;
+                    self.run.end();
+                }
+                return Ok(Status { verdict: None, ..shown });
             }
             if !confirming.again().await {
                 // The drive still shows its fault: where the pulse itself failed, that is the reason.

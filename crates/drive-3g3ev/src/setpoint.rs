@@ -56,8 +56,8 @@ impl<P: Port> Drive3g3ev<P> {
         let unit = self.reference_unit(order).await?;
         let word = unit.frequency_word(frequency).ok_or(Error::Unsupported {
             what: "a setpoint in hertz",
-            reason: "n39 counts the reference in percent of a frequency that the manual names no register for; \
-                     0 or 1 counts it in hertz",
+            reason: "n39 counts the reference in percent of a frequency that the manual names no register for: \
+                     write 0 to n39, save it, and switch the drive off and on; then it takes hertz",
         })?;
         word.map_err(|problem| Error::Setpoint {
             slave: self.registers.slave(),
@@ -81,6 +81,7 @@ impl<P: Port> Drive3g3ev<P> {
     /// by 21h, or keeps another value, and the reading back tells.
     async fn write_reference(&mut self, word: u16, order: Order) -> Result<()> {
         let mut calls = self.registers.at(Class::Command).replacing(REFERENCE.address());
+        self.proof.disagree();
         calls.write(REFERENCE, word).await?;
         self.see_reference(word, order).await.map_err(Error::after_write)
     }
@@ -95,6 +96,7 @@ impl<P: Port> Drive3g3ev<P> {
                 Err(error) => return Err(error),
             };
             if kept && because.is_none() {
+                self.proof.agree(word);
                 return Ok(());
             }
             if !kept || Instant::now() >= settled || !confirming.again().await {
@@ -120,7 +122,12 @@ impl<P: Port> Drive3g3ev<P> {
 
     /// Whether two references are the same but for what the drive rounds; not judged where nobody knows what they count.
     pub(crate) async fn is_same_reference(&mut self, one: u16, other: u16) -> Result<bool> {
-        let unit = self.unit(Class::Command).await?;
-        Ok(unit.is_none_or(|unit| one.abs_diff(other) <= unit.rounding()))
+        self.unit(Class::Command).await?;
+        Ok(self.is_same(one, other))
+    }
+
+    /// The same, by what is known of the unit.
+    pub(crate) fn is_same(&self, one: u16, other: u16) -> bool {
+        self.known_unit().is_none_or(|unit| one.abs_diff(other) <= unit.rounding())
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Direction, Error, Exchange, Port, Reaction, Refusal, Result, Watchdog,
+    Class, Command, Direction, Error, ExceptionMeaning, Exchange, Port, Reaction, Refusal, Result, Watchdog,
     registers::{Register, Row, access::Readable},
 };
 
@@ -28,6 +28,11 @@ impl Settings {
         self.unit_changed |= row.address == N39.address();
         *self = Self { unit_changed: self.unit_changed, ..Self::default() };
     }
+
+    /// Somebody has changed n39.
+    pub(crate) const fn unit_was_changed(&mut self) {
+        self.unit_changed = true;
+    }
 }
 
 impl<P: Port> Drive3g3ev<P> {
@@ -37,6 +42,11 @@ impl<P: Port> Drive3g3ev<P> {
             return Ok(None);
         }
         Ok(FrequencyUnit::of(self.n39(class).await?))
+    }
+
+    /// The same without an exchange; `None` also where it was not read.
+    pub(crate) fn known_unit(&self) -> Option<FrequencyUnit> {
+        self.settings.n39.filter(|_| !self.settings.unit_changed).and_then(FrequencyUnit::of)
     }
 
     /// What the reference counts.
@@ -65,11 +75,14 @@ impl<P: Port> Drive3g3ev<P> {
 
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
         let mut calls = self.registers.at(Class::Background);
-        match calls.read(N40).await? {
+        let n40 = calls.read(N40).await?;
+        self.proof.settings[1] = Some(n40);
+        match n40 {
             0 => Ok(Watchdog { timeout: Some(TIME_OVER), reaction: Some(Reaction::Trip) }),
             1 => Ok(Watchdog { timeout: None, reaction: Some(Reaction::Ignore) }),
             _ => {
                 let exchange = Exchange { function: 0x03, register: Some(N40.address()) };
+                let calls = self.registers.at(Class::Background);
                 Err(calls.answer(exchange, "n40 holds a value that the manual does not list"))
             }
         }
@@ -106,7 +119,11 @@ impl<P: Port> Drive3g3ev<P> {
 
     async fn n05(&mut self) -> Result<u16> {
         let known = self.settings.n05;
-        let value = self.once(Class::Command, N05, known).await?;
+        let value = match self.once(Class::Command, N05, known).await {
+            // What this drive does not have forbids nothing.
+            Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => 0,
+            read => read?,
+        };
         self.settings.n05 = Some(value);
         Ok(value)
     }

@@ -5,7 +5,7 @@ use drive_core::{Control, Current, Direction, Motion, RawWord, State, Status};
 use crate::{
     blocks::Words,
     frequency::FrequencyUnit,
-    registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, SIGNALS, STATE},
+    registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, REFERENCE_SEEN, SIGNALS, STATE},
     words::{Command, DriveState, Errors, Signals},
 };
 
@@ -15,6 +15,7 @@ pub(crate) struct FastWords {
     signals: Signals,
     errors: Errors,
     state: DriveState,
+    reference: u16,
     output: u16,
     current: u16,
     raw: Vec<RawWord>,
@@ -26,6 +27,7 @@ impl FastWords {
             signals: Signals::from_bits_retain(words.word(SIGNALS)),
             errors: Errors::from_bits_retain(words.word(ERRORS)),
             state: DriveState::from_bits_retain(words.word(STATE)),
+            reference: words.word(REFERENCE_SEEN),
             output: words.word(OUTPUT_FREQUENCY),
             current: words.word(CURRENT),
             raw: words.into_raw(),
@@ -44,7 +46,7 @@ impl FastWords {
             direction: Some(if reverse { Direction::Reverse } else { Direction::Forward }),
             output_frequency: unit.and_then(|unit| unit.frequency(self.output)),
             current: Some(Current::from_deciamperes(u32::from(self.current))),
-            current_share: None,
+            reference: unit.and_then(|unit| unit.frequency(self.reference)),
             at_reference: Some(self.state.contains(DriveState::AT_REFERENCE)),
             warning: Some(warning),
             fault_code: (self.errors.bits() != 0).then(|| lowest_bit(self.errors)),
@@ -66,6 +68,8 @@ impl FastWords {
             || self.state.contains(DriveState::MAJOR_FAULT);
         let running = self.signals.contains(Signals::RUN) || self.state.contains(DriveState::RUN);
         let turning = self.output != 0 && !self.state.contains(DriveState::OUTPUT_OFF);
+        // A run command without an output is none: something keeps it off.
+        let cut = self.state.contains(DriveState::OUTPUT_OFF) && self.reference != 0 && self.output == 0;
         let ready = self.signals.contains(Signals::READY)
             && self.state.contains(DriveState::READY)
             && !self.state.contains(DriveState::UNDERVOLTAGE);
@@ -75,6 +79,8 @@ impl FastWords {
             State::Fault
         } else if running && stop_ordered {
             State::Stopping
+        } else if running && cut {
+            State::NotReady
         } else if running {
             State::Running
         } else if turning {

@@ -56,7 +56,7 @@ impl<P: Port> Atv21<P> {
             lease.is_some_and(|lease| lease.word == held.bits()) || commanded_by_other(&status).is_some();
         // One that was not seen to arrive may come late: what stands is written again, and read after it.
         let may_come = !stands && lease.is_some();
-        if !may_come && !(stands && ours) {
+        if !(may_come || stands && ours) {
             self.run.end();
             return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }

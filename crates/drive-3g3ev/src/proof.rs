@@ -1,0 +1,257 @@
+//! What proves that a run command of this side is in force: what each status carries of it, and what takes turns.
+//!
+//! 0020h, 0021h, 0023h and 002Ch stand in every status: who commands, whose reference it is, which reference is in force,
+//! whether the output is off. 0001h and 0002h (another master's words) and n39, n40 and n02 take turns, one exchange behind
+//! every tenth status, which is a twentieth more. 0001h and 0002h are looked at within 20 statuses, and 0001h at once where the
+//! drive runs, turns or is commanded otherwise; n39 and n40 within 80, n02 too.
+
+use std::time::Duration;
+
+use drive_core::{Class, Evidence, Frequency, Ground, Output, Port, Refusal, RunWord, Status, Told, Verdict};
+use tokio::time::Instant;
+
+use crate::{
+    Drive3g3ev,
+    command::{LOCAL_REFERENCE, OTHER_COMMAND, OTHER_REFERENCE, OUTPUT_OFF, is_run, state_word},
+    registers::address,
+    words::{Command, DriveState},
+};
+
+/// Statuses that pay for one exchange more.
+const PAID_BY: u16 = 10;
+
+const NO_SUPPLY: Refusal = Refusal::Overridden {
+    by: "a lack of voltage (bit 7 of 002Ch)",
+    remedy: "switch the supply on, and start it again if it is to run",
+};
+const STOPPED: Refusal = Refusal::Overridden {
+    by: "a stop at the drive (RUN is off in 0020h and 002Ch)",
+    remedy: "see to the panel and the inputs (n06 to n08), and start it again if it is to run",
+};
+const OTHER_SETPOINT: Refusal = Refusal::Overridden {
+    by: "another reference in 0002h than was given",
+    remedy: "see who else writes to this drive",
+};
+
+/// What was last seen of what proves a run command.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Proof {
+    /// 0001h as it was last read.
+    pub(crate) word: Option<Command>,
+    /// 0002h as it was last read.
+    reference: Option<u16>,
+    /// The reference that the run rests on: as this side gave it, or found it at the start.
+    agreed: Option<u16>,
+    /// n39, n40 and n02 as they were last read.
+    pub(crate) settings: [Option<u16>; 3],
+    /// What was found otherwise, and not told yet.
+    pub(crate) changed: Option<Ground>,
+    statuses: u16,
+    turn: u16,
+    /// 0001h and 0002h are to be looked at at once.
+    urgent: bool,
+    descent: Descent,
+}
+
+impl Proof {
+    /// Of a run command of an earlier run of the program, or after a lost line: what was seen before proves nothing any more.
+    pub(crate) fn of_unknown(agreed: Option<u16>) -> Self {
+        Self { agreed, urgent: true, ..Self::default() }
+    }
+
+    /// What the run rests on.
+    pub(crate) const fn agreed(&self) -> Option<u16> {
+        self.agreed
+    }
+
+    /// A reference that was seen to stand in 0002h by this side's will.
+    pub(crate) const fn agree(&mut self, reference: u16) {
+        (self.agreed, self.reference) = (Some(reference), Some(reference));
+    }
+
+    /// Nothing is known of the reference any more.
+    pub(crate) const fn disagree(&mut self) {
+        (self.agreed, self.reference) = (None, None);
+    }
+}
+
+/// How fast the output comes down: one that goes at once was cut.
+#[derive(Debug, Clone, Copy, Default)]
+struct Descent {
+    last: Option<(Instant, u16)>,
+    /// Counts in a time.
+    rate: Option<(u16, Duration)>,
+}
+
+impl Descent {
+    fn see(&mut self, now: Instant, output: u16) {
+        if let Some((then, before)) = self.last
+            && output < before
+            && now > then
+        {
+            self.rate = Some((before - output, now - then));
+        }
+        self.last = Some((now, output));
+    }
+
+    /// Whether an output that is 0 at `now` cannot have come down so fast by its ramp.
+    fn is_cut(&self, now: Instant) -> bool {
+        let (Some((then, output)), Some((counts, time))) = (self.last, self.rate) else { return false };
+        let needed = time * u32::from(output) / u32::from(counts.max(1));
+        now.saturating_duration_since(then) * 2 < needed
+    }
+}
+
+/// What keeps the motor from being driven by a run command that stands.
+pub(crate) fn withheld(status: &Status) -> Option<Refusal> {
+    let state = state_word(status);
+    let wanted = status.raw(address::REFERENCE_SEEN) != Some(0);
+    if status.is_fault() {
+        Some(Refusal::Tripped)
+    } else if state.contains(DriveState::UNDERVOLTAGE) {
+        Some(NO_SUPPLY)
+    } else if state.contains(DriveState::OUTPUT_OFF) && wanted {
+        Some(OUTPUT_OFF)
+    } else {
+        (!is_run(status)).then_some(STOPPED)
+    }
+}
+
+impl<P: Port> Drive3g3ev<P> {
+    /// What a reading of the fast set says of the shaft and of the run command.
+    pub(crate) fn tell(&mut self, status: &mut Status) {
+        let now = Instant::now();
+        let counts = status.raw(address::OUTPUT_FREQUENCY).unwrap_or(0);
+        // In percent too: what counts is whether it is 0.
+        let output = Frequency::from_centihertz(counts.into());
+        let shown = self.output(now, status, output);
+        status.motion = self.shaft.see(now, shown, Some(output));
+        self.was_lost = false;
+        match shown {
+            Output::Braking(_) => self.proof.descent.see(now, counts),
+            _ => self.proof.descent = Descent::default(),
+        }
+        status.verdict = self.verdict(status);
+    }
+
+    /// What these words say of the output. The bus does not tell how the drive stops, and bit 8 of 002Ch is on at rest as
+    /// well: an output that is gone was cut unless it was seen to come down by an order.
+    fn output(&self, now: Instant, status: &Status, output: Frequency) -> Output {
+        let state = state_word(status);
+        let runs = is_run(status);
+        let at_zero = status.raw(address::REFERENCE_SEEN) == Some(0) && output == Frequency::ZERO;
+        let off = state.contains(DriveState::OUTPUT_OFF) && !(runs && at_zero);
+        let ordered = self.command.is_none_or(|held| held.contains(Command::RUN));
+        if status.is_fault() || state.contains(DriveState::UNDERVOLTAGE) {
+            return Output::Cut;
+        }
+        if runs && !off {
+            let by_bus = !state.contains(DriveState::LOCAL_RUN);
+            return if by_bus && !ordered { Output::Braking(output) } else { Output::Driven };
+        }
+        if !off && output != Frequency::ZERO {
+            return Output::Braking(output);
+        }
+        let came_down = self.shaft.was_braked() && !self.proof.descent.is_cut(now) && !self.was_lost;
+        if came_down { Output::None } else { Output::Cut }
+    }
+
+    /// The verdict that a status carries, as far as is known without more exchanges.
+    pub(crate) fn verdict(&self, status: &Status) -> Option<Verdict> {
+        let mut run = self.run;
+        run.judge(&self.evidence(status))
+    }
+
+    /// The verdict of a status, which ends a run command that stands no more.
+    pub(crate) fn judge(&mut self, status: &mut Status) {
+        let evidence = self.evidence(status);
+        status.verdict = self.run.judge(&evidence);
+    }
+
+    fn evidence(&self, status: &Status) -> Evidence {
+        let Some(lease) = self.run.lease() else { return Evidence::default() };
+        let word = match self.proof.word {
+            None => RunWord::NotTold,
+            Some(held) if held.bits() == lease.word => RunWord::Stands,
+            Some(held) if held.contains(Command::RUN) => RunWord::Another,
+            Some(_) => RunWord::Gone,
+        };
+        let state = state_word(status);
+        let local = state.contains(DriveState::LOCAL_RUN).then_some(OTHER_COMMAND);
+        Evidence {
+            word,
+            command: Told::unless(local),
+            output: Told::unless(withheld(status)),
+            reference: self.reference_told(status, state),
+        }
+    }
+
+    fn reference_told(&self, status: &Status, state: DriveState) -> Told {
+        if state.contains(DriveState::LOCAL_REFERENCE) {
+            return Told::No(LOCAL_REFERENCE);
+        }
+        let (Some(agreed), Some(seen)) = (self.proof.agreed, status.raw(address::REFERENCE_SEEN)) else {
+            return Told::NotTold;
+        };
+        if self.proof.reference.is_some_and(|held| held != agreed) {
+            return Told::No(OTHER_SETPOINT);
+        }
+        if !self.is_same(seen, agreed) {
+            return Told::No(OTHER_REFERENCE);
+        }
+        Told::Yes
+    }
+
+    /// Looks at what has its turn, behind a status. What cannot be read now, a later turn tells.
+    pub(crate) async fn prove(&mut self) {
+        if self.run.lease().is_none() {
+            return;
+        }
+        self.proof.statuses += 1;
+        if self.proof.urgent {
+            self.proof.urgent = !self.look_at_orders().await;
+            return;
+        }
+        if self.proof.statuses < PAID_BY {
+            return;
+        }
+        self.proof.statuses = 0;
+        self.proof.turn = self.proof.turn.wrapping_add(1);
+        match self.proof.turn % 8 {
+            0 => self.look_at_settings(address::N39, &[0, 1]).await,
+            4 => self.look_at_settings(address::N02, &[2]).await,
+            _ => {
+                self.look_at_orders().await;
+            }
+        }
+    }
+
+    /// 0001h and 0002h.
+    async fn look_at_orders(&mut self) -> bool {
+        let Ok([command, reference]) = self.registers.at(Class::Status).read_array(address::COMMAND).await
+        else {
+            return false;
+        };
+        let command = Command::from_bits_retain(command);
+        (self.command, self.proof.word) = (Some(command), Some(command));
+        self.proof.reference = Some(reference);
+        self.proof.agreed = self.proof.agreed.or(Some(reference));
+        true
+    }
+
+    async fn look_at_settings(&mut self, first: u16, which: &[usize]) {
+        let count = u16::try_from(which.len()).unwrap_or(1);
+        let Ok(words) = self.registers.at(Class::Status).read_words(first, count).await else { return };
+        for (&index, word) in which.iter().zip(words) {
+            let known = self.proof.settings.get_mut(index).and_then(|known| known.replace(word));
+            if known.is_none_or(|known| known == word) {
+                continue;
+            }
+            self.proof.changed = Some([Ground::Units, Ground::Watchdog, Ground::Inputs][index]);
+            if index == 0 {
+                // It acts at the next power-up (§2.1 note 3).
+                self.settings.unit_was_changed();
+            }
+        }
+    }
+}
