@@ -54,6 +54,34 @@ impl Endpoint {
     }
 }
 
+/// What is known of a gateway: a box, or a program, between a network and the drives' own line. It goes on with a question
+/// after its master has given up, and most serve one question at a time, so that a drive that does not answer holds up all
+/// others, and a stop. The line finds out what is not set, and asks no more than one such question at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Gateway {
+    /// How many requests it serves at once. `None`: the line finds out.
+    pub at_once: Option<usize>,
+    /// How long it waits for a drive that does not answer, all its attempts together: 3 s for three attempts of one second.
+    /// `None`: [`ASSUMED_WAIT`](Self::ASSUMED_WAIT), until the line has seen it. Zero: there is no gateway, each drive has
+    /// its own connection.
+    pub wait: Option<Duration>,
+}
+
+impl Gateway {
+    /// How long a gateway is taken to wait of which nothing is known: three attempts of a second, as many come.
+    pub const ASSUMED_WAIT: Duration = Duration::from_secs(3);
+
+    /// There is none: what answers is the drive itself.
+    pub const NONE: Self = Self { at_once: None, wait: Some(Duration::ZERO) };
+
+    /// What it adds to the wait of a stop: one question in vain, and one more where it is not known how many it serves at
+    /// once.
+    #[must_use]
+    pub fn stop_waits(&self) -> Duration {
+        self.wait.unwrap_or(Self::ASSUMED_WAIT) * if self.at_once.is_some() { 1 } else { 2 }
+    }
+}
+
 /// How soon an answer that comes twice comes again. Chosen, not measured: a repetition follows its original, and a frame of
 /// 20 words takes 25 ms at 19200 bit/s.
 pub(crate) const DOUBLE: Duration = Duration::from_millis(50);
@@ -142,6 +170,9 @@ pub struct LineConfig {
     /// Keep no silences and count no character times: for a stream that is no line, and for measurements of everything
     /// but the line.
     pub unpaced: bool,
+    /// The gateway between a connection and its drives: what it does that a line cannot see. `None`: one of which nothing is
+    /// known on a connection and on Modbus TCP, and none on a serial port or a stream of RTU.
+    pub gateway: Option<Gateway>,
     /// Whether the far end takes the time that characters take on a line, so that what comes sooner than request and answer
     /// can is no answer. `None`: it follows from the kind of port, see [`Endpoint::far_end_paces`].
     pub far_end_paces: Option<bool>,
@@ -217,6 +248,7 @@ impl LineConfig {
             // Back in a second where a plug was pulled, and hardly a load where a drive is off for the night.
             probe_backoff: (Duration::from_millis(500), Duration::from_secs(10)),
             unpaced: false,
+            gateway: None,
             far_end_paces: None,
             double_window: DOUBLE,
             precise_timer: false,
@@ -240,6 +272,9 @@ impl LineConfig {
     /// A Stop that is **repeated** to a slave that is off-line may wait longer: all such repetitions together take a fifth of
     /// the line.
     ///
+    /// Behind a [`Gateway`] it ends where the stop is on the drives' line, and what the gateway may be waiting for is in it:
+    /// one question in vain, and one more where it is not known how many requests it serves at once.
+    ///
     /// With [`Echo::Auto`] it includes the one read that finds out about the echo, though that happens only before the
     /// first write after opening.
     #[must_use]
@@ -248,7 +283,22 @@ impl LineConfig {
         let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
         let timeout = timeout.max(self.broadcast_pause);
         let asks_echo = self.echo == Echo::Auto && self.protocol.asks_for_echo();
-        self.stop_bound((longest_request, longest_answer), timeout, asks_echo, true)
+        let bound = self.stop_bound((longest_request, longest_answer), timeout, asks_echo, true);
+        let Some(gateway) = self.far_end() else { return bound };
+        bound + gateway.stop_waits() + self.behind_gateway((longest_request, longest_answer), timeout)
+    }
+
+    /// What there may be between the line's port and the drives.
+    #[must_use]
+    pub fn far_end(&self) -> Option<Gateway> {
+        let is_likely = self.endpoint.is_connection() || !self.protocol.is_paced();
+        let gateway = self.gateway.or_else(|| is_likely.then(Gateway::default));
+        gateway.filter(|gateway| gateway.wait != Some(Duration::ZERO))
+    }
+
+    /// How long a gateway may be busy with one more exchange that is answered, on a line of which the settings are known.
+    pub(crate) fn behind_gateway(&self, (request, answer): (usize, usize), timeout: Duration) -> Duration {
+        self.serial.characters(self.request_len(request) + self.answer_len(answer)) + timeout
     }
 
     /// The longest wait of a Stop where answers have `timeout` to begin; `asks_echo`: the adapter may be asked for its

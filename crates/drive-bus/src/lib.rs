@@ -95,7 +95,7 @@ pub mod unite;
 
 #[cfg(feature = "serial")]
 pub use config::Rs485;
-pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
+pub use config::{Echo, Endpoint, Gateway, LineConfig, SlaveSettings};
 pub use line::Line;
 pub use protocol::Protocol;
 pub use slave::Slave;

@@ -60,7 +60,7 @@ impl Ending {
         match result {
             Ok(Ok(_)) => Self::Answered,
             Ok(Err(_)) => Self::Exception,
-            Err(Failure::Timeout) => Self::NoAnswer,
+            Err(Failure::Timeout | Failure::Nobody) => Self::NoAnswer,
             Err(Failure::Damaged(_)) => Self::Damaged,
             Err(Failure::Mismatch(_)) => Self::Mismatch,
             Err(Failure::Refused(_)) => Self::Busy,

@@ -31,12 +31,12 @@ pub struct Slave {
     pub(crate) handle: Arc<Handle>,
     address: u8,
     pub(crate) terms: Terms,
-    answered_at: Option<Instant>,
+    asked_at: Option<Instant>,
 }
 
 impl Slave {
     pub(crate) fn new(handle: Arc<Handle>, address: u8) -> Self {
-        Self { handle, address, terms: Terms::default(), answered_at: None }
+        Self { handle, address, terms: Terms::default(), asked_at: None }
     }
 
     /// Its address, 0 for the broadcast.
@@ -82,7 +82,7 @@ impl Client for Slave {
         let (outcome, at) = outcome.await.unwrap_or_else(|_| (Err(PortError::Closed), Instant::now()));
         waiting.done();
         if outcome.is_ok() {
-            self.answered_at = Some(at);
+            self.asked_at = Some(at);
         }
         outcome.map_err(|error| tokio_modbus::Error::Transport(error.into_io()))
     }
@@ -103,8 +103,8 @@ impl Port for Slave {
         self.terms = terms;
     }
 
-    fn answered_at(&self) -> Option<Instant> {
-        self.answered_at
+    fn asked_at(&self) -> Option<Instant> {
+        self.asked_at
     }
 
     fn made_for(&self) -> Option<SlaveAddress> {

@@ -293,6 +293,35 @@ pub struct ClassStats {
     pub waits: Spread,
 }
 
+/// What is known of the gateway between a connection and its drives, see [`Gateway`](crate::Gateway).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct FarEndStats {
+    /// Questions in vain that it may still be at.
+    pub owed: usize,
+    /// How many requests it serves at once, as far as was seen.
+    pub at_once: usize,
+    /// It was seen, or is set, that it serves no more.
+    pub no_more: bool,
+    /// How long it waits for a drive that does not answer.
+    pub wait: Duration,
+    /// Where that is from.
+    pub wait_is: WaitIs,
+    /// Questions that were asked in vain.
+    pub in_vain: u64,
+}
+
+/// How it is known how long a gateway waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum WaitIs {
+    /// Nobody knows: [`Gateway::ASSUMED_WAIT`](crate::Gateway::ASSUMED_WAIT).
+    Assumed,
+    /// As configured.
+    Set,
+    /// As it was seen to wait last.
+    Seen,
+}
+
 /// What a line has counted since it was opened.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -326,6 +355,8 @@ pub struct Stats {
     pub opened: u64,
     /// How often the port was lost.
     pub lost: u64,
+    /// The gateway, where there may be one.
+    pub far_end: Option<FarEndStats>,
     /// Why the port was lost or cannot be opened; `None` while it is open, and before that is known.
     pub away: Option<String>,
     /// Requests that wait now.

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use drive_clock::{Timer, Watch};
+use drive_clock::{Sleeps, Timer, Watch};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     task::yield_now,
@@ -21,7 +21,7 @@ use crate::{
     config::{Endpoint, LineConfig},
     master::Outcome,
     shared::{Caller, Shared},
-    transport::{BoxedStream, Connector, OpenError, Opening, poll_read_now},
+    transport::{BoxedStream, Connector, OpenError, Opening, poll_read_now, reset_when_dropped},
 };
 
 /// How long a frame may wait for room in the system's buffer. That has room for many frames and is empty when one is sent,
@@ -43,6 +43,7 @@ pub(crate) struct Task {
     port: Connection,
     timer: Timer,
     watch: Option<Watch>,
+    sleeps: Sleeps,
     /// When the answer that is awaited is worth being awake for.
     awake: Option<Range<Instant>>,
     /// Before the next attempt to open the port. It is shortest again once the port has given a byte, not when it
@@ -75,6 +76,7 @@ impl Task {
     ) -> Self {
         let on_descriptor = config.endpoint.is_serial() || config.endpoint.is_connection();
         let precise = on_descriptor && config.protocol.is_paced() || config.precise_timer;
+        shared.master().set_reopens(connector.reopens());
         let port = match stream {
             Some(stream) => {
                 up(&shared, &config.endpoint);
@@ -89,6 +91,7 @@ impl Task {
             port,
             timer: if precise { Timer::precise() } else { Timer::tokio() },
             watch: (precise && config.stay_awake).then(Watch::new),
+            sleeps: Sleeps::new(),
             awake: None,
             backoff: REOPEN_BACKOFF.0,
             received: vec![0; 512],
@@ -99,7 +102,11 @@ impl Task {
     pub(crate) async fn run(mut self) {
         while let Some(deadline) = self.decide().await {
             self.shared.count_round();
-            match self.next_event(deadline).await {
+            let event = self.next_event(deadline).await;
+            if self.was_asleep() {
+                continue;
+            }
+            match event {
                 Event::Received(Ok(0)) => self.lose("the port was closed by its far end"),
                 Event::Received(Ok(len)) => self.take(len),
                 Event::Received(Err(error)) => self.lose(&error.to_string()),
@@ -122,19 +129,24 @@ impl Task {
     async fn decide(&mut self) -> Option<Option<Instant>> {
         loop {
             self.read_rest().await;
-            let (frame, deadline, finished, exchange_end) = {
+            let (frame, deadline, finished, asked_at, mute) = {
                 let now = Instant::now();
                 let mut master = self.shared.master();
                 master.handle_timeout(now);
-                let exchange_end = master.exchange_end();
+                let asked_at = master.asked_at();
+                let mute = master.poll_mute(now);
                 let frame = master.poll_transmit(now);
                 self.awake.take_if(|_| !master.is_busy());
                 self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
-                (frame, master.deadline(), master.is_finished(), exchange_end)
+                (frame, master.deadline(), master.is_finished(), asked_at, mute)
             };
             let answered = !self.ended.is_empty();
             for (caller, outcome) in self.ended.drain(..) {
-                caller.answer(outcome, exchange_end);
+                caller.answer(outcome, asked_at);
+            }
+            if let Some(reason) = mute {
+                self.leave(&reason);
+                continue;
             }
             let Some(frame) = frame else {
                 if answered && !finished {
@@ -236,6 +248,23 @@ impl Task {
         };
         watch.ended(began.elapsed(), awake.is_some());
         event
+    }
+
+    /// Where the computer was asleep the line is one that was lost: what lies in the port is as old as that, and so is
+    /// whatever was asked.
+    fn was_asleep(&mut self) -> bool {
+        let slept = self.sleeps.slept().filter(|_| self.connector.reopens());
+        let Some((slept, Connection::Open(_))) = slept.zip(Some(&self.port)) else { return false };
+        self.leave(&format!("the computer was asleep for {} s", slept.as_secs()));
+        true
+    }
+
+    /// The port is mute: whatever lies in it, and in the one at its far end, goes with it.
+    fn leave(&mut self, reason: &str) {
+        if let Connection::Open(stream) = &self.port {
+            reset_when_dropped(stream);
+        }
+        self.lose(reason);
     }
 
     fn lose(&mut self, reason: &str) {

@@ -409,7 +409,7 @@ impl<P: Port> Calls<'_, P> {
         }
         self.registers.port.set_terms(terms);
         let outcome = self.registers.port.call(request).await;
-        if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.answered_at()) {
+        if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.asked_at()) {
             self.registers.oldest = Some(self.registers.oldest.map_or(at, |oldest| oldest.min(at)));
         }
         match outcome {

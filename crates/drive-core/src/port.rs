@@ -128,9 +128,10 @@ pub trait Port: Client {
         None
     }
 
-    /// When the exchange that brought the last answer ended on the line; `None` where the port does not keep it. A value is
-    /// as old as that, whenever its caller is told.
-    fn answered_at(&self) -> Option<Instant> {
+    /// When the exchange that brought the last answer began; `None` where the port does not keep it. A value is not older than
+    /// that, and may be: whoever shows one age shows this one, however long the exchange took and whenever its caller was
+    /// told.
+    fn asked_at(&self) -> Option<Instant> {
         None
     }
 
@@ -167,8 +168,8 @@ impl Port for Box<dyn Port> {
         (**self).made_for()
     }
 
-    fn answered_at(&self) -> Option<Instant> {
-        (**self).answered_at()
+    fn asked_at(&self) -> Option<Instant> {
+        (**self).asked_at()
     }
 
     fn is_ascii(&self) -> bool {

@@ -45,7 +45,7 @@ pub struct Reconnecting<F> {
     terms: Terms,
     /// The answer to a request that is under way, or that nobody waits for any more, may come until then.
     owed_until: Option<Instant>,
-    answered_at: Option<Instant>,
+    asked_at: Option<Instant>,
 }
 
 impl<F, C> Reconnecting<F>
@@ -64,7 +64,7 @@ where
             slave: Slave(0),
             terms: Terms::of(Class::Status),
             owed_until: None,
-            answered_at: None,
+            asked_at: None,
         }
     }
 
@@ -87,12 +87,13 @@ where
             return Err(PortError::Expired);
         }
         context.set_slave(self.slave);
-        self.owed_until = Some(Instant::now() + LATE.max(self.response_timeout * 3 / 2));
+        let sent = Instant::now();
+        self.owed_until = Some(sent + LATE.max(self.response_timeout * 3 / 2));
         let problem = match timeout(self.response_timeout, context.call(request)).await {
             Ok(Ok(_)) if doubtful => PortError::Mismatch("an earlier answer may have come".to_owned()),
             Ok(Ok(answer)) => {
                 self.owed_until = None;
-                self.answered_at = Some(Instant::now());
+                self.asked_at = Some(sent);
                 return Ok(answer);
             }
             Ok(Err(error)) => PortError::from_modbus(error),
@@ -161,8 +162,8 @@ where
         self.terms = terms;
     }
 
-    fn answered_at(&self) -> Option<Instant> {
-        self.answered_at
+    fn asked_at(&self) -> Option<Instant> {
+        self.asked_at
     }
 }
 

@@ -103,7 +103,10 @@ impl Mbap {
     }
 
     fn fits(&mut self, transaction: Option<u16>, unit: u8, pdu: Bytes) -> Option<Answer> {
-        let stray = Stray::frame(unit, &pdu);
+        let mut stray = Stray::frame(unit, &pdu);
+        if let Stray::Frame { number, .. } = &mut stray {
+            *number = transaction;
+        }
         let Some(current) = self.current.as_mut().filter(|_| transaction == Some(self.transaction)) else {
             self.strays.push(stray);
             return None;
@@ -183,5 +186,9 @@ impl Machine for Mbap {
 
     fn confuses_late_answers(&self) -> bool {
         false
+    }
+
+    fn number(&self) -> Option<u16> {
+        Some(self.transaction)
     }
 }

@@ -35,6 +35,9 @@ pub(crate) fn of(config: &LineConfig) -> Box<dyn Machine> {
     }
 }
 
+/// Exception 0Bh, gateway target device failed to respond (Modbus Application Protocol V1.1b3, section 7).
+pub(crate) const NOBODY_ANSWERED: u8 = 0x0B;
+
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
 
@@ -56,6 +59,8 @@ pub enum Step {
 pub enum Failure {
     /// No answer came in time. It may still come.
     Timeout,
+    /// A gateway has waited for the slave, and says that it did not answer.
+    Nobody,
     /// What came looks like the answer and is not whole.
     Damaged(&'static str),
     /// No answer came in time, but an intact frame of the slave that does not fit the request. The answer may still come.
@@ -79,6 +84,10 @@ pub enum Stray {
         shape: Shape,
         /// Another master's request.
         is_request: bool,
+        /// Its transaction number, where the protocol has one.
+        number: Option<u16>,
+        /// A gateway says that nobody has answered it (exception 0Bh).
+        nobody: bool,
     },
     /// An intact frame with the form of the answer, and sooner than a line can carry the request and it.
     Early {
@@ -98,7 +107,8 @@ impl Stray {
     pub(crate) fn frame(slave: u8, pdu: &[u8]) -> Self {
         let function = pdu.first().copied().unwrap_or_default();
         let shape = Shape::heard(pdu);
-        Self::Frame { slave, function, shape, is_request: Shape::is_request(pdu) }
+        let nobody = function & 0x80 != 0 && pdu.get(1) == Some(&NOBODY_ANSWERED);
+        Self::Frame { slave, function, shape, is_request: Shape::is_request(pdu), number: None, nobody }
     }
 }
 
@@ -185,6 +195,11 @@ pub trait Machine: Send {
     /// late answers.
     fn shape(&self, pdu: &[u8]) -> Shape {
         Shape::of_answer_to(pdu)
+    }
+
+    /// The transaction number of the exchange that began last, where the protocol has one.
+    fn number(&self) -> Option<u16> {
+        None
     }
 
     /// Whether it is unknown if the adapter echoes, so that an answer that equals its request proves nothing yet.

@@ -148,9 +148,14 @@ impl Machine for UniTelway {
 
     fn take_strays(&mut self) -> Vec<Stray> {
         let translated = |stray| match stray {
-            drive_unitelway::Stray::Frame { slave, function } => {
-                Stray::Frame { slave, function, shape: Shape::ANY, is_request: false }
-            }
+            drive_unitelway::Stray::Frame { slave, function } => Stray::Frame {
+                slave,
+                function,
+                shape: Shape::ANY,
+                is_request: false,
+                number: None,
+                nobody: false,
+            },
             drive_unitelway::Stray::Noise(bytes) => Stray::Noise(bytes),
             drive_unitelway::Stray::Echo => Stray::Echo,
         };

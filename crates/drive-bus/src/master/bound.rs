@@ -21,11 +21,17 @@ impl<C> Master<C> {
         let timeout = timeouts.max().unwrap_or(self.config.response_timeout);
         let broadcast = if self.stats.broadcasts > 0 { self.config.broadcast_pause } else { Duration::ZERO };
         let (request, answer) = self.longest;
-        self.config.stop_bound(
-            (request, answer),
-            timeout.max(broadcast),
-            self.exchange.echo_is_unknown(),
-            heard_else,
-        )
+        let behind = if self.far_end.is_there() {
+            self.far_end.stop_waits() + self.config.behind_gateway((request, answer), timeout)
+        } else {
+            Duration::ZERO
+        };
+        behind
+            + self.config.stop_bound(
+                (request, answer),
+                timeout.max(broadcast),
+                self.exchange.echo_is_unknown(),
+                heard_else,
+            )
     }
 }

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
     answer, config,
-    exchange::{Answer, Failure},
+    exchange::{Answer, Failure, NOBODY_ANSWERED},
     record::Ending,
     schedule::Entry,
     shape,
@@ -23,13 +23,21 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take() else { return };
         self.to_send = None;
         self.exchange_end = now;
+        self.asked_at = flight.asked_at;
         let slave = flight.slave;
+        if flight.purpose.is_thrown_away() {
+            return self.throw_away(now, &flight, &result);
+        }
         let result = self.believe(now, &flight, result);
+        let (result, nobody) = self.from_gateway(now, &flight, result);
         self.record.ended(now, slave, flight.started, Ending::of(&result));
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
             Err(failure) => self.note_failure(now, &flight, failure),
+        }
+        if nobody {
+            self.nobody_answered(now, vec![slave]);
         }
         let took = now.saturating_duration_since(flight.started);
         self.station(slave).stats.exchanges.record(took);
@@ -50,7 +58,7 @@ impl<C> Master<C> {
                 }
                 Err(failure) => {
                     if entry.terms.class == Class::Stop {
-                        self.offline.stop_failed(now, slave, took);
+                        self.offline.stop_failed(now, slave, took.max(self.in_vain()));
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
@@ -60,19 +68,27 @@ impl<C> Master<C> {
             },
             Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
             Purpose::Probe => {
-                let took = took + self.config.silence();
-                self.probing.ended(
-                    now,
-                    took,
-                    answered,
-                    flight.question == Question::Long,
-                    self.offline.len(),
-                );
+                let held = if answered { Duration::ZERO } else { self.in_vain() };
+                let long = flight.question == Question::Long && held.is_zero();
+                let took = took.max(held) + self.config.silence();
+                self.probing.ended(now, took, answered, long, self.offline.len());
             }
+            Purpose::ThrowAway => {}
             Purpose::EchoRead => {
                 tracing::debug!(slave, echoes = self.exchange.echoes(), "adapter asked for its echo");
             }
         }
+    }
+
+    /// What the last port left behind has come, or the answer, or nothing: either of the two may still come.
+    fn throw_away(&mut self, now: Instant, flight: &Flight<C>, result: &Result<Answer, Failure>) {
+        self.record.ended(now, flight.slave, flight.started, Ending::of(result));
+        self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
+        self.fear_late_answer(now, flight);
+        if *result == Err(Failure::Timeout) {
+            self.owe(flight);
+        }
+        self.thrown_away(now);
     }
 
     /// What the exchange brought, as far as it proves itself. Where it does not, its own answer may still come.
@@ -91,14 +107,59 @@ impl<C> Master<C> {
         Ok(answer.map(|response| shape::shortened(response, flight.more)))
     }
 
+    /// What a gateway says for a slave that has not answered is no answer of it.
+    fn from_gateway(
+        &mut self,
+        now: Instant,
+        flight: &Flight<C>,
+        result: Result<Answer, Failure>,
+    ) -> (Result<Answer, Failure>, bool) {
+        match result {
+            Ok(Err(code)) if self.far_end.is_there() && u8::from(code) == NOBODY_ANSWERED => {
+                self.far_end.nobody_answered(now, flight.started);
+                (Err(Failure::Nobody), true)
+            }
+            result => (result, false),
+        }
+    }
+
+    /// The far end has waited for these in vain, as long and as often as it does: they are off-line, without being asked
+    /// again.
+    pub(super) fn nobody_answered(&mut self, now: Instant, slaves: Vec<u8>) {
+        if self.config.offline_after == 0 {
+            return;
+        }
+        for slave in slaves {
+            if self.missed(now, slave, true) {
+                self.go_offline(now, slave);
+            }
+        }
+    }
+
+    /// How long a question in vain holds everybody up.
+    fn in_vain(&self) -> Duration {
+        if self.far_end.holds_others_up() { self.far_end.wait() } else { Duration::ZERO }
+    }
+
+    /// The far end may still be at it.
+    pub(super) fn owe(&mut self, flight: &Flight<C>) {
+        if let Some(asked) = flight.asked() {
+            self.far_end.owe(asked);
+        }
+    }
+
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
         let double = self.config.double_window;
         let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
         let characters = self.config.characters(self.config.answer_len(expected));
         let took = self.exchange.took();
         let confuses = self.exchange.confuses_late_answers();
+        let at_once = flight.sent.is_none_or(|sent| now <= sent.usually_by);
+        let given_up = self.far_end.answered(now, flight.behind, at_once);
+        self.nobody_answered(now, given_up);
         let station = self.station(flight.slave);
-        if let Some(sent) = flight.sent {
+        // What has waited behind what was owed says nothing of its slave.
+        if let Some(sent) = flight.sent.filter(|_| at_once) {
             let elapsed = || now.saturating_duration_since(sent.end).saturating_sub(characters);
             let after = took.unwrap_or_else(elapsed);
             station.timeout.answered(after);
@@ -109,6 +170,7 @@ impl<C> Master<C> {
                 station.stats.outcomes.answered += 1;
                 if confuses {
                     station.doubt.answered(now, flight.shape, double);
+                    self.fresh.answered(flight.slave, flight.shape);
                 }
             }
             Err(_) => station.stats.outcomes.exceptions += 1,
@@ -116,7 +178,7 @@ impl<C> Master<C> {
         self.note_alive(now, flight.slave);
     }
 
-    fn note_alive(&mut self, now: Instant, slave: u8) {
+    pub(super) fn note_alive(&mut self, now: Instant, slave: u8) {
         self.station(slave).answered(now);
         if self.offline.remove(slave) {
             self.welcome(now, slave);
@@ -157,10 +219,21 @@ impl<C> Master<C> {
             }
             Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
             Failure::Timeout => station.stats.outcomes.timeouts += 1,
+            // Its gateway has waited for it.
+            Failure::Nobody => {
+                station.stats.outcomes.timeouts += 1;
+                return;
+            }
         }
         let goes_offline = *failure == Failure::Timeout
             && self.missed(now, flight.slave, flight.question == Question::Short);
         self.fear_late_answer(now, flight);
+        if *failure == Failure::Timeout {
+            self.owe(flight);
+            if self.stations.get(&flight.slave).is_some_and(|station| station.timeout.is_learned()) {
+                self.fresh.in_vain(now);
+            }
+        }
         if goes_offline {
             self.go_offline(now, flight.slave);
         }
@@ -227,10 +300,10 @@ impl<C> Master<C> {
             },
             Failure::Doubted(why) if write => PortError::OutcomeUnknown(why),
             Failure::Doubted(why) => PortError::Mismatch(why.to_owned()),
-            Failure::Timeout if write => PortError::OutcomeUnknown("no answer"),
+            Failure::Timeout | Failure::Nobody if write => PortError::OutcomeUnknown("no answer"),
             Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
             Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),
-            Failure::Timeout => PortError::Timeout { after: waited },
+            Failure::Timeout | Failure::Nobody => PortError::Timeout { after: waited },
             Failure::Damaged(why) => PortError::Damaged(why),
             Failure::Mismatch(why) => PortError::Mismatch(why),
         };

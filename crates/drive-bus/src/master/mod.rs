@@ -5,7 +5,9 @@
 mod aside;
 mod bound;
 mod doubt;
+mod far_end;
 mod finish;
+mod fresh;
 mod offline;
 mod port;
 mod probing;
@@ -27,7 +29,7 @@ use tokio_modbus::Request;
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
-    exchange::{self, Answer, Machine, Step, Stray},
+    exchange::{self, Answer, Failure, Machine, Step, Stray},
     pdu,
     record::{Ending, Exchange, Record},
     schedule::{Entry, Rules, Schedule, Ticket},
@@ -36,6 +38,8 @@ use crate::{
 };
 
 use aside::Aside;
+use far_end::FarEnd;
+use fresh::Fresh;
 use offline::Offline;
 use port::PortState;
 use probing::{Probing, Question};
@@ -57,6 +61,10 @@ pub struct Master<C> {
     stations: BTreeMap<u8, Box<Station>>,
     /// Those that do not answer: they are probed.
     offline: Offline,
+    /// What the last port may have left behind, and whether this one is mute.
+    fresh: Fresh,
+    /// What the gateway still owes, if there is one.
+    far_end: FarEnd,
     flight: Option<Flight<C>>,
     /// Exchanges whose slaves are not ready yet.
     aside: BTreeMap<u8, Aside<C>>,
@@ -75,6 +83,8 @@ pub struct Master<C> {
     heard: Option<(Instant, Instant)>,
     /// End of our own last exchange.
     exchange_end: Instant,
+    /// When the last exchange that ended was asked.
+    asked_at: Instant,
     last_slave: Option<u8>,
     /// When somebody's call was sent last.
     called_at: Option<Instant>,
@@ -120,7 +130,22 @@ struct Flight<C> {
     patience: Duration,
     question: Question,
     started: Instant,
+    /// The same of its first part, where it was put aside.
+    asked_at: Instant,
+    /// Its transaction number, where the protocol has one.
+    number: Option<u16>,
+    /// How many questions in vain the far end owed when it was sent.
+    behind: usize,
     sent: Option<Sent>,
+}
+
+impl<C> Flight<C> {
+    /// What the far end was asked, if it was and somebody is to answer.
+    fn asked(&self) -> Option<far_end::Asked> {
+        let sent = self.sent.filter(|sent| sent.unanswered_until.is_none())?;
+        let &Self { slave, number, shape, .. } = self;
+        Some(far_end::Asked { slave, number, shape, at: sent.end })
+    }
 }
 
 /// What the port was given.
@@ -137,6 +162,8 @@ struct Sent {
     timeout: Duration,
     /// When the answer is due.
     answer_by: Instant,
+    /// When it would be due if the far end owed nothing.
+    usually_by: Instant,
     /// Nobody answers; it is over at this time.
     unanswered_until: Option<Instant>,
 }
@@ -148,6 +175,8 @@ enum Purpose<C> {
     Probe,
     /// Whether the adapter echoes.
     EchoRead,
+    /// What may still lie in a port that was opened again.
+    ThrowAway,
 }
 
 impl<C> Master<C> {
@@ -159,6 +188,8 @@ impl<C> Master<C> {
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
             offline: Offline::default(),
+            fresh: Fresh::default(),
+            far_end: FarEnd::new(config.far_end()),
             flight: None,
             aside: BTreeMap::new(),
             resumed: false,
@@ -172,6 +203,7 @@ impl<C> Master<C> {
             heard: None,
             called_at: None,
             exchange_end: now,
+            asked_at: now,
             last_slave: None,
             probing: Probing::default(),
             longest: (0, 0),
@@ -296,13 +328,45 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take_if(|flight| matches!(flight.purpose, Purpose::Probe)) else {
             return;
         };
+        self.break_off(now, &flight);
+        self.offline.probe_again(now, flight.slave);
+    }
+
+    /// The exchange that was under way is given up for a stop.
+    fn break_off(&mut self, now: Instant, flight: &Flight<C>) {
         self.exchange.abandon();
         self.to_send = None;
         self.record.ended(now, flight.slave, flight.started, Ending::GivenUp);
-        self.fear_late_answer(now, &flight);
-        self.offline.probe_again(now, flight.slave);
+        self.fear_late_answer(now, flight);
+        self.owe(flight);
         self.quiet_from = self.quiet_from.max(now);
         self.exchange_end = self.quiet_from;
+    }
+
+    /// What only goes on because the far end owes something is given up for a stop that was not sent yet: behind what is
+    /// owed that is the next.
+    fn let_stops_through(&mut self, now: Instant) {
+        if self.gives_way_at().is_none_or(|at| at > now) {
+            return;
+        }
+        let Some(flight) = self.flight.take() else { return };
+        self.break_off(now, &flight);
+        match flight.purpose {
+            Purpose::Call(Some(entry)) => {
+                let waited = flight.sent.map_or(Duration::ZERO, |sent| sent.timeout);
+                self.fail(now, entry, Failure::Timeout, waited);
+            }
+            Purpose::Call(None) => {}
+            Purpose::ThrowAway => self.thrown_away(now),
+            Purpose::Probe | Purpose::EchoRead => self.offline.probe_again(now, flight.slave),
+        }
+    }
+
+    /// When the exchange that is under way gives way to a stop that waits, if it does before its time.
+    fn gives_way_at(&self) -> Option<Instant> {
+        let sent = self.flight.as_ref().filter(|flight| flight.behind > 0)?.sent?;
+        let first = |entry: &Entry<Asked<C>>| entry.work.is_write && entry.work.attempts == 0;
+        self.schedule.first_stop(first).map(|_| sent.usually_by)
     }
 
     /// The caller of a request is gone.
@@ -323,6 +387,7 @@ impl<C> Master<C> {
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let goes_on = self.heard.filter(|(_, until)| now < *until + self.config.silence());
         self.heard = Some((goes_on.map_or(now, |(since, _)| since), now));
+        self.fresh.heard(now);
         self.quiet_from = self.quiet_from.max(now);
         if self.flight.is_some() {
             self.record.heard(bytes);
@@ -357,6 +422,9 @@ impl<C> Master<C> {
         for entry in self.schedule.expired(now) {
             self.drop_unsent(entry, PortError::Expired);
         }
+        let given_up = self.far_end.expired(now);
+        self.nobody_answered(now, given_up);
+        self.let_stops_through(now);
         let unanswered =
             self.flight.as_ref().and_then(|flight| flight.sent).and_then(|sent| sent.unanswered_until);
         if unanswered.is_some_and(|until| now >= until) {
@@ -384,7 +452,10 @@ impl<C> Master<C> {
         let unanswered =
             self.flight.as_ref().and_then(|flight| flight.sent).and_then(|sent| sent.unanswered_until);
         let exchange = if unanswered.is_some() { unanswered } else { self.exchange.deadline() };
-        [exchange, self.choose_at, self.schedule.next_expiry()].into_iter().flatten().min()
+        [exchange, self.choose_at, self.gives_way_at(), self.mute_at(), self.schedule.next_expiry()]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     fn act(&mut self, now: Instant, step: Step) {
@@ -416,14 +487,25 @@ impl<C> Master<C> {
                     station.stats.early += 1;
                     station.doubt.heard(now, shape, false);
                 }
-                Stray::Frame { slave, function, shape, is_request } => {
-                    self.count_frame(now, slave, function, shape, is_request);
+                Stray::Frame { slave, function, shape, is_request, number, nobody } => {
+                    let given_up = self.far_end.heard(now, slave, number, shape, nobody);
+                    let was_owed = given_up.is_some();
+                    if was_owed && !nobody && number.is_some() && self.stations.contains_key(&slave) {
+                        self.note_alive(now, slave);
+                    }
+                    self.nobody_answered(now, given_up.unwrap_or_default());
+                    self.count_frame(now, (slave, function, shape, is_request), was_owed);
                 }
             }
         }
     }
 
-    fn count_frame(&mut self, now: Instant, slave: u8, function: u8, shape: Shape, is_request: bool) {
+    fn count_frame(
+        &mut self,
+        now: Instant,
+        (slave, function, shape, is_request): (u8, u8, Shape, bool),
+        was_owed: bool,
+    ) {
         if let Some(flight) = self.flight.as_mut().filter(|flight| flight.slave == slave) {
             // Two masters have asked for the same; whose answer comes first nobody knows.
             flight.suspect |= is_request && shape == flight.shape;
@@ -436,6 +518,10 @@ impl<C> Master<C> {
             return;
         };
         let late = confuses && station.doubt.heard(now, shape, is_request);
+        if was_owed && !late {
+            station.stats.late += 1;
+            return;
+        }
         if late {
             station.heard_late();
             self.offline.hope(now, slave);
@@ -453,10 +539,11 @@ impl<C> Master<C> {
         self.outcomes.pop_front()
     }
 
-    /// When the last exchange ended on the line: what [`poll_outcome`](Self::poll_outcome) gives now is as old as that.
+    /// When the last exchange began: what [`poll_outcome`](Self::poll_outcome) gives now is not older than that, and nobody
+    /// knows by how much it is younger.
     #[must_use]
-    pub const fn exchange_end(&self) -> Instant {
-        self.exchange_end
+    pub const fn asked_at(&self) -> Instant {
+        self.asked_at
     }
 
     /// A slave has said what its link has counted.
@@ -473,6 +560,7 @@ impl<C> Master<C> {
         stats.queued = self.schedule.len();
         stats.echoing = self.exchange.echoes();
         stats.worst_case_stop = self.learned_worst_case_stop();
+        stats.far_end = self.far_end.stats();
         stats.away = self.port.away().map(str::to_owned);
         stats.slaves = self
             .stations

@@ -5,7 +5,7 @@ use std::mem;
 use drive_core::PortError;
 use tokio::time::Instant;
 
-use super::Master;
+use super::{Flight, Master};
 
 /// The state of the port.
 pub(super) enum PortState {
@@ -36,6 +36,9 @@ impl<C> Master<C> {
         self.exchange.reset();
         self.quiet_from = now;
         self.exchange_end = now;
+        if self.stats.opened > 0 {
+            self.open_again(now);
+        }
         self.stats.opened += 1;
         self.opened_at.get_or_insert(now);
     }
@@ -46,6 +49,8 @@ impl<C> Master<C> {
         self.port = PortState::Opening(Some(reason.to_owned()));
         self.stats.lost += 1;
         self.exchange.reset();
+        let asked = self.flight.as_ref().and_then(Flight::asked);
+        self.far_end.lost(asked);
         self.fail_flight(now, reason);
         self.sending = None;
     }

@@ -89,6 +89,7 @@ impl<C> Master<C> {
     /// anything may wait before it has aged: on a full line a drive that is back would never be noticed.
     pub(super) fn next_probe(&self, now: Instant) -> Option<(u8, Instant)> {
         let (slave, at) = self.due_probe(now)?;
+        let at = self.far_end.gate(false).map_or(at, |gate| gate.max(at));
         let urgent = self.schedule.any(|entry| entry.terms.class >= Class::KeepAlive);
         Some((slave, if urgent { at + AGING } else { at }))
     }
@@ -96,13 +97,20 @@ impl<C> Master<C> {
     fn due_probe(&self, now: Instant) -> Option<(u8, Instant)> {
         let rested =
             self.soonest(now, false).map(|(slave, at)| (slave, self.probing.free_at.unwrap_or(at).max(at)));
-        if !self.schedule.is_empty() {
+        // Behind a gateway that serves one question at a time no question in vain is free, as long as anybody lives.
+        if !self.schedule.is_empty() || self.far_end.holds_others_up() && self.somebody_answers() {
             return rested;
         }
         // Nobody has asked for anything for a while: what probes take is taken from nobody.
         let idle_from = self.called_at.map(|called| called + IDLE);
         let idle = self.soonest(now, true).map(|(slave, at)| (slave, idle_from.unwrap_or(at).max(at)));
         rested.into_iter().chain(idle).min_by_key(|(_, at)| *at)
+    }
+
+    fn somebody_answers(&self) -> bool {
+        self.stations
+            .iter()
+            .any(|(slave, station)| station.timeout.is_learned() && !self.offline.contains(*slave))
     }
 
     /// Whom to probe and when, if the line were his.

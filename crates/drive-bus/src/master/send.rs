@@ -9,6 +9,7 @@ use tokio_modbus::Request;
 
 use super::{
     Asked, Flight, Master, Purpose, Sending, Sent,
+    fresh::First,
     port::PortState,
     probing,
     waits::{Waits, shape_of, wants_echo_read},
@@ -45,8 +46,8 @@ impl<C> Master<C> {
             return None;
         }
         let free_at = self.free_at();
-        let Self { exchange, stations, aside: waiting, offline, .. } = &*self;
-        let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline };
+        let Self { exchange, stations, aside: waiting, offline, far_end, .. } = &*self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline, far_end };
         let stop_since = self.schedule.first_stop(|entry| waits.until(now, entry).is_none());
         let stop_at = stop_since.map(|since| self.stop_free_at(since));
         let probe = self.next_probe(now).filter(|_| stop_at.is_none() && !self.closing);
@@ -56,6 +57,17 @@ impl<C> Master<C> {
             let waits = !self.schedule.is_empty() || probe.is_some() || aside.is_some();
             self.choose_at = waits.then_some(soonest);
             return None;
+        }
+        if stop_at.is_none() && !self.closing {
+            match self.first(now) {
+                First::Nothing => {}
+                First::Listen(until) => {
+                    let waits = !self.schedule.is_empty() || probe.is_some();
+                    self.choose_at = waits.then_some(until);
+                    return None;
+                }
+                First::Ask(slave) => return self.begin_read(now, slave, Purpose::ThrowAway),
+            }
         }
         let due = aside.filter(|(at, _)| stop_at.is_none() && *at <= now);
         if let Some((_, slave)) = due.filter(|_| !self.resumed || self.closing) {
@@ -81,8 +93,8 @@ impl<C> Master<C> {
     }
 
     fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Chosen<Asked<C>> {
-        let Self { schedule, stations, aside, config, last_slave, exchange, offline, .. } = self;
-        let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline };
+        let Self { schedule, stations, aside, config, last_slave, exchange, offline, far_end, .. } = self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline, far_end };
         schedule.choose(now, |entry| {
             let stop = entry.terms.class == Class::Stop;
             let mut at = stop_at.filter(|_| stop).unwrap_or(free_at);
@@ -169,7 +181,11 @@ impl<C> Master<C> {
 
     fn begin_read(&mut self, now: Instant, slave: u8, purpose: Purpose<C>) -> Option<Bytes> {
         let request = self.station(slave).harmless_read();
-        let request = if let Purpose::Probe = purpose { probing::shortest(request) } else { request };
+        let request = if let Purpose::Probe | Purpose::ThrowAway = purpose {
+            probing::shortest(request)
+        } else {
+            request
+        };
         let pdu = pdu::encode(&request).ok()?;
         self.note_start(now, slave, now);
         Some(self.fly(now, slave, purpose, request, &pdu, 0))
@@ -201,8 +217,9 @@ impl<C> Master<C> {
             self.exchange.start(slave, Arc::clone(&request), pdu)
         };
         let is_write = self.exchange.is_write(&request);
+        let first = self.fresh.is_first();
         let doubt = &mut self.station(slave).doubt;
-        let suspect = doubt.owes(now, shape);
+        let suspect = first || doubt.owes(now, shape);
         if is_write {
             doubt.written(shape);
         }
@@ -220,6 +237,9 @@ impl<C> Master<C> {
             patience,
             question,
             started: now,
+            asked_at: now,
+            number: self.exchange.number(),
+            behind: self.far_end.owes(),
             sent: None,
         });
         bytes
@@ -253,11 +273,13 @@ impl<C> Master<C> {
         }
         let timeout = flight.patience;
         let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
-        let answer_by = end + timeout + characters;
+        let usually_by = end + timeout + characters;
+        let answer_by = usually_by + self.far_end.held_up(end);
         flight.sent = Some(Sent {
             end,
             timeout,
             answer_by,
+            usually_by,
             unanswered_until: unanswered.then(|| end + self.config.broadcast_pause),
         });
         self.exchange.handle_sent(end - taken_in, answer_by);

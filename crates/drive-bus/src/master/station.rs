@@ -104,6 +104,16 @@ impl Station {
         self.asked.is_some_and(|asked| at <= asked + INTEREST)
     }
 
+    /// Whether somebody has asked for it since then.
+    pub(super) fn was_asked_since(&self, since: Instant) -> bool {
+        self.asked.is_some_and(|asked| asked >= since)
+    }
+
+    /// Whether it has answered, and what was asked last.
+    pub(super) const fn is_answering(&self) -> bool {
+        self.failures == 0 && self.timeout.is_learned()
+    }
+
     /// An answer came when its time was over: it is there, and slow.
     pub(super) const fn heard_late(&mut self) {
         self.slow = true;

@@ -5,6 +5,7 @@
 //!   stop's itself;
 //! - no **answer that may still come** could be taken for its own, nor for that of the read which asks the adapter for its
 //!   echo on its behalf. The write of a stop waits for neither;
+//! - the **far end** is done with what it owes, or can do more meanwhile. The write of a stop waits for nothing of that;
 //! - the stop of a slave that is off-line, once it was sent in vain, for **its share of the line**.
 //!
 //! A stop that waits for none of them **holds the line**: nothing less urgent starts, not in its slave's pause either. One
@@ -16,7 +17,7 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Asked, Purpose, aside::Aside, offline::Offline, station::Station};
+use super::{Asked, Purpose, aside::Aside, far_end::FarEnd, offline::Offline, station::Station};
 use crate::{answer, exchange::Machine, pdu, schedule::Entry, shape::Shape};
 
 /// How long what may not overtake an exchange that was put aside waits until it is looked at again: less than a poll of
@@ -29,6 +30,7 @@ pub(super) struct Waits<'a, C> {
     pub(super) stations: &'a BTreeMap<u8, Box<Station>>,
     pub(super) aside: &'a BTreeMap<u8, Aside<C>>,
     pub(super) offline: &'a Offline,
+    pub(super) far_end: &'a FarEnd,
 }
 
 impl<C> Waits<'_, C> {
@@ -45,7 +47,18 @@ impl<C> Waits<'_, C> {
             station.place(now, entry).1.max(read.and_then(|read| station.doubt.wait(now, read)))
         });
         let share = self.offline.stop_at(entry.slave).filter(|_| is_stop);
-        aside.max(doubt).max(share).filter(|until| *until > now)
+        let gate = self.far_end.gate(self.proves_something(entry)).filter(|_| !goes_at_once);
+        aside.max(doubt).max(share).max(gate).filter(|until| *until > now)
+    }
+}
+
+impl<C> Waits<'_, C> {
+    /// Whether its answer would say something of the far end: it is a read of a drive that answers, or of any if none does.
+    fn proves_something(&self, entry: &Entry<Asked<C>>) -> bool {
+        let answers = |slave: u8, station: &Station| station.is_answering() && !self.offline.contains(slave);
+        let may_answer = self.stations.get(&entry.slave).is_some_and(|station| answers(entry.slave, station))
+            || !self.stations.iter().any(|(slave, station)| answers(*slave, station));
+        self.far_end.owes() > 0 && !entry.work.is_write && may_answer
     }
 }
 

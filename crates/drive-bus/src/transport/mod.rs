@@ -52,6 +52,17 @@ pub(crate) fn poll_read_now(
     Pin::new(stream).poll_read(context, &mut buffer).map_ok(|()| buffer.filled().len())
 }
 
+/// A connection is to end with a reset, not with what may still be on its way.
+#[cfg_attr(not(feature = "tcp"), expect(clippy::missing_const_for_fn, reason = "there are no connections"))]
+pub(crate) fn reset_when_dropped(stream: &BoxedStream) {
+    #[cfg(feature = "tcp")]
+    if let Some(stream) = (stream.as_ref() as &dyn Any).downcast_ref::<tokio::net::TcpStream>() {
+        tcp::reset_when_dropped(stream);
+    }
+    #[cfg(not(feature = "tcp"))]
+    let _ = stream;
+}
+
 /// Why a line could not be opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -128,6 +139,11 @@ impl Connector {
             Endpoint::Tcp(address) => Ok(Self::Tcp(address.clone())),
             Endpoint::Stream => Err(OpenError::NoPort),
         }
+    }
+
+    /// Whether there is something to open, also once more.
+    pub(crate) const fn reopens(&self) -> bool {
+        !matches!(self, Self::None)
     }
 
     /// Begins to open the stream; `None` when there is nothing to open.

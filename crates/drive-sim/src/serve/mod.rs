@@ -1,5 +1,6 @@
 //! Endpoints: how a master reaches a line.
 
+mod gateway;
 #[cfg(unix)]
 mod pty;
 mod tcp;
@@ -13,6 +14,8 @@ use tokio::{io::DuplexStream, net::TcpListener, task::JoinHandle};
 use tokio_serial::{DataBits, FlowControl, SerialPortBuilderExt, StopBits};
 
 use crate::{line::SimLine, wire::Master};
+
+pub use gateway::{Gateway, GatewayInMemory};
 
 /// Characters that an endpoint in memory keeps for a master that does not read, about as many as a pty keeps.
 const MEMORY: usize = 4_096;

@@ -58,7 +58,7 @@ pub(super) async fn serve_modbus(line: SimLine, listener: TcpListener) -> io::Re
 
 /// A frame is one small write and must not wait for the next. A connection that refuses is gone, and its service shows
 /// it; the endpoint goes on.
-fn hurry(stream: &TcpStream) {
+pub(super) fn hurry(stream: &TcpStream) {
     if let Err(error) = stream.set_nodelay(true) {
         tracing::debug!(%error, "connection not hurried");
     }
@@ -115,7 +115,7 @@ async fn connection(line: SimLine, mut stream: TcpStream) -> io::Result<()> {
 }
 
 /// Takes a whole request from what was received: transaction, unit, PDU.
-fn next_request(received: &mut Vec<u8>) -> io::Result<Option<(u16, u8, Vec<u8>)>> {
+pub(super) fn next_request(received: &mut Vec<u8>) -> io::Result<Option<(u16, u8, Vec<u8>)>> {
     let &[t1, t2, p1, p2, l1, l2, unit, ..] = &received[..] else { return Ok(None) };
     let length = usize::from(u16::from_be_bytes([l1, l2]));
     if [p1, p2] != [0, 0] || !(2..=LONGEST + 1).contains(&length) {
@@ -128,7 +128,7 @@ fn next_request(received: &mut Vec<u8>) -> io::Result<Option<(u16, u8, Vec<u8>)>
     Ok(Some((u16::from_be_bytes([t1, t2]), unit, request)))
 }
 
-fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+pub(super) fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     let length = u16::try_from(pdu.len() + 1).unwrap_or(u16::MAX);
     let mut frame = Vec::with_capacity(HEADER + pdu.len());
     frame.extend(transaction.to_be_bytes());

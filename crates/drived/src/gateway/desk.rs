@@ -268,7 +268,7 @@ impl Desk {
             Ok(Ok(Ok(response))) => {
                 if let Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) = &response
                 {
-                    let at = slave.answered_at().unwrap_or_else(Instant::now);
+                    let at = slave.asked_at().unwrap_or_else(Instant::now);
                     self.kept.keep(drive.name(), ask, words, at, self.config.max_age);
                 }
                 return Ok(pdu::answer(ask, response));

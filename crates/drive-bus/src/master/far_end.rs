@@ -1,0 +1,367 @@
+//! What stands between a connection and the drives: what it still owes, how much it does at once, how long it waits for a
+//! drive that does not answer.
+//!
+//! A gateway goes on with a question after its master has given up, and many serve one question at a time: whatever is asked
+//! meanwhile waits there, a stop as well. So a **question in vain stays owed** until its late answer comes, or exception
+//! 0Bh, or the gateway can no longer be at it. While something is owed:
+//! - a far end of which it is **not known** whether it does more than one thing at once is asked one thing more: a read, of a
+//!   drive that answers. Its answer comes at once, then it does; or behind what was owed, which shows how long that took;
+//! - one that **does no more** is asked nothing, until what is owed is over;
+//! - a stop is sent, whatever is owed.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::{
+    config::Gateway,
+    shape::Shape,
+    stats::{FarEndStats, WaitIs},
+};
+
+/// Of so many questions in vain one asks again whether a far end that does one thing at a time still does.
+const ASK_AGAIN: u32 = 8;
+
+/// What is owed at the most: one question of each of the drives of a long line.
+const MOST: usize = 32;
+
+/// How often what is waited for may double while nothing proves that the far end is done.
+const DOUBLINGS: u32 = 2;
+
+/// The far end of one line.
+#[derive(Debug)]
+pub(super) struct FarEnd {
+    /// `None`: there is nothing that could owe.
+    gateway: Option<Gateway>,
+    owed: Vec<Owed>,
+    /// So many things at once, at least.
+    serves: usize,
+    /// And no more.
+    exactly: bool,
+    /// How long it was seen to wait.
+    seen: Option<Duration>,
+    /// When it was last done with something that was owed.
+    free_from: Option<Instant>,
+    /// How often in a row nothing has proved that it was done.
+    unproven: u32,
+    in_vain: u32,
+}
+
+/// A question in vain.
+#[derive(Debug, Clone, Copy)]
+struct Owed {
+    slave: u8,
+    number: Option<u16>,
+    shape: Shape,
+    asked: Instant,
+    until: Instant,
+    /// It was asked over a connection that is gone, and so may be the question.
+    over_a_lost_port: bool,
+}
+
+/// A question that was given up, or is under way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    pub(super) slave: u8,
+    pub(super) number: Option<u16>,
+    pub(super) shape: Shape,
+    pub(super) at: Instant,
+}
+
+impl FarEnd {
+    pub(super) fn new(gateway: Option<Gateway>) -> Self {
+        let at_once = gateway.and_then(|gateway| gateway.at_once);
+        Self {
+            gateway,
+            owed: Vec::new(),
+            serves: at_once.unwrap_or(1).max(1),
+            exactly: at_once.is_some(),
+            seen: None,
+            free_from: None,
+            unproven: 0,
+            in_vain: 0,
+        }
+    }
+
+    /// Whether there may be something in between.
+    pub(super) const fn is_there(&self) -> bool {
+        self.gateway.is_some()
+    }
+
+    /// Whether it does one thing at a time, as far as is known: then a question in vain costs everybody its whole wait.
+    pub(super) const fn holds_others_up(&self) -> bool {
+        self.gateway.is_some() && self.serves < 2
+    }
+
+    /// How long it waits for a drive that does not answer: seen, set, or assumed.
+    pub(super) fn wait(&self) -> Duration {
+        let Some(gateway) = self.gateway else { return Duration::ZERO };
+        self.seen.or(gateway.wait).unwrap_or(Gateway::ASSUMED_WAIT)
+    }
+
+    /// What it adds to the wait of a stop: one question in vain, and one more where it is not yet known whether it does
+    /// more than one thing at once.
+    pub(super) fn stop_waits(&self) -> Duration {
+        let Some(gateway) = self.gateway else { return Duration::ZERO };
+        let questions = if self.exactly || self.serves > 1 { 1 } else { 2 };
+        self.wait().max(gateway.wait.unwrap_or_default()) * questions
+    }
+
+    /// How many questions it owes.
+    pub(super) fn owes(&self) -> usize {
+        self.owed.len()
+    }
+
+    pub(super) fn stats(&self) -> Option<FarEndStats> {
+        let gateway = self.gateway?;
+        let wait_is = match (self.seen, gateway.wait) {
+            (Some(_), _) => WaitIs::Seen,
+            (None, Some(_)) => WaitIs::Set,
+            (None, None) => WaitIs::Assumed,
+        };
+        Some(FarEndStats {
+            owed: self.owed.len(),
+            at_once: self.serves,
+            no_more: self.exactly,
+            wait: self.wait(),
+            wait_is,
+            in_vain: u64::from(self.in_vain),
+        })
+    }
+
+    /// A question was given up.
+    pub(super) fn owe(&mut self, asked: Asked) {
+        if self.gateway.is_none() || asked.slave == 0 {
+            return;
+        }
+        let begins = self.owed.iter().map(|owed| owed.until).max().filter(|_| self.serves < 2);
+        let limit = self.wait() * 5 / 4 * (1 << self.unproven.min(DOUBLINGS));
+        let until = begins.unwrap_or(asked.at).max(asked.at) + limit;
+        let Asked { slave, number, shape, at } = asked;
+        if self.owed.len() >= MOST {
+            self.owed.remove(0);
+        }
+        self.owed.push(Owed { slave, number, shape, asked: at, until, over_a_lost_port: false });
+        self.in_vain = self.in_vain.saturating_add(1);
+    }
+
+    /// Until when a request waits. `reads`: it is a read of a drive that answers, or of any where none does.
+    pub(super) fn gate(&self, reads: bool) -> Option<Instant> {
+        let owed = self.owed.len();
+        if owed == 0 || owed < self.serves {
+            return None;
+        }
+        let asks_whether = !self.exactly || self.in_vain % ASK_AGAIN == 0 && self.gateway_may_change();
+        if asks_whether && reads && owed == self.serves {
+            return None;
+        }
+        self.owed.iter().map(|owed| owed.until).min()
+    }
+
+    fn gateway_may_change(&self) -> bool {
+        self.gateway.is_some_and(|gateway| gateway.at_once.is_none())
+    }
+
+    /// How much longer than usual the answer to what is sent at `now` may take, because it waits behind what is owed.
+    pub(super) fn held_up(&self, now: Instant) -> Duration {
+        let last = self.owed.iter().map(|owed| owed.until).max().filter(|_| self.owed.len() >= self.serves);
+        last.map_or(Duration::ZERO, |last| last.saturating_duration_since(now))
+    }
+
+    /// What was sent behind `behind` questions in vain was answered: at once, or only when its usual time was over. Gives
+    /// the slaves that the far end has waited for in vain to the end.
+    pub(super) fn answered(&mut self, now: Instant, behind: usize, at_once: bool) -> Vec<u8> {
+        self.unproven = 0;
+        if behind == 0 || self.gateway.is_none() {
+            return Vec::new();
+        }
+        if at_once {
+            if self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
+                self.serves = behind + 1;
+                self.exactly = false;
+            }
+            return Vec::new();
+        }
+        if self.gateway_may_change() {
+            self.serves = behind.max(1);
+            self.exactly = true;
+        }
+        self.done_with_all(now)
+    }
+
+    /// An intact frame came that was no answer to what was asked. `nobody`: the gateway says that nobody answered. `None`:
+    /// it was not owed. Gives otherwise the slaves that the far end has waited for in vain to the end.
+    pub(super) fn heard(
+        &mut self,
+        now: Instant,
+        slave: u8,
+        number: Option<u16>,
+        shape: Shape,
+        nobody: bool,
+    ) -> Option<Vec<u8>> {
+        let is_it = |owed: &Owed| match (owed.number, number) {
+            (Some(owed), Some(number)) => owed == number,
+            _ => owed.slave == slave && (owed.shape == shape || shape.is_refusal_of(owed.shape)),
+        };
+        let at = self.owed.iter().position(is_it)?;
+        let mut given_up = Vec::new();
+        if self.serves < 2 {
+            // One after another: what was asked before is over too.
+            let before: Vec<_> = self.owed.drain(..at).collect();
+            if let Some(first) = before.first() {
+                self.saw(now, first.asked, before.len());
+                given_up.extend(before.iter().map(|owed| owed.slave));
+            }
+        }
+        let owed = self.owed.remove(if self.serves < 2 { 0 } else { at });
+        if nobody {
+            self.saw(now, owed.asked, 1);
+            given_up.push(owed.slave);
+        }
+        self.unproven = 0;
+        self.free_from = Some(now);
+        Some(given_up)
+    }
+
+    /// The gateway says of what was asked at `asked` that nobody answered.
+    pub(super) fn nobody_answered(&mut self, now: Instant, asked: Instant) {
+        self.unproven = 0;
+        if self.owed.is_empty() {
+            self.saw(now, asked, 1);
+        }
+        self.free_from = Some(now);
+    }
+
+    /// What can no longer come, as far as is known: the slaves that were asked, where it is known how long is waited for
+    /// them.
+    pub(super) fn expired(&mut self, now: Instant) -> Vec<u8> {
+        if self.owed.iter().all(|owed| owed.until > now) {
+            return Vec::new();
+        }
+        self.unproven = self.unproven.saturating_add(1);
+        let waits = self.seen.is_some() || self.gateway.is_some_and(|gateway| gateway.wait.is_some());
+        let over = self.owed.extract_if(.., |owed| owed.until <= now);
+        over.filter(|owed| waits && !owed.over_a_lost_port).map(|owed| owed.slave).collect()
+    }
+
+    /// The connection is lost, with this question under way: a gateway that has a line may still be at it.
+    pub(super) fn lost(&mut self, under_way: Option<Asked>) {
+        if let Some(asked) = under_way.filter(|_| self.exactly && self.serves < 2) {
+            self.owe(asked);
+        }
+        for owed in &mut self.owed {
+            owed.number = None;
+            owed.over_a_lost_port = true;
+        }
+    }
+
+    fn done_with_all(&mut self, now: Instant) -> Vec<u8> {
+        if let Some(first) = self.owed.first().map(|owed| owed.asked) {
+            self.saw(now, first, self.owed.len());
+        }
+        let slaves = self.owed.drain(..).map(|owed| owed.slave).collect();
+        self.free_from = Some(now);
+        slaves
+    }
+
+    /// So many questions, the first of them asked at `asked`, were over at `now`, for want of an answer.
+    fn saw(&mut self, now: Instant, asked: Instant, questions: usize) {
+        let began = self.free_from.map_or(asked, |free| free.max(asked));
+        let waited = now.saturating_duration_since(began) / u32::try_from(questions).unwrap_or(1).max(1);
+        if waited > Duration::ZERO {
+            self.seen = Some(waited);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+    const MS: Duration = Duration::from_millis(1);
+
+    fn asked(slave: u8, number: u16, at: Instant) -> Asked {
+        Asked { slave, number: Some(number), shape: Shape::ANY, at }
+    }
+
+    #[test]
+    fn nothing_is_owed_where_nothing_is_in_between() {
+        let mut far = FarEnd::new(None);
+        far.owe(asked(1, 1, Instant::now()));
+        assert_eq!((far.owes(), far.gate(true), far.stop_waits()), (0, None, Duration::ZERO));
+    }
+
+    #[test]
+    fn one_living_drive_is_read_to_see_and_nothing_is_written_meanwhile() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        assert_eq!(far.gate(true), None);
+        assert!(far.gate(false).is_some());
+        far.owe(asked(2, 2, now));
+        assert!(far.gate(true).is_some(), "two are enough");
+    }
+
+    #[test]
+    fn what_is_answered_at_once_beside_a_question_in_vain_shows_that_it_does_more_at_once() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        assert!(far.answered(now + 20 * MS, 1, true).is_empty());
+        assert_eq!((far.gate(false), far.held_up(now)), (None, Duration::ZERO));
+        assert!(!far.holds_others_up());
+        far.owe(asked(3, 2, now));
+        assert!(far.gate(false).is_some(), "of three at once nothing is known");
+        assert_eq!(far.gate(true), None);
+    }
+
+    #[test]
+    fn an_answer_behind_a_question_in_vain_shows_how_long_that_took_and_that_it_does_one_thing_at_a_time() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        assert_eq!(far.stop_waits(), 2 * Gateway::ASSUMED_WAIT);
+        far.owe(asked(1, 1, now));
+        assert_eq!(far.answered(now + 2 * SECOND, 1, false), [1]);
+        assert_eq!((far.wait(), far.stop_waits(), far.owes()), (2 * SECOND, 2 * SECOND, 0));
+        far.owe(asked(1, 3, now + 3 * SECOND));
+        assert_eq!(far.gate(true), Some(now + 5_500 * MS));
+        assert!(far.expired(now + 5_400 * MS).is_empty());
+        assert_eq!(far.expired(now + 5_500 * MS), [1]);
+    }
+
+    #[test]
+    fn a_late_answer_of_known_number_ends_what_was_asked_before_it() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), ..Gateway::default() }));
+        far.owe(asked(1, 1, now));
+        far.owe(asked(2, 2, now + SECOND));
+        assert_eq!(far.heard(now + 9 * SECOND, 2, Some(7), Shape::ANY, false), None);
+        assert_eq!(far.heard(now + 9 * SECOND, 2, Some(2), Shape::ANY, false), Some(vec![1]));
+        assert_eq!((far.owes(), far.wait()), (0, 9 * SECOND));
+    }
+
+    #[test]
+    fn a_gateway_that_says_nobody_teaches_its_wait() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        assert_eq!(far.heard(now + 4 * SECOND, 1, Some(1), Shape::ANY, true), Some(vec![1]));
+        assert_eq!(far.wait(), 4 * SECOND);
+    }
+
+    #[test]
+    fn while_nothing_proves_that_it_is_done_it_is_asked_less_and_less() {
+        let mut now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { wait: Some(SECOND), ..Gateway::default() }));
+        let mut limits = Vec::new();
+        for number in 0..4 {
+            far.owe(asked(1, number, now));
+            let until = far.gate(false).expect("it is owed");
+            limits.push(until - now);
+            now = until;
+            assert_eq!(far.expired(now), [1]);
+        }
+        assert_eq!(limits, [1_250 * MS, 2_500 * MS, 5_000 * MS, 5_000 * MS]);
+    }
+}

@@ -1,0 +1,214 @@
+//! A gateway that serves one request at a time and waits three seconds for a drive that does not answer: the living are
+//! read, and a stop waits for one question in vain and no more.
+
+#![cfg(feature = "tcp")]
+
+mod support;
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, Protocol};
+use drive_core::{Class, SerialSettings, Terms};
+use drive_sim::{Gateway, GatewayInMemory, SimLine, SimSlave, Wiring, models::atv312::Atv312};
+use support::{MS, read, write};
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
+    task::JoinSet,
+    time::{Instant, sleep, sleep_until, timeout},
+};
+
+const SECOND: Duration = Duration::from_secs(1);
+const ETA: u16 = 3201;
+const CMD: u16 = 8501;
+const DRIVES: u8 = 8;
+/// How often each drive is asked.
+const EVERY: Duration = Duration::from_millis(200);
+
+struct Plant {
+    drives: Vec<SimSlave>,
+    gateway: GatewayInMemory,
+    habits: Gateway,
+}
+
+fn plant(habits: Gateway) -> Plant {
+    let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+    let add = |address| simulated.add(address, Atv312::under_bus_control()).unwrap();
+    let drives = (1..=DRIVES).map(add).collect();
+    Plant { drives, gateway: simulated.behind(habits), habits }
+}
+
+/// The ways in which gateways tell that nobody answers, and speak.
+fn kinds() -> [Gateway; 3] {
+    let told = Gateway::default();
+    [told, Gateway { tells: false, ..told }, Gateway { rtu: true, tells: false, ..told }]
+}
+
+impl Plant {
+    fn line(&self) -> Line {
+        let protocol = if self.habits.rtu { Protocol::Rtu } else { Protocol::Tcp };
+        let config = LineConfig { protocol, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
+        Line::over(
+            self.gateway.connect(),
+            LineConfig { gateway: Some(drive_bus::Gateway::default()), ..config },
+        )
+    }
+
+    fn drive(&self, address: u8) -> &SimSlave {
+        &self.drives[usize::from(address) - 1]
+    }
+
+    /// When this drive first got a stop, if it has.
+    fn stopped(&self, address: u8) -> Option<Instant> {
+        let received = self.drive(address).received();
+        received.iter().find(|request| request.pdu[..] == [6, 0x21, 0x35, 0, 0]).map(|request| request.at)
+    }
+}
+
+/// Asks every drive on its grid until `until`, and counts what the living say from `from` on.
+async fn polled(line: &Line, dead: &[u8], from: Instant, until: Instant) -> u32 {
+    let mut drives = JoinSet::new();
+    for address in 1..=DRIVES {
+        let mut slave = line.slave(address).with_terms(Terms::of(Class::Status).within(EVERY).sparing(3));
+        let counts = !dead.contains(&address);
+        drives.spawn(async move {
+            let (mut good, mut next) = (0, Instant::now());
+            while next < until {
+                sleep_until(next).await;
+                let answered = read(&mut slave, ETA, 4).await.is_ok();
+                let now = Instant::now();
+                good += u32::from(answered && counts && now >= from && now < until);
+                next = now.max(next + EVERY);
+            }
+            good
+        });
+    }
+    drives.join_all().await.into_iter().sum()
+}
+
+/// What a loop gets that asks one drive after another and waits `patience` for each, over Modbus TCP.
+async fn naive(mut stream: DuplexStream, patience: Duration, dead: &[u8], until: Instant) -> u32 {
+    let (mut good, mut transaction) = (0, 0_u16);
+    loop {
+        for address in 1..=DRIVES {
+            transaction += 1;
+            let [high, low] = transaction.to_be_bytes();
+            stream.write_all(&[high, low, 0, 0, 0, 6, address, 3, 0x0C, 0x81, 0, 4]).await.unwrap();
+            let answer = async {
+                loop {
+                    let mut head = [0; 7];
+                    stream.read_exact(&mut head).await.unwrap();
+                    let mut pdu = vec![0; usize::from(head[5]) - 1];
+                    stream.read_exact(&mut pdu).await.unwrap();
+                    if head[..2] == [high, low] {
+                        return pdu[0] == 3;
+                    }
+                }
+            };
+            let answered = timeout(patience, answer).await.unwrap_or(false);
+            if Instant::now() >= until {
+                return good;
+            }
+            good += u32::from(answered && !dead.contains(&address));
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_living_behind_a_gateway_are_read_at_least_as_often_as_by_a_loop_that_waits() {
+    let time = 30 * SECOND;
+    let mut loops = Vec::new();
+    for patience in [SECOND, 4 * SECOND] {
+        let plant = plant(Gateway::default());
+        plant.drive(3).mute();
+        loops.push(naive(plant.gateway.connect(), patience, &[3], Instant::now() + time).await);
+    }
+    for habits in kinds() {
+        let plant = plant(habits);
+        let line = plant.line();
+        let died = Instant::now() + 3 * SECOND;
+        let polling = polled(&line, &[3], died, died + time);
+        let dies = async {
+            sleep_until(died).await;
+            plant.drive(3).mute();
+        };
+        let (good, ()) = tokio::join!(polling, dies);
+        println!("{habits:?}: {good}, loops {loops:?}, {:?}", line.stats().slaves[&1].outcomes);
+        // All there are is 7 * 150.
+        assert!(good >= 5 * loops.iter().max().unwrap(), "{good} with {habits:?}, a loop {loops:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_behind_a_gateway_waits_for_one_question_in_vain() {
+    for habits in kinds() {
+        let mut worst = Duration::ZERO;
+        for after in (0..40).map(|n| 173 * MS * n).chain([33 * SECOND]) {
+            let plant = plant(habits);
+            let line = plant.line();
+            let died = Instant::now() + 2 * SECOND;
+            let stops = async {
+                sleep_until(died).await;
+                plant.drive(3).mute();
+                sleep(after).await;
+                let called = Instant::now();
+                let mut slave = line.slave(4).with_terms(Terms::of(Class::Stop));
+                let confirmed = write(&mut slave, CMD, 0).await;
+                assert!(confirmed.is_ok(), "{confirmed:?}, {after:?} with {habits:?}");
+                plant.stopped(4).expect("it is confirmed") - called
+            };
+            let polling = polled(&line, &[3], died, died + after + 5 * SECOND);
+            let (waited, _) = tokio::join!(stops, polling);
+            worst = worst.max(waited);
+            let bound = line.worst_case_stop();
+            assert!(waited <= bound, "{waited:?} of {bound:?}, {after:?} with {habits:?}");
+        }
+        println!("{habits:?}: a stop waited for {worst:?}");
+        assert!(worst <= habits.wait * habits.attempts + SECOND / 2, "{worst:?} with {habits:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn several_that_die_at_once_behind_a_gateway_delay_a_stop_by_no_more_than_the_line_says() {
+    for habits in kinds() {
+        let mut worst = Duration::ZERO;
+        for after in (0..60).map(|n| 211 * MS * n) {
+            let plant = plant(habits);
+            let line = plant.line();
+            let died = Instant::now() + 2 * SECOND;
+            let stops = async {
+                sleep_until(died).await;
+                (1..=3).for_each(|address| plant.drive(address).mute());
+                sleep(after).await;
+                let (called, bound) = (Instant::now(), line.worst_case_stop());
+                let learned = line.stats().worst_case_stop;
+                let mut slave = line.slave(6).with_terms(Terms::of(Class::Stop));
+                assert!(write(&mut slave, CMD, 0).await.is_ok(), "{after:?} with {habits:?}");
+                let waited = plant.stopped(6).expect("it is confirmed") - called;
+                assert!(waited <= bound.min(learned), "{waited:?} of {bound:?}, {learned:?}, {after:?}");
+                waited
+            };
+            let polling = polled(&line, &[1, 2, 3], died, died + after + 8 * SECOND);
+            let (waited, _) = tokio::join!(stops, polling);
+            worst = worst.max(waited);
+        }
+        println!("{habits:?}: a stop waited for {worst:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn drives_behind_a_gateway_whose_power_comes_back_are_read_again() {
+    for habits in kinds() {
+        let plant = plant(habits);
+        let line = plant.line();
+        let begin = Instant::now();
+        let power = async {
+            sleep(5 * SECOND).await;
+            plant.drives.iter().for_each(SimSlave::mute);
+            sleep(60 * SECOND).await;
+            plant.drives.iter().for_each(SimSlave::unmute);
+        };
+        // All of them are back 30 s later: 8 drives, 5 times a second, for 10 s.
+        let (good, ()) = tokio::join!(polled(&line, &[], begin + 95 * SECOND, begin + 105 * SECOND), power);
+        assert!(good >= 390, "{good} with {habits:?}");
+    }
+}

@@ -1,0 +1,272 @@
+//! A gateway with a stranger's habits: a box between a network and the line, which serves one request after another and
+//! waits for drives that do not answer.
+
+use std::{collections::VecDeque, io, sync::Arc, time::Duration};
+
+use crc::{CRC_16_MODBUS, Crc};
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream},
+    net::TcpListener,
+    sync::{Mutex, watch},
+    task::JoinSet,
+    time::{Instant, sleep, sleep_until},
+};
+
+use super::{MEMORY, Serving, tcp};
+use crate::{
+    line::SimLine,
+    speech::{Content, Speech},
+};
+
+/// Exception 0Bh: the gateway has asked and nobody has answered (Modbus Application Protocol V1.1b3, section 7).
+const NOBODY_ANSWERED: u8 = 0x0B;
+/// How many frames it can keep to give them once more.
+const KEPT: usize = 8;
+const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+
+/// What a gateway does. As it comes: Modbus TCP, one request at a time for all its connections, three attempts of a second
+/// for a drive that does not answer, and then exception 0Bh, as mbusd and most boxes do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gateway {
+    /// RTU frames over its connections instead of Modbus TCP.
+    pub rtu: bool,
+    /// How often it asks a drive that does not answer.
+    pub attempts: u32,
+    /// How long it waits each time.
+    pub wait: Duration,
+    /// Whether it says that nobody answered, by exception 0Bh, or nothing.
+    pub tells: bool,
+    /// Whether the connections share one line, so that one waits for another's request.
+    pub one_line: bool,
+    /// So many of the last answers are given once more to whoever connects next.
+    pub replays: usize,
+    /// When those come: as soon as somebody has connected, or with the first byte that he sends.
+    pub replays_when_asked: bool,
+    /// Each answer comes once more after so long.
+    pub doubles_after: Option<Duration>,
+    /// A connection gives nothing any more when it is so old; the next one does.
+    pub mute_after: Option<Duration>,
+}
+
+impl Default for Gateway {
+    fn default() -> Self {
+        Self {
+            rtu: false,
+            attempts: 3,
+            wait: Duration::from_secs(1),
+            tells: true,
+            one_line: true,
+            replays: 0,
+            replays_when_asked: false,
+            doubles_after: None,
+            mute_after: None,
+        }
+    }
+}
+
+/// What the connections of a gateway share.
+struct Behind {
+    line: SimLine,
+    habits: Gateway,
+    /// Whoever has it has the line.
+    turn: Mutex<()>,
+    /// Ends every connection.
+    cut: watch::Sender<()>,
+    /// Its last answers, as they went out.
+    last: std::sync::Mutex<VecDeque<Vec<u8>>>,
+}
+
+/// A gateway in memory: connections to it are made one after another, or several at once.
+#[derive(Clone)]
+pub struct GatewayInMemory(Arc<Behind>);
+
+impl GatewayInMemory {
+    /// The master's end of a new connection.
+    #[must_use]
+    pub fn connect(&self) -> DuplexStream {
+        let (master, slaves) = tokio::io::duplex(MEMORY);
+        // Detached: it ends by itself with the master's end.
+        drop(tokio::spawn(connection(Arc::clone(&self.0), slaves)));
+        master
+    }
+}
+
+impl GatewayInMemory {
+    /// Ends all its connections, as a network does.
+    pub fn cut(&self) {
+        self.0.cut.send_replace(());
+    }
+}
+
+impl std::fmt::Debug for GatewayInMemory {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GatewayInMemory").field("habits", &self.0.habits).finish_non_exhaustive()
+    }
+}
+
+impl SimLine {
+    /// The line behind a gateway, in memory, on tokio's own clock, paused or not.
+    #[must_use]
+    pub fn behind(&self, habits: Gateway) -> GatewayInMemory {
+        GatewayInMemory(self.behind_it(habits))
+    }
+
+    /// The line behind a gateway on TCP.
+    #[must_use]
+    pub fn serve_gateway(&self, listener: TcpListener, habits: Gateway) -> Serving {
+        Serving::new(tokio::spawn(accept(self.behind_it(habits), listener)))
+    }
+
+    fn behind_it(&self, habits: Gateway) -> Arc<Behind> {
+        let last = std::sync::Mutex::default();
+        Arc::new(Behind {
+            line: self.clone(),
+            habits,
+            turn: Mutex::new(()),
+            cut: watch::Sender::new(()),
+            last,
+        })
+    }
+}
+
+async fn accept(behind: Arc<Behind>, listener: TcpListener) -> io::Result<()> {
+    let mut connections = JoinSet::new();
+    loop {
+        tokio::select! {
+            accepted = listener.accept() => {
+                let (stream, _) = accepted?;
+                tcp::hurry(&stream);
+                connections.spawn(connection(Arc::clone(&behind), stream));
+            }
+            Some(ended) = connections.join_next() => {
+                if let Ok(Err(error)) = ended {
+                    tracing::debug!(%error, "connection lost");
+                }
+            }
+        }
+    }
+}
+
+/// One connection, until it is cut.
+async fn connection(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) -> io::Result<()> {
+    let mut cut = behind.cut.subscribe();
+    tokio::select! {
+        served = serve(behind, stream) => served,
+        _ = cut.changed() => Ok(()),
+    }
+}
+
+/// Its requests are served in their order, each when the one before it is over.
+async fn serve(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) -> io::Result<()> {
+    let (mut from, mut to) = tokio::io::split(stream);
+    let habits = behind.habits;
+    let begun = Instant::now();
+    let mut received = Vec::new();
+    let mut replayed = behind.replayed();
+    loop {
+        if !habits.replays_when_asked {
+            to.write_all(&std::mem::take(&mut replayed)).await?;
+        }
+        let request = loop {
+            if let Some(request) = Asked::take(habits.rtu, &mut received)? {
+                break request;
+            }
+            if from.read_buf(&mut received).await? == 0 {
+                return Ok(());
+            }
+        };
+        if habits.mute_after.is_some_and(|age| begun.elapsed() >= age) {
+            continue;
+        }
+        to.write_all(&std::mem::take(&mut replayed)).await?;
+        let Some(answer) = behind.serve(&request).await else { continue };
+        to.write_all(&answer).await?;
+        if let Some(after) = habits.doubles_after {
+            sleep(after).await;
+            to.write_all(&answer).await?;
+        }
+    }
+}
+
+impl Behind {
+    /// The answer to a request as it goes out to the connection.
+    async fn serve(&self, request: &Asked) -> Option<Vec<u8>> {
+        let _turn = if self.habits.one_line { Some(self.turn.lock().await) } else { None };
+        let settings = self.line.wiring().settings;
+        sleep(settings.characters(request.pdu.len() + 3)).await;
+        let speech = {
+            let mut state = self.line.shared().lock();
+            // A gateway knows how each of its slaves speaks.
+            state.reached = None;
+            state.request(Instant::now(), request.unit, &request.pdu).into_iter().next()
+        };
+        self.line.shared().has_changed();
+        if let Some(Speech { content: Content::Message(answer), heard, turnaround, .. }) = speech {
+            sleep_until(heard + turnaround + settings.characters(answer.len() + 3)).await;
+            let frame = request.answered(&answer);
+            self.keep(&frame);
+            return Some(frame);
+        }
+        if request.unit == 0 {
+            return None;
+        }
+        sleep(self.habits.wait * self.habits.attempts).await;
+        let told = [request.pdu.first().copied().unwrap_or_default() | 0x80, NOBODY_ANSWERED];
+        self.habits.tells.then(|| request.answered(&told))
+    }
+
+    fn keep(&self, frame: &[u8]) {
+        let mut last = self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        last.push_back(frame.to_vec());
+        if last.len() > KEPT {
+            last.pop_front();
+        }
+    }
+
+    /// What whoever connects is given first.
+    fn replayed(&self) -> Vec<u8> {
+        let last = self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let from = last.len().saturating_sub(self.habits.replays);
+        last.range(from..).flatten().copied().collect()
+    }
+}
+
+/// A request, and what its answer repeats.
+struct Asked {
+    /// On Modbus TCP.
+    transaction: Option<u16>,
+    unit: u8,
+    pdu: Vec<u8>,
+}
+
+impl Asked {
+    fn take(rtu: bool, received: &mut Vec<u8>) -> io::Result<Option<Self>> {
+        if !rtu {
+            let request = tcp::next_request(received)?;
+            return Ok(request.map(|(transaction, unit, pdu)| Self {
+                transaction: Some(transaction),
+                unit,
+                pdu,
+            }));
+        }
+        let is_frame = |end: &usize| {
+            received
+                .get(..*end)
+                .and_then(<[u8]>::split_last_chunk::<2>)
+                .is_some_and(|(frame, check)| frame.len() > 1 && CRC.checksum(frame).to_le_bytes() == *check)
+        };
+        let Some(end) = (4..=received.len()).find(is_frame) else { return Ok(None) };
+        let frame: Vec<u8> = received.drain(..end).collect();
+        let (unit, pdu) = (frame.first().copied().unwrap_or_default(), frame.get(1..end - 2));
+        Ok(Some(Self { transaction: None, unit, pdu: pdu.unwrap_or_default().to_vec() }))
+    }
+
+    fn answered(&self, pdu: &[u8]) -> Vec<u8> {
+        if let Some(transaction) = self.transaction {
+            return tcp::frame(transaction, self.unit, pdu);
+        }
+        let mut frame = [&[self.unit], pdu].concat();
+        frame.extend(CRC.checksum(&frame).to_le_bytes());
+        frame
+    }
+}
