@@ -264,10 +264,12 @@ impl<P: Port> Atv21<P> {
     fn watch_approach(&mut self, status: &Status) {
         let runs = status_word(status).contains(StatusWord::RUN | StatusWord::STANDBY_RUN);
         let by_bus = source(status) == CommandSource::Serial;
+        // A motor that is turned round moves away from its reference first.
+        let directed = self.run.lease().is_some_and(|lease| status.direction == Some(lease.direction));
         let output = status.raw(map::OUTPUT_FREQUENCY.address());
         let reference = self.proof.agreed.filter(|(register, _)| register.address() == FREQUENCY);
         match (output, reference) {
-            (Some(output), Some((_, reference))) if runs && by_bus => {
+            (Some(output), Some((_, reference))) if runs && by_bus && directed => {
                 if self.proof.approach.see(Instant::now(), output, reference) {
                     self.proof.urgent = 2;
                 }

@@ -82,7 +82,10 @@ impl<P: Port> Atv21<P> {
             return Ok(limit);
         }
         let limit = match self.registers.at(Class::Command).read(map::UPPER_LIMIT).await {
-            Ok(word) => Frequency::from_centihertz(word.into()),
+            Ok(word) => {
+                self.proof.knows(map::UPPER_LIMIT.address(), word);
+                Frequency::from_centihertz(word.into())
+            }
             Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
                 Frequency::from_centihertz(u16::MAX.into())
             }

@@ -106,7 +106,7 @@ pub trait Drive: Send {
 
     /// Reads the fast set, in [`Capabilities::status_exchanges`] exchanges or fewer while the drive stands or runs. Of a drive
     /// with a lease, or whose watchdog was armed by this value, one more behind every
-    /// [twentieth](crate::STATUSES_PER_TURN), and at once one more where its words speak against what was known of it: in all
+    /// [twentieth](crate::STATUSES_PER_TURN) or as often as the family says, and at once one more where its words speak against what was known of it: in all
     /// never more than one.
     async fn status(&mut self) -> Result<Status>;
 

@@ -243,6 +243,18 @@ async fn a_motor_that_something_behind_the_reference_holds_elsewhere_is_told_and
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_motor_that_is_turned_round_on_the_longest_ramp_is_in_force_all_the_way() {
+    let (rig, mut drive) = running().await;
+    rig.machine.poke(0x0010, 32_000);
+    drive.start(Direction::Reverse).await.unwrap();
+    for _ in 0..120 {
+        tokio::time::sleep(SECOND).await;
+        assert_eq!(verdict(&mut drive).await, Some(Verdict::InForce));
+    }
+    assert!(rig.machine.observe().output_frequency > 0, "it comes down still");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_trip_that_is_first_seen_at_a_reconnect_is_withdrawn_on_the_wire() {
     let (rig, mut drive) = running().await;
     rig.machine.trip(24);
