@@ -66,6 +66,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
         Refused::StopPending,
         Refused::Stopped,
         Refused::Superseded,
+        Refused::Withdrawn,
         Refused::QueueFull,
         Refused::ShutDown,
         Refused::Limit(LimitProblem::NotInHertz),

@@ -20,7 +20,7 @@ use crate::{
 /// its own [`Terms`].
 ///
 /// # Cancellation
-/// A call may be dropped at any time. What has not been sent never is; what is on the wire finishes there and its answer
+/// A call does nothing until it is polled, and is in the schedule after its first poll. It may be dropped at any time. What has not been sent never is; what is on the wire finishes there and its answer
 /// is discarded. The next call is not affected.
 ///
 /// # Errors

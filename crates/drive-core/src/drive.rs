@@ -56,8 +56,13 @@ pub struct BroadcastWrite {
 /// - What a drive sends **must not** panic, in debug or release.
 ///
 /// # Cancellation
-/// Dropping the future of any method leaves the line whole and the drive as the last exchange left it. A dropped
-/// command may have been carried out, in part; read the status, and stop a drive whose start was dropped.
+/// **The future of a method does nothing until it is polled**: also a stop that stands in a `select!` beside a branch that is
+/// ready may never be sent. A program with other things to do gives its drives to a fleet (`drive-fleet`), where a
+/// command is on its way when its method returns.
+///
+/// Dropping the future of any method leaves the line whole and the drive as the last exchange left it; what is unsent is
+/// withdrawn by the port. A dropped command may have been carried out, in part; read the status, and stop a drive
+/// whose start was dropped.
 ///
 /// # Errors
 /// Every method that talks to the drive returns [`Error::Port`] when no valid answer came and [`Error::Exception`]

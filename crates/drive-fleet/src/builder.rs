@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, RwLock},
+    sync::{Arc, RwLock, atomic::AtomicU64},
     time::Duration,
 };
 
@@ -449,7 +449,6 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         exit,
         callers: BTreeMap::new(),
         askers: BTreeMap::new(),
-        next_call: 0,
         accepts: None,
     };
     let turns = Arc::clone(&line.turns);
@@ -464,6 +463,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         broadcasts,
         messages,
         urgent,
+        calls: AtomicU64::new(0),
         snapshots: snapshot,
         exit: exited,
     })

@@ -59,6 +59,8 @@ pub enum Policy {
     Tripped,
     /// A start that is not confirmed is taken back.
     StartNotConfirmed,
+    /// A start whose ticket was dropped before its outcome was heard is taken back.
+    StartWithdrawn,
     /// [`OnExit`](crate::OnExit), because the fleet shuts down.
     Exit,
     /// [`OnExit`](crate::OnExit), because the drive leaves the fleet: it was removed, or became another.
@@ -75,6 +77,7 @@ drive_core::named! { Policy {
     ControlTaken => "control taken",
     Tripped => "tripped",
     StartNotConfirmed => "start not confirmed",
+    StartWithdrawn => "start withdrawn",
     Exit => "exit",
     Removal => "removal",
     Watchdog => "watchdog",

@@ -16,6 +16,7 @@ use drive_bus::Line;
 use futures_core::Stream;
 use futures_util::future::join_all;
 use tokio::{
+    runtime::Handle,
     sync::{
         Semaphore,
         broadcast::{self, error::RecvError},
@@ -98,6 +99,8 @@ pub(crate) struct Inner {
     events: Mutex<Option<Teller>>,
     /// How many acts of groups there were.
     acts: AtomicU64,
+    /// Where the steps of a group's commands go on when nobody polls them.
+    pub(crate) runtime: Handle,
     /// For the first reader, which misses nothing of the start.
     first: Mutex<Option<broadcast::Receiver<Event>>>,
 }
@@ -117,6 +120,7 @@ impl Fleet {
             changing: Mutex::default(),
             events: Mutex::new(Some(events)),
             acts: AtomicU64::new(0),
+            runtime: Handle::current(),
             first: Mutex::new(Some(first)),
         };
         Self { inner: Arc::new(inner) }
@@ -165,11 +169,23 @@ impl Fleet {
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
     /// a drive that is still stopping then has [`ExitAction::TimeOver`].
+    ///
+    /// The policies are on their way when this returns.
+    ///
+    /// # Cancellation
+    /// When the future is dropped the policies go on, without a limit.
     #[must_use = "a drive that was not stopped may run"]
-    pub async fn shutdown(&self, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
-        let actions = end(&self.members().entries, Policy::Exit, limit).await;
-        self.inner.events.lock().unwrap_or_else(PoisonError::into_inner).take();
-        actions
+    pub fn shutdown(
+        &self,
+        limit: Duration,
+    ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
+        let (ended, inner) =
+            (end(self.members().entries.clone(), Policy::Exit, limit), Arc::clone(&self.inner));
+        async move {
+            let actions = ended.await;
+            inner.events.lock().unwrap_or_else(PoisonError::into_inner).take();
+            actions
+        }
     }
 
     /// An id for an act that has none.
@@ -192,24 +208,31 @@ impl Fleet {
     }
 }
 
-/// Has the policies of these drives act. What is not done after `limit` is given up.
-pub(crate) async fn end(entries: &[Arc<Entry>], why: Policy, limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
-    let tell = |message: &dyn Fn() -> Urgent| {
-        for entry in entries {
-            // A task that is gone has its action in the watch.
-            let _ = entry.urgent.send(message());
-        }
-    };
-    let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
-    tell(&|| Urgent::Exit(why));
-    let actions = match tokio::time::timeout(limit, all_done()).await {
-        Ok(actions) => actions,
-        Err(_) => {
-            tell(&|| Urgent::ExitTimeOver);
-            all_done().await
-        }
-    };
-    entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
+/// Has the policies of these drives act: they are on their way when this returns. What is not done after `limit` is given up.
+pub(crate) fn end(
+    entries: Vec<Arc<Entry>>,
+    why: Policy,
+    limit: Duration,
+) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
+    tell(&entries, || Urgent::Exit(why));
+    async move {
+        let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
+        let actions = match tokio::time::timeout(limit, all_done()).await {
+            Ok(actions) => actions,
+            Err(_) => {
+                tell(&entries, || Urgent::ExitTimeOver);
+                all_done().await
+            }
+        };
+        entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
+    }
+}
+
+fn tell(entries: &[Arc<Entry>], message: impl Fn() -> Urgent) {
+    for entry in entries {
+        // A task that is gone has its action in the watch.
+        let _ = entry.urgent.send(message());
+    }
 }
 
 async fn exit_action(entry: &Entry) -> ExitAction {

@@ -8,17 +8,22 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    task::{Context, Waker},
     time::Duration,
 };
 
 use drive_core::{BroadcastWrite, Class, Direction, Setpoint, StopMode, Terms};
-use futures_util::future::{join, join_all};
-use tokio::time::{Instant, sleep, sleep_until, timeout};
+use futures_util::future::join_all;
+use tokio::{
+    sync::watch,
+    time::{Instant, sleep, sleep_until, timeout},
+};
 use tokio_modbus::{Request, client::Client};
 
 use crate::{
     cause::Act,
     fleet::{Fleet, LineEntry, Members},
+    group_ticket::{GroupStop, GroupTicket, Told},
     handle::{DriveHandle, Entry},
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     snapshot::{Link, Snapshot, has_reached},
@@ -57,8 +62,8 @@ impl Fleet {
     }
 
     /// Stops every drive: see [`Group::stop`].
-    pub async fn stop_all(&self, mode: StopMode) -> StopReport {
-        self.all().stop(mode).await
+    pub fn stop_all(&self, mode: StopMode) -> GroupStop {
+        self.all().stop(mode)
     }
 }
 
@@ -144,7 +149,7 @@ impl fmt::Display for GroupFailure {
 
 impl std::error::Error for GroupFailure {}
 
-/// Several drives of a fleet, commanded together. A drive that has left the fleet since refuses every command.
+/// Several drives of a fleet, commanded together: as of each drive, a command is given when its method returns. A drive that has left the fleet since refuses every command.
 #[derive(Debug, Clone)]
 pub struct Group {
     fleet: Fleet,
@@ -180,55 +185,58 @@ impl Group {
         &self.members
     }
 
-    /// Stops every drive of the group.
+    /// Stops every drive of the group. All of it is on its way when this returns, and goes on whoever drops the ticket.
     ///
     /// On a line whose drives all belong to the group, may all be commanded and all take the same write for this mode,
     /// one broadcast goes out first. Nobody confirms it, so each drive is then stopped by itself, which also verifies it.
-    /// The report comes when every drive stands or its time is over; a drive that does not answer is named after the time
-    /// that its line's plan gives. Stops that are not confirmed go on being repeated.
-    pub async fn stop(&self, mode: StopMode) -> StopReport {
-        self.in_one_act().stop_each(mode, false, &|_, _| ()).await
-    }
-
-    /// The same, and tells the outcome of each drive as soon as it is known. Every stop is on its way to its drive when
-    /// this has been polled for the first time.
-    pub async fn stop_telling(&self, mode: StopMode, told: impl Fn(&str, &Outcome)) -> StopReport {
-        self.in_one_act().stop_each(mode, false, &told).await
+    /// It is finished when every drive stands or its time is over; a drive that does not answer is named after the time
+    /// that its line's plan gives. Stops that are not confirmed go on being repeated, by each drive's own task.
+    pub fn stop(&self, mode: StopMode) -> GroupStop {
+        self.in_one_act().stop_each(mode, false)
     }
 
     /// Stops every drive of the group; `anyhow`: a stop in another mode that is under way does as well, and no broadcast
     /// comes over it.
-    async fn stop_each(&self, mode: StopMode, anyhow: bool, told: &impl Fn(&str, &Outcome)) -> StopReport {
-        let mut report = StopReport::default();
-        let (members, read_only): (Vec<DriveHandle>, Vec<DriveHandle>) =
-            self.members.iter().cloned().partition(|member| member.entry.settings().control);
-        report.read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
+    fn stop_each(&self, mode: StopMode, anyhow: bool) -> GroupStop {
+        let (members, read_only): (Vec<&DriveHandle>, Vec<&DriveHandle>) =
+            self.members.iter().partition(|member| member.entry.settings().control);
         let standing = self.fleet.members();
-        let mut stops = Vec::new();
+        let mut broadcasts = Vec::new();
+        let mut patience = Vec::new();
         for line in &standing.lines {
-            let members = members.iter().filter(|member| Arc::ptr_eq(&member.entry.line, line));
-            let write = self.common_write(&standing, line, mode).filter(|_| !anyhow);
-            stops.push(stop_line(line, write, members.cloned().collect(), mode, anyhow, told));
-        }
-        // Drives that have left the fleet since.
-        let gone =
-            |member: &&DriveHandle| !standing.lines.iter().any(|line| Arc::ptr_eq(line, &member.entry.line));
-        for member in members.iter().filter(gone) {
-            let outcome = Outcome::Refused(Refused::ShutDown);
-            told(member.name(), &outcome);
-            report.unconfirmed.push((Arc::clone(member.name()), outcome));
-        }
-        for (broadcast, outcomes) in join_all(stops).await {
-            report.broadcasts.extend(broadcast);
-            for (name, outcome) in outcomes {
-                if outcome.is_confirmed() {
-                    report.confirmed.push(name);
-                } else {
-                    report.unconfirmed.push((name, outcome));
-                }
+            // It is first on the line, and no start of before can come behind the stops of each.
+            if let Some(write) = self.common_write(&standing, line, mode).filter(|_| !anyhow) {
+                broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
+            let on_line = members.iter().filter(|member| Arc::ptr_eq(&member.entry.line, line));
+            let silent = on_line.filter(|member| member.snapshot().link != Link::Connected).count();
+            let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
+            patience.push((line, line.plan().stop_all(mute) + line.line.worst_case_stop()));
         }
-        report
+        let stop = |member: &&DriveHandle| {
+            let of_line = patience.iter().find(|(line, _)| Arc::ptr_eq(&member.entry.line, line));
+            let stop = member.stop_within(mode, anyhow, of_line.map(|(_, patience)| *patience));
+            (Arc::clone(member.name()), stop)
+        };
+        let each = members.iter().map(stop).collect();
+        let read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
+        GroupStop::new(each, read_only, broadcasts)
+    }
+
+    /// Sends a broadcast, which has its place on the line when this returns; whether it went out is told when it is known.
+    fn broadcast(&self, line: &Arc<LineEntry>, write: BroadcastWrite) -> watch::Receiver<Option<bool>> {
+        let (told, sent) = watch::channel(None);
+        let line = Arc::clone(line);
+        let mut sending = Box::pin(async move {
+            told.send_replace(Some(send(&line, write).await));
+        });
+        // A call is submitted by its first poll. Whoever is woken polls it again, so that nothing is lost by a waker that
+        // wakes nobody.
+        let mut context = Context::from_waker(Waker::noop());
+        if sending.as_mut().poll(&mut context).is_pending() {
+            self.fleet.inner.runtime.spawn(sending);
+        }
+        sent
     }
 
     /// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
@@ -259,16 +267,22 @@ impl Group {
     /// is stopped meanwhile, by whomever, is not started any more even if its turn comes when that stop is long
     /// confirmed.
     ///
-    /// # Errors
-    /// [`GroupFailure`] names who was not ready, or did not start.
-    ///
-    /// # Cancellation
-    /// When the future is dropped no further drive is begun. Those that were begun go on.
-    pub async fn start(&self, start: GroupStart) -> Result<(), GroupFailure> {
-        self.in_one_act().start_each(start).await
+    /// [`GroupFailure`] names who was not ready, or did not start. Dropping the ticket before its outcome was heard takes the
+    /// whole start back: see [`GroupTicket`].
+    pub fn start(&self, start: GroupStart) -> GroupTicket<Result<(), GroupFailure>> {
+        let gone = self.members.iter().map(|member| (Arc::clone(member.name()), Refused::ShutDown));
+        let gone = Err(GroupFailure::NotReady(gone.collect()));
+        let group = self.in_one_act();
+        GroupTicket::spawn(&self.fleet.inner.runtime, gone, async move |told| {
+            group.started(start, &told).await
+        })
     }
 
-    async fn start_each(&self, start: GroupStart) -> Result<(), GroupFailure> {
+    async fn started(
+        &self,
+        start: GroupStart,
+        told: &Told<Result<(), GroupFailure>>,
+    ) -> Result<(), GroupFailure> {
         let GroupStart { direction, setpoint, spacing, until } = start;
         let asked = join_all(self.members.iter().map(|member| member.ask(setpoint))).await;
         let (mut leaves, mut unready) = (Vec::new(), Vec::new());
@@ -284,12 +298,13 @@ impl Group {
         let together = spacing.is_zero();
         if let Some(setpoint) = setpoint.filter(|_| together) {
             let order = Order::Setpoint { setpoint, until: Until::InForce };
-            self.keep_or_stop(self.all_or_none(&leaves, order, spacing).await).await?;
+            self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
         }
         let setpoint = setpoint.filter(|_| !together);
         let order = Order::Start { direction, setpoint, until: Until::InForce };
-        self.keep_or_stop(self.all_or_none(&leaves, order, spacing).await).await?;
+        self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
         if until == Until::AtReference {
+            told.in_force(Ok(()));
             let reached = self.members.iter().map(|member| reach(member.clone(), start.setpoint));
             self.keep_or_stop(join_all(reached).await).await?;
         }
@@ -297,15 +312,18 @@ impl Group {
     }
 
     /// Gives every drive of the group a setpoint, on each line one drive after the other as in [`start`](Self::start).
-    #[must_use = "only a confirmed setpoint is known to be in force"]
-    pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Vec<(Arc<str>, Outcome)> {
+    pub fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> GroupTicket<Vec<(Arc<str>, Outcome)>> {
+        let gone = Outcome::Refused(Refused::ShutDown);
+        let gone = self.members.iter().map(|member| (Arc::clone(member.name()), gone.clone())).collect();
         let order = Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce };
-        let this = &self.in_one_act();
-        let commands = this.members.iter().map(|member| async move {
-            let outcome = this.on_line(member, async || member.order(order).await).await;
-            (Arc::clone(member.name()), outcome)
-        });
-        join_all(commands).await
+        let group = self.in_one_act();
+        GroupTicket::spawn(&self.fleet.inner.runtime, gone, async move |_| {
+            let commands = group.members.iter().map(|member| async {
+                let outcome = group.on_line(member, async || member.order(order).await).await;
+                (Arc::clone(member.name()), outcome)
+            });
+            join_all(commands).await
+        })
     }
 
     /// Commands drives that have given their leave, the first now and the others each `spacing` after the one before,
@@ -315,6 +333,7 @@ impl Group {
         leaves: &[(&DriveHandle, Leave)],
         order: Order,
         spacing: Duration,
+        told: &Told<Result<(), GroupFailure>>,
     ) -> Vec<(Arc<str>, Outcome)> {
         let failed = &AtomicBool::new(false);
         let commands = leaves.iter().zip(0_u32..).map(|(&(member, leave), number)| async move {
@@ -323,7 +342,9 @@ impl Group {
                 if failed.load(Ordering::Relaxed) {
                     return None;
                 }
-                let outcome = member.order_on(Some(leave), None, order).await;
+                let ticket = member.order_on(Some(leave), None, order);
+                let outcome = ticket.unheard(false).await;
+                told.hold(ticket);
                 failed.fetch_or(!outcome.is_confirmed(), Ordering::Relaxed);
                 Some((Arc::clone(member.name()), outcome))
             };
@@ -351,45 +372,9 @@ impl Group {
         }
         // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
         // perhaps by its freewheel, is not slowed down by this.
-        let stopped = Box::pin(self.stop_each(StopMode::Ramp, true, &|_, _| ())).await;
+        let stopped = self.stop_each(StopMode::Ramp, true).finished().await;
         Err(GroupFailure::Failed { outcomes, stopped })
     }
-}
-
-/// Stops drives of one line, after a broadcast where there is one.
-async fn stop_line(
-    line: &LineEntry,
-    write: Option<BroadcastWrite>,
-    members: Vec<DriveHandle>,
-    mode: StopMode,
-    anyhow: bool,
-    told: &impl Fn(&str, &Outcome),
-) -> (Option<Arc<str>>, Vec<(Arc<str>, Outcome)>) {
-    let broadcast = async {
-        match write {
-            Some(write) if send(line, write).await => Some(Arc::clone(&line.name)),
-            _ => None,
-        }
-    };
-    let silent = members.iter().filter(|member| member.snapshot().link != Link::Connected).count();
-    let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
-    let patience = line.plan().stop_all(mute) + line.line.worst_case_stop();
-    let stops: Vec<_> =
-        members.into_iter().map(|member| stop_one(member, mode, anyhow, patience, told)).collect();
-    // Both at once: the broadcast is first on the line, and no start of before can come behind it.
-    join(broadcast, join_all(stops)).await
-}
-
-async fn stop_one(
-    member: DriveHandle,
-    mode: StopMode,
-    anyhow: bool,
-    patience: Duration,
-    told: &impl Fn(&str, &Outcome),
-) -> (Arc<str>, Outcome) {
-    let outcome = member.stop_within(mode, anyhow, Some(patience)).await;
-    told(member.name(), &outcome);
-    (Arc::clone(member.name()), outcome)
 }
 
 /// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it

@@ -3,7 +3,10 @@
 use std::{
     fmt,
     pin::pin,
-    sync::{Arc, PoisonError, RwLock},
+    sync::{
+        Arc, PoisonError, RwLock,
+        atomic::{AtomicU64, Ordering},
+    },
     time::Duration,
 };
 
@@ -21,12 +24,13 @@ use crate::{
     cause::Act,
     event::ExitAction,
     fleet::LineEntry,
-    outcome::{Order, Outcome, Refused, Until},
+    outcome::{Order, Refused, Until},
     plan::Demand,
     settings::DriveSettings,
     snapshot::{Snapshot, WatchdogCheck},
-    supervisor::{Leave, Question, Told},
+    supervisor::{CallId, Leave, Question, Told},
     task::{Message, Urgent},
+    ticket::{Progress, StopTicket, Ticket, refused},
 };
 
 /// What the handles of a drive share.
@@ -42,6 +46,8 @@ pub(crate) struct Entry {
     pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
     pub(crate) messages: mpsc::Sender<Message>,
     pub(crate) urgent: mpsc::UnboundedSender<Urgent>,
+    /// The number of the last call.
+    pub(crate) calls: AtomicU64,
     pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
     pub(crate) exit: watch::Receiver<Option<ExitAction>>,
 }
@@ -49,6 +55,10 @@ pub(crate) struct Entry {
 impl Entry {
     pub(crate) fn settings(&self) -> Arc<DriveSettings> {
         Arc::clone(&self.settings.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn new_call(&self) -> CallId {
+        CallId(self.calls.fetch_add(1, Ordering::Relaxed))
     }
 
     /// What it wants of its line.
@@ -66,9 +76,10 @@ impl Entry {
 
 /// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives.
 ///
-/// # Cancellation
-/// Dropping the future of a command does not take the command back: what is sent is sent, what is not yet sent expires
-/// by its lifetime, and a stop is repeated until it is confirmed.
+/// # Commands
+/// Each method that commands the drive has **given the command when it returns**, before anything is awaited, and returns a
+/// ticket that tells what becomes of it. An order whose [`Ticket`] is dropped before its outcome was heard is withdrawn, and a
+/// start is taken back; a stop never is, whoever drops its [`StopTicket`].
 #[derive(Clone)]
 pub struct DriveHandle {
     pub(crate) entry: Arc<Entry>,
@@ -183,11 +194,7 @@ impl DriveHandle {
         let mut watch = self.watch();
         loop {
             watch.mark_unchanged();
-            let refused = match self.unready(None).await {
-                // Whether a setpoint is allowed is not a matter of the drive.
-                None | Some(Refused::Limit(_)) => return Ok(()),
-                Some(refused) => refused,
-            };
+            let Some(refused) = self.unready().await else { return Ok(()) };
             tokio::select! {
                 changed = watch.changed() => if changed.is_err() {
                     return Err(refused);
@@ -197,8 +204,14 @@ impl DriveHandle {
         }
     }
 
-    /// Why a start, with this setpoint, would be refused now; `None` when it would be sent.
-    pub async fn unready(&self, setpoint: Option<Setpoint>) -> Option<Refused> {
+    /// Why the drive would refuse a start now, whatever the setpoint; `None` when it is ready.
+    pub async fn unready(&self) -> Option<Refused> {
+        // Whether a setpoint is allowed is judged last, and not a matter of the drive.
+        self.would_refuse(None).await.filter(|refused| !matches!(refused, Refused::Limit(_)))
+    }
+
+    /// Why a start at this setpoint, or at the one that the drive holds, would be refused now; `None` when it would be sent.
+    pub async fn would_refuse(&self, setpoint: Option<Setpoint>) -> Option<Refused> {
         self.ask(setpoint).await.err()
     }
 
@@ -211,96 +224,88 @@ impl DriveHandle {
     }
 
     /// Starts the motor at the setpoint that the drive holds. Confirmed when the run command shows in its words.
-    pub async fn start(&self, direction: Direction) -> Outcome {
-        self.order(Order::Start { direction, setpoint: None, until: Until::InForce }).await
+    pub fn start(&self, direction: Direction) -> Ticket {
+        self.order(Order::Start { direction, setpoint: None, until: Until::InForce })
     }
 
     /// Gives a setpoint and starts the motor. Confirmed when the run command shows in its words: the speed is then on its
     /// way, and [`run`](Self::run) waits until it is reached.
-    pub async fn start_at(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Outcome {
+    pub fn start_at(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Ticket {
         let setpoint = Some(setpoint.into());
-        self.order(Order::Start { direction, setpoint, until: Until::InForce }).await
+        self.order(Order::Start { direction, setpoint, until: Until::InForce })
     }
 
-    /// Gives a setpoint, starts the motor, and waits until it has reached it; [`start_at`](Self::start_at) does not wait.
-    pub async fn run(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Outcome {
+    /// Gives a setpoint and starts the motor. Finished when it has reached the setpoint; [`start_at`](Self::start_at) does not
+    /// wait for that.
+    pub fn run(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Ticket {
         let setpoint = Some(setpoint.into());
-        self.order(Order::Start { direction, setpoint, until: Until::AtReference }).await
+        self.order(Order::Start { direction, setpoint, until: Until::AtReference })
     }
 
     /// Changes the setpoint. Confirmed when the drive holds it. A setpoint that is not yet sent gives its place to a
     /// later one.
-    pub async fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Outcome {
-        self.order(Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce }).await
+    pub fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> Ticket {
+        self.order(Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce })
     }
 
     /// Stops the motor. It goes ahead of everything, interrupts what is asked of this drive, and is repeated until the
     /// drive shows standstill. A mode that the drive does not have is replaced by its driver; an event says so.
     ///
-    /// The outcome comes at standstill, or when the time of the settings is over: the stop goes on being repeated then.
-    pub async fn stop(&self, mode: StopMode) -> Outcome {
-        self.stop_within(mode, false, None).await
+    /// It is in force when the drive shows that no run command is, and finished at standstill, or when the time of the
+    /// settings is over: it goes on being repeated then.
+    pub fn stop(&self, mode: StopMode) -> StopTicket {
+        self.stop_within(mode, false, None)
     }
 
-    pub(crate) async fn stop_within(
-        &self,
-        mode: StopMode,
-        anyhow: bool,
-        patience: Option<Duration>,
-    ) -> Outcome {
-        let (reply, outcome) = oneshot::channel();
-        let act = Arc::clone(&self.act);
-        if self.entry.urgent.send(Urgent::Stop { mode, anyhow, act, patience, reply }).is_err() {
-            return Outcome::Refused(Refused::ShutDown);
-        }
-        outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown))
+    pub(crate) fn stop_within(&self, mode: StopMode, anyhow: bool, patience: Option<Duration>) -> StopTicket {
+        let (reply, hearer) = watch::channel(Progress::default());
+        let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
+        // One that cannot be given any more is refused by the end of its reply.
+        let _ = self.entry.urgent.send(Urgent::Stop { id, mode, anyhow, act, patience, reply });
+        StopTicket::new(hearer)
     }
 
     /// Resets the present fault, once. The motor does not start.
-    pub async fn reset_faults(&self) -> Outcome {
-        self.order(Order::ResetFaults).await
+    pub fn reset_faults(&self) -> Ticket {
+        self.order(Order::ResetFaults)
     }
 
     /// Gives control back to the panel or the terminals; the motor must stand.
-    pub async fn release(&self) -> Outcome {
-        self.order(Order::Release).await
+    pub fn release(&self) -> Ticket {
+        self.order(Order::Release)
     }
 
     /// Takes what the drive says it is for right from now on, after
     /// [`IdentityChanged`](crate::EventKind::IdentityChanged).
-    pub async fn accept_identity(&self) -> Outcome {
-        self.order(Order::AcceptIdentity).await
+    pub fn accept_identity(&self) -> Ticket {
+        self.order(Order::AcceptIdentity)
     }
 
     /// Saves the drive's parameters to EEPROM: refused when nothing changed, and counted
     /// ([`Counters::saves`](crate::Counters::saves)).
-    pub async fn persist(&self) -> Outcome {
-        self.order(Order::Persist).await
+    pub fn persist(&self) -> Ticket {
+        self.order(Order::Persist)
     }
 
-    /// Gives an order and waits for its outcome.
-    pub async fn order(&self, order: Order) -> Outcome {
-        self.order_on(None, None, order).await
+    /// Gives an order.
+    pub fn order(&self, order: Order) -> Ticket {
+        self.order_on(None, None, order)
     }
 
-    /// Gives an order that is not sent after `expires`, whatever lifetime the settings give, and waits for its outcome.
-    pub async fn order_until(&self, order: Order, expires: Instant) -> Outcome {
-        self.order_on(None, Some(expires), order).await
+    /// Gives an order that is not sent after `expires`, whatever lifetime the settings give.
+    pub fn order_until(&self, order: Order, expires: Instant) -> Ticket {
+        self.order_on(None, Some(expires), order)
     }
 
     /// Gives an order, and no more if a stop has come since its leave.
-    pub(crate) async fn order_on(
-        &self,
-        leave: Option<Leave>,
-        expires: Option<Instant>,
-        order: Order,
-    ) -> Outcome {
-        let (reply, outcome) = oneshot::channel();
-        let act = Arc::clone(&self.act);
-        match self.post(Message::Order { order, leave, expires, act, reply }) {
-            Ok(()) => outcome.await.unwrap_or(Outcome::Refused(Refused::ShutDown)),
-            Err(refused) => Outcome::Refused(refused),
-        }
+    pub(crate) fn order_on(&self, leave: Option<Leave>, expires: Option<Instant>, order: Order) -> Ticket {
+        let (reply, hearer) = watch::channel(Progress::default());
+        let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
+        let hearer = match self.post(Message::Order { id, order, leave, expires, act, reply }) {
+            Ok(()) => hearer,
+            Err(error) => refused(error),
+        };
+        Ticket::new(id, hearer, self.entry.urgent.downgrade())
     }
 
     /// Reads the present faults and the history, when the drive's turn comes.
@@ -339,8 +344,8 @@ impl DriveHandle {
 
     async fn question(&self, question: Question) -> Result<Told, Refused> {
         let (reply, told) = oneshot::channel();
-        let name = Arc::clone(&self.act.commander);
-        self.post(Message::Question { question, name, reply })?;
+        let (id, name) = (self.entry.new_call(), Arc::clone(&self.act.commander));
+        self.post(Message::Question { id, question, name, reply })?;
         told.await.unwrap_or(Err(Refused::ShutDown))
     }
 

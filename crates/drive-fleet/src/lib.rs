@@ -50,6 +50,7 @@ mod concern;
 mod event;
 mod fleet;
 mod group;
+mod group_ticket;
 mod handle;
 mod limits;
 mod membership;
@@ -61,6 +62,7 @@ mod supervisor;
 mod task;
 #[cfg(test)]
 mod testing;
+mod ticket;
 #[cfg(feature = "serde")]
 pub mod view;
 
@@ -70,6 +72,7 @@ pub use concern::{Concern, ConcernKind, Severity};
 pub use event::{Event, EventKind, ExitAction, Limit};
 pub use fleet::{Events, Fleet, Received};
 pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
+pub use group_ticket::{GroupStop, GroupTicket};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{Became, LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
@@ -82,3 +85,4 @@ pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,
 };
 pub use supervisor::checks::FEED_PART;
+pub use ticket::{StopTicket, Ticket};

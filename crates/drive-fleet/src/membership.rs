@@ -73,21 +73,29 @@ impl Fleet {
 
     /// Takes drives out of the fleet: the policy of each acts as at a [`shutdown`](Self::shutdown), within `limit`, and what
     /// was done is listed. Handles of it refuse every command from then on. Names that the fleet does not have are left out.
+    /// The policies are on their way when this returns.
     ///
     /// # Cancellation
     /// When the future is dropped the policies go on, and the drives stay listed.
     #[must_use = "a drive that was not stopped may run"]
-    pub async fn remove(&self, drives: &[&str], limit: Duration) -> Vec<(Arc<str>, ExitAction)> {
+    pub fn remove(
+        &self,
+        drives: &[&str],
+        limit: Duration,
+    ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
         let is_meant = |name: &str| drives.contains(&name);
         let leaving: Vec<_> =
             self.members().entries.iter().filter(|entry| is_meant(&entry.name)).cloned().collect();
-        let actions = end(&leaving, Policy::Removal, limit).await;
-        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut members = Members::clone(&self.members());
-        members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));
-        leaving.iter().for_each(|left| replan(&members, &left.line));
-        self.set_members(members);
-        actions
+        let (ended, fleet) = (end(leaving.clone(), Policy::Removal, limit), self.clone());
+        async move {
+            let actions = ended.await;
+            let _changing = fleet.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut members = Members::clone(&fleet.members());
+            members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));
+            leaving.iter().for_each(|left| replan(&members, &left.line));
+            fleet.set_members(members);
+            actions
+        }
     }
 
     /// Takes a line without drives out of the fleet, and gives it. `None` where the fleet has no such line, or drives on it.

@@ -247,6 +247,8 @@ pub enum Unconfirmed {
     Superseded,
     /// A stop came.
     Stopped,
+    /// Its ticket was dropped.
+    Withdrawn,
     /// The drive tripped.
     Tripped,
     /// The drive was lost.
@@ -264,6 +266,7 @@ impl Unconfirmed {
             Self::Denied(_) => "denied",
             Self::Superseded => "later_command",
             Self::Stopped => "stop",
+            Self::Withdrawn => "withdrawn",
             Self::Tripped => "fault",
             Self::Lost => "offline",
         }
@@ -288,6 +291,7 @@ impl fmt::Display for Unconfirmed {
             Self::Denied(error) => error.fmt(f),
             Self::Superseded => f.write_str("a later command took its place"),
             Self::Stopped => f.write_str("a stop came"),
+            Self::Withdrawn => f.write_str("it was withdrawn"),
             Self::Tripped => f.write_str("the drive tripped"),
             Self::Lost => f.write_str("the drive was lost"),
         }
@@ -320,6 +324,8 @@ pub enum Refused {
     Stopped,
     /// A later command took its place before it was sent.
     Superseded,
+    /// Its ticket was dropped before it was sent.
+    Withdrawn,
     /// The limits of this fleet forbid the setpoint.
     Limit(LimitProblem),
     /// The drive refused it, or its driver for another reason than the drive's state.
@@ -345,6 +351,7 @@ impl Refused {
             Self::StopPending => "stop_pending",
             Self::Stopped => "stop",
             Self::Superseded => "later_command",
+            Self::Withdrawn => "withdrawn",
             Self::Limit(LimitProblem::Forbidden { .. }) => "forbidden_band",
             Self::Limit(_) | Self::Drive(Error::Setpoint { .. }) => "limit",
             Self::Drive(Error::Unsupported { .. }) => "unsupported",
@@ -382,6 +389,7 @@ impl fmt::Display for Refused {
             Self::StopPending => f.write_str("a stop of it is not confirmed yet"),
             Self::Stopped => f.write_str("a stop came before it was sent"),
             Self::Superseded => f.write_str("a later command took its place before it was sent"),
+            Self::Withdrawn => f.write_str("it was withdrawn before it was sent"),
             Self::Limit(problem) => problem.fmt(f),
             Self::Drive(error) => error.fmt(f),
             Self::QueueFull => f.write_str("too many commands for this drive wait"),

@@ -16,10 +16,11 @@ use tokio::{
 use crate::{
     cause::{Act, Policy},
     event::{ExitAction, Teller},
-    outcome::{Order, Outcome, Refused},
+    outcome::{Order, Refused},
     settings::DriveSettings,
     snapshot::Snapshot,
     supervisor::{Asker, CallId, Job, Leave, Output, Question, Reply, Step, Supervisor, Told, Turn},
+    ticket::Report,
 };
 
 /// What waits its turn.
@@ -27,15 +28,16 @@ use crate::{
 pub(crate) enum Message {
     /// An order.
     Order {
+        id: CallId,
         order: Order,
         leave: Option<Leave>,
         /// When it may not be sent any more; `None`: as the settings say.
         expires: Option<Instant>,
         act: Arc<Act>,
-        reply: oneshot::Sender<Outcome>,
+        reply: Report,
     },
     /// A question.
-    Question { question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
+    Question { id: CallId, question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
     /// The question whether a start would be sent now.
     Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
 }
@@ -45,14 +47,17 @@ pub(crate) enum Message {
 pub(crate) enum Urgent {
     /// A stop.
     Stop {
+        id: CallId,
         mode: StopMode,
         /// A stop in another mode that is under way does as well.
         anyhow: bool,
         act: Arc<Act>,
         /// Until its lack of confirmation is an alarm; `None`: as the settings say.
         patience: Option<Duration>,
-        reply: oneshot::Sender<Outcome>,
+        reply: Report,
     },
+    /// The ticket of an order was dropped before its outcome was heard.
+    Withdraw(CallId),
     /// Other settings.
     Settings(Arc<DriveSettings>),
     /// The fleet shuts down, or the drive leaves it: by which policy it ends.
@@ -186,9 +191,8 @@ pub(crate) struct Desk {
     pub(crate) events: Teller,
     pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
     pub(crate) exit: watch::Sender<Option<ExitAction>>,
-    pub(crate) callers: BTreeMap<CallId, oneshot::Sender<Outcome>>,
+    pub(crate) callers: BTreeMap<CallId, Report>,
     pub(crate) askers: BTreeMap<CallId, oneshot::Sender<Result<Told, Refused>>>,
-    pub(crate) next_call: u64,
     /// Which restarts the drive is to accept from its next call on.
     pub(crate) accepts: Option<Vec<String>>,
 }
@@ -197,16 +201,20 @@ impl Desk {
     fn handle_message(&mut self, message: Message) -> bool {
         let now = Instant::now();
         match message {
-            Message::Order { order, leave, expires, act, reply } => {
-                let asker = self.caller(act, reply);
+            Message::Order { id, order, leave, expires, act, reply } => {
+                let withdrawn = reply.is_closed();
+                let asker = self.caller(id, act, reply);
+                if withdrawn {
+                    self.supervisor.refuse(asker, order, Refused::Withdrawn);
+                    return false;
+                }
                 self.supervisor.handle_order(now, asker, order, leave, expires)
             }
-            Message::Question { question, name, reply } => {
+            Message::Question { id, question, name, reply } => {
                 // Who does not wait any more leaves his place to the next.
                 self.askers.retain(|_, asker| !asker.is_closed());
                 let askers = &self.askers;
                 self.supervisor.forget_questions(|id| !askers.contains_key(&id));
-                let id = self.new_call();
                 self.askers.insert(id, reply);
                 self.supervisor.handle_question(id, &name, question);
                 false
@@ -221,14 +229,15 @@ impl Desk {
     fn handle_urgent(&mut self, message: Urgent) -> bool {
         let now = Instant::now();
         match message {
-            Urgent::Stop { mode, anyhow, act, patience, reply } => {
+            Urgent::Stop { id, mode, anyhow, act, patience, reply } => {
                 // A stop may be pending for hours; only those who still wait for it are kept.
                 self.callers.retain(|_, caller| !caller.is_closed());
                 let callers = &self.callers;
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
-                let asker = self.caller(act, reply);
+                let asker = self.caller(id, act, reply);
                 self.supervisor.handle_stop(now, asker, mode, anyhow, patience)
             }
+            Urgent::Withdraw(id) => self.supervisor.handle_withdrawal(now, id),
             Urgent::Settings(settings) => {
                 self.accepts = Some(settings.accept_self_restart.clone());
                 self.supervisor.handle_settings(now, &settings);
@@ -242,15 +251,9 @@ impl Desk {
         }
     }
 
-    fn caller(&mut self, act: Arc<Act>, reply: oneshot::Sender<Outcome>) -> Asker {
-        let id = self.new_call();
+    fn caller(&mut self, id: CallId, act: Arc<Act>, reply: Report) -> Asker {
         self.callers.insert(id, reply);
         Asker::Caller { id, act }
-    }
-
-    const fn new_call(&mut self) -> CallId {
-        self.next_call += 1;
-        CallId(self.next_call)
     }
 
     /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.
@@ -270,9 +273,14 @@ impl Desk {
                         let _ = asker.send(told);
                     }
                 }
+                Output::InForce(id) => {
+                    if let Some(caller) = self.callers.get(&id) {
+                        caller.send_modify(|progress| progress.in_force = true);
+                    }
+                }
                 Output::Answer(id, outcome) => {
                     if let Some(caller) = self.callers.remove(&id) {
-                        let _ = caller.send(outcome);
+                        caller.send_modify(|progress| progress.finished = Some(outcome));
                     }
                 }
             }

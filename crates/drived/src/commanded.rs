@@ -122,16 +122,14 @@ impl Commanded {
     /// A verdict comes in its time, whatever line and port do.
     pub(crate) async fn stop(&mut self, mode: StopMode) -> Result<Status, Failure> {
         let name = self.name;
-        let handle = self.handle.clone();
-        let stop = handle.stop(mode);
-        tokio::pin!(stop);
+        let stop = self.handle.stop(mode);
         let mut watch = self.handle.watch();
         let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
         let (mut waited, mut taken) = (0, false);
         let outcome = loop {
             tokio::select! {
                 biased;
-                outcome = &mut stop => break outcome,
+                outcome = stop.finished() => break outcome,
                 () = self.ending.asked() => {
                     return Err(Failure::Drive(match taken {
                         true => format!(

@@ -66,6 +66,14 @@ pub(crate) enum Asker {
 }
 
 impl Asker {
+    /// The caller that waits.
+    const fn id(&self) -> Option<CallId> {
+        match self {
+            Self::Caller { id, .. } => Some(*id),
+            Self::Policy(_) => None,
+        }
+    }
+
     fn name(&self) -> Arc<str> {
         match self {
             Self::Caller { act, .. } => Arc::clone(&act.commander),
@@ -91,6 +99,8 @@ impl Asker {
 pub(crate) enum Output {
     /// To everybody.
     Event(Happened),
+    /// To one caller: the drive shows that it is in force what he has asked for.
+    InForce(CallId),
     /// To one caller.
     Answer(CallId, Outcome),
     /// To one who asked a question.
@@ -124,6 +134,8 @@ pub(crate) struct Supervisor {
     /// Why it ends.
     exits_by: Policy,
     started_here: bool,
+    /// Who asked for the last start that was sent.
+    started_by: Option<CallId>,
     exceeded: BTreeMap<&'static str, Limit>,
     /// Who has taken control, until it is back.
     control_taken: Option<Control>,
@@ -177,6 +189,7 @@ impl Supervisor {
             exit: Exit::No,
             exits_by: Policy::Exit,
             started_here: false,
+            started_by: None,
             exceeded: BTreeMap::new(),
             control_taken: None,
             acted: None,

@@ -2,10 +2,10 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use drive_core::Error;
+use drive_core::{Error, StopMode};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Leave, Supervisor, permission::Blocked};
+use super::{Asker, CallId, Job, Leave, Supervisor, permission::Blocked};
 use crate::{
     cause::{Cause, Policy},
     outcome::{Order, Outcome, Refused, Unconfirmed},
@@ -23,7 +23,7 @@ pub(super) struct Queued {
 /// The order that is being carried out.
 #[derive(Debug)]
 pub(super) struct Active {
-    asker: Asker,
+    pub(super) asker: Asker,
     pub(super) order: Order,
     /// When its lifetime is over.
     expires: Instant,
@@ -95,6 +95,49 @@ impl Supervisor {
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
         gives_way
+    }
+
+    /// An order that is not even taken on.
+    pub(crate) fn refuse(&mut self, asker: Asker, order: Order, refused: Refused) {
+        self.conclude_order(asker, &order, Outcome::Refused(refused));
+    }
+
+    /// Nobody has heard what became of an order, and nobody will. What is unsent of it never is; a start whose run command
+    /// was sent, or may have been, is taken back. Gives whether the job in flight has to be dropped for it.
+    pub(crate) fn handle_withdrawal(&mut self, now: Instant, id: CallId) -> bool {
+        let is_it = |asker: &Asker| asker.id() == Some(id);
+        if let Some(at) = self.queue.iter().position(|queued| is_it(&queued.asker)) {
+            if let Some(Queued { asker, order, .. }) = self.queue.remove(at) {
+                self.refuse(asker, order, Refused::Withdrawn);
+            }
+            return false;
+        }
+        let Some(active) = self.active.as_ref().filter(|active| is_it(&active.asker)) else {
+            return self.started_here && self.started_by == Some(id) && self.take_back(now);
+        };
+        match active.phase {
+            Phase::Prepare => {
+                self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
+                false
+            }
+            Phase::Sending(Job::SetSetpoint(_)) => {
+                self.given = None;
+                self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
+                true
+            }
+            _ if self.started_by == Some(id) => self.take_back(now),
+            Phase::Verifying { job: Job::SetSetpoint(_), .. } => {
+                self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
+                false
+            }
+            // An edge is not left half done.
+            Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => false,
+        }
+    }
+
+    fn take_back(&mut self, now: Instant) -> bool {
+        self.stop_by_policy(now, Asker::Policy(Policy::StartWithdrawn), StopMode::Ramp);
+        self.drops_for_stop()
     }
 
     /// Only the latest setpoint counts; what is not yet sent gives its place away.
@@ -179,6 +222,7 @@ impl Supervisor {
                 Ok(Some(job)) => {
                     if matches!(job, Job::Start(_)) {
                         self.started_here = true;
+                        self.started_by = self.active.as_ref().and_then(|active| active.asker.id());
                         // What is started anew is not to be withdrawn any more.
                         self.withdrawal = None;
                     }

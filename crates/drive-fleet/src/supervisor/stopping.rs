@@ -89,6 +89,11 @@ impl Supervisor {
         }
         let mode = self.stopping.as_ref().filter(|_| anyhow).map_or(mode, |stopping| stopping.mode);
         self.begin_stop(now, asker, mode, patience.unwrap_or(self.settings.times.stop_alarm));
+        self.drops_for_stop()
+    }
+
+    /// Whether the job in flight has to be dropped for the stop that is under way.
+    pub(super) fn drops_for_stop(&self) -> bool {
         match self.in_flight {
             Some(Job::Stop(mode)) => self.stopping.as_ref().is_some_and(|stopping| stopping.mode != mode),
             Some(_) => true,
@@ -106,6 +111,7 @@ impl Supervisor {
     pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, mode: StopMode, patience: Duration) {
         self.end_orders_by_stop();
         self.stops += 1;
+        self.started_by = None;
         self.changed = true;
         // A stop takes the run command back as well.
         self.withdrawal = None;
@@ -122,7 +128,9 @@ impl Supervisor {
                     stopping.next_try = Some(now);
                     stopping.pause = REPEAT.0;
                 }
+                let in_force = waiter.asker.id().filter(|_| stopping.taken);
                 stopping.waiters.push(waiter);
+                self.outputs.extend(in_force.map(Output::InForce));
                 stopping.asker = asker;
             }
             None => {
@@ -178,6 +186,7 @@ impl Supervisor {
                     stopping.alarm_at = Some(now + standstill);
                     for waiter in &mut stopping.waiters {
                         waiter.until = now + standstill;
+                        self.outputs.extend(waiter.asker.id().map(Output::InForce));
                     }
                 }
                 if let Some(other) = taken_from {

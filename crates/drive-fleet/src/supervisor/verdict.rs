@@ -8,7 +8,7 @@ use drive_core::{
 use tokio::time::Instant;
 
 use super::{
-    Asker, Job, Supervisor,
+    Asker, Job, Output, Supervisor,
     orders::{Active, Phase},
 };
 use crate::{
@@ -55,6 +55,8 @@ impl Supervisor {
     fn await_reference(&mut self, now: Instant) {
         let until = now + self.settings.times.reference;
         self.set_phase(Phase::Awaiting { since: now, until });
+        let asker = self.active.as_ref().and_then(|active| active.asker.id());
+        self.outputs.extend(asker.map(Output::InForce));
         self.pace.quicken(now);
     }
 

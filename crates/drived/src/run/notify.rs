@@ -192,7 +192,7 @@ impl Pulse {
         drives.insert(Arc::clone(name), false);
         let (seen, drive) = (Arc::clone(&self.drives), drive.clone());
         tokio::spawn(async move {
-            let refused = drive.unready(None).await;
+            let refused = drive.unready().await;
             let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
             match refused {
                 // It was not asked: once more at the next look.

@@ -312,7 +312,7 @@ impl Rig {
     fn happened(&self) -> impl Iterator<Item = &Happened> {
         self.outputs.iter().filter_map(|output| match output {
             Output::Event(happened) => Some(happened),
-            Output::Answer(..) | Output::Told(..) => None,
+            Output::InForce(_) | Output::Answer(..) | Output::Told(..) => None,
         })
     }
 

@@ -15,6 +15,7 @@ export const SENTENCES_FR = {
   'a stop of it is not confirmed yet': 'un arrêt n’est pas encore confirmé',
   'a stop came before it was sent': 'un arrêt est arrivé avant son envoi',
   'a later command took its place before it was sent': 'un ordre ultérieur l’a remplacé avant son envoi',
+  'it was withdrawn before it was sent': 'il a été retiré avant son envoi',
   'too many commands for this drive wait': 'trop d’ordres attendent pour ce variateur',
   'the fleet has shut down': 'le service est arrêté',
   'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
@@ -48,6 +49,7 @@ export const SENTENCES_FR = {
 
   // What became of it.
   'a later command took its place': 'un ordre ultérieur l’a remplacé',
+  'it was withdrawn': 'il a été retiré',
   'a stop came': 'un arrêt est arrivé',
   'the drive tripped': 'le variateur est passé en défaut',
   'the drive was lost': 'la liaison avec le variateur a été perdue',

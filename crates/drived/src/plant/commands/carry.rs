@@ -2,14 +2,15 @@
 
 use std::{
     borrow::Cow,
-    pin::Pin,
     sync::{Arc, Mutex, PoisonError},
-    task::{Context, Waker},
     time::Duration,
 };
 
 use drive_core::StopMode;
-use drive_fleet::{Act, DriveHandle, Group, GroupFailure, GroupStart, Link, Order, Outcome};
+use drive_fleet::{
+    Act, DriveHandle, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
+    StopTicket, Ticket,
+};
 use futures_util::future::join_all;
 use tokio::{
     sync::Notify,
@@ -50,6 +51,17 @@ struct Inner {
     changed: Notify,
     /// What holds for all of them.
     head: CommandView,
+}
+
+/// What was asked of the drives: it is on its way to them.
+enum Posted {
+    Stop(StopTicket),
+    StopOfSeveral(GroupStop),
+    SetpointOfSeveral(GroupTicket<Vec<(Arc<str>, Outcome)>>),
+    /// One for each member.
+    Orders(Vec<Ticket>),
+    /// A start of several waits for its turn first.
+    Nothing,
 }
 
 impl Work {
@@ -114,21 +126,16 @@ impl Work {
     }
 
     /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
-    /// returns.
+    /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn.
     pub(super) fn begin(self, command: Command) {
-        let mut carried: Pin<Box<dyn Future<Output = ()> + Send>> =
-            Box::pin(self.clone().carried(Arc::clone(&command)));
-        // Whoever is woken polls it again, so that nothing is lost by a waker that wakes nobody.
-        let mut context = Context::from_waker(Waker::noop());
-        if carried.as_mut().poll(&mut context).is_pending() {
-            self.tell(&command);
-            tokio::spawn(carried);
-        }
+        let posted = self.post();
+        self.tell(&command);
+        tokio::spawn(self.carried(posted, command));
     }
 
-    async fn carried(self, command: Command) {
+    async fn carried(self, posted: Posted, command: Command) {
         tokio::select! {
-            () = self.work() => {}
+            () = self.work(posted) => {}
             () = self.tell_changes(&command) => {}
         }
         self.tell(&command);
@@ -157,33 +164,47 @@ impl Work {
         }
     }
 
-    async fn work(&self) {
-        let Inner { plant, request, members, .. } = &*self.0;
-        let expires = request.arrived + request.lifetime;
+    fn post(&self) -> Posted {
+        let Inner { request, members, .. } = &*self.0;
         match (request.action, &request.target, &**members) {
-            (Action::Stop(mode), Target::Drive(_), [member]) => self.end(0, &member.stop(mode).await),
-            (Action::Stop(mode), ..) => {
-                let told = |name: &str, outcome: &Outcome| self.end_of(name, outcome);
-                let _ = self.group().stop_telling(mode, told).await;
+            (Action::Stop(mode), Target::Drive(_), [member]) => Posted::Stop(member.stop(mode)),
+            (Action::Stop(mode), ..) => Posted::StopOfSeveral(self.group().stop(mode)),
+            (Action::Start { .. }, Target::Group(_) | Target::All, _) => Posted::Nothing,
+            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
+                Posted::SetpointOfSeveral(self.group().set_setpoint(setpoint))
             }
-            (Action::Start { .. }, Target::Group(_) | Target::All, _) => {
+            (action, ..) => {
+                let expires = request.arrived + request.lifetime;
+                let order = |member: &DriveHandle| Some(member.order_until(order(action)?, expires));
+                Posted::Orders(members.iter().filter_map(order).collect())
+            }
+        }
+    }
+
+    async fn work(&self, posted: Posted) {
+        match posted {
+            Posted::Stop(stop) => self.end(0, &stop.await),
+            Posted::StopOfSeveral(stops) => {
+                let each = stops.each().iter();
+                join_all(each.map(async |(name, stop)| self.end_of(name, &stop.finished().await))).await;
+            }
+            Posted::SetpointOfSeveral(given) => {
+                for (name, outcome) in given.await {
+                    self.end_of(&name, &outcome);
+                }
+            }
+            Posted::Orders(orders) => {
+                let orders = orders.iter().enumerate();
+                join_all(orders.map(async |(number, order)| self.end(number, &order.finished().await))).await;
+            }
+            Posted::Nothing => {
+                let Inner { plant, request, .. } = &*self.0;
+                let expires = request.arrived + request.lifetime;
                 let Ok(_turn) = timeout_at(expires, plant.0.group_starts.lock()).await else {
                     let text = "another start of a group was under way";
                     return self.end_all(OutcomeWord::Expired, GROUP_BUSY, text);
                 };
                 self.start_group().await;
-            }
-            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
-                for (name, outcome) in self.group().set_setpoint(setpoint).await {
-                    self.end_of(&name, &outcome);
-                }
-            }
-            (action, ..) => {
-                let Some(order) = order(action) else { return };
-                let orders = members.iter().enumerate().map(|(number, member)| async move {
-                    self.end(number, &member.order_until(order, expires).await);
-                });
-                join_all(orders).await;
             }
         }
     }

@@ -266,8 +266,8 @@ async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
 
 #[cfg(test)]
 mod tests {
-    use drive_fleet::{Outcome, Refused};
-    use tokio::task::spawn_blocking;
+    use drive_fleet::{EventKind, Outcome, Received, Refused};
+    use tokio::{sync::mpsc, task::spawn_blocking};
 
     use super::*;
     use crate::{doors::Rights, plant::testing::TestPlant};
@@ -293,6 +293,38 @@ mod tests {
         drop(held);
         assert!(started.await.unwrap().is_ok());
         assert!(plant.0.stopped.0.try_lock().is_ok(), "and then stops are taken");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn every_command_of_a_burst_is_on_its_way_when_it_was_taken_however_long_the_burst() {
+        let plant = TestPlant::of(1).await.plant;
+        let (mut events, pump) = (plant.fleet().events(), plant.fleet().drive("pump 1").unwrap());
+        let caller = Caller { name: "scada".to_owned(), origin: "mqtt".to_owned(), rights: Rights::ALL };
+        let beside = pump.commanded_by("beside");
+        let (messages, mut inbox) = mpsc::unbounded_channel();
+        (0..1_000).for_each(|number| messages.send(number).unwrap());
+        drop(messages);
+        let mut stops = Vec::new();
+        // Each message that is there at once takes a part of what this task may spend before it lets others run.
+        while inbox.recv().await.is_some() {
+            let (action, arrived) = (Action::Stop(StopMode::Ramp), Instant::now());
+            let target = Target::Drive("pump 1".to_owned());
+            let _ = plant.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived });
+            stops.push(beside.stop(StopMode::Ramp));
+        }
+        for stop in stops {
+            assert_eq!(stop.await, Outcome::Confirmed);
+        }
+        let mut commanders = Vec::new();
+        while commanders.len() < 2_000 {
+            let Received::Event(event) = events.recv().await else { panic!("events are missing") };
+            if let EventKind::Command { commander, .. } = event.kind {
+                commanders.push(commander);
+            }
+        }
+        let expected = ["scada", "beside"].into_iter().cycle();
+        let late = commanders.iter().zip(expected).position(|(commander, expected)| **commander != *expected);
+        assert_eq!(late, None, "the stop that was taken first was overtaken");
     }
 
     #[test]

@@ -1,0 +1,208 @@
+//! Tickets of what several drives were told together.
+
+use std::{
+    fmt,
+    future::IntoFuture,
+    pin::Pin,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use futures_util::future::join_all;
+use tokio::{runtime::Handle, sync::watch, task::AbortHandle};
+
+use crate::{
+    group::StopReport,
+    outcome::Outcome,
+    ticket::{StopTicket, Ticket},
+};
+
+/// A stop that was given to several drives: all of it is on its way, whether or not anybody awaits this.
+///
+/// Awaiting it gives what [`finished`](Self::finished) gives. **A stop is never withdrawn**: when this is dropped every drive is
+/// stopped all the same, and each drive's own task repeats its stop until the drive stands.
+#[derive(Debug, Clone)]
+#[must_use = "a stop that is not confirmed is an alarm"]
+pub struct GroupStop {
+    each: Vec<(Arc<str>, StopTicket)>,
+    read_only: Vec<Arc<str>>,
+    /// The lines, and whether the broadcast went out, when that is known.
+    broadcasts: Vec<(Arc<str>, watch::Receiver<Option<bool>>)>,
+}
+
+impl GroupStop {
+    pub(crate) const fn new(
+        each: Vec<(Arc<str>, StopTicket)>,
+        read_only: Vec<Arc<str>>,
+        broadcasts: Vec<(Arc<str>, watch::Receiver<Option<bool>>)>,
+    ) -> Self {
+        Self { each, read_only, broadcasts }
+    }
+
+    /// The stop of each drive that may be commanded.
+    #[must_use]
+    pub fn each(&self) -> &[(Arc<str>, StopTicket)] {
+        &self.each
+    }
+
+    /// Waits until each drive shows that no run command is in force any more, which is what `confirmed` means in this
+    /// report, or until its time is over.
+    ///
+    /// # Cancellation
+    /// Safe to drop.
+    pub async fn in_force(&self) -> StopReport {
+        self.report(join_all(self.each.iter().map(|(_, stop)| stop.in_force())).await).await
+    }
+
+    /// Waits until each drive stands, or until its time is over: its stop goes on being repeated then.
+    ///
+    /// # Cancellation
+    /// Safe to drop.
+    pub async fn finished(&self) -> StopReport {
+        self.report(join_all(self.each.iter().map(|(_, stop)| stop.finished())).await).await
+    }
+
+    async fn report(&self, outcomes: Vec<Outcome>) -> StopReport {
+        let mut report = StopReport { read_only: self.read_only.clone(), ..StopReport::default() };
+        for ((name, _), outcome) in self.each.iter().zip(outcomes) {
+            if outcome.is_confirmed() {
+                report.confirmed.push(Arc::clone(name));
+            } else {
+                report.unconfirmed.push((Arc::clone(name), outcome));
+            }
+        }
+        for (line, sent) in &self.broadcasts {
+            if sent.clone().wait_for(Option::is_some).await.is_ok_and(|sent| *sent == Some(true)) {
+                report.broadcasts.push(Arc::clone(line));
+            }
+        }
+        report
+    }
+}
+
+impl IntoFuture for GroupStop {
+    type Output = StopReport;
+    type IntoFuture = Pin<Box<dyn Future<Output = StopReport> + Send>>;
+
+    fn into_future(self) -> Self::IntoFuture {
+        Box::pin(async move { self.finished().await })
+    }
+}
+
+/// How far a command of a group has come.
+#[derive(Debug)]
+struct Progress<T> {
+    in_force: Option<T>,
+    finished: Option<T>,
+}
+
+/// The tickets of the members: dropped with the group's, they withdraw what nobody has heard of.
+type Held = Arc<Mutex<Vec<Ticket>>>;
+
+/// Where the steps of a group's command tell what they have done.
+pub(crate) struct Told<T> {
+    progress: watch::Sender<Progress<T>>,
+    held: Held,
+}
+
+impl<T> Told<T> {
+    /// It is in force, and not finished yet.
+    pub(crate) fn in_force(&self, outcome: T) {
+        self.progress.send_modify(|progress| progress.in_force = Some(outcome));
+    }
+
+    /// This order is a part of it.
+    pub(crate) fn hold(&self, ticket: Ticket) {
+        lock(&self.held).push(ticket);
+    }
+}
+
+/// A start or a setpoint that was given to several drives: a task of the fleet carries it out, one drive of a line after the
+/// other, whether or not anybody awaits this.
+///
+/// Awaiting it gives what [`finished`](Self::finished) gives.
+///
+/// # Dropping
+/// **When it is dropped before its outcome was heard it is withdrawn**, drive by drive as by the drives' own
+/// [tickets](Ticket#dropping): no further drive is commanded, and those that were started are stopped again along their ramps,
+/// where nobody else has started or stopped them since. When it is dropped after its outcome was heard the motors go on.
+#[must_use = "a command is withdrawn when its ticket is dropped before its outcome was heard"]
+pub struct GroupTicket<T> {
+    progress: watch::Receiver<Progress<T>>,
+    held: Held,
+    steps: AbortHandle,
+    /// What is told when the runtime has ended before the steps have.
+    gone: T,
+}
+
+impl<T: Clone + Send + Sync + 'static> GroupTicket<T> {
+    /// Begins with these steps.
+    pub(crate) fn spawn<F>(runtime: &Handle, gone: T, steps: impl FnOnce(Arc<Told<T>>) -> F) -> Self
+    where
+        F: Future<Output = T> + Send + 'static,
+    {
+        let (progress, heard) = watch::channel(Progress { in_force: None, finished: None });
+        let held = Held::default();
+        let told = Arc::new(Told { progress, held: Arc::clone(&held) });
+        let steps = steps(Arc::clone(&told));
+        let steps = runtime.spawn(async move {
+            let outcome = steps.await;
+            told.progress.send_modify(|progress| progress.finished = Some(outcome));
+        });
+        Self { progress: heard, held, steps: steps.abort_handle(), gone }
+    }
+
+    /// Waits until it is in force on every drive, or why it is not: a start does not wait for the reference here.
+    ///
+    /// # Cancellation
+    /// Dropping the wait leaves the ticket as it is.
+    pub async fn in_force(&self) -> T {
+        self.hear(|progress| progress.in_force.clone().or_else(|| progress.finished.clone())).await
+    }
+
+    /// Waits for what became of it.
+    ///
+    /// # Cancellation
+    /// Dropping the wait leaves the ticket as it is.
+    pub async fn finished(&self) -> T {
+        self.hear(|progress| progress.finished.clone()).await
+    }
+
+    /// Takes it back as if nobody had heard of it: see [dropping](#dropping).
+    pub fn withdraw(self) {
+        lock(&self.held).drain(..).for_each(Ticket::withdraw);
+    }
+
+    async fn hear(&self, known: impl Fn(&Progress<T>) -> Option<T>) -> T {
+        let mut progress = self.progress.clone();
+        let told = progress.wait_for(|progress| known(progress).is_some()).await;
+        let outcome = told.ok().and_then(|progress| known(&progress)).unwrap_or_else(|| self.gone.clone());
+        lock(&self.held).iter().for_each(Ticket::keep);
+        outcome
+    }
+}
+
+impl<T> Drop for GroupTicket<T> {
+    fn drop(&mut self) {
+        self.steps.abort();
+        lock(&self.held).clear();
+    }
+}
+
+impl<T: Clone + Send + Sync + 'static> IntoFuture for GroupTicket<T> {
+    type Output = T;
+    type IntoFuture = Pin<Box<dyn Future<Output = T> + Send>>;
+
+    fn into_future(self) -> Self::IntoFuture {
+        Box::pin(async move { self.finished().await })
+    }
+}
+
+impl<T> fmt::Debug for GroupTicket<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GroupTicket").finish_non_exhaustive()
+    }
+}
+
+fn lock(held: &Held) -> MutexGuard<'_, Vec<Ticket>> {
+    held.lock().unwrap_or_else(PoisonError::into_inner)
+}

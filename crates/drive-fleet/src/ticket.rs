@@ -1,0 +1,188 @@
+//! Tickets: what tells how far a command has come, from the moment that it was given.
+
+use std::{
+    fmt,
+    future::IntoFuture,
+    pin::Pin,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use tokio::sync::{mpsc, watch};
+
+use crate::{
+    outcome::{Outcome, Refused},
+    supervisor::CallId,
+    task::Urgent,
+};
+
+/// How far a command has come.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Progress {
+    /// The drive has shown that it is in force.
+    pub(crate) in_force: bool,
+    pub(crate) finished: Option<Outcome>,
+}
+
+/// Where the progress of a command is told.
+pub(crate) type Report = watch::Sender<Progress>;
+
+/// Where it is heard.
+pub(crate) type Hearer = watch::Receiver<Progress>;
+
+/// A command that has ended before it began.
+pub(crate) fn refused(refused: Refused) -> Hearer {
+    watch::Sender::new(Progress { in_force: false, finished: Some(Outcome::Refused(refused)) }).subscribe()
+}
+
+/// What became of a command, when it is known; with `early` also that it is in force.
+async fn outcome(hearer: &Hearer, early: bool) -> Outcome {
+    let known = |progress: &Progress| {
+        let in_force = (early && progress.in_force).then_some(Outcome::Confirmed);
+        in_force.or_else(|| progress.finished.clone())
+    };
+    let mut hearer = hearer.clone();
+    let told = hearer.wait_for(|progress| known(progress).is_some()).await;
+    told.ok().and_then(|progress| known(&progress)).unwrap_or(Outcome::Refused(Refused::ShutDown))
+}
+
+/// An order that was given to a drive: it is on its way, whether or not anybody awaits this.
+///
+/// Awaiting it gives what [`finished`](Self::finished) gives.
+///
+/// # Dropping
+/// **An order whose ticket is dropped before its outcome was heard is withdrawn**: before [`in_force`](Self::in_force) or
+/// [`finished`](Self::finished) has returned, as in a `timeout` that is over or a branch of a `select!` that was not taken.
+/// - What is unsent of it never is.
+/// - A start whose run command was sent, or may have been, is taken back by a stop along the ramp, which is repeated until it is
+///   confirmed, also where the motor ran before: so nothing runs by a start that nobody has heard of. It is not where
+///   somebody else has started or stopped the motor since.
+/// - A setpoint that was sent stays. A reset, a release and a save that are under way are finished: they are edges, and half of one
+///   would stand in the drive.
+///
+/// Once its outcome was heard, dropping it does nothing.
+#[must_use = "an order is withdrawn when its ticket is dropped before its outcome was heard"]
+pub struct Ticket {
+    /// `None` when it is dropped.
+    hearer: Option<Hearer>,
+    heard: AtomicBool,
+    id: CallId,
+    /// Weak, because a drive without handles is supervised no more, whoever holds a ticket.
+    urgent: mpsc::WeakUnboundedSender<Urgent>,
+}
+
+impl Ticket {
+    pub(crate) const fn new(id: CallId, hearer: Hearer, urgent: mpsc::WeakUnboundedSender<Urgent>) -> Self {
+        Self { hearer: Some(hearer), heard: AtomicBool::new(false), id, urgent }
+    }
+
+    /// Waits until the drive's own words show that the order is in force, or why it is not: a start and a setpoint do not wait for
+    /// the reference here. For other orders the same as [`finished`](Self::finished).
+    ///
+    /// # Cancellation
+    /// Dropping the wait leaves the ticket as it is.
+    pub async fn in_force(&self) -> Outcome {
+        self.hear(true).await
+    }
+
+    /// Waits for what became of the order: see [`Until`](crate::Until).
+    ///
+    /// # Cancellation
+    /// Dropping the wait leaves the ticket as it is.
+    pub async fn finished(&self) -> Outcome {
+        self.hear(false).await
+    }
+
+    /// Takes the order back as if nobody had heard of it: see [dropping](#dropping).
+    pub fn withdraw(mut self) {
+        *self.heard.get_mut() = false;
+    }
+
+    async fn hear(&self, early: bool) -> Outcome {
+        let outcome = self.unheard(early).await;
+        self.keep();
+        outcome
+    }
+
+    /// The same, and dropping the ticket still withdraws the order.
+    pub(crate) async fn unheard(&self, early: bool) -> Outcome {
+        match &self.hearer {
+            Some(hearer) => outcome(hearer, early).await,
+            None => Outcome::Refused(Refused::ShutDown),
+        }
+    }
+
+    /// Dropping it does nothing from now on.
+    pub(crate) fn keep(&self) {
+        self.heard.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Ticket {
+    fn drop(&mut self) {
+        if !*self.heard.get_mut() {
+            // First of all, so that the order is not taken on that overtakes its own withdrawal.
+            self.hearer = None;
+            if let Some(urgent) = self.urgent.upgrade() {
+                let _ = urgent.send(Urgent::Withdraw(self.id));
+            }
+        }
+    }
+}
+
+impl IntoFuture for Ticket {
+    type Output = Outcome;
+    type IntoFuture = Pin<Box<dyn Future<Output = Outcome> + Send>>;
+
+    fn into_future(self) -> Self::IntoFuture {
+        Box::pin(async move { self.finished().await })
+    }
+}
+
+impl fmt::Debug for Ticket {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Ticket").field("id", &self.id).finish_non_exhaustive()
+    }
+}
+
+/// A stop that was given to a drive: it is on its way, ahead of everything, whether or not anybody awaits this.
+///
+/// Awaiting it gives what [`finished`](Self::finished) gives. **A stop is never withdrawn**: when the ticket is dropped it is
+/// repeated all the same until the drive stands.
+#[derive(Debug, Clone)]
+#[must_use = "a stop that is not confirmed is an alarm"]
+pub struct StopTicket {
+    hearer: Hearer,
+}
+
+impl StopTicket {
+    pub(crate) const fn new(hearer: Hearer) -> Self {
+        Self { hearer }
+    }
+
+    /// Waits until the drive shows that no run command is in force any more: the motor comes down by itself from here. Or
+    /// until the time of the settings is over, as [`finished`](Self::finished).
+    ///
+    /// # Cancellation
+    /// Safe to drop.
+    pub async fn in_force(&self) -> Outcome {
+        outcome(&self.hearer, true).await
+    }
+
+    /// Waits until the drive shows standstill, or until the time of the settings is over: the stop goes on being repeated
+    /// then.
+    ///
+    /// # Cancellation
+    /// Safe to drop.
+    pub async fn finished(&self) -> Outcome {
+        outcome(&self.hearer, false).await
+    }
+}
+
+impl IntoFuture for StopTicket {
+    type Output = Outcome;
+    type IntoFuture = Pin<Box<dyn Future<Output = Outcome> + Send>>;
+
+    fn into_future(self) -> Self::IntoFuture {
+        Box::pin(async move { self.finished().await })
+    }
+}
