@@ -79,7 +79,7 @@ async fn drive(
     Ok(Json(find(&fleet, &name)?.snapshot()))
 }
 
-/// Forward at a setpoint. A client that goes away takes nothing back: the command goes on, or expires unsent.
+/// Forward at a setpoint. A client that goes away before the answer takes its start back; a stop goes on whoever goes away.
 async fn run(
     State(fleet): State<Fleet>,
     Path(name): Path<String>,
