@@ -29,6 +29,14 @@ drive_core::named! { Severity {
     Note => "note",
 } }
 
+impl Severity {
+    /// Whether it is trouble. A note is none: it is often over by itself.
+    #[must_use]
+    pub const fn is_trouble(self) -> bool {
+        matches!(self, Self::Alarm | Self::Warning)
+    }
+}
+
 /// A row of the table.
 struct Row {
     word: &'static str,

@@ -141,6 +141,8 @@ pub struct Judged<T> {
 pub struct ConcernView {
     /// What.
     pub kind: ConcernKind,
+    /// Its place among all kinds: 0 is the worst.
+    pub rank: usize,
     /// How badly.
     pub severity: Severity,
     /// Whether somebody is woken for it.
@@ -150,6 +152,9 @@ pub struct ConcernView {
     pub since_ms: Option<u64>,
     /// It in a sentence.
     pub text: String,
+    /// The part of the sentence that is of this drive, behind the words of the kind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detail: Option<String>,
     /// What to do first.
     pub remedy: String,
 }
@@ -161,10 +166,12 @@ impl ConcernView {
         let kind = concern.kind;
         Self {
             kind,
+            rank: kind.rank(),
             severity: kind.severity(),
             wakes: kind.wakes(),
             since_ms: concern.lasts(now).map(whole_ms),
             text: concern.to_string(),
+            detail: concern.detail.clone(),
             remedy: kind.remedy().to_owned(),
         }
     }

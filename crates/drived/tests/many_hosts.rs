@@ -176,7 +176,7 @@ fn one_prometheus_sees_three_daemons_and_fires_when_a_drive_of_one_trips() {
     east.sim.say("atv312@2 trip OCF", "done");
     let alerts =
         prometheus.wait(|prometheus| prometheus.firing().filter(|alerts| alerts.contains("alertname")));
-    assert!(alerts.contains(r#""alertname":"DrivedDriveTripped""#), "{alerts}");
+    assert!(alerts.contains(r#""alertname":"DrivedTripped""#), "{alerts}");
     assert!(
         alerts.contains(r#""drive":"east pump 2""#) && alerts.contains(r#""mnemonic":"OCF""#),
         "{alerts}"

@@ -66,7 +66,7 @@ fn a_drive_that_was_never_seen_has_no_value() {
         json!({
             "name": "pump 1", "link": "connecting", "status": {"quality": "missing"},
             "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"},
-            "concerns": [{"kind": "never_seen", "severity": "note", "wakes": false, "text": "not seen yet",
+            "concerns": [{"kind": "never_seen", "rank": 14, "severity": "note", "wakes": false, "text": "not seen yet",
                 "remedy": "wait, or look at its supply, its address and its cable"}],
             "watchdog": {"check": "no_contract"}, "start_refused": "the drive does not answer",
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
@@ -108,8 +108,9 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
             "setpoint": {"frequency_hz": 30.0}, "reached": true,
             "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false, "alarm": true},
             "started_here": true, "starts_by_itself": ["Atr"],
-            "concerns": [{"kind": "stop_unconfirmed", "severity": "alarm", "wakes": true, "since_ms": 10_120,
+            "concerns": [{"kind": "stop_unconfirmed", "rank": 0, "severity": "alarm", "wakes": true, "since_ms": 10_120,
                 "text": "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent 2 times",
+                "detail": "ramp stop, sent 2 times",
                 "remedy": "use the emergency stop, then look at the drive; the stop is repeated"}],
             "identity": {"check": "same", "model": "ATV312HU15N4", "codes": []},
             "watchdog": {"check": "verified", "time_ms": 10_000, "reaction": "ramp"},

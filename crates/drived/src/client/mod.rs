@@ -15,8 +15,8 @@ pub(crate) use self::{
     names::{Target, path_of},
     order::{Told, order},
     show::{
-        age, fault_in_words, faults, measured, measurement, overview, registers, state_in_words,
-        status_in_words, whole, words,
+        age, concern, concerns, fault_in_words, faults, measured, measurement, overview, registers,
+        state_in_words, status_in_words, whole, words,
     },
     watch::{Frames, watch},
 };

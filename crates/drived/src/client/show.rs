@@ -1,5 +1,6 @@
 //! What the daemon knows, for a person: every value with its age, an old one never as if it were live.
 
+use drive_fleet::view::ConcernView;
 use serde_json::Value;
 
 use super::Target;
@@ -17,9 +18,9 @@ pub(crate) fn overview(state: &Value, target: &Target) -> Result<(), Failure> {
     let drives: Vec<&Value> = of_target(state, target).collect();
     let mut sorted = drives.clone();
     // Stable: behind those in trouble the order is that of the configuration.
-    sorted.sort_by_key(|drive| trouble(drive));
+    sorted.sort_by_key(|drive| concern(drive).map_or(usize::MAX, |concern| concern.rank));
     let mut table = Table::new(["drive", "state", "output", "setpoint", "current", "age"]);
-    for drive in sorted {
+    for drive in &sorted {
         let status = &drive["status"];
         let old = status["quality"] != "good";
         // An old value is set in brackets: it is what was, not what is.
@@ -39,6 +40,11 @@ pub(crate) fn overview(state: &Value, target: &Target) -> Result<(), Failure> {
         ]);
     }
     output::say_table(table)?;
+    for drive in sorted {
+        if let Some(concern) = concern(drive) {
+            output::say(format_args!("{}: {}", name(drive), concern.text))?;
+        }
+    }
     for line in state["lines"].as_array().into_iter().flatten().filter(|line| line["link"] != "connected") {
         let why = line["error"].as_str().unwrap_or("nobody answers");
         output::say(format_args!("line {} is away: {why}", line["name"].as_str().unwrap_or("?")))?;
@@ -96,7 +102,10 @@ pub(crate) fn whole(drive: &Value, all: bool) -> Result<(), Failure> {
         row("fault", Some(fault_in_words(fault)));
         row("what to do", fault["remedy"].as_str().map(str::to_owned));
     }
-    row("stop", drive["stop"].is_object().then(|| stop_in_words(&drive["stop"])));
+    for concern in concerns(drive) {
+        row("trouble", Some(concern.text));
+        row("what to do", Some(concern.remedy));
+    }
     row("starts by itself", list(&drive["starts_by_itself"]));
     row("start", drive["start_refused"].as_str().map(|why| format!("would be refused: {why}")));
     row("watchdog", drive["watchdog"]["check"].as_str().map(words));
@@ -174,14 +183,14 @@ fn name(drive: &Value) -> &str {
     drive["name"].as_str().unwrap_or("?")
 }
 
-/// Trouble first: lost, tripped, a stop that is not confirmed, the rest.
-fn trouble(drive: &Value) -> u8 {
-    match (drive["status"]["quality"] == "good", drive["status"]["state"].as_str()) {
-        (false, _) => 0,
-        (true, Some("fault" | "fault_reaction")) => 1,
-        (true, _) if drive["stop"].is_object() => 2,
-        (true, _) => 3,
-    }
+/// All that troubles a drive, as the daemon tells it, the worst first.
+pub(crate) fn concerns(drive: &Value) -> Vec<ConcernView> {
+    serde_json::from_value(drive["concerns"].clone()).unwrap_or_default()
+}
+
+/// The worst that troubles a drive.
+pub(crate) fn concern(drive: &Value) -> Option<ConcernView> {
+    concerns(drive).into_iter().next()
 }
 
 /// What a drive does, as far as that is known: an old state is one that was.
@@ -217,13 +226,6 @@ pub(crate) fn fault_in_words(fault: &Value) -> String {
     let mnemonic = fault["mnemonic"].as_str().map(|mnemonic| format!("{mnemonic}:"));
     let meaning = fault["meaning"].as_str().map(str::to_owned);
     [code, mnemonic, meaning].into_iter().flatten().collect::<Vec<_>>().join(" ")
-}
-
-fn stop_in_words(stop: &Value) -> String {
-    let mode = stop["mode"].as_str().map(words).unwrap_or_default();
-    let taken =
-        if stop["taken"] == true { "the drive is stopping" } else { "NOT CONFIRMED, the motor may turn" };
-    format!("{mode}, sent {} times: {taken}", stop["attempts"])
 }
 
 fn raw(status: &Value) -> Option<String> {
@@ -323,6 +325,13 @@ mod tests {
         assert_eq!(state_in_words(&drive), "LOST, was running");
         assert_eq!(old_in_words(&drive["status"]), "NOT LIVE: what stands in brackets was so 21 s ago");
         assert_eq!(answering(&[&drive]), Err(Failure::Drive("pump 1 does not answer".to_owned())));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
+        for (_, drive, worst) in crate::plant::testing::every_pair_of_troubles(tokio::time::Instant::now()) {
+            assert_eq!(concern(&drive).map(|concern| concern.text), Some(worst));
+        }
     }
 
     #[test]

@@ -74,6 +74,9 @@ fn tell_whole(
     }
     let pending = snapshot.stop.map(|stop| now.saturating_duration_since(stop.since).as_secs_f64());
     samples.add_known(Id::DriveStopPending, &labels, pending);
+    for concern in snapshot.concerns(now) {
+        samples.add(Id::DriveConcern, &[line, name, concern.kind.word()], 1.0);
+    }
     samples.add(Id::DriveStopUnconfirmed, &labels, flag(snapshot.stop.is_some_and(|stop| stop.alarm)));
 }
 

@@ -101,6 +101,8 @@ metrics! {
         "For how long a stop has not been confirmed; absent when there is none.";
     DriveStopUnconfirmed: Gauge, "drived_drive_stop_unconfirmed", ["line", "drive"],
         "1 when a stop has not been confirmed for longer than the configuration allows, else 0.";
+    DriveConcern: Gauge, "drived_drive_concern", ["line", "drive", "concern"],
+        "1 for each thing that troubles the drive, by its word; absent otherwise.";
     DriveWatchdogArmed: Gauge, "drived_drive_watchdog_armed", ["line", "drive"],
         "Whether the drive's communication watchdog is known to be armed: as the configuration says, or as it was found.";
     DriveWatchdogTimeout: Gauge, "drived_drive_watchdog_timeout_seconds", ["line", "drive"],

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, fs, path::Path, time::Duration};
 use axum::{Extension, body::Body, http::Request};
 use drive_bus::{Line, LineConfig};
 use drive_families::Family;
-use drive_fleet::{DriveSettings, Fleet};
+use drive_fleet::{ConcernKind, DriveSettings, Fleet};
 use drive_sim::{SimLine, Wiring};
 use http_body_util::BodyExt as _;
 use tokio::time::sleep;
@@ -347,4 +347,45 @@ async fn three_thousand_drives_are_scraped_and_what_that_costs_is_printed() {
         told as f64 / time.as_secs_f64(),
         told as f64 / time.as_secs_f64() / drives as f64,
     );
+}
+
+/// The rules of what troubles a drive, as the fleet's table has them.
+fn rules_of_the_table() -> String {
+    let camel =
+        |word: &str| word.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect::<String>();
+    let mut rules = String::new();
+    for kind in ConcernKind::ALL.iter().filter(|kind| kind.severity().is_trouble()) {
+        let has = format!("drived_drive_concern{{concern=\"{}\"}}", kind.word());
+        let expr = match kind {
+            ConcernKind::Tripped => format!(
+                "|\n          {has} * on (instance, line, drive) group_left (code, mnemonic) drived_drive_fault\n          \
+                 or ({has} unless on (instance, line, drive) drived_drive_fault)"
+            ),
+            ConcernKind::Lost => format!("{has} and on (instance, line) drived_line_up == 1"),
+            _ => has,
+        };
+        // A line that is busy for a moment wakes nobody.
+        let lasts = match kind {
+            ConcernKind::LostRunning => "        for: 10s\n",
+            ConcernKind::Lost => "        for: 30s\n",
+            ConcernKind::Stale => "        for: 1m\n",
+            _ => "",
+        };
+        let severity = if kind.wakes() { "page" } else { "warning" };
+        rules += &format!(
+            "      - alert: Drived{}\n        expr: {expr}\n{lasts}        labels: {{ severity: {severity} }}\n        \
+             annotations:\n          summary: \"{{{{ $labels.drive }}}}: {}\"\n          description: \"What to do first: {}.\"\n\n",
+            camel(kind.word()),
+            kind.words(),
+            kind.remedy()
+        );
+    }
+    rules
+}
+
+#[test]
+fn the_rules_for_a_drive_are_those_of_the_fleets_table() {
+    let (_, rest) = ALERTS.split_once("made from the fleet's own table, and kept so by a test.\n\n").unwrap();
+    let (rules, _) = rest.split_once("      # What troubles a line, a broker or the program.\n").unwrap();
+    assert_eq!(rules, rules_of_the_table());
 }

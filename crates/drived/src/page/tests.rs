@@ -134,3 +134,31 @@ fn every_text_has_an_english_and_a_french_form() {
         }
     }
 }
+
+#[test]
+fn what_troubles_a_drive_has_the_words_of_the_fleets_table_and_its_states_the_words_of_everybody() {
+    let (texts, words, french) = (text_of("/texts.js"), text_of("/words.js"), text_of("/sentences_fr.js"));
+    for kind in drive_fleet::ConcernKind::ALL {
+        let row = format!("  concern_{}: ['{}', '", kind.word(), kind.words());
+        assert!(texts.contains(&row), "{row}");
+        let remedy = format!("  '{}': '", kind.remedy().replace('\'', "\\'"));
+        assert!(french.contains(&remedy), "{remedy}");
+    }
+    use drive_core::State;
+    for state in [
+        State::NotReady,
+        State::Disabled,
+        State::Ready,
+        State::Running,
+        State::Stopping,
+        State::QuickStop,
+        State::FaultReaction,
+        State::Fault,
+        State::Unknown,
+    ] {
+        let word = state.to_string();
+        let (first, rest) = word.split_at(1);
+        let row = format!("  {}: ['{}{rest}', '", word.replace(' ', "_"), first.to_uppercase());
+        assert!(words.contains(&row), "{row}");
+    }
+}

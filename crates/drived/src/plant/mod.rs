@@ -23,8 +23,8 @@ use tokio::{
 };
 
 use self::views::{
-    DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, PlannedLineView,
-    SettingsView, StateView,
+    DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, NoticeView,
+    PlannedLineView, SettingsView, StateView,
 };
 use self::{
     commands::{Log, Stopped},
@@ -111,6 +111,11 @@ impl Plant {
             drives: self.drives(),
             groups: self.groups(),
         }
+    }
+
+    /// Tells what happened to the program itself.
+    pub(crate) fn tell_notice(&self, notice: NoticeView) {
+        self.0.tell_notice(notice);
     }
 
     /// The stream of what happens.

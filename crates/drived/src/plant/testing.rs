@@ -1,12 +1,15 @@
 //! A simulated plant in virtual time, for the tests of what stands on it.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use drive_bus::{Line, LineConfig};
-use drive_core::SerialSettings;
+use drive_core::{Control, Current, Error, Identity, SelfRestart, SerialSettings, State, Status, StopMode};
 use drive_families::Family;
-use drive_fleet::{DriveSettings, Fleet};
+use drive_fleet::{
+    Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, WatchdogCheck,
+};
 use drive_sim::{SimLine, SimSlave, Wiring};
+use tokio::time::Instant;
 
 use super::Plant;
 use crate::{
@@ -60,5 +63,86 @@ impl Plant {
     /// No group starts before what it gives is dropped.
     pub(crate) async fn hold_group_starts(&self) -> impl Drop {
         self.0.group_starts.lock().await
+    }
+}
+
+/// A drive with every pair of troubles, which came in either order: what is known of it, as the API tells it, and its worst
+/// trouble in words.
+pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json::Value, String)> {
+    let shown = |snapshot: &mut Snapshot, change: fn(&mut Status)| {
+        let timed = snapshot.status.as_mut().expect("it has a status");
+        let mut status = Status::clone(&timed.value);
+        change(&mut status);
+        timed.value = Arc::new(status);
+    };
+    let stop =
+        |alarm, now| PendingStop { mode: StopMode::Ramp, since: now, attempts: 3, taken: false, alarm };
+    let error = || Error::Unsupported { what: "a test", reason: "it is one" };
+    let identity = || Arc::new(Identity::default());
+    let troubles: Vec<Box<dyn Fn(&mut Snapshot)>> = vec![
+        Box::new(move |drive| drive.stop = Some(stop(true, now))),
+        Box::new(move |drive| drive.stop = Some(stop(false, now))),
+        Box::new(move |drive| drive.run_command_stands = Some(error())),
+        Box::new(|drive| (drive.link, drive.started_here) = (Link::Lost, true)),
+        Box::new(|drive| drive.link = Link::Lost),
+        Box::new(|drive| drive.link = Link::Connecting),
+        Box::new(move |drive| shown(drive, |status| status.state = State::Fault)),
+        Box::new(move |drive| shown(drive, |status| status.warning = Some(true))),
+        Box::new(move |drive| {
+            drive.identity = IdentityCheck::Changed { remembered: identity(), found: identity() };
+        }),
+        Box::new(|drive| drive.watchdog = WatchdogCheck::Broken("not kept".to_owned())),
+        Box::new(|drive| drive.max_age = Duration::ZERO),
+        Box::new(|drive| {
+            let restart = SelfRestart { code: "Atr", meaning: "starts again" };
+            (drive.self_restarts, drive.restarts_accepted) = (Some([restart].into()), false);
+        }),
+        Box::new(|drive| {
+            let amperes = Current::from_deciamperes;
+            drive.exceeded = vec![Limit::Current { measured: amperes(39), limit: amperes(35) }];
+        }),
+        Box::new(|drive| drive.control_taken = Some(Control::Panel)),
+    ];
+    let plain = untroubled(now);
+    let mut all = Vec::new();
+    for (first, one) in troubles.iter().enumerate() {
+        for (second, other) in troubles.iter().enumerate().filter(|(second, _)| *second != first) {
+            let mut drive = plain.clone();
+            one(&mut drive);
+            other(&mut drive);
+            let told = serde_json::to_value(&drive).expect("it is told");
+            let worst = drive.concern(now).unwrap_or_else(|| panic!("{first} and {second} trouble nobody"));
+            all.push((drive, told, worst.to_string()));
+        }
+    }
+    all
+}
+
+/// A drive that answers, stands, and that nothing troubles; its status is a while old already.
+fn untroubled(now: Instant) -> Snapshot {
+    let status = Status { state: State::Ready, at: Some(now), ..Status::default() };
+    let at = now.checked_sub(Duration::from_millis(1)).unwrap_or(now);
+    Snapshot {
+        name: "pump 1".into(),
+        link: Link::Connected,
+        error: None,
+        status: Some(Timed { value: Arc::new(status), at }),
+        measurements: None,
+        setpoint: None,
+        identity: IdentityCheck::CannotSay,
+        watchdog: WatchdogCheck::NoContract { found: None },
+        self_restarts: None,
+        restarts_accepted: true,
+        control_taken: None,
+        run_command_stands: None,
+        exceeded: Vec::new(),
+        stop: None,
+        started_here: false,
+        start_refused: None,
+        trips: Arc::default(),
+        counters: Counters::default(),
+        since: Vec::new(),
+        max_age: Duration::from_secs(3),
+        measurements_max_age: Duration::from_secs(13),
     }
 }

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     sync::{Arc, Weak},
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 
 use drive_fleet::{DriveHandle, Events, Received};
@@ -28,6 +28,8 @@ const TOGETHER: Duration = Duration::from_millis(100);
 const ANEW: Duration = Duration::from_secs(5);
 /// Between two looks at the lines.
 const LINES: Duration = Duration::from_secs(1);
+/// A clock that is off by less than this was not set but regulated.
+const STEP: Duration = Duration::from_secs(1);
 /// Between two signs of life.
 const TICK: Duration = Duration::from_secs(5);
 
@@ -123,15 +125,45 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
     }
 }
 
+/// The wall's clock beside one that is never set.
+struct WallClock {
+    wall: SystemTime,
+    steady: std::time::Instant,
+}
+
+impl WallClock {
+    fn begin() -> Self {
+        Self { wall: SystemTime::now(), steady: std::time::Instant::now() }
+    }
+
+    /// What is to be said where the wall's clock was set since this was last asked.
+    fn step(&mut self, wall: SystemTime, steady: std::time::Instant) -> Option<String> {
+        let expected = self.wall + steady.saturating_duration_since(self.steady);
+        (self.wall, self.steady) = (wall, steady);
+        let (by, way) = match wall.duration_since(expected) {
+            Ok(ahead) => (ahead, "forward"),
+            Err(back) => (back.duration(), "back"),
+        };
+        (by >= STEP).then(|| {
+            let seconds = by.as_secs();
+            format!("the clock was set {way} by {seconds} s: the times before and after do not compare, the order does")
+        })
+    }
+}
+
 /// Tells the lines where somebody reads along, and the signs of life.
 async fn lines(plant: Weak<Inner>) {
     let mut looks = interval(LINES);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut told, mut watched): (Vec<LineView>, _) = Default::default();
     let mut tick_at = Instant::now() + TICK;
+    let mut clock = WallClock::begin();
     loop {
         looks.tick().await;
         let Some(plant) = plant.upgrade() else { return };
+        if let Some(step) = clock.step(SystemTime::now(), std::time::Instant::now()) {
+            plant.tell_notice(NoticeView::new("clock_stepped", false, step));
+        }
         plant.progress.look(&plant.fleet);
         plant.look_at_lines();
         watch(&plant, &mut watched);
@@ -147,5 +179,23 @@ async fn lines(plant: Weak<Inner>) {
             let revision = plant.revisions.last() + 1;
             plant.revisions.push(Subject::Tick, &TickView { revision, time_unix_ms: unix(Instant::now()) });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_is_told_once_and_one_that_is_regulated_is_not() {
+        let (wall, steady) = (SystemTime::now(), std::time::Instant::now());
+        let mut clock = WallClock { wall, steady };
+        let seconds = Duration::from_secs;
+        let mut at = |wall: SystemTime, after: u64| clock.step(wall, steady + seconds(after));
+        assert_eq!(at(wall + seconds(1), 1), None);
+        assert_eq!(at(wall + Duration::from_millis(2_300), 2), None);
+        let back = at(wall + seconds(3) - seconds(3_600), 3).unwrap();
+        assert!(back.starts_with("the clock was set back by 3600 s"), "{back}");
+        assert_eq!(at(wall + seconds(4) - seconds(3_600), 4), None);
     }
 }

@@ -45,7 +45,9 @@ impl Picture {
     pub(super) fn of(plant: &Plant, log: Vec<String>) -> Self {
         let mut drives: Vec<_> = plant.fleet().drives().iter().map(DriveHandle::snapshot).collect();
         let now = Instant::now();
-        drives.sort_by_key(|drive| !in_trouble(drive, now));
+        // Stable: who troubles nobody stands in the order of the configuration.
+        drives
+            .sort_by_cached_key(|drive| drive.concern(now).map_or(usize::MAX, |concern| concern.kind.rank()));
         Self { now, drives, lines: plant.lines(), log }
     }
 
@@ -168,10 +170,9 @@ fn with_time_alone(line: &str) -> String {
     }
 }
 
-/// Whether somebody should look at it: it has tripped, is lost, shows nothing fresh, or does not confirm a stop.
+/// Whether somebody should look at it.
 fn in_trouble(drive: &Snapshot, now: Instant) -> bool {
-    let tripped = drive.status.as_ref().is_some_and(|status| status.value.is_fault());
-    tripped || drive.freshness(now) != Freshness::Fresh || drive.stop.is_some_and(|stop| stop.alarm)
+    drive.concern(now).is_some_and(|concern| concern.kind.severity().is_trouble())
 }
 
 fn cells(
@@ -194,7 +195,13 @@ fn cells(
             Link::Connected => ("no news", Color::Yellow),
             Link::Lost => ("LOST", Color::Red),
         };
-        return vec![name, Cell::from(word).fg(colour)];
+        let mut cells = vec![name, Cell::from(word).fg(colour)];
+        if with_remark {
+            let empty = if with_bar { 7 } else { 6 };
+            cells.extend(std::iter::repeat_n(Cell::default(), empty - 1));
+            cells.push(remark(drive, now));
+        }
+        return cells;
     };
     let output = status.output_frequency.unwrap_or_default();
     let setpoint = match drive.setpoint {
@@ -227,10 +234,20 @@ fn cells(
     };
     cells.push(fault);
     if with_remark {
-        let remark = drive.start_refused(now).map(ToString::to_string).unwrap_or_default();
-        cells.push(Cell::from(remark).dim());
+        cells.push(remark(drive, now));
     }
     cells
+}
+
+fn remark(drive: &Snapshot, now: Instant) -> Cell<'static> {
+    let cell = Cell::from(remark_text(drive, now));
+    if in_trouble(drive, now) { cell.fg(Color::Yellow) } else { cell.dim() }
+}
+
+/// What troubles it, or why a start would be refused.
+fn remark_text(drive: &Snapshot, now: Instant) -> String {
+    let refused = || drive.start_refused(now).map(ToString::to_string).unwrap_or_default();
+    drive.concern(now).map_or_else(refused, |concern| concern.to_string())
 }
 
 #[cfg(test)]
@@ -240,7 +257,7 @@ mod tests {
     use ratatui::{Terminal, backend::TestBackend};
 
     use super::*;
-    use crate::plant::testing::TestPlant;
+    use crate::plant::testing::{TestPlant, every_pair_of_troubles};
 
     fn drawn(plant: &Plant, log: &[&str], width: u16, height: u16) -> String {
         let log = log.iter().map(|line| (*line).to_owned()).collect();
@@ -274,6 +291,14 @@ mod tests {
                 "{screen}"
             );
             assert!(screen.contains("north: ") && screen.contains("% used, a stop waits"), "{screen}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
+        let now = Instant::now();
+        for (drive, _, worst) in every_pair_of_troubles(now) {
+            assert_eq!(remark_text(&drive, now), worst);
         }
     }
 

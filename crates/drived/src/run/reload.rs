@@ -19,7 +19,7 @@ use crate::{
     json::unix,
     metrics::{Id, Samples, Source},
     one_drive,
-    plant::Plant,
+    plant::{Plant, views::NoticeView},
 };
 
 /// Reads the configuration again. Cheap to clone; one reload at a time.
@@ -75,6 +75,20 @@ impl Reloader {
             Ok(_) => (true, unix(Instant::now())),
             Err(_) => (false, last.1),
         };
+        drop(last);
+        let notice = match &reloaded {
+            Ok(done) if done.changes.is_empty() => None,
+            Ok(Done { changes, turning }) => {
+                let all: Vec<String> = changes.iter().map(ToString::to_string).collect();
+                let text = format!("the configuration was read again: {}", all.join("; "));
+                Some(NoticeView::new("reload", !turning.is_empty(), text))
+            }
+            Err(failure) => {
+                let text = format!("the configuration could not be read again: {failure}");
+                Some(NoticeView::new("reload", true, text))
+            }
+        };
+        notice.into_iter().for_each(|notice| self.0.plant.tell_notice(notice));
         let Done { changes, turning } = reloaded?;
         match turning.is_empty() {
             true => Ok(changes.iter().map(ToString::to_string).collect()),

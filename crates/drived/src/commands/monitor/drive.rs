@@ -3,15 +3,12 @@
 use std::time::Duration;
 
 use drive_core::{Control, Direction, Frequency, Setpoint, State, Status};
+use drive_fleet::{Link, Severity, view::ConcernView};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use tokio::time::Instant;
 
-use super::words;
-use crate::logging::escaped;
-
-/// A stop that is not confirmed after this time is the worst that can be told of a drive.
-const STOP_IS_LATE: Duration = Duration::from_secs(5);
+use crate::{client, logging::escaped};
 
 /// What was heard longer ago is old, whatever it says of itself: a drive of which nothing changes is told anew each 5 s.
 const HEARD_WITHIN: Duration = Duration::from_secs(12);
@@ -34,42 +31,10 @@ pub(super) struct Drive {
     good: bool,
     /// How old it was then.
     age: Option<Duration>,
-    /// For how long a stop had not been confirmed then.
-    stop: Option<Duration>,
+    /// Whether a stop was not confirmed then.
+    stop: bool,
+    concerns: Vec<ConcernView>,
     heard: Instant,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Link {
-    Connecting,
-    Connected,
-    Lost,
-}
-
-/// What is wrong with a drive, the worst first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Trouble {
-    StopIsLate,
-    Tripped,
-    Lost,
-    /// Another drive than before, or a watchdog that is not as its contract says.
-    Changed,
-    Warning,
-    Old,
-    Connecting,
-    None,
-}
-
-impl Trouble {
-    /// Whether somebody should go there.
-    pub(super) fn is_severe(self) -> bool {
-        self <= Self::Lost
-    }
-
-    /// Whether there is anything at all.
-    pub(super) fn is_any(self) -> bool {
-        self < Self::Connecting
-    }
 }
 
 impl Drive {
@@ -81,14 +46,11 @@ impl Drive {
             line: told["line"].as_str().unwrap_or_default().to_owned(),
             status: status_of(status),
             setpoint: read(&told["setpoint"]),
-            link: match told["link"].as_str() {
-                Some("connected") => Link::Connected,
-                Some("lost") => Link::Lost,
-                _ => Link::Connecting,
-            },
+            link: read(&told["link"]).unwrap_or_default(),
             good: status["quality"] == "good",
             age: status["age_ms"].as_u64().map(Duration::from_millis),
-            stop: told["stop"].is_object().then(|| milliseconds(&told["stop"]["since_ms"])),
+            stop: told["stop"].is_object(),
+            concerns: client::concerns(&told),
             heard,
             told,
         })
@@ -116,39 +78,46 @@ impl Drive {
 
     /// Whether a stop of it is not confirmed.
     pub(super) const fn stop_is_pending(&self) -> bool {
-        self.stop.is_some()
+        self.stop
     }
 
-    pub(super) fn trouble(&self, now: Instant, connected: bool) -> Trouble {
-        let stop = self.stop.map(|since| since + self.heard_ago(now));
-        let is = |group: &str, check: &str| self.told[group]["check"] == *check;
-        if stop.is_some_and(|since| since > STOP_IS_LATE) {
-            Trouble::StopIsLate
-        } else if self.status.as_ref().is_some_and(Status::is_fault) {
-            Trouble::Tripped
-        } else if self.link == Link::Lost {
-            Trouble::Lost
-        } else if is("identity", "changed") || is("watchdog", "broken") {
-            Trouble::Changed
-        } else if self.status.as_ref().is_some_and(|status| status.warning == Some(true)) {
-            Trouble::Warning
-        } else if self.link == Link::Connecting {
-            Trouble::Connecting
-        } else if self.is_live(now, connected) {
-            Trouble::None
-        } else {
-            Trouble::Old
-        }
+    /// All that troubles it, the worst first.
+    pub(super) fn concerns(&self) -> &[ConcernView] {
+        &self.concerns
+    }
+
+    /// The worst that troubles it.
+    pub(super) fn concern(&self) -> Option<&ConcernView> {
+        self.concerns.first()
+    }
+
+    /// Its place among all: who troubles nobody comes last.
+    pub(super) fn rank(&self) -> usize {
+        self.concern().map_or(usize::MAX, |concern| concern.rank)
+    }
+
+    /// Whether somebody should see to it.
+    pub(super) fn is_in_trouble(&self) -> bool {
+        self.concern().is_some_and(|concern| concern.severity.is_trouble())
+    }
+
+    /// Whether somebody should go there now.
+    pub(super) fn is_alarming(&self) -> bool {
+        self.concern().is_some_and(|concern| concern.severity == Severity::Alarm)
+    }
+
+    /// Whether it does not answer.
+    pub(super) fn is_lost(&self) -> bool {
+        self.link == Link::Lost
     }
 
     /// Its state in plain words: a drive that is lost is lost, whatever it showed last.
-    pub(super) fn state(&self) -> &'static str {
+    pub(super) fn state(&self) -> String {
         match (self.link, &self.status) {
-            (Link::Lost, _) => "Lost",
-            (Link::Connecting, _) => "Connecting",
-            (Link::Connected, None) => "Not known",
-            (Link::Connected, Some(_)) if self.stop.is_some() => "Stop pending",
-            (Link::Connected, Some(status)) => words::state(status.state),
+            (Link::Lost | Link::Connecting, _) => self.link.to_string(),
+            (Link::Connected, None) => "not known".to_owned(),
+            (Link::Connected, Some(_)) if self.stop => "stop pending".to_owned(),
+            (Link::Connected, Some(status)) => status.state.to_string(),
         }
     }
 
@@ -161,36 +130,13 @@ impl Drive {
     }
 
     /// What is to be said of it in a sentence; empty where nothing is.
-    pub(super) fn remark(&self, now: Instant, connected: bool) -> String {
-        let text = |value: &Value| value.as_str().map(escaped);
-        match self.trouble(now, connected) {
-            Trouble::StopIsLate => {
-                format!(
-                    "STOP NOT CONFIRMED, sent {} times: the motor may turn",
-                    self.told["stop"]["attempts"]
-                )
-            }
-            Trouble::Tripped => {
-                text(&self.told["fault"]["meaning"]).unwrap_or_else(|| "no meaning told yet".to_owned())
-            }
-            Trouble::Lost => text(&self.told["error"]).unwrap_or_else(|| "it does not answer".to_owned()),
-            Trouble::Changed if self.told["watchdog"]["check"] == "broken" => {
-                let why = text(&self.told["watchdog"]["why"]).unwrap_or_default();
-                format!("watchdog not as the contract says: {why}")
-            }
-            Trouble::Changed => "another drive than before answers at its address".to_owned(),
-            Trouble::Warning => "the drive shows an alarm".to_owned(),
-            Trouble::Old if connected => "what it shows is old".to_owned(),
-            Trouble::Old => String::new(),
-            Trouble::Connecting => text(&self.told["error"]).unwrap_or_default(),
-            Trouble::None if self.told["control"] == false => "only read".to_owned(),
-            Trouble::None => String::new(),
+    pub(super) fn remark(&self) -> String {
+        match self.concern() {
+            Some(concern) => escaped(&concern.text),
+            None if self.told["control"] == false => "only read".to_owned(),
+            None => String::new(),
         }
     }
-}
-
-fn milliseconds(value: &Value) -> Duration {
-    Duration::from_millis(value.as_u64().unwrap_or_default())
 }
 
 /// A value of one of the library's own types; `None` where there is none, or none that this program knows.
@@ -213,4 +159,18 @@ pub(super) fn status_of(status: &Value) -> Option<Status> {
         control: word("control").and_then(|control| control.parse::<Control>().ok()),
         ..Status::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::testing::every_pair_of_troubles;
+
+    #[tokio::test(start_paused = true)]
+    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
+        let now = Instant::now();
+        for (_, told, worst) in every_pair_of_troubles(now) {
+            assert_eq!(Drive::told(told, now).map(|drive| drive.remark()), Some(worst));
+        }
+    }
 }

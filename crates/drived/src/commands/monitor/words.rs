@@ -2,23 +2,6 @@
 
 use std::time::Duration;
 
-use drive_core::State;
-
-/// A state.
-pub(super) const fn state(state: State) -> &'static str {
-    match state {
-        State::NotReady => "Not ready",
-        State::Disabled => "Locked",
-        State::Ready => "Ready",
-        State::Running => "Running",
-        State::Stopping => "Stopping",
-        State::QuickStop => "Quick stop",
-        State::FaultReaction => "Tripping",
-        State::Fault => "Tripped",
-        State::Unknown => "Unknown",
-    }
-}
-
 /// What became of a command.
 pub(super) fn outcome(word: &str) -> &str {
     match word {

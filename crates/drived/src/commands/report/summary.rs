@@ -1,10 +1,11 @@
 //! What a reader wants to know first: what needs somebody, and every drive in one line.
 
+use drive_fleet::Severity;
 use maud::{Markup, html};
 use serde_json::Value;
 
 use super::{
-    drive::{UNWATCHED, tripped},
+    drive::UNWATCHED,
     gather::{DriveTold, Gathered, LEFT_OUT},
     line::KINDS,
     words::{cell, count, list, share, table, text, unread},
@@ -41,30 +42,30 @@ pub(super) fn overview(gathered: &Gathered) -> Markup {
 }
 
 fn trouble(drive: &DriveTold) -> bool {
-    !drive.is_there() || !drive.trips().is_empty() || drive.view["stop"].is_object()
+    client::concern(&drive.view).is_some_and(|concern| concern.severity.is_trouble())
 }
 
 /// What needs somebody, the worst first; what is the same of several drives stands once.
 pub(super) fn attention(gathered: &Gathered) -> Markup {
-    let mut all: Vec<(Concern, Vec<&DriveTold>)> = Vec::new();
+    let mut all: Vec<(Finding, Vec<&DriveTold>)> = Vec::new();
     for drive in &gathered.drives {
-        for concern in of_drive(drive) {
-            match all.iter_mut().find(|(known, _)| *known == concern) {
+        for finding in of_drive(drive) {
+            match all.iter_mut().find(|(known, _)| *known == finding) {
                 Some((_, drives)) => drives.push(drive),
-                None => all.push((concern, vec![drive])),
+                None => all.push((finding, vec![drive])),
             }
         }
     }
-    all.sort_by_key(|(concern, _)| concern.grade);
+    all.sort_by_key(|(finding, _)| (finding.grade, finding.rank));
     let lines: Vec<Markup> = gathered.lines.iter().flat_map(of_line).collect();
     html! {
         @if all.is_empty() && lines.is_empty() {
             p { "Nothing: every drive answers, none has a fault, and every line is as it was planned." }
         } @else {
             ul {
-                @for (concern, drives) in &all { li {
-                    @if concern.grade == Grade::Severe { strong { (concern.what) } } @else { (concern.what) }
-                    @if !concern.more.is_empty() { ": " (concern.more) }
+                @for (finding, drives) in &all { li {
+                    @if finding.grade == Grade::Severe { strong { (finding.what) } } @else { (finding.what) }
+                    @if !finding.more.is_empty() { ": " (finding.more) }
                     " – "
                     @for (index, drive) in drives.iter().enumerate() {
                         @if index > 0 { ", " } a href={ "#" (drive.anchor()) } { (drive.name()) }
@@ -78,8 +79,10 @@ pub(super) fn attention(gathered: &Gathered) -> Markup {
 
 /// Something of a drive that needs somebody.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Concern {
+struct Finding {
     grade: Grade,
+    /// That of what troubles the drive by itself; what only a report finds comes behind.
+    rank: usize,
     what: String,
     more: String,
 }
@@ -91,38 +94,34 @@ enum Grade {
     Unread,
 }
 
-fn of_drive(drive: &DriveTold) -> Vec<Concern> {
+/// What troubles a drive by itself, the worst first.
+fn concerns(view: &Value) -> Vec<Finding> {
+    let concerns = client::concerns(view).into_iter().map(|concern| Finding {
+        grade: match concern.severity {
+            Severity::Alarm => Grade::Severe,
+            Severity::Warning | Severity::Note => Grade::Worth,
+        },
+        rank: concern.rank,
+        what: concern.kind.to_string(),
+        more: concern.detail.unwrap_or_default(),
+    });
+    concerns.collect()
+}
+
+fn of_drive(drive: &DriveTold) -> Vec<Finding> {
     let view = &drive.view;
-    let mut told = Vec::new();
-    let mut say = |grade, what: &str, more: String| told.push(Concern { grade, what: what.to_owned(), more });
-    if !drive.is_there() {
-        let why = view["error"].as_str().unwrap_or("nothing is known of it");
-        say(Grade::Severe, "does not answer", why.to_owned());
-    }
-    for fault in drive.trips() {
-        say(Grade::Severe, "tripped", tripped(fault));
-    }
-    if view["stop"].is_object() {
-        say(Grade::Severe, "a stop is not confirmed, the motor may turn", String::new());
-    }
-    if view["identity"]["check"] == "changed" {
-        say(Grade::Severe, "it is another drive than the one that the program knows", String::new());
-    }
+    let mut told = concerns(view);
+    let mut say = |grade, what: &str, more: String| {
+        told.push(Finding { grade, rank: usize::MAX, what: what.to_owned(), more });
+    };
     let settings = drive.settings.as_ref();
-    if view["watchdog"]["check"] == "broken" {
-        let why = text(&view["watchdog"]["why"]).to_owned();
-        say(Grade::Worth, "the communication watchdog is not as the settings say", why);
-    } else if settings.is_ok_and(|told| told["feed"]["in_time"] == false) {
+    if settings.is_ok_and(|told| told["feed"]["in_time"] == false) {
         say(Grade::Worth, "the communication watchdog may run out between two frames", String::new());
     } else if settings.is_ok_and(|told| told["watchdog_armed"] == false) {
         say(Grade::Worth, "the communication watchdog is off", UNWATCHED.to_owned());
     }
     for warning in drive.faults.iter().flat_map(|faults| list(&faults["warnings"])) {
         say(Grade::Worth, "alarm", client::fault_in_words(warning));
-    }
-    let restarts: Vec<&str> = list(&view["starts_by_itself"]).iter().filter_map(Value::as_str).collect();
-    if !restarts.is_empty() {
-        say(Grade::Worth, "its own settings start the motor again by themselves", restarts.join(", "));
     }
     if drive.is_there() {
         let all = [settings.err(), drive.faults.as_ref().err(), drive.parameters.as_ref().err()];
@@ -164,4 +163,22 @@ fn of_line(line: &Result<Value, String>) -> Vec<Markup> {
         say(html! { "the settings ask for more than the line has: " (cell(format!("{planned:.0} %"))) });
     }
     told
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::time::Instant;
+
+    use super::*;
+    use crate::plant::testing::every_pair_of_troubles;
+
+    #[tokio::test(start_paused = true)]
+    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
+        for (_, view, worst) in every_pair_of_troubles(Instant::now()) {
+            let all = concerns(&view);
+            assert!(all.is_sorted_by_key(|finding| (finding.grade, finding.rank)), "{all:?}");
+            let Finding { what, more, .. } = &all[0];
+            assert_eq!(if more.is_empty() { what.clone() } else { format!("{what}: {more}") }, worst);
+        }
+    }
 }

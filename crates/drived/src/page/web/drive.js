@@ -9,7 +9,7 @@ import { MISSING, old, quantity } from './format.js';
 import { age, plant, quality, takeDrive } from './plant.js';
 import { named, t } from './texts.js';
 import { trend } from './trend.js';
-import { SEVERE, trouble } from './trouble.js';
+import { trouble } from './trouble.js';
 import { setpointText, stateWord, word } from './words.js';
 
 /** Measurements are read seldom: what is older than this says so, though it is the latest that there is. */
@@ -69,14 +69,14 @@ export function drive(root, name) {
     if (!names.has('state') && !names.has(`drive ${name}`)) return;
     shown = plant.drives.get(name) ?? shown;
     const status = shown.status ?? {};
-    const { rank, text } = trouble(shown);
-    setAttribute(head, 'data-state', rank <= SEVERE ? 'trouble' : status.state);
+    const { severity, text, remedy: first } = trouble(shown);
+    setAttribute(head, 'data-state', severity === 'alarm' ? 'trouble' : status.state);
     setText(state, stateWord(shown));
     setText(turns, [status.direction && word(status.direction), status.control && named(t('control'), word(status.control))]
       .filter(Boolean).map(part => ` · ${part}`).join(''));
     setText(place, t('line_of', shown));
     place.title = shown.identity?.model ?? '';
-    const said = shown.fault || status.state === 'fault' ? '' : text;
+    const said = shown.fault || status.state === 'fault' ? '' : [text, first].filter(Boolean).join(' – ');
     setText(remark, said);
     remark.hidden = !said;
     BIG.forEach(([, value, group], index) => {

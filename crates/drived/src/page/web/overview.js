@@ -8,7 +8,7 @@ import { carryOut } from './orders.js';
 import { plant } from './plant.js';
 import { COLUMNS, makeRow } from './row.js';
 import { named, t } from './texts.js';
-import { FINE, trouble } from './trouble.js';
+import { isTrouble, trouble } from './trouble.js';
 import { stateWord, word } from './words.js';
 
 /** Rows that are shown at once, and how many more each frame: the worst are read while the rest is made. */
@@ -17,7 +17,7 @@ const ROWS_AT_ONCE = 24;
 const MOVING = new Set(['running', 'stopping', 'quick_stop', 'fault_reaction']);
 const FILTERS = {
   all: () => true,
-  trouble: drive => trouble(drive).rank < FINE,
+  trouble: drive => isTrouble(trouble(drive)),
   running_drives: drive => MOVING.has(drive.status?.state),
   standing_drives: drive => !MOVING.has(drive.status?.state),
 };

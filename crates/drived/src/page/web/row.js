@@ -4,7 +4,7 @@ import { el, setAttribute, setClass, setText } from './dom.js';
 import { MISSING, old, quantity } from './format.js';
 import { age, quality } from './plant.js';
 import { t } from './texts.js';
-import { CONNECTING, SEVERE, trouble } from './trouble.js';
+import { isTrouble, trouble } from './trouble.js';
 import { setpointText, stateWord, word } from './words.js';
 
 const USUAL_HIGH_HZ = 50;
@@ -43,9 +43,10 @@ export function makeRow(drive) {
     shown = drive;
     const status = drive.status ?? {};
     const known = quality(status);
-    const { rank, text } = trouble(drive);
-    setAttribute(element, 'data-state', rank <= SEVERE ? 'trouble' : status.state);
-    setAttribute(element, 'data-trouble', rank <= SEVERE ? 'severe' : rank < CONNECTING && 'minor');
+    const worst = trouble(drive);
+    const severe = worst.severity === 'alarm';
+    setAttribute(element, 'data-state', severe ? 'trouble' : status.state);
+    setAttribute(element, 'data-trouble', severe ? 'severe' : isTrouble(worst) && 'minor');
     setAttribute(element, 'data-quality', known);
     setText(place, `${drive.line} · ${drive.slave} · ${drive.family}`);
     setText(state, stateWord(drive));
@@ -60,7 +61,8 @@ export function makeRow(drive) {
       ? quantity(status.current_a, 1, 'A') : quantity(status.current_percent, 0, '%'));
     setClass(currentBar, 'unknown', !share);
     fill(currentBar, status.current_percent, 100);
-    setText(note, text);
+    setText(note, worst.text);
+    note.title = worst.remedy;
     setText(control, status.control ? word(status.control) : MISSING);
     tick();
   }

@@ -47,6 +47,22 @@ export const SENTENCES_FR = {
   'start it first': 'le démarrer d’abord',
   'see what its display says, for its manual does not explain its status word': 'voir son afficheur, car son manuel n’explique pas ce mot d’état',
 
+  // What to do about what troubles a drive.
+  'use the emergency stop, then look at the drive; the stop is repeated': 'utiliser l’arrêt d’urgence, puis voir le variateur ; l’arrêt est répété',
+  'stop the drive at its panel before control is given back': 'arrêter le variateur à son terminal avant de rendre la commande',
+  'look at the motor, then at the drive\'s supply and its cable': 'voir le moteur, puis l’alimentation du variateur et son câble',
+  'see which drive it is, then accept its identity': 'voir quel variateur c’est, puis accepter son identité',
+  'set it at the drive, or change the contract': 'la régler sur le variateur, ou changer le contrat',
+  'stop the motor: it is set up at standstill': 'arrêter le moteur : elle est réglée à l’arrêt',
+  'look at its supply, its address and its cable': 'voir son alimentation, son adresse et son câble',
+  'see how busy its line is': 'voir à quel point sa ligne est chargée',
+  'switch them off at the drive, or accept them by name': 'les désactiver sur le variateur, ou les accepter par leur nom',
+  'look at load, fan and filters': 'voir la charge, le ventilateur et les filtres',
+  'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
+  'give control back there': 'y rendre la commande',
+  'wait until it is confirmed': 'attendre qu’il soit confirmé',
+  'wait, or look at its supply, its address and its cable': 'attendre, ou voir son alimentation, son adresse et son câble',
+
   // What became of it.
   'a later command took its place': 'un ordre ultérieur l’a remplacé',
   'it was withdrawn': 'il a été retiré',

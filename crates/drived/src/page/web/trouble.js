@@ -1,37 +1,25 @@
-// What is wrong with a drive, the worst first, in words.
+// What troubles a drive, as the daemon tells it: the worst, and its words in the language of the page.
 
 import { faultMeaning } from './fault_texts.js';
-import { quality } from './plant.js';
 import { t } from './texts.js';
 import { told } from './told.js';
 import { word } from './words.js';
 
-const STOP_IS_LATE_MS = 5_000;
-/** Ranks up to this one: the drive has tripped, is lost, or does not confirm a stop. */
-export const SEVERE = 2;
-/** The rank of a drive that has not been seen yet. */
-export const CONNECTING = 6;
-/** The rank of a drive that nothing is wrong with. */
-export const FINE = 9;
+/** How a drive stands that nothing troubles. */
+const NOTHING = { rank: Infinity, severity: 'none', text: '', remedy: '' };
 
-/** `{rank, text}`: 0 is the worst; `FINE` with a remark or none. */
+/** `{rank, severity, text, remedy}`: 0 is the worst; the severity is `alarm`, `warning`, `note` or `none`. */
 export function trouble(drive) {
-  const state = drive.status?.state;
-  if (drive.stop?.since_ms > STOP_IS_LATE_MS) return { rank: 0, text: t('stop_late', { count: drive.stop.attempts }) };
-  if (state === 'fault' || state === 'fault_reaction') return { rank: 1, text: faultText(drive) };
-  if (drive.link === 'lost') return { rank: 2, text: lostText(drive) };
-  if (drive.identity?.check === 'changed') return { rank: 3, text: t('identity_changed') };
-  if (drive.watchdog?.check === 'broken') return { rank: 3, text: t('watchdog_broken', { why: told(drive.watchdog.why) }) };
-  if (drive.status?.warning) return { rank: 4, text: t('warning_present') };
-  if (quality(drive.status) === 'stale') return { rank: 5, text: t('values_old') };
-  if (drive.link === 'connecting') return { rank: CONNECTING, text: told(drive.error) };
-  if (drive.stop) return { rank: FINE, text: t('stop_waits', { count: drive.stop.attempts }) };
-  if (drive.control === false) return { rank: FINE, text: t('only_read') };
-  return { rank: FINE, text: '' };
+  const [worst] = drive.concerns ?? [];
+  if (!worst) return drive.control === false ? { ...NOTHING, text: t('only_read') } : NOTHING;
+  const detail = worst.kind === 'tripped' ? faultText(drive) : told(worst.detail);
+  const text = [t(`concern_${worst.kind}`), detail].filter(Boolean).join(': ');
+  return { rank: worst.rank, severity: worst.severity, text, remedy: told(worst.remedy) };
 }
 
-function lostText({ error }) {
-  return told(error) || t('lost_now');
+/** Whether somebody should see to it; a note is none. */
+export function isTrouble({ severity }) {
+  return severity === 'alarm' || severity === 'warning';
 }
 
 /** Code, mnemonic and meaning of the present fault. */

@@ -7,14 +7,14 @@ import { told } from './told.js';
 const WORDS = {
   // States of a drive.
   not_ready: ['Not ready', 'Non prêt'],
-  disabled: ['Locked', 'Variateur verrouillé'],
+  disabled: ['Disabled', 'Verrouillé'],
   ready: ['Ready', 'Prêt'],
   running: ['Running', 'En marche'],
   stopping: ['Stopping', 'Décélération'],
   quick_stop: ['Quick stop', 'Arrêt rapide'],
-  fault_reaction: ['Tripping', 'Réaction au défaut'],
-  fault: ['Tripped', 'En défaut'],
-  unknown: ['Unknown state', 'État inconnu'],
+  fault_reaction: ['Fault reaction', 'Réaction au défaut'],
+  fault: ['Fault', 'En défaut'],
+  unknown: ['Unknown', 'État inconnu'],
   // Links.
   connecting: ['Connecting', 'Connexion'],
   connected: ['Connected', 'Raccordé'],
@@ -86,7 +86,9 @@ const WORDS = {
   warning: ['Alarm of the drive', 'Alarme du variateur'],
   limit: ['Limit', 'Limite'],
   control_taken: ['Control taken', 'Commande prise'],
+  control_elsewhere: ['Control elsewhere', 'Commande ailleurs'],
   control_returned: ['Control returned', 'Commande rendue'],
+  start_took_command: ['Start took command', 'Démarrage : commande prise'],
   run_command_stands: ['Run command stands', 'Ordre de marche présent'],
   restarts_itself: ['Restarts itself', 'Redémarre seul'],
   identified: ['Identified', 'Identifié'],
@@ -99,6 +101,10 @@ const WORDS = {
   stop_confirmed: ['Stop confirmed', 'Arrêt confirmé'],
   command: ['Command', 'Commande'],
   exit: ['Exit', 'Fin du service'],
+  removed: ['Removed', 'Retiré'],
+  reconfigured: ['Settings changed', 'Réglages modifiés'],
+  reload: ['Reload', 'Rechargement'],
+  clock_stepped: ['Clock stepped', 'Horloge recalée'],
   audit_log: ['Audit log', 'Journal d’audit'],
 };
 

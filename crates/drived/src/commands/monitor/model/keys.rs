@@ -27,7 +27,7 @@ impl Model {
         }
         if self.is_typing {
             self.type_search(key.code);
-            self.mark(KeyCode::Null, now);
+            self.mark(KeyCode::Null);
             return None;
         }
         match key.code {
@@ -39,7 +39,7 @@ impl Model {
             KeyCode::Char('3') => self.show(View::Events),
             KeyCode::Tab => self.next_view(),
             KeyCode::Esc | KeyCode::Backspace => self.back(),
-            _ => self.in_view(key.code, now),
+            _ => self.in_view(key.code),
         }
         None
     }
@@ -49,7 +49,7 @@ impl Model {
         match letter.to_ascii_lowercase() {
             STOP_ALL => Some(self.stop(Stop::All, unix(now))),
             STOP_THIS => {
-                let Some(name) = self.marked(now) else {
+                let Some(name) = self.marked() else {
                     self.refuse("No drive is marked: NOTHING WAS STOPPED. Ctrl-S stops all.");
                     return None;
                 };
@@ -132,17 +132,17 @@ impl Model {
         }
     }
 
-    fn in_view(&mut self, code: KeyCode, now: Instant) {
+    fn in_view(&mut self, code: KeyCode) {
         match (&self.view, code) {
             (View::Fleet, KeyCode::Enter | KeyCode::Right) => {
-                let first = || self.rows(now).first().map(|drive| drive.name.clone());
-                if let Some(name) = self.marked(now).or_else(first) {
+                let first = || self.rows().first().map(|drive| drive.name.clone());
+                if let Some(name) = self.marked().or_else(first) {
                     self.selected = Some(name.clone());
                     self.show(View::Drive(name));
                 }
             }
             (View::Fleet, KeyCode::Char('g')) => self.next_group(),
-            (View::Fleet, code) => self.mark(code, now),
+            (View::Fleet, code) => self.mark(code),
             (View::Drive(_), KeyCode::Char(' ')) => self.curves.pause_or_resume(),
             (View::Drive(_), KeyCode::Left) => self.curves.step(-1),
             (View::Drive(_), KeyCode::Right) => self.curves.step(1),
@@ -165,8 +165,8 @@ impl Model {
     }
 
     /// Moves the mark among the rows.
-    fn mark(&mut self, code: KeyCode, now: Instant) {
-        let names: Vec<String> = self.rows(now).iter().map(|drive| drive.name.clone()).collect();
+    fn mark(&mut self, code: KeyCode) {
+        let names: Vec<String> = self.rows().iter().map(|drive| drive.name.clone()).collect();
         let at = names.iter().position(|name| Some(name) == self.selected.as_ref());
         let to = match at {
             Some(at) => moved(at, code, self.page).min(names.len().saturating_sub(1)),

@@ -12,7 +12,7 @@ pub(super) use self::plant::{Connection, Plant};
 use super::{
     account::{Account, Progress, Sent, Stop},
     curves::Curves,
-    drive::{Drive, Trouble},
+    drive::Drive,
     happening::{Happening, Kind},
 };
 
@@ -128,9 +128,10 @@ impl Model {
                 let Some(account) = known else { return };
                 let is_silent = match &account.stop {
                     Stop::All => false,
-                    Stop::One(name) => self.plant.drive(name).is_some_and(|drive| {
-                        drive.trouble(now, true) == Trouble::Lost || !drive.is_live(now, true)
-                    }),
+                    Stop::One(name) => self
+                        .plant
+                        .drive(name)
+                        .is_some_and(|drive| drive.is_lost() || !drive.is_live(now, true)),
                 };
                 account.take(progress, is_silent);
             }
@@ -148,28 +149,24 @@ impl Model {
     }
 
     /// The drives that are searched for, those in trouble first.
-    pub(super) fn rows(&self, now: Instant) -> Vec<&Drive> {
-        let connected = self.plant.is_connected();
+    pub(super) fn rows(&self) -> Vec<&Drive> {
         let mut rows: Vec<&Drive> =
-            self.plant.drives.iter().filter(|drive| self.is_searched(drive, now)).collect();
+            self.plant.drives.iter().filter(|drive| self.is_searched(drive)).collect();
         // Stable: behind those in trouble the order is that of the daemon.
-        rows.sort_by_cached_key(|drive| match drive.trouble(now, connected) {
-            trouble if trouble.is_any() => trouble,
-            _ => Trouble::None,
-        });
+        rows.sort_by_key(|drive| drive.rank());
         rows
     }
 
-    fn is_searched(&self, drive: &Drive, now: Instant) -> bool {
+    fn is_searched(&self, drive: &Drive) -> bool {
         let in_group = self.group.as_ref().is_none_or(|group| self.plant.has(group, &drive.name));
         let text = || {
             let parts = [
                 drive.name.as_str(),
                 &drive.line,
-                drive.state(),
+                &drive.state(),
                 drive.told["family"].as_str().unwrap_or_default(),
                 &drive.fault().unwrap_or_default(),
-                &drive.remark(now, self.plant.is_connected()),
+                &drive.remark(),
             ];
             parts.join(" ").to_lowercase()
         };
@@ -193,13 +190,13 @@ impl Model {
     }
 
     /// The drive that the stop key of one drive is for.
-    pub(super) fn marked(&self, now: Instant) -> Option<String> {
+    pub(super) fn marked(&self) -> Option<String> {
         match &self.view {
             View::Drive(name) => Some(name.clone()),
             // One that is not in sight is not meant.
             View::Fleet => {
                 let marked = |drive: &&Drive| Some(&drive.name) == self.selected.as_ref();
-                self.rows(now).into_iter().find(marked).map(|drive| drive.name.clone())
+                self.rows().into_iter().find(marked).map(|drive| drive.name.clone())
             }
             View::Line(_) | View::Events => None,
         }

@@ -70,7 +70,7 @@ fn head(drive: &Drive, model: &Model, now: Instant, width: usize) -> Vec<Line<'s
         (true, true) => format!("STOP PENDING: {shows}"),
         (false, _) => format!("{}, NOT LIVE, {age} ago: ({shows})", drive.state().to_uppercase()),
     };
-    let style = match drive.trouble(now, model.plant.is_connected()).is_severe() {
+    let style = match drive.is_alarming() {
         true => alarm(),
         false if live => Style::new().add_modifier(Modifier::BOLD),
         false => Style::new().add_modifier(Modifier::DIM),
@@ -87,9 +87,15 @@ fn known(drive: &Drive, model: &Model, now: Instant, width: usize) -> Document {
     let live = drive.is_live(now, connected);
     let text = |value: &Value| value.as_str().map(escaped);
     fault(&mut document, &told["fault"]);
-    let remark = drive.remark(now, connected);
+    let remark = drive.remark();
     if !told["fault"].is_object() && !remark.is_empty() {
-        document.say(&remark, if drive.trouble(now, connected).is_any() { alarm() } else { Style::new() });
+        document.say(&remark, if drive.is_in_trouble() { alarm() } else { Style::new() });
+    }
+    for (place, concern) in drive.concerns().iter().enumerate() {
+        if place > 0 {
+            document.say(&escaped(&concern.text), Style::new());
+        }
+        document.pair("what to do", Some(escaped(&concern.remedy)));
     }
     if let Some(why) = text(&told["start_refused"]).filter(|_| told["control"] == true) {
         document.pair("a start now", Some(format!("would be refused: {why}")));

@@ -1,6 +1,7 @@
 //! The drives as a table, those in trouble first, and the lines below.
 
 use drive_core::Setpoint;
+use drive_fleet::Severity;
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
@@ -12,11 +13,7 @@ use serde_json::Value;
 use tokio::time::Instant;
 
 use super::{
-    super::{
-        drive::{Drive, Trouble},
-        model::Model,
-        words,
-    },
+    super::{drive::Drive, model::Model, words},
     document::{alarm, old},
     text::{fitted, height_of, shortened},
 };
@@ -58,7 +55,7 @@ pub(super) fn draw(model: &mut Model, now: Instant, frame: &mut Frame<'_>, area:
     ])
     .areas(area);
     let height = usize::from(table.height);
-    let rows = model.rows(now);
+    let rows = model.rows();
     let marked = rows.iter().position(|drive| Some(&drive.name) == model.selected.as_ref());
     // The mark stays in sight, and the last row is not far from the bottom.
     let first = marked.unwrap_or_default().saturating_sub(height / 2).min(rows.len().saturating_sub(height));
@@ -87,7 +84,8 @@ fn filter(model: &Model, found: usize) -> String {
 /// One drive in words and numbers.
 struct Row {
     name: String,
-    trouble: Trouble,
+    /// How badly something troubles it.
+    trouble: Option<Severity>,
     is_live: bool,
     colour: Color,
     /// Under [`HEADS`].
@@ -118,7 +116,7 @@ impl Row {
         };
         Self {
             name: drive.name.clone(),
-            trouble: drive.trouble(now, connected),
+            trouble: drive.concern().map(|concern| concern.severity),
             is_live,
             colour: status.map_or(Color::Reset, |status| colour(status, as_setpoint)),
             cells: [
@@ -129,7 +127,7 @@ impl Row {
                 dated(status.map_or("-", control).to_owned()),
             ],
             bar: output.filter(|_| is_live).map(|output| (output, setpoint.unwrap_or_default())),
-            remark: drive.remark(now, connected),
+            remark: drive.remark(),
         }
     }
 }
@@ -140,10 +138,10 @@ fn state(drive: &Drive, is_live: bool) -> String {
     let turning = status.filter(|status| status.state.is_moving() && !drive.stop_is_pending());
     let more = drive.fault().or_else(|| turning.map(|status| direction(status).to_owned()));
     let word = drive.state();
-    match (word, more) {
-        ("Lost" | "Connecting" | "Not known", _) => word.to_owned(),
-        (word, more) => {
-            let text = more.map_or_else(|| word.to_owned(), |more| format!("{word} {more}"));
+    match (&*word, more) {
+        ("lost" | "connecting" | "not known", _) => word,
+        (_, more) => {
+            let text = more.map_or_else(|| word.clone(), |more| format!("{word} {more}"));
             if is_live { text } else { format!("({text})") }
         }
     }
@@ -217,12 +215,12 @@ impl Columns {
 
     fn line(&self, row: &Row, is_marked: bool) -> Line<'static> {
         let sign = match row.trouble {
-            trouble if trouble.is_severe() => "!",
-            trouble if trouble.is_any() => "~",
+            Some(Severity::Alarm) => "!",
+            Some(Severity::Warning) => "~",
             _ => " ",
         };
         let mark = if is_marked { "▸" } else { " " };
-        let style = match (row.is_live, row.trouble.is_severe()) {
+        let style = match (row.is_live, row.trouble == Some(Severity::Alarm)) {
             (false, _) => old(),
             (true, true) => Style::new().fg(Color::Red),
             (true, false) => Style::new(),

@@ -51,7 +51,7 @@ pub(super) fn draw(model: &mut Model, now: Instant, frame: &mut Frame<'_>) {
     } else {
         view(model, now, frame, body);
     }
-    frame.render_widget(keys(model, now, width), footer);
+    frame.render_widget(keys(model, width), footer);
     if !has_colours() {
         without_colours(frame);
     }
@@ -75,8 +75,7 @@ fn without_colours(frame: &mut Frame<'_>) {
 
 fn title_of(model: &Model, now: Instant, width: usize) -> Line<'static> {
     let plant = &model.plant;
-    let connected = plant.is_connected();
-    let troubled = plant.drives.iter().filter(|drive| drive.trouble(now, connected).is_severe()).count();
+    let troubled = plant.drives.iter().filter(|drive| drive.is_in_trouble()).count();
     let drives = output::counted(plant.drives.len(), "drive", "drives");
     let trouble = if troubled > 0 { format!(", {troubled} in trouble") } else { String::new() };
     let (state, colour) = match &plant.connection {
@@ -142,14 +141,14 @@ fn accounts(model: &Model, width: usize) -> Vec<Line<'static>> {
     lines
 }
 
-fn keys(model: &Model, now: Instant, width: usize) -> Line<'static> {
+fn keys(model: &Model, width: usize) -> Line<'static> {
     let style = Style::new().add_modifier(Modifier::REVERSED);
     let text = if let Some(hint) = &model.hint {
         hint.clone()
     } else if model.is_typing {
         format!("Ctrl-S STOP ALL  search: {}_  Enter: keep, Esc: clear", model.search)
     } else {
-        let this = model.marked(now).map(|name| format!("  Ctrl-T stop {name}"));
+        let this = model.marked().map(|name| format!("  Ctrl-T stop {name}"));
         let stop = match model.plant.may_stop {
             true => format!("Ctrl-S STOP ALL ({NO_EMERGENCY_STOP}){}", this.unwrap_or_default()),
             false => "you have no right to stop".to_owned(),

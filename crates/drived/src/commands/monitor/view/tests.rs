@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use drive_fleet::{Concern, ConcernKind, view::ConcernView};
 use proptest::prelude::*;
 use ratatui::{Terminal, backend::TestBackend};
 use serde_json::{Value, json};
@@ -37,6 +38,12 @@ fn with(name: &str, more: &[(&str, Value)]) -> Value {
     drive
 }
 
+/// What troubles a drive, as the daemon tells it.
+fn concern(kind: ConcernKind, detail: &str) -> Value {
+    let concern = Concern { kind, since: None, detail: Some(detail.to_owned()) };
+    json!([ConcernView::of(&concern, Instant::now())])
+}
+
 fn tripped(name: &str) -> Value {
     let mut drive =
         with(name, &[("/status/state", json!("fault")), ("/status/output_frequency_hz", json!(0.0))]);
@@ -46,6 +53,7 @@ fn tripped(name: &str) -> Value {
         "before": {"state": "running", "direction": "forward", "output_frequency_hz": 48.5, "current_a": 9.9},
         "at_trip": {"state": "fault", "output_frequency_hz": 12.5},
     });
+    drive["concerns"] = concern(ConcernKind::Tripped, "9 OLF: motor overload");
     drive
 }
 
@@ -54,6 +62,7 @@ fn lost(name: &str) -> Value {
         [("/link", json!("lost")), ("/status/quality", json!("stale")), ("/status/age_ms", json!(21_000))];
     let mut drive = with(name, &stale);
     drive["error"] = "no answer".into();
+    drive["concerns"] = concern(ConcernKind::Lost, "no answer");
     drive
 }
 
@@ -129,10 +138,10 @@ fn those_in_trouble_stand_first_and_say_what_it_is() {
     let screen = monitor.screen(120, 24);
     let rows: Vec<&str> = screen.lines().collect();
     assert!(rows[0].contains("3 drives, 2 in trouble") && rows[0].contains("live"), "{screen}");
-    assert!(rows[2].contains("!pump 3") && rows[2].contains("Tripped OLF"), "{screen}");
+    assert!(rows[2].contains("!pump 3") && rows[2].contains("fault OLF"), "{screen}");
     assert!(rows[2].contains("motor overload"), "{screen}");
-    assert!(rows[3].contains("!pump 2") && rows[3].contains("Lost"), "{screen}");
-    assert!(rows[4].contains(" pump 1") && rows[4].contains("Running fwd"), "{screen}");
+    assert!(rows[3].contains("!pump 2") && rows[3].contains("lost"), "{screen}");
+    assert!(rows[4].contains(" pump 1") && rows[4].contains("running fwd"), "{screen}");
     assert!(screen.contains("north: 68 % used, a stop waits 608 ms at most"), "{screen}");
 }
 
@@ -460,7 +469,7 @@ fn what_begins_to_be_in_trouble_is_in_sight_until_somebody_marks_something_else(
     let mut monitor = Monitor::of(&drives);
     for number in [90, 80, 70] {
         monitor.tell("drive", tripped(&format!("pump {number}")));
-        assert!(monitor.row(&format!("!pump {number}"), 80).contains("Tripped OLF"));
+        assert!(monitor.row(&format!("!pump {number}"), 80).contains("fault OLF"));
     }
     monitor.press(KeyCode::Down);
     assert!(monitor.screen(80, 24).contains("▸!pump 70"), "the first of those in trouble");
