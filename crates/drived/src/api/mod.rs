@@ -20,6 +20,7 @@ use axum::{
     body::Bytes,
     extract::DefaultBodyLimit,
     http::header::{CACHE_CONTROL, CONTENT_TYPE},
+    response::{IntoResponse as _, Response},
     routing::{any, get},
 };
 
@@ -29,7 +30,7 @@ use self::{
     problem::Problem,
     routes::{Route, demo_routes, door_routes, reload_routes, routes},
 };
-use crate::plant::Plant;
+use crate::{doors::Caller, plant::Plant};
 
 /// The largest body that is read.
 const LARGEST_BODY: usize = 64 << 10;
@@ -47,6 +48,11 @@ pub(crate) fn demo_router(plant: Plant, stage: Stage) -> Router {
     let mut all = routes();
     all.extend(demo_routes());
     of(all, plant).layer(Extension(stage))
+}
+
+/// What is answered to somebody who lacks a right.
+pub(crate) fn lacks_right(caller: &Caller, right: &str) -> Response {
+    Problem::lacks_right(caller, right).into_response()
 }
 
 /// The description of a daemon's API.

@@ -1,59 +1,195 @@
-//! `drived audit`: whether the log of who did what is whole.
+//! `drived audit`: who did what, and whether the log of it is whole.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, str::FromStr};
 
-use serde_json::json;
+use chrono::{DateTime, Days, Local, NaiveDateTime, NaiveTime, TimeZone as _};
+use serde_json::{Value, json};
 
 use super::token::ConfigArgs;
 use crate::{
-    doors::audit::{Verdict, verify},
+    doors::audit::{Filter, Verdict, shown, verify_since},
     failure::Failure,
-    output::{self, JsonArgs},
+    output::{self, JsonArgs, Table},
 };
 
 /// Look into the audit log
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Say whether each line of the log stands behind the line that it was written behind
+    /// Say whether the log is whole: from the first line that is kept to the last that was written
     ///
     /// The files that were put aside (FILE.1 and so on) are read too. Exit code 1 where a line was changed, added or taken
-    /// out. A log that was cut at its end is known by the last hash alone, so note it elsewhere.
+    /// out, also at the beginning and at the end. A log that was put back as it was earlier, with its key, is known by a newest line
+    /// that was noted elsewhere: the daemon tells it in its own log, at its start and every hour.
     Verify {
-        /// The log, if not that of the configuration
-        #[arg(value_name = "FILE")]
-        file: Option<PathBuf>,
         #[command(flatten)]
-        config: ConfigArgs,
+        log: LogArgs,
+        /// A newest line that was noted earlier: it has to be in the log
+        #[arg(long, value_name = "HEAD")]
+        since: Option<String>,
+        #[command(flatten)]
+        json: JsonArgs,
+    },
+    /// Show who did what
+    Show {
+        #[command(flatten)]
+        log: LogArgs,
+        /// From this time on: 03:12, "2026-11-21 03:12" or as RFC 3339 has it
+        #[arg(long, value_name = "TIME")]
+        since: Option<Time>,
+        /// Before this time
+        #[arg(long, value_name = "TIME")]
+        until: Option<Time>,
+        /// By whom: a token's name, local, anonymous, drived
+        #[arg(long, value_name = "NAME")]
+        caller: Option<String>,
+        /// About what: a part of it, such as the name of a drive
+        #[arg(long, value_name = "TEXT")]
+        about: Option<String>,
+        /// What somebody might not do, instead of what was done
+        #[arg(long)]
+        refused: bool,
+        /// How many, the newest
+        #[arg(long, value_name = "COUNT", default_value_t = 100)]
+        last: usize,
         #[command(flatten)]
         json: JsonArgs,
     },
 }
 
-pub(crate) fn run(command: Command) -> Result<(), Failure> {
-    let Command::Verify { file, config, json } = command;
-    let file = match file {
-        Some(file) => file,
-        None => config.named("audit", config.doors()?.state.audit)?,
+/// Which log it is.
+#[derive(Debug, clap::Args)]
+pub(crate) struct LogArgs {
+    /// The log, if not that of the configuration
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+impl LogArgs {
+    fn file(self) -> Result<PathBuf, Failure> {
+        match self.file {
+            Some(file) => Ok(file),
+            None => self.config.named("audit", self.config.doors()?.state.audit),
+        }
+    }
+}
+
+/// A moment, as a person says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Time(u64);
+
+impl FromStr for Time {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let time = moment(text, Local::now())
+            .ok_or("expected 03:12, \"2026-11-21 03:12\" or 2026-11-21T03:12:00+01:00")?;
+        u64::try_from(time.timestamp_millis()).map(Self).map_err(|_| "expected a time after 1970")
+    }
+}
+
+/// A time without a day is the last one that has been.
+fn moment(text: &str, now: DateTime<Local>) -> Option<DateTime<Local>> {
+    if let Ok(whole) = DateTime::parse_from_rfc3339(text) {
+        return Some(whole.with_timezone(&Local));
+    }
+    let day = ["%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S"]
+        .into_iter()
+        .find_map(|form| NaiveDateTime::parse_from_str(text, form).ok());
+    let time =
+        || ["%H:%M", "%H:%M:%S"].into_iter().find_map(|form| NaiveTime::parse_from_str(text, form).ok());
+    let local = match day {
+        Some(day) => day,
+        None => {
+            let today = now.date_naive().and_time(time()?);
+            if today <= now.naive_local() { today } else { today.checked_sub_days(Days::new(1))? }
+        }
     };
-    let verdict = verify(&file)
-        .map_err(|error| Failure::Input(format!("{}: cannot be read: {error}", file.display())))?;
-    match verdict {
-        Verdict::Unbroken { records, torn, last } => {
-            let object = || json!({ "file": file, "records": records, "torn": torn, "last": last });
+    Local.from_local_datetime(&local).earliest()
+}
+
+pub(crate) fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Verify { log, since, json } => verify(log.file()?, since.as_deref(), json),
+        Command::Show { log, since, until, caller, about, refused, last, json } => {
+            let [since_unix_ms, until_unix_ms] = [since, until].map(|time| time.map(|time| time.0));
+            let filter = Filter { since_unix_ms, until_unix_ms, caller, about, refused };
+            let file = log.file()?;
+            let records = shown(&file, &filter, last).map_err(|error| unreadable(&file, &error))?;
+            if json.is_json() {
+                return records.iter().try_for_each(output::say_as_it_is);
+            }
+            if records.is_empty() {
+                return output::say(format_args!("{}: nothing of that", file.display()));
+            }
+            show(&records)
+        }
+    }
+}
+
+fn unreadable(file: &std::path::Path, error: &std::io::Error) -> Failure {
+    Failure::Input(format!("{}: cannot be read: {error}", file.display()))
+}
+
+fn show(records: &[Value]) -> Result<(), Failure> {
+    let mut table = Table::new(["time", "caller", "from", "kind", "what", "outcome"]);
+    for record in records {
+        let text = |key: &str| record[key].as_str().unwrap_or_default().to_owned();
+        let time = record["time_unix_ms"].as_i64().and_then(DateTime::from_timestamp_millis);
+        let time =
+            output::or_dash(time.map(|time| time.with_timezone(&Local).format("%Y-%m-%d %H:%M:%S%.3f")));
+        let body = match &record["body"] {
+            Value::Null => String::new(),
+            body => format!(" {body}"),
+        };
+        let outcome = output::or_dash(
+            record["outcome"]
+                .as_str()
+                .map(str::to_owned)
+                .or_else(|| record["status"].as_u64().map(|status| status.to_string())),
+        );
+        table.row([time, text("caller"), text("origin"), text("kind"), text("what") + &body, outcome]);
+    }
+    output::say_table(table)
+}
+
+fn verify(file: PathBuf, since: Option<&str>, json: JsonArgs) -> Result<(), Failure> {
+    match verify_since(&file, since).map_err(|error| unreadable(&file, &error))? {
+        Verdict::Unbroken { records, torn, last, head } => {
+            let object =
+                || json!({ "file": file, "records": records, "torn": torn, "last": last, "head": head });
             json.say(object, || {
                 let torn = match torn {
                     0 => String::new(),
                     torn => format!(", {torn} torn by a crash"),
                 };
+                let head = head.as_ref().unwrap_or(&last);
                 output::say(format_args!(
-                    "{}: {records} records, unbroken{torn}; the last is {last}",
+                    "{}: {records} records, unbroken{torn}; the last is {head}",
                     file.display()
                 ))
             })
         }
-        Verdict::Broken { file, line } => Err(Failure::Drive(format!(
-            "{}:{line}: the chain is broken: this line or the one before was changed, added or taken out",
-            file.display()
-        ))),
+        Verdict::Broken { file, line, why } => {
+            Err(Failure::Drive(format!("{}:{line}: the chain is broken: {why}", file.display())))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_without_a_day_is_the_last_one_that_has_been() {
+        let now = Local.with_ymd_and_hms(2026, 11, 21, 9, 0, 0).unwrap();
+        let told = |text: &str| moment(text, now).map(|time| time.naive_local().to_string());
+        assert_eq!(told("03:12").as_deref(), Some("2026-11-21 03:12:00"));
+        assert_eq!(told("23:10:05").as_deref(), Some("2026-11-20 23:10:05"));
+        assert_eq!(told("2026-11-01 03:12").as_deref(), Some("2026-11-01 03:12:00"));
+        let whole = moment("2026-11-21T03:12:00+01:00", now).unwrap();
+        assert_eq!(whole.timestamp(), 1_795_227_120);
+        assert_eq!(told("soon"), None);
     }
 }

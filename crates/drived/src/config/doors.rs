@@ -11,6 +11,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
+    gateway::Network,
     place::{ConfigError, Source},
     state::State,
     values::Parsed,
@@ -49,6 +50,8 @@ pub(crate) struct HttpConfig {
     pub(crate) plain: bool,
     /// Names by which it may be called beside its addresses.
     pub(crate) allowed_hosts: Vec<String>,
+    /// The proxies that say truly for whom they ask.
+    pub(crate) proxies: Vec<Network>,
     /// What is given without login; `None`: to see and to stop for this machine, nothing for others.
     pub(crate) without_login: Option<Freely>,
     /// Whether the drives are simulated, so that everybody may move them.
@@ -61,6 +64,8 @@ impl HttpConfig {
         match self.without_login {
             Some(Freely(role)) => role.map_or(Rights::NONE, Role::rights),
             None if proxied || !self.listen.ip().is_loopback() => Rights::NONE,
+            // It is called by a name, or in clear from beyond this machine: that is a proxy, which may not say that it is one.
+            None if self.proxies.is_empty() && (self.plain || !self.allowed_hosts.is_empty()) => Rights::NONE,
             None if self.demo => Role::Operate.rights(),
             None => Role::Stop.rights(),
         }
@@ -169,6 +174,8 @@ pub(super) struct HttpEntry {
     plain: bool,
     #[serde(default)]
     allowed_hosts: Vec<Spanned<String>>,
+    #[serde(default)]
+    proxies: Vec<Parsed<Network>>,
     without_login: Option<Parsed<Freely>>,
 }
 
@@ -183,7 +190,15 @@ pub(super) struct SocketEntry {
 impl HttpConfig {
     /// A server without anything that has to be configured.
     fn at(listen: SocketAddr) -> Self {
-        Self { listen, tls: None, plain: false, allowed_hosts: Vec::new(), without_login: None, demo: false }
+        Self {
+            listen,
+            tls: None,
+            plain: false,
+            allowed_hosts: Vec::new(),
+            proxies: Vec::new(),
+            without_login: None,
+            demo: false,
+        }
     }
 }
 
@@ -268,6 +283,7 @@ impl HttpEntry {
             tls,
             plain: self.plain,
             allowed_hosts: self.allowed_hosts.iter().map(|host| host.get_ref().clone()).collect(),
+            proxies: self.proxies.iter().map(|network| network.0).collect(),
             without_login: self.without_login.map(|freely| freely.0),
             demo: false,
         };

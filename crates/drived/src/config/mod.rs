@@ -27,7 +27,7 @@ use drive_fleet::{
 
 pub(crate) use self::{
     doors::{DoorsConfig, Http, HttpConfig, SocketConfig, TlsFiles},
-    gateway::{GatewayConfig, Units},
+    gateway::{GatewayConfig, Network, Units},
     groups::Group,
     mqtt::{Address, Discovery, MqttConfig},
     place::{ConfigError, Source as Place},

@@ -484,3 +484,39 @@ fn what_is_wrong_with_an_edge_node_is_told_with_its_place() {
         assert!(told.contains(problem), "{told}");
     }
 }
+
+/// The keys that a section takes, by the parser's own words for one that it does not know.
+fn taken(section: &str) -> std::collections::BTreeSet<String> {
+    let told = read(&format!("{section}\nnobody_knows_it = 1\n")).unwrap_err();
+    let (_, all) = told.split_once("expected one of ").unwrap_or_else(|| panic!("{section}: {told}"));
+    all.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// The keys of the table of the README with this head.
+fn documented(head: &str) -> std::collections::BTreeSet<String> {
+    let readme = include_str!("../../README.md");
+    let rows = readme.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
+    let firsts = rows.map_while(|row| row.strip_prefix("| ")?.split(" | ").next());
+    let keys = firsts.flat_map(|first| first.split('`').skip(1).step_by(2));
+    let bare = |key: &str| key.trim_matches(['[', ']']).rsplit('.').next().unwrap_or_default().to_owned();
+    keys.map(bare).collect()
+}
+
+#[test]
+fn the_readme_has_every_key_of_the_file_and_no_other() {
+    let mut top = documented("Top level");
+    top.extend(["lines", "drives"].map(str::to_owned));
+    assert_eq!(top, taken(""));
+    for (head, section) in [
+        ("`[lines.NAME]`", "[lines.a]"),
+        ("`[[drives]]`", "[[drives]]"),
+        ("`[http]`", "[http]"),
+        ("`[[gateways]]`", "[[gateways]]"),
+        ("`[mqtt.sparkplug]`", "[mqtt]\nservers = []\n[mqtt.sparkplug]"),
+    ] {
+        assert_eq!(documented(head), taken(section), "{head}");
+    }
+    let mut mqtt = documented("`[mqtt]`");
+    mqtt.insert("sparkplug".to_owned());
+    assert_eq!(mqtt, taken("[mqtt]"));
+}

@@ -3,6 +3,7 @@
 use std::{convert::Infallible, pin::pin, sync::Arc, time::Duration};
 
 use axum::{body::Body, http::Request, response::Response};
+use futures_util::FutureExt as _;
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
@@ -16,7 +17,7 @@ use super::{
     patient::Patient,
 };
 
-/// How long the head of a request may take, and how long a connection may ask for nothing.
+/// How long a connection may ask for nothing.
 const HEAD_WITHIN: Duration = Duration::from_secs(5);
 /// The most that the head of a request may be.
 const HEAD: usize = 16 * 1024;
@@ -45,14 +46,18 @@ pub(super) async fn serve<S, F>(
         .header_read_timeout(HEAD_WITHIN)
         .max_headers(HEADERS)
         .max_buf_size(HEAD)
-        .serve_connection(TokioIo::new(Patient::new(stream)), service);
+        .serve_connection(TokioIo::new(Patient::new(stream, Arc::clone(&place))), service);
     let mut connection = pin!(connection);
-    tokio::select! {
+    let makes_room = tokio::select! {
         // Whatever it ended by is the far end's affair.
         _ = connection.as_mut() => return,
-        () = place.wanted() => {}
-        _ = end.wait_for(|ended| *ended) => {}
-    }
+        () = place.wanted() => true,
+        _ = end.wait_for(|ended| *ended) => false,
+    };
     connection.as_mut().graceful_shutdown();
+    // Whoever has asked whole by now is answered; who has not makes room at once.
+    if makes_room && (connection.as_mut().now_or_never().is_some() || !place.asks()) {
+        return;
+    }
     let _ = timeout(DRAINED_WITHIN, connection).await;
 }

@@ -11,12 +11,14 @@ use axum::{
     Router,
     body::{Body, Bytes},
     http::{
-        HeaderMap, HeaderValue, Method, Request, StatusCode,
+        HeaderMap, HeaderValue, Method, Request, StatusCode, Version,
         header::{self, HeaderName},
+        request::Parts,
     },
     response::Response,
 };
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
+use hyper::body::Body as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
@@ -26,23 +28,27 @@ use tokio::{
 use tower::ServiceExt as _;
 
 use super::{
-    audit::{Audit, Kind, Record},
+    audit::{Audit, Kind, Record, bounded},
+    authority::Authority,
     crowd::Asking,
     failures::Failures,
     host::{self, Hosts},
     kept::Kept,
     refusal::Refusal,
-    rights::{Caller, Rights},
+    rights::{Caller, Rights, Role},
     sessions::{self, Sessions},
     token_desk,
     tokens::{self, Token, TokenError, Tokens},
 };
-use crate::json::line;
+use crate::{api::lacks_right, config::Network, json::line};
 
 /// The most that a request may say.
 const BODY: usize = 64 * 1024;
-/// How long it may take to say it.
+/// The most that whoever begins a session may say.
+const LOGIN_BODY: usize = 4 * 1024;
+/// How long whoever has brought a right token may take to say it, and whoever has not.
 const BODY_WITHIN: Duration = Duration::from_secs(10);
+const BODY_OF_NOBODY_WITHIN: Duration = Duration::from_secs(1);
 /// How long an answer may take to begin: the longest wait for a command, and 10 s.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 
@@ -71,7 +77,44 @@ pub(super) struct Door {
     pub(super) freely: Rights,
     /// The same, where a proxy stands between.
     pub(super) through_a_proxy: Rights,
+    /// Those who say truly for whom they ask.
+    pub(super) proxies: Vec<Network>,
     pub(super) encrypted: bool,
+}
+
+/// What a proxy adds to what it passes on.
+const OF_PROXIES: [&str; 10] = [
+    "forwarded",
+    "x-forwarded-for",
+    "x-forwarded-host",
+    "x-forwarded-port",
+    "x-forwarded-proto",
+    "x-forwarded-server",
+    "x-real-ip",
+    "via",
+    "cf-connecting-ip",
+    "true-client-ip",
+];
+
+impl Door {
+    /// Who asks, and whether through a proxy. Of one that is not named nothing is believed but that it is one.
+    fn whose(&self, peer: Peer, version: Version, headers: &HeaderMap) -> (Peer, bool) {
+        let Peer::Address(address) = peer else { return (peer, false) };
+        let is_named = |address: IpAddr| self.proxies.iter().any(|network| network.has(address));
+        if !is_named(address) {
+            // No browser and none of ours speaks the older one; proxies do where they are not told otherwise.
+            let proxied =
+                version == Version::HTTP_10 || OF_PROXIES.into_iter().any(|name| headers.contains_key(name));
+            return (peer, proxied);
+        }
+        // Each proxy adds whom it heard behind what it was told: the last that is none of ours is believed.
+        let all = headers.get_all("x-forwarded-for").iter().filter_map(|said| said.to_str().ok());
+        let said: Vec<IpAddr> =
+            all.flat_map(|said| said.split(',')).map_while(|one| one.trim().parse().ok()).collect();
+        let of_them =
+            said.into_iter().rev().map(|one: IpAddr| one.to_canonical()).find(|one| !is_named(*one));
+        (Peer::Address(of_them.unwrap_or(address)), true)
+    }
 }
 
 /// The far end of a connection.
@@ -97,7 +140,12 @@ pub(super) struct Gate {
     pub(super) tokens: Option<Arc<Tokens>>,
     pub(super) audit: Audit,
     pub(super) sessions: Mutex<Sessions>,
-    pub(super) failures: Mutex<Failures>,
+    /// Wrong tokens, by address.
+    pub(super) failures: Mutex<Failures<Option<IpAddr>>>,
+    /// What somebody may not do and has asked for, by caller.
+    pub(super) refused: Mutex<Failures<String>>,
+    /// Told when somebody may have lost what he was let in by.
+    pub(super) changes: watch::Sender<()>,
     /// True when the server ends.
     pub(super) end: watch::Receiver<bool>,
 }
@@ -105,7 +153,7 @@ pub(super) struct Gate {
 impl Gate {
     /// Answers a request.
     pub(super) async fn answer<B>(
-        &self,
+        self: &Arc<Self>,
         door: &Door,
         peer: Peer,
         request: Request<B>,
@@ -115,10 +163,10 @@ impl Gate {
         B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
     {
         let of_api = request.uri().path().starts_with(API);
-        let mut answer = match self.pass(door, peer, request).await {
-            Ok(answer) => answer,
-            Err(refusal) => refusal.into_response(),
-        };
+        let (peer, proxied) = door.whose(peer, request.version(), request.headers());
+        let mut authority = Authority::Freely;
+        let passed = self.pass(door, (peer, proxied), request, &asking, &mut authority).await;
+        let mut answer = passed.unwrap_or_else(Refusal::into_response);
         let is_stream = |headers: &HeaderMap| {
             headers
                 .get(header::CONTENT_TYPE)
@@ -131,17 +179,26 @@ impl Gate {
                 .after(Duration::from_secs(5))
                 .into_response();
         }
-        let streams = streams && answer.status().is_success();
+        // An answer that is made as it goes, such as an event stream or a capture.
+        let goes_on = answer.status().is_success() && answer.body().size_hint().exact().is_none();
+        let authority = authority.ends(Arc::clone(self), self.changes.subscribe());
         protect(answer.headers_mut(), of_api);
         answer.map(|body| {
-            Body::new(match streams {
-                true => Kept::stream(body, asking, self.end.clone()),
+            Body::new(match goes_on {
+                true => Kept::stream(body, asking, self.end.clone(), authority),
                 false => Kept::whole(body, asking),
             })
         })
     }
 
-    async fn pass<B>(&self, door: &Door, peer: Peer, request: Request<B>) -> Result<Response, Refusal>
+    async fn pass<B>(
+        &self,
+        door: &Door,
+        (peer, proxied): (Peer, bool),
+        request: Request<B>,
+        asking: &Asking,
+        authority: &mut Authority,
+    ) -> Result<Response, Refusal>
     where
         B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
     {
@@ -161,34 +218,56 @@ impl Gate {
         }
         let path = parts.uri.path().to_owned();
         let stops = parts.method == Method::POST && is_stop(&path);
+        if asking.is_for_stops() && !stops {
+            let why = "all places are taken: this one is for stops";
+            return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, why).after(Duration::from_secs(1)));
+        }
         let logs_in = parts.method == Method::POST && path == LOGIN;
+        let freely = freely(door, peer, proxied, &parts.headers);
         let caller = match logs_in {
-            true => freely(door, peer, &parts.headers),
-            false => self.caller(door, peer, &parts.headers, stops)?,
+            true => freely,
+            false => {
+                let caller;
+                (caller, *authority) = self.caller(freely, peer, &parts.headers, stops)?;
+                caller
+            }
+        };
+        let read = async |limit: usize| {
+            let is_known = *authority != Authority::Freely || peer.address().is_none();
+            let body = read(body, limit, if is_known { BODY_WITHIN } else { BODY_OF_NOBODY_WITHIN }).await?;
+            asking.is_whole();
+            Ok(body)
         };
         if let Some(name) = token_desk::named(&path) {
-            let body = if reads { Bytes::new() } else { read(body).await? };
+            let is_read = !reads && peer.address().is_none();
+            let body = if is_read { read(BODY).await? } else { Bytes::new() };
             return self.tokens_for(peer, &caller, (&parts.method, name), &body).await;
         }
         if reads {
+            asking.is_whole();
             parts.extensions.insert(caller);
             return self.route(Request::from_parts(parts, Body::empty())).await;
         }
-        if caller.rights == Rights::NONE && !logs_in {
-            return Err(Refusal::unauthorized("a token is needed"));
-        }
-        let body = read(body).await?;
         if logs_in {
-            return self.log_in(door, peer, caller, &body);
+            return self.log_in(door, peer, caller, &read(LOGIN_BODY).await?);
+        }
+        if caller.rights == Rights::NONE {
+            return Err(Refusal::unauthorized("a token is needed"));
         }
         if parts.method == Method::POST && path == LOGOUT {
             return Ok(self.log_out(door, &caller, &parts.headers));
         }
+        let Rights { stop, operate, engineer, .. } = caller.rights;
+        if !(operate || engineer || stops && stop) {
+            self.note_refused(&caller, &parts);
+            return Ok(lacks_right(&caller, if stops { "stop" } else { "operate" }));
+        }
+        let body = read(BODY).await?;
         let record = |kind| {
             let what = parts.uri.path_and_query().map_or(path.as_str(), |path| path.as_str());
             Record::new(kind, &caller, format!("{} {what}", parts.method))
         };
-        let came = Record { body: serde_json::from_slice(&body).ok(), ..record(Kind::Command) };
+        let came = Record { body: bounded(&body), ..record(Kind::Command) };
         let written = self.audit.record(came);
         if stops {
             // No disk holds up a stop.
@@ -247,18 +326,42 @@ impl Gate {
         let Some(tokens) = &self.tokens else {
             return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
         };
-        token_desk::answer(Arc::clone(tokens), &self.audit, caller, what, body).await
+        let answer = token_desk::answer(Arc::clone(tokens), &self.audit, caller, what, body).await;
+        self.changes.send_replace(());
+        answer
     }
 
-    /// Who asks. A token that is wrong is never taken for none.
-    fn caller(&self, door: &Door, peer: Peer, headers: &HeaderMap, stops: bool) -> Result<Caller, Refusal> {
-        let without = freely(door, peer, headers);
+    /// Whether what somebody was let in by is so still.
+    pub(super) fn holds(&self, authority: &Authority) -> bool {
+        let of_hash = |hash: &str, role: Role| {
+            let token = self.tokens.as_ref().and_then(|tokens| tokens.of_hash(hash).ok().flatten());
+            token.is_some_and(|token| token.role == role)
+        };
+        match authority {
+            Authority::Freely => true,
+            Authority::Token { sha256, role } => of_hash(sha256, *role),
+            Authority::Session { secret, sha256, role } => {
+                let is_begun = lock(&self.sessions).token(secret, Instant::now()) == Some(sha256.as_str());
+                is_begun && of_hash(sha256, *role)
+            }
+        }
+    }
+
+    /// Who asks, and by what he is let in. A token that is wrong is never taken for none.
+    fn caller(
+        &self,
+        without: Caller,
+        peer: Peer,
+        headers: &HeaderMap,
+        stops: bool,
+    ) -> Result<(Caller, Authority), Refusal> {
         match self.bearer(peer, headers, stops, &without) {
             // A file of tokens that cannot be read keeps nobody from a stop that needs none.
-            Err(Unlet::Unreadable(_)) if stops && without.rights.stop => Ok(without),
+            Err(Unlet::Unreadable(_)) if stops && without.rights.stop => Ok((without, Authority::Freely)),
             Err(Unlet::Unreadable(error)) => Err(unreadable(error)),
             Err(Unlet::Refused(refusal)) => Err(refusal),
-            Ok(token) => Ok(token.map_or(without.clone(), |token| of_token(&token, without))),
+            Ok(None) => Ok((without, Authority::Freely)),
+            Ok(Some((token, authority))) => Ok((of_token(&token, without), authority)),
         }
     }
 
@@ -269,15 +372,18 @@ impl Gate {
         headers: &HeaderMap,
         stops: bool,
         without: &Caller,
-    ) -> Result<Option<Token>, Unlet> {
+    ) -> Result<Option<(Token, Authority)>, Unlet> {
         let Some(authorization) = headers.get(header::AUTHORIZATION) else {
-            let session = sessions::cookie(headers)
-                .and_then(|cookie| lock(&self.sessions).token(cookie, Instant::now()).map(str::to_owned));
             // A session that is over is no wrong token: who had it is anybody again, and the page says so.
-            return match (session, &self.tokens) {
-                (Some(hash), Some(tokens)) => Ok(tokens.of_hash(&hash)?),
-                _ => Ok(None),
-            };
+            let Some(secret) = sessions::cookie(headers) else { return Ok(None) };
+            let hash = lock(&self.sessions).token(secret, Instant::now()).map(str::to_owned);
+            let (Some(sha256), Some(tokens)) = (hash, &self.tokens) else { return Ok(None) };
+            let token = tokens.of_hash(&sha256)?;
+            let secret = secret.to_owned();
+            return Ok(token.map(|token| {
+                let role = token.role;
+                (token, Authority::Session { secret, sha256, role })
+            }));
         };
         // Whoever has a right token stops his motors, whatever others do at the same address.
         if !stops {
@@ -288,8 +394,11 @@ impl Gate {
             .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
             .map(|(_, secret)| secret.trim());
         match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
-            Some(token) => Ok(Some(token)),
-            None => Err(Unlet::Refused(self.failed(peer, without.clone()))),
+            Some(token) => {
+                let authority = Authority::Token { sha256: token.sha256.clone(), role: token.role };
+                Ok(Some((token, authority)))
+            }
+            None => Err(Unlet::Refused(self.failed(peer, without))),
         }
     }
 
@@ -302,7 +411,7 @@ impl Gate {
         let LoginBody { token: secret } = serde_json::from_slice(body)
             .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
         let Some(token) = self.token(secret.trim()).map_err(unreadable)? else {
-            return Err(self.failed(peer, caller));
+            return Err(self.failed(peer, &caller));
         };
         let session = tokens::new_secret().map_err(unreadable)?;
         lock(&self.sessions).begin(&session, &token.sha256, Instant::now());
@@ -314,6 +423,7 @@ impl Gate {
     fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {
         if let Some(session) = sessions::cookie(headers) {
             lock(&self.sessions).end(session);
+            self.changes.send_replace(());
         }
         self.audit.record(Record::new(Kind::Logout, caller, "logout")).whenever();
         told(caller, None, door.encrypted)
@@ -321,8 +431,10 @@ impl Gate {
 
     /// Whether tokens of this address are looked at.
     fn wait(&self, peer: Peer) -> Result<(), Refusal> {
-        let Some(address) = peer.address() else { return Ok(()) };
-        match lock(&self.failures).wait(address, Instant::now()) {
+        if peer.address().is_none() {
+            return Ok(());
+        }
+        match lock(&self.failures).wait(&peer.address(), Instant::now()) {
             None => Ok(()),
             Some(wait) => {
                 let why = "too many wrong tokens from this address";
@@ -331,13 +443,31 @@ impl Gate {
         }
     }
 
-    fn failed(&self, peer: Peer, caller: Caller) -> Refusal {
-        if let Some(address) = peer.address() {
-            lock(&self.failures).count(address, Instant::now());
+    /// A wrong token has come. Of many only some are told.
+    fn failed(&self, peer: Peer, caller: &Caller) -> Refusal {
+        if let Some(untold) = lock(&self.failures).count(&peer.address(), Instant::now()) {
+            let what = and_before("a wrong token", untold);
+            tracing::warn!("{what} from {}", caller.origin);
+            self.audit.record_refused(Record::new(Kind::LoginFailed, caller, what));
         }
-        tracing::warn!("a wrong token from {}", caller.origin);
-        self.audit.record(Record::new(Kind::LoginFailed, &caller, "a wrong token")).whenever();
         Refusal::unauthorized("the token is wrong")
+    }
+
+    /// Somebody has asked for what he may not do. Of many only some are told.
+    fn note_refused(&self, caller: &Caller, asked: &Parts) {
+        let who = format!("{} {}", caller.name, caller.origin);
+        if let Some(untold) = lock(&self.refused).count(&who, Instant::now()) {
+            let what = and_before(&format!("{} {}", asked.method, asked.uri.path()), untold);
+            self.audit.record_refused(Record::new(Kind::Refused, caller, what));
+        }
+    }
+}
+
+/// What is told, and how often it has been so without being told.
+fn and_before(what: &str, untold: u64) -> String {
+    match untold {
+        0 => what.to_owned(),
+        untold => format!("{what}, and {untold} before that were not told"),
     }
 }
 
@@ -351,10 +481,8 @@ fn unreadable(error: TokenError) -> Refusal {
 }
 
 /// Whoever brings no token.
-fn freely(door: &Door, peer: Peer, headers: &HeaderMap) -> Caller {
+fn freely(door: &Door, peer: Peer, proxied: bool, headers: &HeaderMap) -> Caller {
     let browser = headers.contains_key("sec-fetch-site") || headers.contains_key(header::COOKIE);
-    let proxied =
-        ["forwarded", "x-forwarded-for", "x-real-ip"].into_iter().any(|name| headers.contains_key(name));
     let (name, origin) = match peer {
         Peer::Address(address) => {
             ("anonymous", format!("{} {}", if browser { "page" } else { "http" }, address.to_canonical()))
@@ -392,14 +520,14 @@ fn is_stop(path: &str) -> bool {
 }
 
 /// The body of a request, as far as it may go.
-async fn read<B>(body: B) -> Result<Bytes, Refusal>
+async fn read<B>(body: B, limit: usize, within: Duration) -> Result<Bytes, Refusal>
 where
     B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
 {
-    match timeout(BODY_WITHIN, Limited::new(body, BODY).collect()).await {
+    match timeout(within, Limited::new(body, limit).collect()).await {
         Ok(Ok(body)) => Ok(body.to_bytes()),
         Ok(Err(error)) if error.is::<LengthLimitError>() => {
-            Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, "a request may say 64 KiB"))
+            Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, format!("this may say {} KiB", limit >> 10)))
         }
         Ok(Err(_)) => Err(Refusal::new(StatusCode::BAD_REQUEST, "the request ended before its end")),
         Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long")),

@@ -1,4 +1,4 @@
-//! The body of an answer, which keeps the connection's place and ends with the server.
+//! The body of an answer, which keeps the connection's place, and ends with the server and with the authority of who asked for it.
 
 use std::{
     pin::Pin,
@@ -15,7 +15,7 @@ use super::crowd::Asking;
 pub(super) struct Kept {
     body: Body,
     _asking: Asking,
-    /// An event stream has no end of its own.
+    /// What goes on for long ends when this does.
     end: Option<Pin<Box<dyn Future<Output = ()> + Send>>>,
 }
 
@@ -24,10 +24,18 @@ impl Kept {
         Self { body, _asking: asking, end: None }
     }
 
-    pub(super) fn stream(body: Body, asking: Asking, mut end: watch::Receiver<bool>) -> Self {
+    pub(super) fn stream(
+        body: Body,
+        asking: Asking,
+        mut end: watch::Receiver<bool>,
+        authority: impl Future<Output = ()> + Send + 'static,
+    ) -> Self {
         let end = Box::pin(async move {
-            // Where nobody could say it any more, it has ended too.
-            let _ = end.wait_for(|ended| *ended).await;
+            tokio::select! {
+                // Where nobody could say it any more, it has ended too.
+                _ = end.wait_for(|ended| *ended) => {}
+                () = authority => {}
+            }
         });
         Self { body, _asking: asking, end: Some(end) }
     }

@@ -4,8 +4,9 @@
 //! Neither holds up a line: what is slow, idle or hostile is bounded, and what does not fit is turned away.
 
 pub(crate) mod audit;
+mod authority;
 mod connection;
-mod crowd;
+pub(crate) mod crowd;
 mod failures;
 mod gate;
 mod host;
@@ -20,7 +21,12 @@ mod tls;
 mod token_desk;
 pub(crate) mod tokens;
 
-use std::{io, net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    io,
+    net::{IpAddr, SocketAddr},
+    sync::Arc,
+    time::Duration,
+};
 
 use axum::Router;
 use drive_fleet::Events;
@@ -39,7 +45,7 @@ pub(crate) use self::socket::usual_places;
 use self::{
     audit::{Audit, Kind, Record},
     connection::DRAINED_WITHIN,
-    crowd::{Crowd, Place},
+    crowd::{Crowd, Limits, Place},
     gate::{Door, Gate, Peer},
     host::Hosts,
     tls::Tls,
@@ -137,8 +143,17 @@ impl Prepared {
         let (here, gone) = mpsc::channel(1);
         let (listens, listening) = watch::channel(self.http.is_none());
         let Self { tokens, audit, .. } = self;
-        let (sessions, failures) = Default::default();
-        let gate = Gate { router, tokens, audit: audit.clone(), sessions, failures, end: end.clone() };
+        let (sessions, failures, refused, changes) = Default::default();
+        let gate = Gate {
+            router,
+            tokens,
+            audit: audit.clone(),
+            sessions,
+            failures,
+            refused,
+            changes,
+            end: end.clone(),
+        };
         let shared = Shared { gate: Arc::new(gate), end, _here: here };
         audit.record(Record::of_program(Kind::Daemon, "the daemon serves")).whenever();
         #[cfg(unix)]
@@ -194,11 +209,12 @@ async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender
         hosts: Hosts::new(Some(address), &config.allowed_hosts),
         freely: config.freely(false),
         through_a_proxy: config.freely(true),
+        proxies: config.proxies.clone(),
         encrypted: tls.is_some(),
     };
     let listener = Listener::Tcp(listener, tls);
     let entrance =
-        Entrance { name: "the HTTP server", listener, door: Arc::new(door), crowd: Crowd::new(true) };
+        Entrance { name: "the HTTP server", listener, door: Arc::new(door), crowd: Crowd::new(Limits::HTTP) };
     entrance.serve_all(shared).await;
 }
 
@@ -252,8 +268,14 @@ impl Entrance {
             Err(error) => return Err(Failure::Input(error.to_string())),
         };
         let hosts = Hosts::new(None, &[]);
-        let door = Door { hosts, freely: Rights::ALL, through_a_proxy: Rights::ALL, encrypted: false };
-        let (listener, crowd) = (Listener::Unix(socket), Crowd::new(false));
+        let door = Door {
+            hosts,
+            freely: Rights::ALL,
+            through_a_proxy: Rights::ALL,
+            proxies: Vec::new(),
+            encrypted: false,
+        };
+        let (listener, crowd) = (Listener::Unix(socket), Crowd::new(Limits::SOCKET));
         Ok(Some(Self { name: "the control socket", listener, door: Arc::new(door), crowd }))
     }
 
@@ -273,7 +295,10 @@ impl Entrance {
                     continue;
                 }
             };
-            match self.crowd.enter(peer.address(), Instant::now()) {
+            // Behind a proxy there are many.
+            let is_proxy = |address: &IpAddr| self.door.proxies.iter().any(|network| network.has(*address));
+            let address = peer.address().filter(|address| !is_proxy(address));
+            match self.crowd.enter(address, Instant::now()) {
                 Some(place) => {
                     tokio::spawn(serve(shared.clone(), Arc::clone(&self.door), stream, peer, place));
                 }
@@ -316,7 +341,12 @@ async fn serve(shared: Shared, door: Arc<Door>, stream: Stream, peer: Peer, plac
     match stream {
         Stream::Tcp(stream, None) => connection::serve(stream, place, end, answer).await,
         Stream::Tcp(stream, Some(tls)) => {
-            if let Some(stream) = tls.accept(stream).await {
+            // Who is slow to agree makes room for others.
+            let accepted = tokio::select! {
+                accepted = tls.accept(stream) => accepted,
+                () = place.wanted() => None,
+            };
+            if let Some(stream) = accepted {
                 connection::serve(stream, place, end, answer).await;
             }
         }

@@ -83,14 +83,24 @@ impl Rig {
             hosts: Hosts::new(Some(config.listen), &[]),
             freely: config.freely(false),
             through_a_proxy: config.freely(true),
+            proxies: Vec::new(),
             encrypted: false,
         };
         let (end, ended) = watch::channel(false);
-        let (sessions, failures) = Default::default();
+        let (sessions, failures, refused, changes) = Default::default();
         let tokens = Some(Arc::new(Tokens::open(&folder.file("tokens")).unwrap()));
         let audit = Audit::open(&folder.file("audit")).unwrap();
-        let gate = Arc::new(Gate { router: router(), tokens, audit, sessions, failures, end: ended });
-        Self { gate, door, crowd: Crowd::new(true), end, folder }
+        let gate = Arc::new(Gate {
+            router: router(),
+            tokens,
+            audit,
+            sessions,
+            failures,
+            refused,
+            changes,
+            end: ended,
+        });
+        Self { gate, door, crowd: Crowd::new(crowd::Limits::HTTP), end, folder }
     }
 
     fn token(&self, name: &str, role: Role) -> String {
@@ -153,11 +163,30 @@ impl Rig {
         Some(far)
     }
 
+    /// An event stream with these headers, of which something has been heard.
+    async fn stream(&self, headers: &str) -> DuplexStream {
+        let mut stream = self.connect();
+        let request = format!("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n{headers}\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut heard = Vec::new();
+        while !heard.windows(4).any(|four| four == b"tick") {
+            assert_ne!(stream.read_buf(&mut heard).await.unwrap(), 0, "{}", String::from_utf8_lossy(&heard));
+        }
+        stream
+    }
+
     /// What the audit log has of it, kind and outcome, once all is written.
     async fn audited(&self) -> Vec<String> {
         let last = Record::of_program(Kind::Daemon, "last");
-        self.gate.audit.record(last).done().await.unwrap();
-        let text = fs::read_to_string(self.folder.file("audit")).unwrap();
+        self.gate.audit.record(last.clone()).done().await.unwrap();
+        // That of what was refused has a writer of its own.
+        self.gate.audit.record_refused(last);
+        while !fs::read_to_string(self.folder.file("audit.refused")).unwrap().contains("\"what\":\"last\"") {
+            tokio::task::yield_now().await;
+        }
+        let text = ["audit", "audit.refused"]
+            .map(|name| fs::read_to_string(self.folder.file(name)).unwrap())
+            .concat();
         let told = |line: &str| {
             let line: serde_json::Value = serde_json::from_str(line).unwrap();
             let text = |key: &str| line[key].as_str().unwrap_or("-").to_owned();
@@ -339,8 +368,8 @@ async fn every_answer_tells_the_browser_to_keep_to_itself_and_no_other_site_is_a
 #[tokio::test]
 async fn each_command_is_audited_with_what_became_of_it() {
     let rig = Rig::new("audited");
-    rig.ask(&START).await;
-    assert_eq!(rig.audited().await, ["command anonymous -", "answer anonymous refused"]);
+    rig.ask_on_socket(&START).await;
+    assert_eq!(rig.audited().await, ["command local -", "answer local refused"]);
     let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
     assert!(log.contains("POST /api/v1/drives/pump%201/start") && log.contains(r#""id":"c-1""#), "{log}");
 }
@@ -348,24 +377,24 @@ async fn each_command_is_audited_with_what_became_of_it() {
 #[tokio::test]
 async fn what_cannot_be_audited_is_not_done_but_a_stop() {
     let rig = Rig::new("no-audit");
-    rig.ask(&START).await;
+    rig.ask_on_socket(&START).await;
     assert_eq!(rig.audited().await.len(), 2);
     // A folder in its place: nothing can be written there.
     fs::remove_file(rig.folder.file("audit")).unwrap();
     fs::create_dir(rig.folder.file("audit")).unwrap();
-    rig.ask(&START).await.assert_refused(503);
+    rig.ask_on_socket(&START).await.assert_refused(503);
     assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
     assert_eq!(rig.ask(&STATE).await.status, StatusCode::OK);
     fs::remove_dir(rig.folder.file("audit")).unwrap();
-    assert_eq!(rig.ask(&START).await.status, StatusCode::CONFLICT, "the disk is there again");
+    assert_eq!(rig.ask_on_socket(&START).await.status, StatusCode::CONFLICT, "the disk is there again");
 }
 
 #[tokio::test]
 async fn a_request_says_64_kib_at_the_most() {
     let rig = Rig::new("body");
     let most = " ".repeat(64 * 1024);
-    assert_eq!(rig.ask(&Asked { body: &most, ..START }).await.status, StatusCode::CONFLICT);
-    rig.ask(&Asked { body: &(most.clone() + " "), ..START }).await.assert_refused(413);
+    assert_eq!(rig.ask_on_socket(&Asked { body: &most, ..START }).await.status, StatusCode::CONFLICT);
+    rig.ask_on_socket(&Asked { body: &(most.clone() + " "), ..START }).await.assert_refused(413);
 }
 
 const HEAD: &[u8] = b"GET /api/v1/state HTTP/1.1\r\nHost: localhost\r\n";
@@ -470,6 +499,183 @@ async fn login_and_logout_are_answered_as_the_document_says() {
         &serde_json::from_str(&right).unwrap(),
         "the body",
     );
+}
+
+/// How much is still heard of a stream in so many of its ticks; `None`: it has ended.
+async fn heard(stream: &mut DuplexStream, ticks: u32) -> Option<usize> {
+    let (mut all, mut ended) = (Vec::new(), false);
+    let _ = timeout(ticks * Duration::from_secs(5), async {
+        ended = stream.read_to_end(&mut all).await.is_ok();
+    })
+    .await;
+    (!ended).then_some(all.len())
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_stream_ends_when_its_token_is_removed_and_others_go_on() {
+    let rig = Rig::new("live");
+    let bearers =
+        ["removed", "other"].map(|name| format!("Authorization: Bearer {}", rig.token(name, Role::View)));
+    let mut removed = rig.stream(&bearers[0]).await;
+    let mut other = rig.stream(&bearers[1]).await;
+    let mut free = rig.stream("X: y").await;
+    rig.gate.tokens.as_ref().unwrap().remove("removed").unwrap();
+    assert_eq!(heard(&mut removed, 2).await, None);
+    assert!(heard(&mut other, 10).await.is_some());
+    assert!(heard(&mut free, 10).await.is_some());
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_stream_ends_with_its_session_by_logout_and_by_time() {
+    let rig = Rig::new("live-session");
+    let login = format!("{{\"token\":\"{}\"}}", rig.token("panel", Role::Operate));
+    let login = Asked { path: "/api/v1/login", body: &login, ..START };
+    let mut cookies = Vec::new();
+    for _ in 0..2 {
+        let answer = rig.ask(&login).await;
+        cookies
+            .push(answer.headers[header::SET_COOKIE].to_str().unwrap().split(';').next().unwrap().to_owned());
+    }
+    let mut left = rig.stream(&format!("Cookie: {}", cookies[0])).await;
+    let mut kept = rig.stream(&format!("Cookie: {}", cookies[1])).await;
+    rig.ask(&Asked { path: "/api/v1/logout", headers: &[("cookie", &cookies[0])], ..START }).await;
+    assert_eq!(heard(&mut left, 2).await, None);
+    assert!(heard(&mut kept, 10).await.is_some());
+    // Its cookie lasts for twelve hours.
+    assert_eq!(heard(&mut kept, 12 * 60 * 12 + 2).await, None);
+}
+
+/// A whole stop, and whether it was answered.
+async fn stops(stream: &mut DuplexStream, bearer: &str) -> bool {
+    let request = format!(
+        "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 2\r\n{bearer}\r\n{{}}"
+    );
+    stream.write_all(request.as_bytes()).await.unwrap();
+    let mut status = [0; 12];
+    stream.read_exact(&mut status).await.is_ok() && &status == b"HTTP/1.1 200"
+}
+
+#[tokio::test(start_paused = true)]
+async fn whoever_says_his_login_slowly_keeps_nobody_from_a_stop() {
+    let rig = Rig::new("slow-logins");
+    let bearer = format!("Authorization: Bearer {}\r\n", rig.token("panel", Role::Stop));
+    let login = "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 80\r\n\r\n{";
+    let mut slow = Vec::new();
+    for number in 0..64 {
+        let mut stream = rig.connect_from([10, 0, number / 16, number % 16]).unwrap();
+        stream.write_all(login.as_bytes()).await.unwrap();
+        slow.push(stream);
+    }
+    sleep(Duration::from_millis(10)).await;
+    for address in [[10, 0, 0, 1], [10, 0, 9, 9]] {
+        let mut stream = rig.connect_from(address).expect("the slow make room");
+        assert!(stops(&mut stream, &bearer).await);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn nothing_is_read_for_longer_than_a_second_before_it_is_known_who_asks() {
+    let rig = Rig::new("login-in-time");
+    let mut slow = rig.connect();
+    let login = "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 80\r\n\r\n{";
+    slow.write_all(login.as_bytes()).await.unwrap();
+    let begun = Instant::now();
+    let mut answer = Vec::new();
+    slow.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 408"), "{}", String::from_utf8_lossy(&answer));
+    assert!(begun.elapsed() <= Duration::from_millis(1_100), "{:?}", begun.elapsed());
+}
+
+#[tokio::test]
+async fn a_proxy_that_hides_whom_it_speaks_for_makes_nobody_local() {
+    let rest = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";
+    let folder = Folder::new("proxies");
+    for (http, freely) in [
+        ("", Role::Stop.rights()),
+        // Somebody calls it by a name: a proxy stands before it.
+        ("allowed_hosts = [\"drives.example\"]", Rights::NONE),
+        // A proxy encrypts, as the key says.
+        ("plain = true", Rights::NONE),
+    ] {
+        fs::write(folder.file("drives.toml"), format!("[http]\n{http}\n{rest}")).unwrap();
+        let config = crate::config::Config::load(&folder.file("drives.toml")).unwrap();
+        assert_eq!(config.doors.http.unwrap().freely(false), freely, "{http}");
+    }
+    let rig = Rig::new("hidden-proxy");
+    for (name, value) in
+        [("via", "1.1 front"), ("x-forwarded-host", "drives.example"), ("x-forwarded-proto", "https")]
+    {
+        rig.ask(&Asked { headers: &[(name, value)], ..STOP }).await.assert_refused(401);
+    }
+}
+
+#[tokio::test]
+async fn what_a_viewer_may_not_do_takes_no_room_in_the_log_of_what_was_done() {
+    let rig = Rig::new("refused");
+    let bearer = format!("Bearer {}", rig.token("viewer", Role::View));
+    let body = format!("{{\"a\":\"{}\"}}", "x".repeat(60_000));
+    for _ in 0..50 {
+        let asked = Asked { headers: &[("authorization", &bearer)], body: &body, ..START };
+        rig.ask(&asked).await.assert_refused(403);
+    }
+    // Of fifty ten are told, in a file of their own.
+    assert_eq!(rig.audited().await, vec!["refused viewer -"; 10]);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(!log.contains("viewer"), "{log}");
+    let size: u64 =
+        fs::read_dir(rig.folder.file("")).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
+    assert!(size < 20_000, "{size} bytes");
+}
+
+#[tokio::test]
+async fn a_token_that_was_sent_to_a_wrong_path_stands_nowhere() {
+    let rig = Rig::new("masked");
+    let bearer = format!("Bearer {}", rig.token("boss", Role::Engineer));
+    let body = format!("{{\"token\":\"{}\",\"password\":\"secret\"}}", &bearer[7..]);
+    let path = format!("/api/v1/logins?token={}", &bearer[7..]);
+    rig.ask(&Asked { path: &path, headers: &[("authorization", &bearer)], body: &body, ..START }).await;
+    rig.audited().await;
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(log.contains("POST /api/v1/logins"), "{log}");
+    assert!(!log.contains(&bearer[11..]) && !log.contains("secret"), "{log}");
+}
+
+#[tokio::test]
+async fn a_stop_that_could_not_be_written_stands_in_the_log_as_soon_as_it_can() {
+    let rig = Rig::new("gap");
+    rig.ask_on_socket(&START).await;
+    rig.audited().await;
+    let held = fs::read(rig.folder.file("audit")).unwrap();
+    fs::remove_file(rig.folder.file("audit")).unwrap();
+    fs::create_dir(rig.folder.file("audit")).unwrap();
+    assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
+    rig.ask_on_socket(&START).await.assert_refused(503);
+    assert!(*rig.gate.audit.failing().borrow());
+    fs::remove_dir(rig.folder.file("audit")).unwrap();
+    fs::write(rig.folder.file("audit"), held).unwrap();
+    rig.audited().await;
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    let gap = log.lines().find(|line| line.contains("\"kind\":\"gap\"")).expect("a gap");
+    assert!(gap.contains("POST /api/v1/stop"), "{gap}");
+    assert!(!*rig.gate.audit.failing().borrow());
+    let verdict = audit::verify(&rig.folder.file("audit")).unwrap();
+    assert!(matches!(verdict, audit::Verdict::Unbroken { .. }), "{verdict:?}");
+}
+
+#[tokio::test]
+async fn wrong_tokens_on_the_path_of_a_stop_fill_no_log() {
+    let rig = Rig::new("flood");
+    for number in 0..500 {
+        let wrong = format!("Bearer drv_{number}");
+        rig.ask(&Asked { headers: &[("authorization", &wrong)], ..STOP }).await.assert_refused(401);
+    }
+    rig.audited().await;
+    let mut lines = 0;
+    for file in fs::read_dir(rig.folder.file("")).unwrap() {
+        let text = fs::read_to_string(file.unwrap().path()).unwrap_or_default();
+        lines += text.lines().filter(|line| line.contains("login_failed")).count();
+    }
+    assert!((1..=30).contains(&lines), "{lines}");
 }
 
 #[tokio::test]

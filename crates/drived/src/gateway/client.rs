@@ -16,6 +16,7 @@ use super::{
     desk::{Asked, Desk},
     framing::{Frame, Frames},
 };
+use crate::doors::crowd::Place;
 
 /// Requests that wait behind the one that is carried out; one more is answered by 06h.
 const QUEUED: usize = 8;
@@ -35,13 +36,18 @@ struct Waiting {
 }
 
 /// Serves a client until it goes, or has to.
-pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAddr, desk: Arc<Desk>) {
+pub(super) async fn serve(
+    stream: impl AsyncRead + AsyncWrite + Send,
+    peer: IpAddr,
+    desk: Arc<Desk>,
+    place: &Place,
+) {
     let (input, output) = tokio::io::split(stream);
     let (answers, outbox) = mpsc::channel(UNREAD);
     let (queue, waiting) = mpsc::channel(QUEUED);
     let mut written = std::pin::pin!(write(output, outbox));
     let mut carried = std::pin::pin!(carry_out(&desk, peer, waiting, answers.clone()));
-    let read = read(input, &desk, peer, queue, answers);
+    let read = read(input, &desk, (peer, place), queue, answers);
     let (ended, takes_more) = tokio::select! {
         ended = read => (ended, true),
         // Whoever takes no answer any more asks nothing more.
@@ -67,7 +73,7 @@ pub(super) async fn serve(stream: impl AsyncRead + AsyncWrite + Send, peer: IpAd
 async fn read(
     mut input: impl AsyncRead + Unpin,
     desk: &Arc<Desk>,
-    peer: IpAddr,
+    (peer, place): (IpAddr, &Place),
     queue: mpsc::Sender<Waiting>,
     answers: mpsc::Sender<Bytes>,
 ) -> Option<Ended> {
@@ -91,6 +97,7 @@ async fn read(
                 Err(_) => return Some(Ended::Malformed),
             };
             desk.clients.hear(peer, arrived);
+            place.hear(arrived);
             let Frame { transaction, unit, .. } = frame;
             let asked = desk.look_at(arrived, &frame);
             if asked.stop.is_some() {

@@ -20,8 +20,8 @@ use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use tokio::{
     net::{TcpListener, TcpStream},
-    sync::{Semaphore, watch},
-    time::sleep,
+    sync::watch,
+    time::{Instant, sleep},
 };
 
 use self::{
@@ -30,7 +30,12 @@ use self::{
 };
 use crate::{
     config::{Config, GatewayConfig},
-    doors::{TRIED_AGAIN, audit::Audit, listen},
+    doors::{
+        TRIED_AGAIN,
+        audit::Audit,
+        crowd::{Crowd, Limits},
+        listen,
+    },
     metrics::Source,
     plant::Plant,
 };
@@ -94,7 +99,7 @@ async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<()>) {
 /// Accepts clients until the end, and serves each on a task of its own. When the system has no room for one more, such as
 /// no file descriptor, it is tried again a little later.
 async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::Receiver<()>) {
-    let places = Arc::new(Semaphore::new(desk.config.clients));
+    let places = Crowd::new(Limits::of_gateway(desk.config.clients));
     let (name, mut failed) = (&desk.config.name, 0_u64);
     loop {
         let (stream, peer) = tokio::select! {
@@ -113,7 +118,7 @@ async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::
         };
         let allow = &desk.config.allow;
         let place = match allow.is_empty() || allow.iter().any(|network| network.has(peer)) {
-            true => Arc::clone(&places).try_acquire_owned().map_err(|_| Ended::Full),
+            true => places.enter(Some(peer), Instant::now()).ok_or(Ended::Full),
             false => Err(Ended::NotAllowed),
         };
         let place = match place {
@@ -132,10 +137,11 @@ async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::
         tokio::spawn(async move {
             let _present = desk.counters.enter();
             tokio::select! {
-                () = client::serve(stream, peer, Arc::clone(&desk)) => {}
+                () = client::serve(stream, peer, Arc::clone(&desk), &place) => {}
+                // Somebody who speaks needs the place of one who does not.
+                () = place.wanted() => drop(desk.counters.end(Ended::Idle)),
                 _ = ended.changed() => {}
             }
-            drop(place);
         });
     }
 }

@@ -128,11 +128,19 @@ impl Kept {
 
     /// Opens it to read and to append; where there is none it is made, for its owner alone.
     pub(crate) fn open_to_append(&self) -> io::Result<File> {
+        self.open_or_make(OFlags::RDWR.union(OFlags::APPEND))
+    }
+
+    /// Opens it to read and to write in its place; where there is none it is made, for its owner alone.
+    pub(crate) fn open_to_write(&self) -> io::Result<File> {
+        self.open_or_make(OFlags::RDWR)
+    }
+
+    fn open_or_make(&self, how: OFlags) -> io::Result<File> {
         let folder = folder::open_or_make(&self.folder)?;
-        let append = OFlags::RDWR.union(OFlags::APPEND);
-        match self.open_in(&folder, append.union(OFlags::CREATE).union(OFlags::EXCL)) {
+        match self.open_in(&folder, how | OFlags::CREATE | OFlags::EXCL) {
             Ok(file) => give_to_owner_of(&folder, &file).map(|()| file),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => self.open_in(&folder, append),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => self.open_in(&folder, how),
             Err(error) => Err(error),
         }
     }

@@ -1,28 +1,48 @@
-//! The audit log: who asked for what, from where, and what was answered. One JSON object a line, each with the SHA-256 of
-//! the line before, so that a line that was changed, added or taken out is found.
+//! The audit log: who asked for what, from where, and what was answered. One JSON object a line, each with its number, the SHA-256
+//! of the line before and a seal by a key, so that a line that was changed, added or taken out is found, at the end too.
+//!
+//! What somebody may not do stands in a file of its own, so that nobody pushes out what was done. What could not be written is
+//! kept, and written as a gap as soon as it can be.
 
 mod file;
+mod gap;
+mod said;
+mod seal;
+mod show;
 mod verify;
 
 use std::{
     path::Path,
     sync::{
-        Arc,
-        mpsc::{Receiver, SyncSender, sync_channel},
+        Arc, Mutex, MutexGuard, PoisonError,
+        mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel},
     },
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 use drive_fleet::{Event, EventKind, Events, Received};
 use serde::Serialize;
 use tokio::sync::{oneshot, watch};
 
-use self::file::File;
-pub(crate) use self::verify::{Verdict, verify};
+#[cfg(test)]
+pub(crate) use self::verify::verify;
+use self::{file::File, gap::Gap, said::masked};
+pub(crate) use self::{
+    said::bounded,
+    show::{Filter, shown},
+    verify::{Verdict, verify_since},
+};
 use super::rights::{Caller, Rights};
+use crate::kept::Kept;
 
 /// Records that wait for the disk.
 const WAITING: usize = 256;
+/// From one try to write a gap to the next.
+const TRIED_AGAIN: Duration = Duration::from_secs(1);
+/// How often the newest line is told in the program's log, where it is out of reach of who has the file.
+const HEAD_TOLD_EVERY: Duration = Duration::from_secs(3_600);
+/// What stands behind the name of the log in that of the file of what was refused.
+const REFUSED: &str = ".refused";
 
 /// What happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -46,6 +66,10 @@ pub(crate) enum Kind {
     LoginFailed,
     /// A token was added or removed.
     Token,
+    /// Somebody has asked for what he may not do.
+    Refused,
+    /// What is missing before this line, and why.
+    Gap,
 }
 
 /// One line of the log, without time and chain.
@@ -77,7 +101,7 @@ impl Record {
             kind,
             caller: name,
             origin,
-            what: what.into(),
+            what: masked(&what.into()),
             body: None,
             id: None,
             outcome: None,
@@ -94,9 +118,10 @@ impl Record {
     }
 }
 
-/// A record as it stands in the file.
+/// A record as it stands in the file, without its seal.
 #[derive(Serialize)]
 struct Line<'a> {
+    number: u64,
     time_unix_ms: u64,
     #[serde(flatten)]
     record: &'a Record,
@@ -115,7 +140,33 @@ type Waiting = (Record, oneshot::Sender<Result<(), NotWritten>>);
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Audit {
     waiting: Option<SyncSender<Waiting>>,
-    failing: Arc<watch::Sender<bool>>,
+    /// What somebody may not do.
+    refused: Option<SyncSender<Record>>,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    failing: watch::Sender<bool>,
+    /// What could not be written.
+    gap: Mutex<Gap>,
+}
+
+impl Shared {
+    fn gap(&self) -> MutexGuard<'_, Gap> {
+        self.gap.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps what could not be written, and tells it.
+    fn lose(&self, record: &Record, why: &dyn std::fmt::Display) {
+        if self.gap().add(record, unix_ms()) {
+            let Record { caller, origin, what, .. } = record;
+            tracing::error!("not in the audit log yet: {what}, by {caller} ({origin})");
+        }
+        if !self.failing.send_replace(true) {
+            tracing::error!("the audit log cannot be written: {why}: only stops are carried out");
+        }
+    }
 }
 
 impl Audit {
@@ -128,17 +179,20 @@ impl Audit {
         let failed =
             |error: std::io::Error| format!("the audit log {} cannot be written: {error}", path.display());
         let file = File::open(path).map_err(failed)?;
+        let aside = File::open_refused(Kept::at(path).beside(REFUSED).path()).map_err(failed)?;
         let (waiting, records) = sync_channel(WAITING);
-        let failing = Arc::new(watch::Sender::new(false));
-        let told = Arc::clone(&failing);
+        let (refused, refusals) = sync_channel(WAITING);
+        let shared = Arc::<Shared>::default();
+        let of_writer = Arc::clone(&shared);
         // A disk may take as long as it likes: no thread of the runtime waits for it.
-        std::thread::spawn(move || write_all(file, &records, &told));
-        Ok(Self { waiting: Some(waiting), failing })
+        std::thread::spawn(move || write_all(file, &records, &of_writer));
+        std::thread::spawn(move || write_refused(aside, &refusals));
+        Ok(Self { waiting: Some(waiting), refused: Some(refused), shared })
     }
 
     /// Whether it cannot be written now.
     pub(crate) fn failing(&self) -> watch::Receiver<bool> {
-        self.failing.subscribe()
+        self.shared.failing.subscribe()
     }
 
     /// Hands a record to the disk at once. What it gives need not be waited for.
@@ -146,10 +200,18 @@ impl Audit {
         let Some(waiting) = &self.waiting else { return Written(None) };
         let (done, written) = oneshot::channel();
         // A record that finds no room drops its sender: not written.
-        if waiting.try_send((record, done)).is_err() && !self.failing.send_replace(true) {
-            tracing::error!("the audit log is not written in time: only stops are carried out");
+        if let Err(error) = waiting.try_send((record, done)) {
+            let (TrySendError::Full((record, _)) | TrySendError::Disconnected((record, _))) = error;
+            self.shared.lose(&record, &"the disk does not take it in time");
         }
         Written(Some(written))
+    }
+
+    /// Hands on what somebody may not do. Of a flood, what finds no room is not written.
+    pub(crate) fn record_refused(&self, record: Record) {
+        if let Some(refused) = &self.refused {
+            let _ = refused.try_send(record);
+        }
     }
 }
 
@@ -175,7 +237,13 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
     loop {
         let Event { drive, kind, .. } = match events.recv().await {
             Received::Event(event) => event,
-            Received::Missed(_) => continue,
+            Received::Missed(events) => {
+                let what = format!(
+                    "{events} events of drives came too fast: what became of some commands is missing"
+                );
+                audit.record(Record::of_program(Kind::Gap, what)).whenever();
+                continue;
+            }
             Received::End => return,
         };
         let name = kind.name();
@@ -196,22 +264,57 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
     }
 }
 
-fn write_all(mut file: File, records: &Receiver<Waiting>, failing: &watch::Sender<bool>) {
-    for (record, done) in records {
-        let written = file.append(&record);
-        match &written {
-            Ok(()) => {
-                if failing.send_replace(false) {
-                    tracing::warn!("the audit log is written again");
-                }
-            }
-            Err(error) => {
-                if !failing.send_replace(true) {
-                    tracing::error!(%error, "the audit log cannot be written: only stops are carried out");
-                }
-            }
+fn write_all(mut file: File, records: &Receiver<Waiting>, shared: &Shared) {
+    let mut told: Option<(String, SystemTime)> = None;
+    loop {
+        let has_gap = !shared.gap().is_empty();
+        let next = match has_gap {
+            true => records.recv_timeout(TRIED_AGAIN),
+            false => records.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        // What is missing stands before what comes after it.
+        let closed = close_gap(&mut file, shared);
+        let (record, done) = match next {
+            Ok(waiting) => waiting,
+            Err(RecvTimeoutError::Timeout) => continue,
+            Err(RecvTimeoutError::Disconnected) => return,
+        };
+        let written = closed.and_then(|()| file.append(&record));
+        if let Err(error) = &written {
+            shared.lose(&record, error);
         }
         let _ = done.send(written.map_err(|_| NotWritten));
+        let is_due = |at: &SystemTime| at.elapsed().is_ok_and(|age| age >= HEAD_TOLD_EVERY);
+        if record.kind == Kind::Daemon || told.as_ref().is_none_or(|(_, at)| is_due(at)) {
+            let head = file.head();
+            if told.as_ref().is_none_or(|(last, _)| *last != head) {
+                tracing::info!("the audit log ends with {head}: drived audit verify --since {head}");
+            }
+            told = Some((head, SystemTime::now()));
+        }
+    }
+}
+
+/// Writes what is missing, if anything is.
+fn close_gap(file: &mut File, shared: &Shared) -> std::io::Result<()> {
+    let Some((record, many)) = shared.gap().record(unix_ms()) else { return Ok(()) };
+    file.append(&record)?;
+    // What was lost while this was written is the next gap.
+    shared.gap().forget(many);
+    if shared.gap().is_empty() && shared.failing.send_replace(false) {
+        tracing::warn!("the audit log is written again");
+    }
+    Ok(())
+}
+
+fn write_refused(mut file: File, records: &Receiver<Record>) {
+    let mut is_failing = false;
+    for record in records {
+        let written = file.append(&record);
+        if let (Err(error), false) = (&written, is_failing) {
+            tracing::warn!("what was refused is not written: {error}");
+        }
+        is_failing = written.is_err();
     }
 }
 

@@ -12,12 +12,19 @@ use std::{
 
 use drive_bus::exchange::mbap;
 use drive_core::Class;
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream};
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream},
+    time::Instant,
+};
 
 use super::{client, desk::Desk};
 use crate::{
     config::{GatewayConfig, Units},
-    doors::{Role, audit::Audit},
+    doors::{
+        Role,
+        audit::Audit,
+        crowd::{Crowd, Limits, Place},
+    },
     plant::testing::TestPlant,
 };
 
@@ -62,7 +69,8 @@ impl Peer {
 
     fn at(desk: &Arc<Desk>, address: IpAddr) -> Self {
         let (stream, theirs) = tokio::io::duplex(4_096);
-        tokio::spawn(client::serve(theirs, address, Arc::clone(desk)));
+        let desk = Arc::clone(desk);
+        tokio::spawn(async move { client::serve(theirs, address, desk, &place(address)).await });
         Self { stream, sent: BTreeMap::new(), next: 0x1501 }
     }
 
@@ -97,6 +105,11 @@ impl Peer {
     async fn is_ended(&mut self) -> bool {
         matches!(self.stream.read(&mut [0; 1]).await, Ok(0) | Err(_))
     }
+}
+
+/// A place of a client, where there is room.
+fn place(address: IpAddr) -> Place {
+    Crowd::new(Limits::of_gateway(1)).enter(Some(address), Instant::now()).unwrap()
 }
 
 fn read(address: u16, count: u16) -> Vec<u8> {

@@ -306,7 +306,10 @@ impl tokio::io::AsyncWrite for Deaf {
 async fn the_task_of_a_client_that_takes_no_answer_any_more_ends_without_a_panic() {
     let (_plant, desk) = plant(1, |_| ()).await;
     let (mut near, theirs) = tokio::io::duplex(4_096);
-    let served = tokio::spawn(super::client::serve(Deaf(theirs), "127.0.0.1".parse().unwrap(), desk));
+    let address = "127.0.0.1".parse().unwrap();
+    let served = tokio::spawn(async move {
+        super::client::serve(Deaf(theirs), address, desk, &super::place(address)).await
+    });
     near.write_all(&mbap::frame(1, 1, &read(ETA, 1))).await.unwrap();
     served.await.unwrap();
 }
