@@ -30,6 +30,7 @@ mod one_drive;
 mod output;
 mod page;
 mod plant;
+mod registers;
 mod run;
 mod screen;
 mod signals;

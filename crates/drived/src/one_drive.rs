@@ -64,7 +64,7 @@ impl OneDriveArgs {
         let name = name.ok_or_else(unnamed)?;
         let mut daemon = self.daemon.connect().await?;
         let target = Target::find(&daemon.state().await?, name)?;
-        client::order(&self.daemon, &mut daemon, &target, told).await
+        client::order(&self.daemon, daemon, &target, told).await
     }
 
     /// The path of something of one drive of the running daemon.
@@ -117,7 +117,7 @@ impl OneDriveArgs {
         let name = one.name;
         let body =
             json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
-        self.daemon.say(&body, |_| output::say(format_args!("{name} {done}: the drive shows {status}")))
+        self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

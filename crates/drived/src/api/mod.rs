@@ -24,7 +24,10 @@ use axum::{
     routing::{any, get},
 };
 
-pub(crate) use self::{ask::Viewer, reload::reload_router};
+pub(crate) use self::{
+    ask::Viewer,
+    reload::{Changes, reload_router},
+};
 use self::{
     demo::Stage,
     problem::Problem,

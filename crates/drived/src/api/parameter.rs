@@ -20,9 +20,9 @@ use super::{
     read::{fresh, no_drive},
 };
 use crate::{
-    commands::param::wanted,
     one_drive::may_have_written,
     plant::{Plant, parameters::WrittenView},
+    registers::wanted,
 };
 
 /// How long one answer of a drive is waited for.

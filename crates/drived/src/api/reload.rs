@@ -20,11 +20,11 @@ struct Asked {
 }
 
 /// What a reload does.
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct Changes {
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(crate) struct Changes {
     dry_run: bool,
     /// What was done, or would be, a sentence each.
-    changes: Vec<String>,
+    pub(crate) changes: Vec<String>,
 }
 
 /// Where it is served.

@@ -18,13 +18,18 @@ use hyper::{
     server::conn::http1 as server,
 };
 use hyper_util::{rt::TokioIo, service::TowerToHyperService};
+use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     time::timeout,
 };
 
-use crate::failure::Failure;
+use super::path_of;
+use crate::{
+    failure::Failure,
+    plant::views::{CommandView, StateView},
+};
 
 /// How long the daemon may take to begin an answer: it waits itself for what it is asked to.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
@@ -64,19 +69,52 @@ pub(crate) struct Answer {
     pub(crate) body: Value,
 }
 
+/// What a problem document says.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Problem {
+    title: Option<String>,
+    detail: Option<String>,
+    text: Option<String>,
+    reason: Option<String>,
+    drive_status: Option<Value>,
+}
+
 impl Answer {
     /// The body, if that is what was asked for.
-    pub(crate) fn done(self) -> Result<Value, Failure> {
-        if self.status.is_success() { Ok(self.body) } else { Err(self.failure()) }
+    pub(crate) fn done<T: DeserializeOwned>(self) -> Result<T, Failure> {
+        if !self.status.is_success() {
+            return Err(self.failure());
+        }
+        let other = |error| Failure::Drive(format!("the daemon answers something else: {error}"));
+        serde_json::from_value(self.body).map_err(other)
+    }
+
+    /// The command that it tells of, however that has ended.
+    pub(crate) fn command(&self) -> Option<CommandView> {
+        let mut members = self.body.as_object()?.clone();
+        if !self.status.is_success() {
+            // The status of a problem document is that of the answer.
+            members.remove("status");
+            members.extend(self.problem().drive_status.map(|shown| ("status".to_owned(), shown)));
+        }
+        serde_json::from_value(Value::Object(members)).ok()
+    }
+
+    /// Why it is refused, in one word.
+    pub(crate) fn reason(&self) -> Option<String> {
+        self.problem().reason
+    }
+
+    fn problem(&self) -> Problem {
+        serde_json::from_value(self.body.clone()).unwrap_or_default()
     }
 
     /// Why it is not what was asked for.
     pub(crate) fn failure(&self) -> Failure {
-        let detail = self.body["detail"].as_str().or_else(|| self.body["text"].as_str());
-        let text = match detail.or_else(|| self.body["title"].as_str()) {
-            Some(text) => text.to_owned(),
-            None => format!("the daemon answers {}", self.status),
-        };
+        let Problem { title, detail, text, .. } = self.problem();
+        let text = detail.or(text).or(title);
+        let text = text.unwrap_or_else(|| format!("the daemon answers {}", self.status));
         match self.status {
             StatusCode::BAD_REQUEST
             | StatusCode::UNAUTHORIZED
@@ -141,9 +179,14 @@ impl Daemon {
         self.ask("GET", path, None).await
     }
 
+    /// Reads something as what it is.
+    pub(crate) async fn read<T: DeserializeOwned>(&mut self, parts: &[&str]) -> Result<T, Failure> {
+        self.get(&path_of(parts)).await?.done()
+    }
+
     /// The state of the whole plant.
-    pub(crate) async fn state(&mut self) -> Result<Value, Failure> {
-        self.get("/api/v1/state").await?.done()
+    pub(crate) async fn state(&mut self) -> Result<StateView, Failure> {
+        self.read(&["state"]).await
     }
 
     /// Asks for something to be done.

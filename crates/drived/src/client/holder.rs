@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::Daemon;
-use crate::drive_spec::DriveName;
+use crate::{
+    drive_spec::DriveName,
+    plant::views::{DriveView, LineView},
+};
 
 /// Says whose a port is that is in use, as far as that can be known.
 pub(crate) async fn explain(port: &Path, drive: Option<DriveName>) -> Option<String> {
@@ -33,16 +34,17 @@ pub(crate) async fn whose(port: &Path) -> Option<String> {
 async fn of_daemon(port: &Path, drive: Option<DriveName>) -> Option<String> {
     let mut daemon = Daemon::connect(None, None).await.ok()?;
     let state = daemon.state().await.ok()?;
-    let is_it = |line: &&Value| {
-        let path = line["port"].as_str().and_then(|port| port.split(',').next()).map(PathBuf::from);
+    let is_it = |line: &&LineView| {
+        let path = line.port.split(',').next().map(PathBuf::from);
         path.is_some_and(|path| path.canonicalize().unwrap_or(path) == port)
     };
-    let line = state["lines"].as_array()?.iter().find(is_it)?["name"].as_str()?;
+    let line = &state.lines.iter().find(is_it)?.name;
     let whose = daemon.pid().map(|pid| format!(" (process {pid})")).unwrap_or_default();
-    let named = state["drives"].as_array().into_iter().flatten().find(|known| {
-        known["line"] == line && drive.is_some_and(|drive| known["slave"] == drive.slave.number())
-    });
-    let instead = match named.and_then(|known| known["name"].as_str()) {
+    let named = state
+        .drives
+        .iter()
+        .find(|known| known.line == *line && drive.is_some_and(|drive| known.slave == drive.slave.number()));
+    let instead = match named.map(DriveView::name) {
         Some(name) => format!("leave out --line and --drive, and name the drive as it does, {name:?}"),
         None => "leave out --line, and name a drive as drived status lists them".to_owned(),
     };

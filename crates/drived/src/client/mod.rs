@@ -4,6 +4,7 @@ mod connection;
 mod holder;
 mod names;
 mod order;
+mod remote;
 mod show;
 mod watch;
 
@@ -12,13 +13,14 @@ use std::path::PathBuf;
 pub(crate) use self::{
     connection::{Answer, Daemon, Way},
     holder::{explain, whose},
-    names::{Target, path_of},
+    names::{Target, path_of, wanted},
     order::{Told, order},
+    remote::{Remote, timely},
     show::{
         age, concern, concerns, fault_in_words, faults, measured, measurement, overview, registers,
         state_in_words, status_in_words, whole, words,
     },
-    watch::{Frames, watch},
+    watch::{Frames, Heard, watch},
 };
 use crate::{failure::Failure, output};
 
@@ -45,10 +47,10 @@ impl DaemonArgs {
     /// Prints an answer: the object for a program, else what a person reads.
     pub(crate) fn say(
         &self,
-        body: &serde_json::Value,
-        text: impl FnOnce(&serde_json::Value) -> Result<(), Failure>,
+        body: &impl serde::Serialize,
+        text: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        if self.json { output::say_as_it_is(body) } else { text(body) }
+        if self.json { output::say_as_it_is(crate::json::line(body)) } else { text() }
     }
 
     pub(crate) const fn is_json(&self) -> bool {

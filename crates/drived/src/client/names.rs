@@ -1,8 +1,9 @@
 //! The names of a plant's drives and groups, as a person writes them.
 
-use serde_json::Value;
-
-use crate::failure::Failure;
+use crate::{
+    failure::Failure,
+    plant::views::{DriveView, StateView},
+};
 
 /// How many near names are told to somebody who has missed one.
 const NEAREST: usize = 3;
@@ -18,19 +19,16 @@ pub(crate) enum Target {
 
 impl Target {
     /// What a name means in a plant whose state this is; a drive comes before a group of its name.
-    pub(crate) fn find(state: &Value, name: &str) -> Result<Self, Failure> {
-        let named = |kind: &str| {
-            let all = state[kind].as_array().into_iter().flatten();
-            all.filter_map(|one| one["name"].as_str()).map(str::to_owned).collect::<Vec<_>>()
-        };
-        let (drives, groups) = (named("drives"), named("groups"));
-        if drives.iter().any(|drive| drive == name) {
+    pub(crate) fn find(state: &StateView, name: &str) -> Result<Self, Failure> {
+        if state.drives.iter().any(|drive| drive.name() == name) {
             return Ok(Self::Drive(name.to_owned()));
         }
-        if groups.iter().any(|group| group == name) {
+        if state.groups.iter().any(|group| group.name == name) {
             return Ok(Self::Group(name.to_owned()));
         }
-        let near = nearest(name, drives.into_iter().chain(groups).collect());
+        let drives = state.drives.iter().map(DriveView::name);
+        let all = drives.chain(state.groups.iter().map(|group| group.name.as_str()));
+        let near = nearest(name, all.map(str::to_owned).collect());
         let near = if near.is_empty() { "the daemon has none".to_owned() } else { near.join(", ") };
         Err(Failure::Input(format!("there is no drive and no group {name:?}: the nearest are {near}")))
     }
@@ -45,18 +43,39 @@ impl Target {
     }
 
     /// Whether a drive of the state belongs to it.
-    pub(crate) fn has(&self, state: &Value, drive: &str) -> bool {
+    pub(crate) fn has(&self, state: &StateView, drive: &str) -> bool {
         match self {
             Self::All => true,
             Self::Drive(name) => name == drive,
             Self::Group(name) => {
-                let groups = state["groups"].as_array().into_iter().flatten();
-                let group = groups.into_iter().find(|group| group["name"] == **name);
-                let members = group.and_then(|group| group["drives"].as_array()).into_iter().flatten();
-                members.into_iter().any(|member| member == drive)
+                let group = state.groups.iter().find(|group| group.name == *name);
+                group.is_some_and(|group| group.drives.iter().any(|member| member == drive))
             }
         }
     }
+}
+
+/// The drives that these names mean: drives, groups and lines; all where none is named.
+///
+/// # Errors
+/// There is none of such a name.
+pub(crate) fn wanted<'a>(state: &'a StateView, names: &[String]) -> Result<Vec<&'a DriveView>, Failure> {
+    let mut wanted: Vec<bool> = vec![names.is_empty(); state.drives.len()];
+    for name in names {
+        let is_line = state.drives.iter().any(|drive| drive.line == *name);
+        let target = match Target::find(state, name) {
+            Ok(target) => Some(target),
+            Err(_) if is_line => None,
+            Err(failure) => return Err(failure),
+        };
+        for (wanted, drive) in wanted.iter_mut().zip(&state.drives) {
+            *wanted |= match &target {
+                Some(target) => target.has(state, drive.name()),
+                None => drive.line == *name,
+            };
+        }
+    }
+    Ok(wanted.iter().zip(&state.drives).filter(|(wanted, _)| **wanted).map(|(_, drive)| drive).collect())
 }
 
 /// A path of the API; each part may be any text.
@@ -109,16 +128,17 @@ fn distance(one: &str, other: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
+    use crate::plant::testing::told;
 
     #[test]
     fn a_name_that_is_not_there_is_answered_with_the_nearest() {
-        let state = json!({
-            "drives": [{"name": "pump 1"}, {"name": "pump 2"}, {"name": "fan 1"}, {"name": "stirrer"}],
-            "groups": [{"name": "fans", "drives": ["fan 1"]}],
-        });
+        let drive = |name: &str| serde_json::from_value(told(name)).unwrap();
+        let state = StateView {
+            drives: ["pump 1", "pump 2", "fan 1", "stirrer"].map(drive).into(),
+            groups: vec![crate::config::Group { name: "fans".to_owned(), drives: vec!["fan 1".to_owned()] }],
+            ..StateView::default()
+        };
         assert_eq!(Target::find(&state, "pump 1"), Ok(Target::Drive("pump 1".to_owned())));
         let fans = Target::find(&state, "fans").unwrap();
         assert!(fans.has(&state, "fan 1") && !fans.has(&state, "pump 1"));

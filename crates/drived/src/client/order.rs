@@ -1,13 +1,20 @@
 //! A command to the daemon, and what became of it.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use axum::http::StatusCode;
-use serde_json::Value;
-use tokio::time::{Instant, sleep};
+use serde_json::{Value, json};
+use tokio::time::{Instant, timeout_at};
 
-use super::{Answer, Daemon, DaemonArgs, Target, path_of, show};
-use crate::{failure::Failure, output};
+use super::{Daemon, DaemonArgs, Remote, Target};
+use crate::{
+    desk::follow::{Follower, News},
+    failure::Failure,
+    output,
+    plant::{
+        commands::{ActionWord, OutcomeWord},
+        views::CommandView,
+    },
+};
 
 /// How often it is asked for what became of it.
 const ASKED_EVERY: Duration = Duration::from_millis(500);
@@ -19,8 +26,7 @@ const TOLD_EVERY: Duration = Duration::from_secs(5);
 /// A command as the API takes it.
 #[derive(Debug, Clone)]
 pub(crate) struct Told {
-    /// `start`, `stop`, `setpoint`, `reset`, `release`.
-    pub(crate) action: &'static str,
+    pub(crate) action: ActionWord,
     pub(crate) body: Value,
     /// What a person reads when it is confirmed.
     pub(crate) done: String,
@@ -33,29 +39,26 @@ pub(crate) struct Told {
 /// It is not confirmed, for each drive; or it cannot be given.
 pub(crate) async fn order(
     args: &DaemonArgs,
-    daemon: &mut Daemon,
+    mut daemon: Daemon,
     target: &Target,
     told: &Told,
 ) -> Result<(), Failure> {
-    let path = format!("{}?wait=2s", target.path(told.action));
-    let answer = settled(args, daemon.post(&path, &told.body).await?, daemon).await?;
-    let body = &answer.body;
-    if body["outcome"].is_null() && body["drives"].is_null() {
-        return Err(answer.failure());
-    }
+    let path = format!("{}?wait=2s", target.path(told.action.name()));
+    let answer = daemon.post(&path, &told.body).await?;
+    let Some(first) = answer.command() else { return Err(answer.failure()) };
+    let command = settled(args, Arc::new(first), daemon).await?;
     if args.is_json() {
-        output::say_as_it_is(body)?;
+        let is_first = command.outcome != OutcomeWord::Pending && !answer.status.is_success();
+        output::say_as_it_is(if is_first { answer.body } else { json!(command) })?;
     }
-    let Some(drives) = body["drives"].as_array() else {
-        return one(args, told, body, &answer);
-    };
+    let Some(several) = &command.several else { return one(args, told, &command) };
     let mut left = Vec::new();
-    for drive in drives {
-        match drive["outcome"].as_str() {
-            Some("confirmed") if args.is_json() => {}
-            Some("confirmed") => output::say(sentence(told, drive))?,
+    for drive in &several.drives {
+        match drive.outcome {
+            OutcomeWord::Confirmed if args.is_json() => {}
+            OutcomeWord::Confirmed => output::say(sentence(told, drive))?,
             // Those that are only read were never meant.
-            _ if body["outcome"] == "confirmed" => {
+            _ if command.outcome == OutcomeWord::Confirmed => {
                 if !args.is_json() {
                     output::say(format_args!("{}: {}", name(drive), why(drive)))?;
                 }
@@ -67,66 +70,75 @@ pub(crate) async fn order(
         0 => Ok(()),
         number => Err(Failure::Drive(format!(
             "{number} of {} not confirmed: {}",
-            output::counted(drives.len(), "drive", "drives"),
+            output::counted(several.drives.len(), "drive", "drives"),
             left.join("; ")
         ))),
     }
 }
 
-fn one(args: &DaemonArgs, told: &Told, command: &Value, answer: &Answer) -> Result<(), Failure> {
-    match command["outcome"].as_str() {
-        Some("confirmed") if args.is_json() => Ok(()),
-        Some("confirmed") => output::say(sentence(told, command)),
-        _ if answer.status.is_client_error()
-            && answer.status != StatusCode::CONFLICT
-            && answer.status != StatusCode::GONE =>
-        {
-            Err(answer.failure())
+fn one(args: &DaemonArgs, told: &Told, command: &CommandView) -> Result<(), Failure> {
+    let why = || format!("{}: {}", name(command), why(command));
+    match command.outcome {
+        OutcomeWord::Confirmed if args.is_json() => Ok(()),
+        OutcomeWord::Confirmed => output::say(sentence(told, command)),
+        // Who has no right has asked for the wrong thing.
+        OutcomeWord::Refused if command.reason.as_deref() == Some("no_right") => {
+            Err(Failure::Input(command.text.clone().unwrap_or_else(why)))
         }
-        _ => Err(Failure::Drive(format!("{}: {}", name(command), why(command)))),
+        _ => Err(Failure::Drive(why())),
     }
 }
 
-/// Asks on until nothing is pending.
-async fn settled(args: &DaemonArgs, mut answer: Answer, daemon: &mut Daemon) -> Result<Answer, Failure> {
+/// Follows a command until nothing is pending.
+async fn settled(
+    args: &DaemonArgs,
+    first: Arc<CommandView>,
+    daemon: Daemon,
+) -> Result<Arc<CommandView>, Failure> {
     let until = Instant::now() + WAITED;
-    let mut tell_at = Instant::now();
-    while answer.body["outcome"] == "pending" && Instant::now() < until {
-        let Some(id) = answer.body["id"].as_str().map(str::to_owned) else { break };
-        if !args.is_json() && Instant::now() >= tell_at {
-            tell_at = Instant::now() + TOLD_EVERY;
-            output::say(pending(&answer.body))?;
+    let mut follower = Follower::from(Remote::new(daemon, &first.id, ASKED_EVERY), first);
+    while follower.last().outcome == OutcomeWord::Pending && Instant::now() < until {
+        if !args.is_json() {
+            output::say(pending(&follower.last()))?;
         }
-        sleep(ASKED_EVERY).await;
-        answer = daemon.get(&path_of(&["commands", &id])).await?;
+        let tell_at = until.min(Instant::now() + TOLD_EVERY);
+        while follower.last().outcome == OutcomeWord::Pending {
+            match timeout_at(tell_at, follower.next()).await {
+                Ok(Some(News::Told(_))) => {}
+                Ok(Some(News::OutOfSight(why) | News::Gone(why))) => return Err(Failure::Drive(why)),
+                Ok(None) => return Ok(follower.last()),
+                Err(_) => break,
+            }
+        }
     }
-    Ok(answer)
+    Ok(follower.last())
 }
 
 /// What is told of a command that is not settled.
-fn pending(body: &Value) -> String {
-    let Some(drives) = body["drives"].as_array() else {
-        return format!("{} has not confirmed it yet: it goes on", name(body));
+fn pending(command: &CommandView) -> String {
+    let Some(several) = &command.several else {
+        return format!("{} has not confirmed it yet: it goes on", name(command));
     };
-    let confirmed = drives.iter().filter(|drive| drive["outcome"] == "confirmed").count();
-    let left = drives.iter().filter(|drive| drive["outcome"] == "pending").map(name);
+    let drives = &several.drives;
+    let left = drives.iter().filter(|drive| drive.outcome == OutcomeWord::Pending).map(name);
     let left: Vec<&str> = left.collect();
+    let confirmed = several.confirmed;
     format!("{confirmed} of {} have confirmed it, waiting for {}", drives.len(), left.join(", "))
 }
 
-fn name(command: &Value) -> &str {
-    command["drive"].as_str().unwrap_or("the drive")
+fn name(command: &CommandView) -> &str {
+    command.drive.as_deref().unwrap_or("the drive")
 }
 
-fn sentence(told: &Told, command: &Value) -> String {
-    let shows = show::status_in_words(&command["status"]);
+fn sentence(told: &Told, command: &CommandView) -> String {
+    let shows = command.status.as_ref().and_then(|shown| shown.status());
     let shows = shows.map(|shows| format!(": the drive shows {shows}")).unwrap_or_default();
     format!("{} {}{shows}", name(command), told.done)
 }
 
-fn why(command: &Value) -> String {
-    let outcome = command["outcome"].as_str().unwrap_or("unknown").replace('_', " ");
-    match command["text"].as_str().or_else(|| command["detail"].as_str()) {
+fn why(command: &CommandView) -> String {
+    let outcome = command.outcome.to_string().replace('_', " ");
+    match command.text.as_deref() {
         Some(text) if text.starts_with(&outcome) => text.to_owned(),
         Some(text) => format!("{outcome}: {text}"),
         None => outcome,
@@ -135,15 +147,22 @@ fn why(command: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]
     fn what_is_left_of_a_group_is_named() {
-        let body = json!({"drives": [
-            {"drive": "fan 1", "outcome": "confirmed"}, {"drive": "fan 2", "outcome": "pending"},
-        ]});
-        assert_eq!(pending(&body), "1 of 2 have confirmed it, waiting for fan 2");
+        let part = |drive: &str, outcome: &str| {
+            json!({"id": "a", "drive": drive, "action": "stop", "command": "ramp stop", "caller": "local",
+                "origin": "socket", "outcome": outcome, "open": outcome == "pending", "time_unix_ms": 1})
+        };
+        let mut body = part("", "pending");
+        body["drives"] = json!([part("fan 1", "confirmed"), part("fan 2", "pending")]);
+        for (key, count) in
+            [("confirmed", 1), ("pending", 1), ("not_reachable", 0), ("refused", 0), ("failed", 0)]
+        {
+            body[key] = count.into();
+        }
+        let command = serde_json::from_value(body).unwrap();
+        assert_eq!(pending(&command), "1 of 2 have confirmed it, waiting for fan 2");
     }
 }

@@ -1,12 +1,17 @@
 //! What the daemon knows, for a person: every value with its age, an old one never as if it were live.
 
+use drive_core::Faults;
 use drive_fleet::view::ConcernView;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::Target;
 use crate::{
     failure::Failure,
     output::{self, Table},
+    plant::{
+        parameters::ParameterView,
+        views::{DriveView, LineLink, StateView},
+    },
 };
 
 /// The drives of a target, one a line, and what is wrong with the lines. Those in trouble come first.
@@ -14,8 +19,9 @@ use crate::{
 /// # Errors
 ///
 /// A drive does not answer.
-pub(crate) fn overview(state: &Value, target: &Target) -> Result<(), Failure> {
-    let drives: Vec<&Value> = of_target(state, target).collect();
+pub(crate) fn overview(state: &StateView, target: &Target) -> Result<(), Failure> {
+    let told: Vec<Value> = of_target(state, target).map(|drive| json!(drive)).collect();
+    let drives: Vec<&Value> = told.iter().collect();
     let mut sorted = drives.clone();
     // Stable: behind those in trouble the order is that of the configuration.
     sorted.sort_by_key(|drive| concern(drive).map_or(usize::MAX, |concern| concern.rank));
@@ -45,9 +51,9 @@ pub(crate) fn overview(state: &Value, target: &Target) -> Result<(), Failure> {
             output::say(format_args!("{}: {}", name(drive), concern.text))?;
         }
     }
-    for line in state["lines"].as_array().into_iter().flatten().filter(|line| line["link"] != "connected") {
-        let why = line["error"].as_str().unwrap_or("nobody answers");
-        output::say(format_args!("line {} is away: {why}", line["name"].as_str().unwrap_or("?")))?;
+    for line in state.lines.iter().filter(|line| line.link == LineLink::Away) {
+        let why = line.error.as_deref().unwrap_or("nobody answers");
+        output::say(format_args!("line {} is away: {why}", line.name))?;
     }
     answering(&drives)
 }
@@ -120,41 +126,43 @@ pub(crate) fn whole(drive: &Value, all: bool) -> Result<(), Failure> {
 }
 
 /// The present faults and the history of one drive.
-pub(crate) fn faults(drive: &str, faults: &Value) -> Result<(), Failure> {
-    let list = |key: &str| faults[key].as_array().cloned().unwrap_or_default();
-    let present = list("present");
-    if present.is_empty() {
+pub(crate) fn faults(drive: &str, faults: &Faults) -> Result<(), Failure> {
+    if faults.present.is_empty() {
         output::say(format_args!("{drive} has no fault"))?;
     }
-    for (what, fault) in present
-        .iter()
-        .map(|fault| (format!("{drive} has tripped, fault"), fault))
-        .chain(list("warnings").iter().map(|warning| ("  warning".to_owned(), warning)))
-    {
-        output::say(format_args!("{what} {}", fault_in_words(fault)))?;
-        if let Some(remedy) = fault["remedy"].as_str() {
+    let present = faults.present.iter().map(|fault| (format!("{drive} has tripped, fault"), fault));
+    let warnings = faults.warnings.iter().map(|fault| ("  warning".to_owned(), fault));
+    for (what, fault) in present.chain(warnings) {
+        output::say(format_args!("{what} {fault}"))?;
+        if let Some(remedy) = fault.remedy() {
             output::say(format_args!("  what to do: {remedy}"))?;
         }
     }
-    for (index, fault) in list("history").iter().enumerate() {
-        output::say(format_args!("  history {}: {}", index + 1, fault_in_words(fault)))?;
+    match faults.reset_allowed {
+        Some(true) if !faults.present.is_empty() => {
+            output::say("  the drive would accept a reset now: drived reset")?;
+        }
+        Some(false) => output::say("  the drive would not accept a reset now: its cause is still there")?,
+        _ => {}
+    }
+    for (position, fault) in faults.history.iter().enumerate() {
+        output::say(format_args!("  history {}: {fault}", position + 1))?;
     }
     Ok(())
 }
 
 /// Registers with their values.
-pub(crate) fn registers(rows: &[Value]) -> Result<(), Failure> {
+pub(crate) fn registers(rows: &[ParameterView]) -> Result<(), Failure> {
     let mut table = Table::new(["register", "mnemonic", "value", "name", "access"]);
     for row in rows {
-        let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
         // A value that could not be read says why.
-        let value = row["text"].as_str().or_else(|| row["error"].as_str()).unwrap_or("-");
+        let value = row.text.as_deref().or(row.error.as_deref()).unwrap_or("-");
         table.row([
-            row["address"].to_string(),
-            text("mnemonic"),
+            row.address.to_string(),
+            row.mnemonic.to_string(),
             value.to_owned(),
-            text("name"),
-            words(&text("access")),
+            row.name.to_string(),
+            row.access.to_string(),
         ]);
     }
     output::say_table(table)
@@ -174,9 +182,8 @@ pub(crate) fn status_in_words(status: &Value) -> Option<String> {
     Some(parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
 }
 
-fn of_target<'a>(state: &'a Value, target: &'a Target) -> impl Iterator<Item = &'a Value> {
-    let drives = state["drives"].as_array().into_iter().flatten();
-    drives.filter(|drive| target.has(state, name(drive)))
+fn of_target<'a>(state: &'a StateView, target: &'a Target) -> impl Iterator<Item = &'a DriveView> {
+    state.drives.iter().filter(|drive| target.has(state, drive.name()))
 }
 
 fn name(drive: &Value) -> &str {
@@ -307,8 +314,6 @@ pub(crate) fn age(milliseconds: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]

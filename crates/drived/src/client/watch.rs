@@ -3,10 +3,15 @@
 use std::collections::BTreeMap;
 
 use http_body_util::BodyExt as _;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
 use super::{Daemon, DaemonArgs, show};
-use crate::{failure::Failure, output};
+use crate::{
+    failure::Failure,
+    output,
+    plant::views::{CommandView, DriveView, HappenedView, LineView},
+};
 
 /// Prints what happens until the daemon ends or nobody reads any more.
 pub(crate) async fn watch(args: &DaemonArgs, daemon: &mut Daemon) -> Result<(), Failure> {
@@ -20,7 +25,7 @@ pub(crate) async fn watch(args: &DaemonArgs, daemon: &mut Daemon) -> Result<(), 
         for (name, data) in events.take(frame.data_ref().map_or(&[][..], |data| data)) {
             if args.is_json() {
                 output::say_as_it_is(serde_json::json!({ "kind": name, "data": data }))?;
-            } else if let Some(text) = text(&name, &data, &mut shown) {
+            } else if let Some(text) = Heard::of(&name, data).and_then(|heard| text(&heard, &mut shown)) {
                 output::say(format_args!("{} {text}", chrono::Local::now().format("%H:%M:%S")))?;
             }
         }
@@ -28,33 +33,63 @@ pub(crate) async fn watch(args: &DaemonArgs, daemon: &mut Daemon) -> Result<(), 
     Err(Failure::Drive("the daemon has ended".to_owned()))
 }
 
-/// What a person reads of an event: for a drive only what has changed in words.
-fn text(name: &str, data: &Value, shown: &mut BTreeMap<String, String>) -> Option<String> {
-    let drive = data["drive"].as_str();
-    match name {
-        "event" => {
-            let alarm = if data["alarm"] == true { "ALARM " } else { "" };
-            Some(format!("{alarm}{}: {}", drive.unwrap_or("the daemon"), data["text"].as_str()?))
+/// An event of the stream.
+#[derive(Debug, Clone)]
+pub(crate) enum Heard {
+    Drive(Box<DriveView>),
+    Line(Box<LineView>),
+    Command(Box<CommandView>),
+    Event(HappenedView),
+    /// Something is missing: the state is to be read anew.
+    Reset,
+    /// A sign of life, or what a newer daemon tells.
+    Other,
+}
+
+impl Heard {
+    /// What an event of this name tells; `None` where it is not what its name says.
+    pub(crate) fn of(name: &str, data: Value) -> Option<Self> {
+        fn read<T: DeserializeOwned>(data: Value) -> Option<T> {
+            serde_json::from_value(data).ok()
         }
-        "command" => {
+        Some(match name {
+            "drive" => Self::Drive(read(data)?),
+            "line" => Self::Line(read(data)?),
+            "command" => Self::Command(read(data)?),
+            "event" => Self::Event(read(data)?),
+            "reset" => Self::Reset,
+            _ => Self::Other,
+        })
+    }
+}
+
+/// What a person reads of an event: for a drive only what has changed in words.
+fn text(heard: &Heard, shown: &mut BTreeMap<String, String>) -> Option<String> {
+    match heard {
+        Heard::Event(event) => {
+            let alarm = if event.alarm { "ALARM " } else { "" };
+            let drive = event.drive.as_deref().unwrap_or("the daemon");
+            Some(format!("{alarm}{drive}: {}", event.text))
+        }
+        Heard::Command(command) => {
             let told = [
-                drive.map(|drive| format!("{drive}: ")),
-                data["command"].as_str().map(str::to_owned),
-                data["caller"].as_str().map(|caller| format!(" by {caller}")),
-                data["outcome"].as_str().map(|outcome| format!(": {}", outcome.replace('_', " "))),
-                data["text"].as_str().map(|text| format!(", {text}")),
+                command.drive.as_ref().map(|drive| format!("{drive}: ")),
+                Some(command.command.clone()),
+                Some(format!(" by {}", command.caller)),
+                Some(format!(": {}", command.outcome.to_string().replace('_', " "))),
+                command.text.as_ref().map(|text| format!(", {text}")),
             ];
             Some(told.into_iter().flatten().collect())
         }
-        "drive" => {
-            let name = data["name"].as_str()?;
-            let quality = if data["status"]["quality"] == "good" { "" } else { "LOST, was " };
-            let now = format!("{quality}{}", show::status_in_words(&data["status"])?);
-            let before = shown.insert(name.to_owned(), now.clone());
-            (before.as_ref() != Some(&now)).then(|| format!("{name}: {now}"))
+        Heard::Drive(drive) => {
+            let status = &json!(drive)["status"];
+            let quality = if status["quality"] == "good" { "" } else { "LOST, was " };
+            let now = format!("{quality}{}", show::status_in_words(status)?);
+            let before = shown.insert(drive.name().to_owned(), now.clone());
+            (before.as_ref() != Some(&now)).then(|| format!("{}: {now}", drive.name()))
         }
-        "reset" => Some("the reader was too slow: something is missing here".to_owned()),
-        _ => None,
+        Heard::Reset => Some("the reader was too slow: something is missing here".to_owned()),
+        Heard::Line(_) | Heard::Other => None,
     }
 }
 
@@ -95,6 +130,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::plant::testing::told;
 
     #[test]
     fn events_are_whole_however_their_bytes_come() {
@@ -113,10 +149,12 @@ mod tests {
     #[test]
     fn a_drive_is_told_again_only_when_it_reads_otherwise() {
         let mut shown = BTreeMap::new();
-        let drive = json!({"name": "pump 1", "status": {"quality": "good", "state": "ready"}});
-        assert_eq!(text("drive", &drive, &mut shown), Some("pump 1: ready".to_owned()));
-        assert_eq!(text("drive", &drive, &mut shown), None);
-        let lost = json!({"name": "pump 1", "status": {"quality": "stale", "state": "ready"}});
-        assert_eq!(text("drive", &lost, &mut shown), Some("pump 1: LOST, was ready".to_owned()));
+        let mut drive = told("pump 1");
+        drive["status"] = json!({"quality": "good", "state": "ready", "raw": []});
+        let mut text = |drive: &Value| text(&Heard::of("drive", drive.clone()).unwrap(), &mut shown);
+        assert_eq!(text(&drive), Some("pump 1: ready".to_owned()));
+        assert_eq!(text(&drive), None);
+        drive["status"]["quality"] = "stale".into();
+        assert_eq!(text(&drive), Some("pump 1: LOST, was ready".to_owned()));
     }
 }

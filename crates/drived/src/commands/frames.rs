@@ -9,13 +9,13 @@ use drive_bus::{
 };
 use http_body_util::BodyExt as _;
 use hyper::body::Incoming;
-use serde_json::Value;
 
 use crate::{
     client::{DaemonArgs, path_of},
     explain::Known,
     failure::Failure,
     line_spec::LineSpec,
+    plant::views::{LineView, StateView},
 };
 
 /// The longest capture that is read.
@@ -63,13 +63,12 @@ impl Frames {
     ) -> Result<(Self, Known), Failure> {
         let mut daemon = args.connect().await?;
         let state = daemon.state().await?;
-        let lines: Vec<&Value> = state["lines"].as_array().into_iter().flatten().collect();
-        let Some(found) = lines.iter().find(|known| known["name"] == *line) else {
-            let names: Vec<&str> = lines.iter().filter_map(|line| line["name"].as_str()).collect();
+        let Some(found) = state.lines.iter().find(|known| known.name == *line) else {
+            let names: Vec<&str> = state.lines.iter().map(|line| line.name.as_str()).collect();
             let names = names.join(", ");
             return Err(Failure::Input(format!("there is no line {line:?}: expected one of {names}")));
         };
-        let known = known(&state, line, found);
+        let known = known(&state, found);
         let path = format!("{}/capture?seconds={seconds}", path_of(&["lines", line]));
         let answer = daemon.send("GET", &path, None).await?;
         if !answer.status().is_success() {
@@ -125,15 +124,11 @@ impl Frames {
 }
 
 /// What the daemon's state says of a line.
-fn known(state: &Value, name: &str, line: &Value) -> Known {
-    let drives = state["drives"].as_array().into_iter().flatten().filter(|drive| drive["line"] == *name);
-    let drives = drives.filter_map(|drive| {
-        let slave = u8::try_from(drive["slave"].as_u64()?).ok()?;
-        let family = drive["family"].as_str()?.parse().ok()?;
-        Some((slave, (family, drive["name"].as_str()?.to_owned())))
-    });
-    let port = line["port"].as_str().and_then(|port| port.parse::<LineSpec>().ok());
-    let config = port.and_then(|port| port.config(&[]).ok());
+fn known(state: &StateView, line: &LineView) -> Known {
+    let drives = state.drives.iter().filter(|drive| drive.line == line.name);
+    let drives =
+        drives.filter_map(|drive| Some((drive.slave, (drive.family.parse().ok()?, drive.name().to_owned()))));
+    let config = line.port.parse::<LineSpec>().ok().and_then(|port| port.config(&[]).ok());
     let serial = config.filter(|config| config.protocol.is_paced()).map(|config| config.serial);
     Known { serial, late: None, drives: drives.collect() }
 }

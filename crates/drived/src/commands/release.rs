@@ -3,7 +3,7 @@
 use drive_fleet::Order;
 use serde_json::json;
 
-use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, plant::commands::ActionWord};
 
 /// Give control of one drive back to its panel or its terminals, such as after a stop that took it; the motor must stand
 #[derive(Debug, clap::Args)]
@@ -18,7 +18,7 @@ pub(crate) struct Args {
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     const DONE: &str = "has given control back";
     if !args.one.is_on_line() {
-        let told = Told { action: "release", body: json!({}), done: DONE.to_owned() };
+        let told = Told { action: ActionWord::Release, body: json!({}), done: DONE.to_owned() };
         return args.one.tell(args.name.as_deref(), &told).await;
     }
     let name = args.one.name()?;

@@ -3,7 +3,7 @@
 use drive_fleet::Order;
 use serde_json::json;
 
-use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, plant::commands::ActionWord};
 
 /// Reset the present fault of a drive, or of all of a group, once; the motor does not start by it
 #[derive(Debug, clap::Args)]
@@ -18,7 +18,7 @@ pub(crate) struct Args {
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     const DONE: &str = "has no fault";
     if !args.one.is_on_line() {
-        let told = Told { action: "reset", body: json!({}), done: DONE.to_owned() };
+        let told = Told { action: ActionWord::Reset, body: json!({}), done: DONE.to_owned() };
         return args.one.tell(args.name.as_deref(), &told).await;
     }
     args.one.order(Order::ResetFaults, DONE).await

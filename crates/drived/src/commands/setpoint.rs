@@ -4,7 +4,7 @@ use drive_core::Setpoint;
 use drive_fleet::{Order, Until};
 use serde_json::json;
 
-use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, plant::commands::ActionWord};
 
 /// Give a drive, or all of a group, a setpoint; a motor that runs follows its ramp to it
 #[derive(Debug, clap::Args)]
@@ -28,7 +28,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let setpoint: Setpoint = wanted.parse().map_err(|why| Failure::Input(format!("{wanted:?}: {why}")))?;
     if !args.one.is_on_line() {
         let body = json!({ "setpoint": setpoint });
-        let told = Told { action: "setpoint", body, done: format!("holds the setpoint {setpoint}") };
+        let told =
+            Told { action: ActionWord::Setpoint, body, done: format!("holds the setpoint {setpoint}") };
         return args.one.tell(name, &told).await;
     }
     let name = args.one.name()?;

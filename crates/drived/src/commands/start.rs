@@ -4,7 +4,7 @@ use drive_core::{Direction, Setpoint};
 use drive_fleet::{Order, Until};
 use serde_json::json;
 
-use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs};
+use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, plant::commands::ActionWord};
 
 /// Start the motor of a drive at the setpoint that it holds, or of all drives of a group
 ///
@@ -38,7 +38,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         if setpoint.is_some() {
             body["setpoint"] = json!(setpoint);
         }
-        let told = Told { action: "start", body, done: format!("started {direction}") };
+        let told = Told { action: ActionWord::Start, body, done: format!("started {direction}") };
         return args.one.tell(args.name.as_deref(), &told).await;
     }
     let mut one = args.one.command(args.accept_self_restart).await?;

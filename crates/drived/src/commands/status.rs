@@ -2,6 +2,7 @@
 
 use drive_core::{Measurements, Status};
 use serde::Serialize;
+use serde_json::json;
 
 use crate::{
     client::{self, Target},
@@ -83,11 +84,11 @@ async fn through_daemon(args: &Args) -> Result<(), Failure> {
     let mut daemon = args.one.daemon.connect().await?;
     let state = daemon.state().await?;
     let target = args.name.as_deref().map_or(Ok(Target::All), |name| Target::find(&state, name))?;
-    let mut drives = state["drives"].as_array().into_iter().flatten();
-    let one = drives.find(|drive| matches!(&target, Target::Drive(name) if drive["name"] == **name));
+    let one =
+        state.drives.iter().find(|drive| matches!(&target, Target::Drive(name) if drive.name() == name));
     match one {
-        Some(drive) => args.one.daemon.say(drive, |drive| client::whole(drive, args.all)),
-        None => args.one.daemon.say(&state, |state| client::overview(state, &target)),
+        Some(drive) => args.one.daemon.say(drive, || client::whole(&json!(drive), args.all)),
+        None => args.one.daemon.say(&state, || client::overview(&state, &target)),
     }
 }
 

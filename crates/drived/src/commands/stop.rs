@@ -8,6 +8,7 @@ use crate::{
     commanded::UNCONFIRMED,
     failure::Failure,
     one_drive::{OneDriveArgs, unnamed},
+    plant::commands::ActionWord,
 };
 
 /// Stop the motor of a drive, of a group or of all, again and again until each drive confirms it
@@ -51,12 +52,16 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 /// A stop that the daemon did not get may leave a motor turning, whatever the reason is.
 async fn through_daemon(args: &Args) -> Result<(), Failure> {
     let unsent = |failure: Failure| Failure::Drive(format!("{UNCONFIRMED}. {failure}"));
-    let told = Told { action: "stop", body: json!({ "mode": args.mode }), done: "stands still".to_owned() };
+    let told = Told {
+        action: ActionWord::Stop,
+        body: json!({ "mode": args.mode }),
+        done: "stands still".to_owned(),
+    };
     let mut daemon = args.one.daemon.connect().await.map_err(unsent)?;
     let target = match (args.all, &args.name) {
         (true, _) => Target::All,
         (false, Some(name)) => Target::find(&daemon.state().await.map_err(unsent)?, name)?,
         (false, None) => return Err(unnamed()),
     };
-    client::order(&args.one.daemon, &mut daemon, &target, &told).await.map_err(unsent)
+    client::order(&args.one.daemon, daemon, &target, &told).await.map_err(unsent)
 }

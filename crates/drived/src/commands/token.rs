@@ -103,7 +103,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
         }
         Command::List { place, json } => {
             let tokens = match open(&place).await? {
-                Way::Daemon(mut daemon) => daemon.get(TOKENS).await?.done()?["tokens"].take(),
+                Way::Daemon(mut daemon) => daemon.get(TOKENS).await?.done::<Value>()?["tokens"].take(),
                 Way::Files(Files { tokens, .. }) => json!(tokens.views().map_err(input)?),
             };
             list(tokens.as_array().map_or(&[], Vec::as_slice), json)
@@ -111,7 +111,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
         Command::Remove { name, place, json } => {
             match open(&place).await? {
                 Way::Daemon(mut daemon) => {
-                    daemon.delete(&format!("{TOKENS}/{name}")).await?.done()?;
+                    daemon.delete(&format!("{TOKENS}/{name}")).await?.done::<Value>()?;
                 }
                 Way::Files(files) => files.remove(&name)?,
             }

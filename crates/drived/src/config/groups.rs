@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::place::{ConfigError, Source};
@@ -12,7 +12,7 @@ use super::place::{ConfigError, Source};
 pub(super) type Entries = BTreeMap<Spanned<String>, Vec<Spanned<String>>>;
 
 /// Drives that are commanded together, in the order in which they start.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct Group {
     pub(crate) name: String,
     pub(crate) drives: Vec<String>,

@@ -14,7 +14,7 @@ pub(crate) struct Caller {
 }
 
 /// What a caller may do. A stop is a right of its own: it can be given where nothing else is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct Rights {
     /// To see everything but secrets.
     pub(crate) view: bool,

@@ -43,6 +43,7 @@ files![
     "events.js",
     "fault_texts.js",
     "faults_fr.js",
+    "follow.js",
     "format.js",
     "icon.svg",
     "line.js",

@@ -11,7 +11,7 @@ use std::{
 use drive_core::{Current, Frequency, Percent, Setpoint};
 use drive_fleet::{DriveHandle, Freshness};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use super::Inner;
@@ -44,7 +44,7 @@ struct Rings {
 }
 
 /// The last ten minutes of a drive: `null` where nothing fresh was known.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct HistoryView {
     pub(crate) step_ms: u64,
     pub(crate) time_unix_ms: Vec<u64>,

@@ -101,7 +101,7 @@ impl Plant {
             revision: self.0.revisions.last(),
             time_unix_ms: unix(now),
             daemon: DaemonView {
-                version: env!("CARGO_PKG_VERSION"),
+                version: env!("CARGO_PKG_VERSION").into(),
                 started_unix_ms: self.0.started_unix_ms,
                 demo: self.0.demo,
                 rights: caller.rights,

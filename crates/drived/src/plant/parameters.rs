@@ -1,6 +1,7 @@
 //! The registers of a drive, read and written in turns between its polls.
 
 use std::{
+    borrow::Cow,
     collections::BTreeMap,
     sync::{Mutex, PoisonError},
     time::Duration,
@@ -12,13 +13,13 @@ use drive_core::{
 };
 use drive_fleet::{DriveHandle, Refused};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout_at};
 
 use super::Plant;
 use crate::{
-    commands::param::{factory, range},
     json::milliseconds,
+    registers::{factory, range},
 };
 
 /// A word that was read this lately is not read again for a list.
@@ -29,11 +30,11 @@ const YOUNG: Duration = Duration::from_secs(60);
 pub(super) struct Words(Mutex<BTreeMap<(String, u16), (u16, Instant)>>);
 
 /// One register, and what the drive holds in it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct ParameterView {
-    pub(crate) mnemonic: &'static str,
+    pub(crate) mnemonic: Cow<'static, str>,
     pub(crate) address: u16,
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     /// In its unit, or the mnemonic of a listed value; absent where it has not been read, or can only be written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) value: Option<ValueView>,
@@ -49,10 +50,9 @@ pub(crate) struct ParameterView {
     /// Why it could not be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) error: Option<String>,
-    #[serde(skip_serializing_if = "str::is_empty")]
-    pub(crate) unit: &'static str,
-    /// `read`, `read_write`, `write_stopped` or `write`.
-    pub(crate) access: &'static str,
+    #[serde(default, skip_serializing_if = "str::is_empty")]
+    pub(crate) unit: Cow<'static, str>,
+    pub(crate) access: AccessWord,
     /// Where a written value lives: `RAM`, `RAM until saved`, `EEPROM` or `unknown`.
     pub(crate) storage: String,
     /// Which values it takes, in words; empty where the manual says nothing.
@@ -61,8 +61,26 @@ pub(crate) struct ParameterView {
     pub(crate) factory: String,
 }
 
+/// How a register may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum AccessWord {
+    Read,
+    ReadWrite,
+    /// Written at standstill.
+    WriteStopped,
+    Write,
+}
+
+drive_core::named! { AccessWord {
+    Read => "read",
+    ReadWrite => "read write",
+    WriteStopped => "write stopped",
+    Write => "write",
+} }
+
 /// A value.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum ValueView {
     Number(f64),
@@ -70,7 +88,7 @@ pub(crate) enum ValueView {
 }
 
 /// What became of a written register.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct WrittenView {
     #[serde(flatten)]
     pub(crate) parameter: ParameterView,
@@ -102,20 +120,20 @@ impl ParameterView {
     ) -> Self {
         let raw = word.map(|(raw, _)| raw);
         Self {
-            mnemonic: row.code,
+            mnemonic: row.code.into(),
             address: row.address,
-            name: row.name,
+            name: row.name.into(),
             value: raw.map(|raw| ValueView::of(row, raw)),
             text: raw.map(|raw| row.show(raw)),
             raw,
             age_ms: word.map(|(_, at)| milliseconds(at.elapsed())),
             error,
-            unit: row.unit.symbol,
+            unit: row.unit.symbol.into(),
             access: match row.access {
-                Access::Read => "read",
-                Access::ReadWrite => "read_write",
-                Access::WriteStopped => "write_stopped",
-                Access::Write => "write",
+                Access::Read => AccessWord::Read,
+                Access::ReadWrite => AccessWord::ReadWrite,
+                Access::WriteStopped => AccessWord::WriteStopped,
+                Access::Write => AccessWord::Write,
             },
             storage: row.storage.to_string(),
             range: range(row),

@@ -6,14 +6,14 @@ use std::{
 };
 
 use drive_core::Command;
-use drive_fleet::{Event, EventKind};
+use drive_fleet::{Event, EventKind, view::EventView};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Inner,
     revisions::Subject,
-    views::{CommandView, NoticeView, SeveralView},
+    views::{CommandView, HappenedView, NoticeView, SeveralView},
 };
 
 /// How many are kept.
@@ -28,7 +28,7 @@ pub(super) struct Recent {
 }
 
 /// Something that happened, as the event stream told it last.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct RecentView {
     /// By which revision.
     pub(crate) revision: u64,
@@ -37,13 +37,13 @@ pub(crate) struct RecentView {
 }
 
 /// What it was.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub(crate) enum Happened {
     /// A command, without its drives where it was for several, and without what they showed: its own address has them.
-    Command(CommandView),
+    Command(Box<CommandView>),
     /// What happened to a drive.
-    Event(Event),
+    Event(Box<EventView>),
     /// What happened to the program itself; the event stream names it `event` too.
     Notice(NoticeView),
 }
@@ -69,6 +69,20 @@ impl Recent {
 }
 
 impl Happened {
+    /// What happened to a drive or to the program; `None`: a command, which is told otherwise.
+    pub(crate) fn event(&self) -> Option<HappenedView> {
+        match self {
+            Self::Command(_) => None,
+            Self::Event(event) => Some(HappenedView {
+                time_unix_ms: event.time_unix_ms,
+                drive: Some(event.drive.to_string()),
+                alarm: event.alarm,
+                text: event.text.clone(),
+            }),
+            Self::Notice(notice) => Some(notice.clone().into()),
+        }
+    }
+
     fn is_same_command(&self, other: &Self) -> bool {
         matches!((self, other), (Self::Command(one), Self::Command(two))
             if (&one.id, one.time_unix_ms) == (&two.id, two.time_unix_ms))
@@ -90,14 +104,15 @@ impl Inner {
         let several = command.several.as_ref();
         let several = several.map(|several| SeveralView { drives: Vec::new(), ..several.clone() });
         let brief = CommandView { status: None, several, ..command.clone() };
-        self.recent.keep(RecentView { revision, what: Happened::Command(brief) });
+        self.recent.keep(RecentView { revision, what: Happened::Command(Box::new(brief)) });
     }
 
     /// Tells what happened to a drive. What came of a command that has been told as such is not told twice.
     pub(super) fn tell_event(&self, event: Event) {
         if !self.is_told_as_a_command(&event.kind) {
             let revision = self.revisions.push(Subject::Event, &event);
-            self.recent.keep(RecentView { revision, what: Happened::Event(event) });
+            self.recent
+                .keep(RecentView { revision, what: Happened::Event(Box::new(EventView::from(&event))) });
         }
     }
 

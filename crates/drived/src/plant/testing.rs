@@ -59,6 +59,16 @@ impl TestPlant {
     }
 }
 
+/// A drive as the API tells it, of which little is known.
+pub(crate) fn told(name: &str) -> serde_json::Value {
+    serde_json::json!({
+        "name": name, "line": "north", "slave": 1, "family": "atv312", "control": true, "link": "connected",
+        "status": {"quality": "missing"}, "measurements": {"quality": "missing"}, "started_here": false,
+        "identity": {"check": "unchecked"}, "watchdog": {"check": "no_contract"}, "concerns": [],
+        "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0},
+    })
+}
+
 impl Plant {
     /// No group starts before what it gives is dropped.
     pub(crate) async fn hold_group_starts(&self) -> impl Drop {

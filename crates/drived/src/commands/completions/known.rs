@@ -7,11 +7,14 @@ use std::{
 };
 
 use drive_families::Family;
-use serde_json::Value;
 use tokio::time::timeout;
 
 use super::place::Place;
-use crate::{client::Daemon, config::Config};
+use crate::{
+    client::Daemon,
+    config::Config,
+    plant::views::{DriveView, StateView},
+};
 
 /// Who presses the tab key waits no longer than this.
 const WITHIN: Duration = Duration::from_millis(500);
@@ -64,27 +67,21 @@ impl Known {
         }
     }
 
-    fn of_state(state: &Value) -> Self {
-        let all = |kind: &str| state[kind].as_array().cloned().unwrap_or_default();
-        let text = |value: &Value| value.as_str().map(str::to_owned);
-        let drive = |drive: Value| {
-            let family = drive["family"].as_str().unwrap_or_default();
-            Some(KnownDrive {
-                name: text(&drive["name"])?,
-                family: family.parse().ok(),
-                place: format!("{family}@{} on {}", drive["slave"], drive["line"].as_str().unwrap_or("?")),
-            })
+    fn of_state(state: &StateView) -> Self {
+        let drive = |drive: &DriveView| KnownDrive {
+            name: drive.name().to_owned(),
+            family: drive.family.parse().ok(),
+            place: format!("{}@{} on {}", drive.family, drive.slave, drive.line),
         };
-        let names = |kind| all(kind).iter().filter_map(|one| text(&one["name"])).collect();
         Self {
-            drives: all("drives").into_iter().filter_map(drive).collect(),
-            groups: names("groups"),
-            lines: names("lines"),
+            drives: state.drives.iter().map(drive).collect(),
+            groups: state.groups.iter().map(|group| group.name.clone()).collect(),
+            lines: state.lines.iter().map(|line| line.name.clone()).collect(),
         }
     }
 }
 
-async fn state(socket: Option<PathBuf>, token_file: Option<PathBuf>) -> Option<Value> {
+async fn state(socket: Option<PathBuf>, token_file: Option<PathBuf>) -> Option<StateView> {
     let mut daemon = Daemon::connect(socket.as_deref(), token_file.as_deref()).await.ok()?;
     daemon.state().await.ok()
 }

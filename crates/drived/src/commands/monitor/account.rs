@@ -1,10 +1,15 @@
 //! What became of a stop, counted until every drive is accounted for.
 
-use axum::http::StatusCode;
-use serde_json::Value;
+use std::sync::Arc;
 
 use super::words;
-use crate::{client::Answer, logging::escaped};
+use crate::{
+    logging::escaped,
+    plant::{
+        commands::OutcomeWord,
+        views::{CommandView, SeveralView},
+    },
+};
 
 /// Whose motors are to stop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,12 +42,12 @@ pub(super) enum Sent {
 /// Every drive once.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Count {
-    pub(super) confirmed: u64,
-    pub(super) pending: u64,
-    pub(super) not_reachable: u64,
+    pub(super) confirmed: usize,
+    pub(super) pending: usize,
+    pub(super) not_reachable: usize,
     /// Drives that are only read.
-    pub(super) refused: u64,
-    pub(super) failed: u64,
+    pub(super) refused: usize,
+    pub(super) failed: usize,
     /// Those that are not confirmed, each with what is known of it.
     pub(super) left: Vec<(String, String)>,
     /// Whether anything may still change.
@@ -55,7 +60,7 @@ pub(super) enum Progress {
     /// Another try has failed, and it is tried again.
     Again(String),
     /// What the daemon answered.
-    Answer(Value),
+    Answer(Arc<CommandView>),
     /// It cannot be asked what became of it for now.
     OutOfSight(String),
     Over(String),
@@ -133,35 +138,27 @@ impl Account {
 }
 
 impl Count {
-    /// Counts an answer of the API: that to a stop of one drive, or of several.
-    fn of(answer: &Value, is_silent: bool) -> Self {
-        let Some(drives) = answer["drives"].as_array() else { return Self::of_one(answer, is_silent) };
-        let count = |key: &str| answer[key].as_u64().unwrap_or_default();
-        let not_done = drives.iter().filter(|drive| drive["outcome"] != "confirmed");
+    /// Counts what became of a stop of one drive, or of several.
+    fn of(command: &CommandView, is_silent: bool) -> Self {
+        let one;
+        let several = match &command.several {
+            Some(several) => several,
+            None => {
+                one = SeveralView::of(vec![command.clone()], |_| is_silent);
+                &one
+            }
+        };
+        let SeveralView { drives, confirmed, pending, not_reachable, refused, failed } = several;
+        let not_done = drives.iter().filter(|drive| drive.outcome != OutcomeWord::Confirmed);
         Self {
-            confirmed: count("confirmed"),
-            pending: count("pending"),
-            not_reachable: count("not_reachable"),
-            refused: count("refused"),
-            failed: count("failed"),
+            confirmed: *confirmed,
+            pending: *pending,
+            not_reachable: *not_reachable,
+            refused: *refused,
+            failed: *failed,
             left: not_done.map(left).collect(),
-            is_open: drives.iter().any(|drive| drive["outcome"] == "pending"),
+            is_open: drives.iter().any(|drive| drive.outcome == OutcomeWord::Pending),
         }
-    }
-
-    fn of_one(answer: &Value, is_silent: bool) -> Self {
-        let mut count = Self::default();
-        let outcome = answer["outcome"].as_str().unwrap_or("unknown");
-        *match outcome {
-            "confirmed" => &mut count.confirmed,
-            "refused" => &mut count.refused,
-            _ if is_silent => &mut count.not_reachable,
-            "pending" => &mut count.pending,
-            _ => &mut count.failed,
-        } = 1;
-        count.left = (outcome != "confirmed").then(|| left(answer)).into_iter().collect();
-        count.is_open = outcome == "pending";
-        count
     }
 
     fn sentence(&self) -> String {
@@ -175,21 +172,7 @@ impl Count {
 }
 
 /// Who is left, and what is known of it.
-fn left(command: &Value) -> (String, String) {
-    let name = escaped(command["drive"].as_str().unwrap_or("the drive"));
-    let outcome = words::outcome(command["outcome"].as_str().unwrap_or("unknown"));
-    (name, outcome.to_owned())
-}
-
-/// What the answer to a stop means.
-pub(super) fn judged(answer: &Answer) -> Progress {
-    let of_command = answer.body["outcome"].is_string() || answer.body["drives"].is_array();
-    match answer.status {
-        _ if of_command => Progress::Answer(answer.body.clone()),
-        StatusCode::NOT_FOUND => Progress::Over(
-            "the daemon does not know of this stop, it was started anew: press again".to_owned(),
-        ),
-        status if status.is_server_error() => Progress::Again(answer.failure().to_string()),
-        _ => Progress::Over(answer.failure().to_string()),
-    }
+fn left(command: &CommandView) -> (String, String) {
+    let name = escaped(command.drive.as_deref().unwrap_or("the drive"));
+    (name, words::outcome(command.outcome))
 }

@@ -1,6 +1,6 @@
 //! The last ten minutes of a drive, and which part of them is looked at.
 
-use serde_json::Value;
+use crate::plant::history::HistoryView;
 
 /// How much is shown, in seconds: ten minutes is what the daemon keeps.
 const WINDOWS: [f64; 4] = [600.0, 300.0, 120.0, 60.0];
@@ -29,21 +29,18 @@ pub(super) struct Sample {
 
 impl Curves {
     /// Takes a history of the API.
-    pub(super) fn take(&mut self, history: &Value) {
+    pub(super) fn take(&mut self, history: HistoryView) {
         if self.is_paused() {
             return;
         }
-        let column = |name: &str| history[name].as_array().map_or(&[][..], Vec::as_slice);
-        let at = |column: &[Value], index: usize| column.get(index).and_then(Value::as_f64);
-        let (frequency, setpoint) = (column("frequency_hz"), column("setpoint_hz"));
-        let (current, torque) = (column("current_a"), column("torque_percent"));
-        let times = column("time_unix_ms").iter().enumerate();
-        let samples = times.map(|(index, time)| Sample {
-            unix_ms: time.as_u64().unwrap_or_default(),
-            frequency: at(frequency, index),
-            setpoint: at(setpoint, index),
-            current: at(current, index),
-            torque: at(torque, index),
+        let HistoryView { time_unix_ms, frequency_hz, setpoint_hz, current_a, torque_percent, .. } = history;
+        let at = |column: &[Option<f64>], index: usize| column.get(index).copied().flatten();
+        let samples = time_unix_ms.into_iter().enumerate().map(|(index, unix_ms)| Sample {
+            unix_ms,
+            frequency: at(&frequency_hz, index),
+            setpoint: at(&setpoint_hz, index),
+            current: at(&current_a, index),
+            torque: at(&torque_percent, index),
         });
         self.samples = samples.collect();
     }

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use http_body_util::BodyExt as _;
-use serde_json::Value;
 use tokio::{
     sync::{mpsc::Sender, watch},
     time::{sleep, timeout},
@@ -11,8 +10,9 @@ use tokio::{
 
 use super::model::{News, Wanted};
 use crate::{
-    client::{Daemon, Frames, Way, path_of},
+    client::{Daemon, Frames, Heard, Way},
     failure::Failure,
+    plant::recent::RecentView,
 };
 
 /// From a connection that broke to the next try.
@@ -43,12 +43,12 @@ pub(super) async fn follow(way: Way, news: Sender<News>) {
 async fn streamed(way: &Way, news: &Sender<News>) -> Result<(), Failure> {
     let mut daemon = timely(way.connect()).await?;
     let state = timely(daemon.state()).await?;
-    let recent = timely(daemon.get("/api/v1/events/recent")).await?.done()?;
-    let since = state["revision"].as_u64().unwrap_or_default();
+    let mut recent: Vec<RecentView> = timely(daemon.read(&["events", "recent"])).await?;
+    let since = state.revision;
     // What happened before is told by both, and is taken once.
-    let recent = before(recent, since);
+    recent.retain(|one| one.revision <= since);
     let gone = || Failure::Drive("nobody looks any more".to_owned());
-    news.send(News::State { state, recent }).await.map_err(|_| gone())?;
+    news.send(News::State { state: Box::new(state), recent }).await.map_err(|_| gone())?;
     let answer = timely(daemon.send("GET", &format!("/api/v1/events?since={since}"), None)).await?;
     if !answer.status().is_success() {
         return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
@@ -58,20 +58,14 @@ async fn streamed(way: &Way, news: &Sender<News>) -> Result<(), Failure> {
         let frame = timeout(SILENT_AFTER, body.frame()).await.map_err(|_| silent())?;
         let Some(Ok(frame)) = frame else { return Err(Failure::Drive("the daemon has ended".to_owned())) };
         for (kind, data) in frames.take(frame.data_ref().map_or(&[][..], |data| data)) {
-            if kind == "reset" {
-                return Ok(());
+            match Heard::of(&kind, data) {
+                Some(Heard::Reset) => return Ok(()),
+                Some(heard) => news.send(News::Heard(heard)).await.map_err(|_| gone())?,
+                // What is not understood is told again with the next state.
+                None => {}
             }
-            news.send(News::Event { kind, data }).await.map_err(|_| gone())?;
         }
     }
-}
-
-/// What was told until a revision.
-fn before(mut recent: Value, revision: u64) -> Value {
-    if let Some(all) = recent.as_array_mut() {
-        all.retain(|one| one["revision"].as_u64().is_some_and(|told| told <= revision));
-    }
-    recent
 }
 
 /// Reads what is wanted, for as long as it is.
@@ -109,12 +103,12 @@ async fn read(way: &Way, connection: &mut Option<Daemon>, what: Wanted) -> Resul
     };
     match what {
         Wanted::History(drive) => {
-            let history = timely(daemon.get(&path_of(&["drives", &drive, "history"]))).await?.done()?;
+            let history = timely(daemon.read(&["drives", &drive, "history"])).await?;
             Ok(News::History { drive, history })
         }
         Wanted::Line(name) => {
-            let line = timely(daemon.get(&path_of(&["lines", &name]))).await?.done()?;
-            Ok(News::Line { name, line })
+            let line = timely(daemon.read(&["lines", &name])).await?;
+            Ok(News::Line(Box::new(line)))
         }
     }
 }

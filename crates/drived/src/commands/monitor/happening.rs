@@ -1,9 +1,14 @@
 //! What has happened: a command with what became of it, a trip, a drive lost or back.
 
-use serde_json::Value;
-
 use super::words;
-use crate::logging::escaped;
+use crate::{
+    logging::escaped,
+    plant::{
+        commands::OutcomeWord,
+        recent::Happened,
+        views::{CommandView, HappenedView, SeveralView},
+    },
+};
 
 /// Which of them are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,36 +51,38 @@ pub(super) struct Happening {
 }
 
 impl Happening {
-    /// Takes what the daemon told; `None` where that is neither a command nor an event.
-    pub(super) fn told(kind: &str, told: &Value) -> Option<Self> {
-        let text = |key: &str| told[key].as_str().map(escaped).unwrap_or_default();
-        let unix_ms = told["time_unix_ms"].as_u64()?;
-        Some(match kind {
-            "command" => {
-                let outcome = told["outcome"].as_str().unwrap_or("unknown");
-                Self {
-                    unix_ms,
-                    drive: match told["group"].as_str() {
-                        Some(group) => format!("group {}", escaped(group)),
-                        None if told["drive"].is_null() => "all drives".to_owned(),
-                        None => text("drive"),
-                    },
-                    text: command(told, outcome),
-                    is_alarm: !["confirmed", "pending", "superseded"].contains(&outcome),
-                    command: Some(text("id")),
-                    is_command: true,
-                }
-            }
-            "event" | "notice" => Self {
-                unix_ms,
-                drive: text("drive"),
-                text: text("text").trim_start_matches("command: ").to_owned(),
-                is_alarm: told["alarm"] == true,
-                command: None,
-                is_command: told["event"] == "command",
-            },
-            _ => return None,
-        })
+    /// Takes what happened lately.
+    pub(super) fn lately(what: &Happened) -> Option<Self> {
+        match what {
+            Happened::Command(told) => Some(Self::commanded(told)),
+            what => what.event().map(|event| Self::happened(&event)),
+        }
+    }
+
+    /// Takes what became of a command.
+    pub(super) fn commanded(told: &CommandView) -> Self {
+        let drive = match (&told.group, &told.drive) {
+            (Some(group), _) => format!("group {}", escaped(group)),
+            (None, Some(drive)) => escaped(drive),
+            (None, None) => "all drives".to_owned(),
+        };
+        let is_alarm =
+            !matches!(told.outcome, OutcomeWord::Confirmed | OutcomeWord::Pending | OutcomeWord::Superseded);
+        let (unix_ms, command) = (told.time_unix_ms, Some(told.id.clone()));
+        Self { unix_ms, drive, text: sentence(told), is_alarm, command, is_command: true }
+    }
+
+    /// Takes what happened to a drive or to the program.
+    pub(super) fn happened(told: &HappenedView) -> Self {
+        let of_command = told.text.strip_prefix("command: ");
+        Self {
+            unix_ms: told.time_unix_ms,
+            drive: told.drive.as_deref().map(escaped).unwrap_or_default(),
+            text: escaped(of_command.unwrap_or(&told.text)),
+            is_alarm: told.alarm,
+            command: None,
+            is_command: of_command.is_some(),
+        }
     }
 
     pub(super) const fn is(&self, kind: Kind) -> bool {
@@ -100,23 +107,18 @@ impl Happening {
 }
 
 /// What was asked, by whom, from where, what became of it, and how long that took.
-fn command(told: &Value, outcome: &str) -> String {
-    let text = |key: &str| told[key].as_str().map(escaped);
-    let what = text("command").or_else(|| text("action")).unwrap_or_default();
-    let who: Vec<String> = [text("caller"), text("origin")].into_iter().flatten().collect();
-    let count = |key: &str, what: &str| told[key].as_u64().map(|count| format!("{count} {what}"));
-    let counts = [
-        count("confirmed", "confirmed"),
-        count("pending", "pending"),
-        count("not_reachable", "not reachable"),
-    ];
-    let counts: Vec<String> = counts.into_iter().flatten().collect();
-    let took = told["took_ms"].as_u64().filter(|_| outcome != "pending");
+fn sentence(told: &CommandView) -> String {
+    let is_confirmed = told.outcome == OutcomeWord::Confirmed;
+    let counts = told.several.as_ref().map(|several| {
+        let SeveralView { confirmed, pending, not_reachable, .. } = several;
+        format!("{confirmed} confirmed, {pending} pending, {not_reachable} not reachable")
+    });
+    let took = told.took_ms.filter(|_| told.outcome != OutcomeWord::Pending);
     let parts = [
-        format!("{what} by {}", who.join(", ")),
-        words::outcome(outcome).to_owned(),
-        counts.join(", "),
-        text("text").filter(|_| outcome != "confirmed").unwrap_or_default(),
+        format!("{} by {}, {}", escaped(&told.command), escaped(&told.caller), escaped(&told.origin)),
+        words::outcome(told.outcome),
+        counts.unwrap_or_default(),
+        told.text.as_deref().filter(|_| !is_confirmed).map(escaped).unwrap_or_default(),
         took.map(|took| format!("after {took} ms")).unwrap_or_default(),
     ];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(": ")

@@ -148,7 +148,10 @@ mod tests {
         super::{account::Progress, model::News, stopping},
         *,
     };
-    use crate::simulated::{self, SetUp};
+    use crate::{
+        plant::commands::OutcomeWord,
+        simulated::{self, SetUp},
+    };
 
     /// How often anything was written to it.
     fn writes(machine: &SimSlave) -> u64 {
@@ -200,7 +203,7 @@ mod tests {
                 last = Some(progress);
             }
             let Some(Progress::Answer(answer)) = last else { panic!("{family}: {last:?}") };
-            assert_eq!(answer["outcome"], "confirmed", "{family}: {answer}");
+            assert_eq!(answer.outcome, OutcomeWord::Confirmed, "{family}: {answer:?}");
             assert!(!one.observe().running, "{family}");
             assert_eq!(writes(two), before[1], "{family}: the other one was not meant");
         }

@@ -2,13 +2,15 @@
 
 use std::time::Duration;
 
+use crate::plant::commands::OutcomeWord;
+
 /// What became of a command.
-pub(super) fn outcome(word: &str) -> &str {
+pub(super) fn outcome(word: OutcomeWord) -> String {
     match word {
-        "not_confirmed" => "NOT confirmed",
-        "unknown" => "outcome unknown",
-        "superseded" => "superseded by a later command",
-        word => word,
+        OutcomeWord::NotConfirmed => "NOT confirmed".to_owned(),
+        OutcomeWord::Unknown => "outcome unknown".to_owned(),
+        OutcomeWord::Superseded => "superseded by a later command".to_owned(),
+        word => word.to_string(),
     }
 }
 

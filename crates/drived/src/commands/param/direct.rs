@@ -3,13 +3,14 @@
 use drive_core::{Capabilities, Drive, ErrorKind, Row, registers::Storage};
 use serde_json::json;
 
-use super::shown::{find, value_cells, value_table, wanted};
+use super::shown::{find, value_cells, value_table};
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
     one_drive::{OneDrive, OneDriveArgs, told},
     output,
     plant::parameters::{ParameterView, WrittenView},
+    registers::wanted,
     signals::Ending,
 };
 
@@ -80,12 +81,12 @@ pub(super) async fn set(args: &OneDriveArgs, register: &str, value: &str, save: 
             }
             Err(failure) => {
                 // What was written is told though it is not saved.
-                args.daemon.say(&body, |_| text.iter().try_for_each(output::say))?;
+                args.daemon.say(&body, || text.iter().try_for_each(output::say))?;
                 return Err(failure);
             }
         }
     }
-    args.daemon.say(&body, |_| text.iter().try_for_each(output::say))?;
+    args.daemon.say(&body, || text.iter().try_for_each(output::say))?;
     one.close().await;
     Ok(())
 }
@@ -97,7 +98,7 @@ pub(super) async fn save_all(args: &OneDriveArgs) -> Result<(), Failure> {
     let mut one = args.open().await?;
     let (saves, text) = persist(&mut one).await?;
     let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
-    args.daemon.say(&body, |_| output::say(text))?;
+    args.daemon.say(&body, || output::say(text))?;
     one.close().await;
     Ok(())
 }
@@ -170,7 +171,7 @@ fn say_values(
         Ok(word) => ParameterView::read(capabilities, row, *word),
         Err(why) => ParameterView::unread(capabilities, row, why.clone()),
     };
-    args.daemon.say(&json!(read.iter().map(view).collect::<Vec<_>>()), |_| {
+    args.daemon.say(&read.iter().map(view).collect::<Vec<_>>(), || {
         let mut table = value_table();
         for (row, word) in read {
             let shown = word.as_ref().map_or_else(Clone::clone, |word| row.show(*word));

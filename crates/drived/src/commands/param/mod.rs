@@ -12,9 +12,7 @@ pub(crate) mod source;
 mod testing;
 
 use drive_families::{Family, UnknownFamily};
-use serde_json::json;
 
-pub(crate) use self::shown::{brief, factory, range, wanted};
 use self::{
     direct::{dump, get, save_all, set},
     shown::list,
@@ -92,7 +90,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
             let family = family(&of, &daemon).await?;
             let capabilities = family.capabilities();
             let rows = capabilities.rows.iter().map(|row| ParameterView::unasked(capabilities, row));
-            daemon.say(&json!(rows.collect::<Vec<_>>()), |_| output::say_table(list(family)))
+            daemon.say(&rows.collect::<Vec<_>>(), || output::say_table(list(family)))
         }
         Command::Get { one, words } if one.is_on_line() => get(&one, &words).await,
         Command::Get { one, words } => remote::get(&one, &words).await,
@@ -126,8 +124,6 @@ async fn family(of: &str, daemon: &DaemonArgs) -> Result<Family, Failure> {
     let Ok(mut daemon) = daemon.connect().await else { return Err(unknown) };
     let state = daemon.state().await?;
     Target::find(&state, of)?;
-    let mut drives = state["drives"].as_array().into_iter().flatten();
-    let family =
-        drives.find(|drive| drive["name"] == of).and_then(|drive| drive["family"].as_str()?.parse().ok());
-    family.ok_or(unknown)
+    let family = state.drives.iter().find(|drive| drive.name() == of);
+    family.and_then(|drive| drive.family.parse().ok()).ok_or(unknown)
 }

@@ -1,12 +1,16 @@
 //! The same through the running daemon.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::{
     client::{self, Told},
     failure::Failure,
     one_drive::OneDriveArgs,
     output,
+    plant::{
+        commands::ActionWord,
+        parameters::{AccessWord, ParameterView, WrittenView},
+    },
 };
 
 /// Reads registers.
@@ -20,7 +24,7 @@ pub(super) async fn get(one: &OneDriveArgs, words: &[String]) -> Result<(), Fail
         let path = one.path(&mut daemon, Some(name), &["parameters", register]).await?;
         rows.push(daemon.get(&path).await?.done()?);
     }
-    one.daemon.say(&Value::Array(rows), show)
+    one.daemon.say(&rows, || client::registers(&rows))
 }
 
 /// Writes one register, reads it back, and saves it if that is wanted.
@@ -33,16 +37,16 @@ pub(super) async fn set(
 ) -> Result<(), Failure> {
     let mut daemon = one.daemon.connect().await?;
     let path = one.path(&mut daemon, Some(name), &["parameters", register]).await?;
-    let written = daemon.put(&path, &json!({ "value": value, "save": save })).await?.done()?;
-    one.daemon.say(&written, |written| {
-        output::say(format_args!("{name} {}", written["text"].as_str().unwrap_or_default()))
-    })
+    let written = daemon.put(&path, &json!({ "value": value, "save": save })).await?;
+    let written: WrittenView = written.done()?;
+    let text = written.parameter.text.as_deref().unwrap_or_default();
+    one.daemon.say(&written, || output::say(format_args!("{name} {text}")))
 }
 
 /// Saves the parameters of a drive to its EEPROM.
 pub(super) async fn save(one: &OneDriveArgs, name: Option<&str>) -> Result<(), Failure> {
     let done = "has saved its parameters to EEPROM: all that it kept in RAM, not one alone".to_owned();
-    one.tell(name, &Told { action: "save", body: json!({}), done }).await
+    one.tell(name, &Told { action: ActionWord::Save, body: json!({}), done }).await
 }
 
 /// Reads every register that can be read. The daemon reads them between its polls, and what it has read it keeps for a
@@ -52,18 +56,15 @@ pub(super) async fn dump(one: &OneDriveArgs, name: Option<&str>) -> Result<(), F
     let path = one.path(&mut daemon, name, &["parameters"]).await? + "?wait=30s";
     let mut left = usize::MAX;
     loop {
-        let rows = daemon.get(&path).await?.done()?;
-        let missing =
-            |row: &&Value| row["access"] != "write" && row["text"].is_null() && row["error"].is_null();
-        let now = rows.as_array().into_iter().flatten().filter(missing).count();
+        let rows: Vec<ParameterView> = daemon.get(&path).await?.done()?;
+        let missing = |row: &&ParameterView| {
+            row.access != AccessWord::Write && row.text.is_none() && row.error.is_none()
+        };
+        let now = rows.iter().filter(missing).count();
         // Where it comes no further the drive is not there.
         if now == 0 || now >= left {
-            return one.daemon.say(&rows, show);
+            return one.daemon.say(&rows, || client::registers(&rows));
         }
         left = now;
     }
-}
-
-fn show(rows: &Value) -> Result<(), Failure> {
-    client::registers(rows.as_array().map_or(&[][..], Vec::as_slice))
 }

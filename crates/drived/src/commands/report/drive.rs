@@ -202,9 +202,9 @@ fn watchdog(drive: &DriveTold) -> Markup {
     let mut rows = vec![("the program".to_owned(), cell(watched(found)))];
     let time = found["time_ms"].as_u64();
     let settings = drive.settings.as_ref();
-    let feed = settings.map_or(&Value::Null, |settings| &settings["feed"]);
+    let feed = settings.ok().and_then(|settings| settings.feed);
     let has_one = drive.family.as_ref().is_ok_and(|family| family.capabilities().watchdog.is_some());
-    let armed = match settings.map(|settings| settings["watchdog_armed"].as_bool()) {
+    let armed = match settings.map(|settings| settings.watchdog_armed) {
         Ok(Some(true)) => cell("yes"),
         Ok(Some(false)) => html! { strong { "no" } ": " (UNWATCHED) },
         Ok(None) if !has_one => {
@@ -214,24 +214,27 @@ fn watchdog(drive: &DriveTold) -> Markup {
         Err(why) => unread(why),
     };
     rows.push(("armed".to_owned(), armed));
-    if let Some(time) = feed["time_ms"].as_f64().or(time.map(|time| time as f64)) {
-        rows.push(("timeout".to_owned(), cell(milliseconds(&time.into()))));
+    if let Some(time) = feed.map(|feed| feed.time_ms).or(time.map(|time| time as f64)) {
+        rows.push(("timeout".to_owned(), cell(milliseconds(time))));
         let reaction = found["reaction"].as_str().map(client::words);
         rows.push(("reaction".to_owned(), reaction.map_or_else(untold, cell)));
     }
-    match settings {
-        Err(why) => rows.push(("fed within".to_owned(), unread(why))),
-        Ok(_) if feed.is_object() => {
-            let (time, within) = (feed["time_ms"].as_f64(), feed["heard_within_ms"].as_f64());
-            rows.push(("fed within, by the plan".to_owned(), cell(milliseconds(&feed["heard_within_ms"]))));
-            let margin = time.zip(within).map(|(time, within)| time - within);
-            rows.push(("margin".to_owned(), match margin {
-                Some(margin) if margin >= 0.0 => cell(milliseconds(&margin.into())),
-                Some(margin) => html! { strong { "none" } ": it may run out " (milliseconds(&(-margin).into())) " too early" },
-                None => unread("the daemon does not say"),
-            }));
+    match (settings, feed) {
+        (Err(why), _) => rows.push(("fed within".to_owned(), unread(why))),
+        (Ok(_), Some(feed)) => {
+            let margin = feed.time_ms - feed.heard_within_ms;
+            rows.push(("fed within, by the plan".to_owned(), cell(milliseconds(feed.heard_within_ms))));
+            rows.push((
+                "margin".to_owned(),
+                match margin >= 0.0 {
+                    true => cell(milliseconds(margin)),
+                    false => {
+                        html! { strong { "none" } ": it may run out " (milliseconds(-margin)) " too early" }
+                    }
+                },
+            ));
         }
-        Ok(_) => {}
+        (Ok(_), None) => {}
     }
     facts(rows)
 }
@@ -272,7 +275,7 @@ fn faults(drive: &DriveTold) -> Markup {
     html! {
         @for fault in drive.trips() { (present(fault)) }
         @if drive.trips().is_empty() { p { "No fault is present." } }
-        @if known["time_unix_ms"].is_u64() { p { "The program saw it at " (moment(&known["time_unix_ms"])) "." } }
+        @if known["time_unix_ms"].is_u64() { p { "The program saw it at " (moment(known["time_unix_ms"].as_u64())) "." } }
         @match faults["reset_allowed"].as_bool() {
             Some(true) if !list(&faults["present"]).is_empty() => p { "The drive would accept a reset." },
             Some(false) => p { "The drive would not accept a reset: its cause is still there." },

@@ -2,12 +2,17 @@
 
 use drive_families::Family;
 use futures_util::future::try_join_all;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
 
 use crate::{
-    client::{Daemon, Target, Way, path_of},
+    client::{Daemon, Way, wanted},
     commands::param::{diff::Comparison, file::Backup, source::Source},
     failure::Failure,
+    plant::{
+        recent::RecentView,
+        views::{DriveView, LineDetailView, SettingsView, StateView},
+    },
 };
 
 /// Why nothing is asked of a drive that is away.
@@ -19,16 +24,16 @@ pub(super) const LEFT_OUT: &str = "left out, as was asked";
 #[derive(Debug)]
 pub(super) struct Gathered {
     /// The state of the plant at the end of the reading.
-    pub(super) state: Value,
+    pub(super) state: StateView,
     /// The lines on which the drives are, each with what was measured on it.
-    pub(super) lines: Vec<Told>,
+    pub(super) lines: Vec<Told<LineDetailView>>,
     pub(super) drives: Vec<DriveTold>,
     /// What happened lately.
-    pub(super) events: Told,
+    pub(super) events: Told<Vec<RecentView>>,
 }
 
 /// An answer, or why there is none.
-pub(super) type Told = Result<Value, String>;
+pub(super) type Told<T> = Result<T, String>;
 
 /// What was read of one drive.
 #[derive(Debug)]
@@ -36,8 +41,8 @@ pub(super) struct DriveTold {
     /// As the API has it.
     pub(super) view: Value,
     pub(super) family: Result<Family, String>,
-    pub(super) settings: Told,
-    pub(super) faults: Told,
+    pub(super) settings: Told<SettingsView>,
+    pub(super) faults: Told<Value>,
     pub(super) parameters: Result<Compared, String>,
 }
 
@@ -57,7 +62,7 @@ impl Gathered {
         let lines = lines_of(&wanted);
         // The lines do not wait for one another.
         let read = lines.iter().map(|line| {
-            let drives = wanted.iter().filter(|drive| drive["line"] == **line);
+            let drives = wanted.iter().filter(|drive| drive.line == *line);
             read_drives(way, drives.copied(), with_parameters)
         });
         let read = try_join_all(read).await?;
@@ -70,9 +75,8 @@ impl Gathered {
         let events = ask(&mut daemon, &["events", "recent"]).await;
         let mut drives: Vec<DriveTold> = read.into_iter().flatten().collect();
         for drive in &mut drives {
-            let now = state["drives"].as_array().into_iter().flatten();
-            if let Some(now) = now.into_iter().find(|now| now["name"] == drive.view["name"]) {
-                drive.view = now.clone();
+            if let Some(now) = state.drives.iter().find(|now| now.name() == drive.name()) {
+                drive.view = json!(now);
             }
             drive.ask_again(&mut daemon).await;
         }
@@ -83,13 +87,15 @@ impl Gathered {
 /// Reads the drives of one line, one after the other.
 async fn read_drives(
     way: &Way,
-    drives: impl Iterator<Item = &Value>,
+    drives: impl Iterator<Item = &DriveView>,
     with_parameters: bool,
 ) -> Result<Vec<DriveTold>, Failure> {
     let mut daemon = way.connect().await?;
     let mut told = Vec::new();
     for view in drives {
-        let name = view["name"].as_str().unwrap_or_default();
+        let name = view.name();
+        let family = view.family.parse().map_err(|error| drive_families::UnknownFamily::to_string(&error));
+        let (drive, view) = (view, json!(view));
         let settings = ask(&mut daemon, &["drives", name, "settings"]).await;
         let is_there = view["status"]["quality"] == "good";
         let (faults, parameters) = match (is_there, with_parameters) {
@@ -97,12 +103,10 @@ async fn read_drives(
             (true, false) => (ask(&mut daemon, &["drives", name, "faults"]).await, Err(LEFT_OUT.to_owned())),
             (true, true) => (
                 ask(&mut daemon, &["drives", name, "faults"]).await,
-                compared(way.connect().await?, view).await,
+                compared(way.connect().await?, drive).await,
             ),
         };
-        let family = view["family"].as_str().unwrap_or_default();
-        let family = family.parse().map_err(|error| drive_families::UnknownFamily::to_string(&error));
-        told.push(DriveTold { view: view.clone(), family, settings, faults, parameters });
+        told.push(DriveTold { view, family, settings, faults, parameters });
     }
     Ok(told)
 }
@@ -121,48 +125,24 @@ impl DriveTold {
     }
 }
 
-/// The drives that these names mean, line by line.
-fn wanted<'a>(state: &'a Value, names: &[String]) -> Result<Vec<&'a Value>, Failure> {
-    let drives = || state["drives"].as_array().into_iter().flatten();
-    if names.is_empty() {
-        return Ok(drives().collect());
-    }
-    let mut targets = Vec::new();
-    for name in names {
-        match Target::find(state, name) {
-            Ok(target) => targets.push(Ok(target)),
-            Err(_) if drives().any(|drive| drive["line"] == **name) => targets.push(Err(name)),
-            Err(failure) => return Err(failure),
-        }
-    }
-    let is_wanted = |drive: &&Value| {
-        targets.iter().any(|target| match target {
-            Ok(target) => drive["name"].as_str().is_some_and(|name| target.has(state, name)),
-            Err(line) => drive["line"] == ***line,
-        })
-    };
-    Ok(drives().filter(is_wanted).collect())
-}
-
 /// The lines of drives, each once.
-fn lines_of(drives: &[&Value]) -> Vec<String> {
+fn lines_of(drives: &[&DriveView]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for line in drives.iter().filter_map(|drive| drive["line"].as_str()) {
-        if !lines.iter().any(|known| known == line) {
-            lines.push(line.to_owned());
+    for drive in drives {
+        if !lines.contains(&drive.line) {
+            lines.push(drive.line.clone());
         }
     }
     lines
 }
 
-async fn ask(daemon: &mut Daemon, parts: &[&str]) -> Told {
-    let answer = daemon.get(&path_of(parts)).await.and_then(crate::client::Answer::done);
-    answer.map_err(|failure| failure.to_string())
+async fn ask<T: DeserializeOwned>(daemon: &mut Daemon, parts: &[&str]) -> Told<T> {
+    daemon.read(parts).await.map_err(|failure| failure.to_string())
 }
 
 /// Reads the parameters of a drive and compares them with its factory setting.
-async fn compared(daemon: Daemon, view: &Value) -> Result<Compared, String> {
-    let mut source = Source::OfDaemon { daemon: Box::new(daemon), view: view.clone() };
+async fn compared(daemon: Daemon, view: &DriveView) -> Result<Compared, String> {
+    let mut source = Source::OfDaemon { daemon: Box::new(daemon), view: Box::new(view.clone()) };
     let held = source.keep().await.map_err(|failure| failure.to_string())?;
     match held.nothing_read() {
         Some(why) => Err(why),

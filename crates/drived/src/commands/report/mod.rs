@@ -91,7 +91,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         .map_err(|error| Failure::Input(format!("{}: {error}", args.to.display())))?;
     let silent = gathered.silent();
     let written = json!({ "file": args.to, "drives": gathered.drives.len(), "silent": silent });
-    args.daemon.say(&written, |_| {
+    args.daemon.say(&written, || {
         let drives = output::counted(gathered.drives.len(), "drive", "drives");
         output::say(format_args!("{}: {drives}", args.to.display()))?;
         match (&args.line, gathered.armed()) {
@@ -128,7 +128,7 @@ impl Gathered {
     /// How many drives have a communication watchdog that runs.
     fn armed(&self) -> usize {
         let is_armed = |drive: &&gather::DriveTold| {
-            drive.settings.as_ref().is_ok_and(|told| told["watchdog_armed"] == true) && drive.is_there()
+            drive.settings.as_ref().is_ok_and(|told| told.watchdog_armed == Some(true)) && drive.is_there()
         };
         self.drives.iter().filter(is_armed).count()
     }

@@ -7,7 +7,7 @@ use super::{
     drive,
     gather::Gathered,
     line, program, summary,
-    words::{facts, moment, text, unread},
+    words::{facts, moment, unread},
 };
 use crate::output;
 
@@ -64,18 +64,18 @@ impl Page<'_> {
     }
 
     fn head(&self) -> Markup {
-        let daemon = &self.gathered.state["daemon"];
+        let daemon = &self.gathered.state.daemon;
         let drives = self.gathered.drives.len();
         let silent = self.gathered.silent().len();
         let mut rows = vec![
             ("written".to_owned(), html! { (self.written.format("%Y-%m-%d %H:%M:%S %:z")) }),
             (
                 "told by".to_owned(),
-                html! { (self.source) @if daemon["demo"] == true { ", " strong { "whose drives are simulated" } } },
+                html! { (self.source) @if daemon.demo { ", " strong { "whose drives are simulated" } } },
             ),
             (
                 "running since".to_owned(),
-                html! { (moment(&daemon["started_unix_ms"])) ", drived " (text(&daemon["version"])) },
+                html! { (moment(daemon.started_unix_ms)) ", drived " (daemon.version) },
             ),
             (
                 "drives".to_owned(),

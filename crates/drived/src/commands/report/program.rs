@@ -1,13 +1,19 @@
 //! What the program was told of the drives, and the alarms that it has raised.
 
 use maud::{Markup, PreEscaped, html};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{
     gather::{DriveTold, Told},
-    words::{cell, facts, list, milliseconds, moment, table, text, unread},
+    words::{cell, facts, milliseconds, moment, table, unread},
 };
-use crate::{client, output};
+use crate::{
+    client, output,
+    plant::{
+        recent::RecentView,
+        views::{HappenedView, SettingsView},
+    },
+};
 
 /// The newest alarms stand in a report, and how many there are besides.
 const ALARMS: usize = 60;
@@ -33,19 +39,18 @@ pub(super) fn settings(drives: &[DriveTold]) -> Markup {
     }
 }
 
-fn rows(told: &Value) -> Vec<(String, Markup)> {
-    let settings = &told["settings"];
+fn rows(told: &SettingsView) -> Vec<(String, Markup)> {
     let mut rows = Vec::new();
+    let settings = json!(told.settings);
     for (key, value) in settings.as_object().into_iter().flatten().filter(|(key, _)| *key != "name") {
         flatten(&client::words(key), value, &mut rows);
     }
-    for (key, label) in [
-        ("running_age_ms", "by the plan, a status is never older, running"),
-        ("rest_age_ms", "the same at rest"),
-        ("measurements_age_ms", "the same of measured values"),
+    for (age, label) in [
+        (told.running_age_ms, "by the plan, a status is never older, running"),
+        (told.rest_age_ms, "the same at rest"),
+        (told.measurements_age_ms, "the same of measured values"),
     ] {
-        let told = &told[key];
-        let age = if told.is_null() { "no limit, or none are read".to_owned() } else { milliseconds(told) };
+        let age = age.map_or_else(|| "no limit, or none are read".to_owned(), milliseconds);
         rows.push((label.to_owned(), cell(age)));
     }
     rows
@@ -66,7 +71,7 @@ fn flatten(label: &str, value: &Value, rows: &mut Vec<(String, Markup)>) {
         }
         Value::Number(_) => {
             let (name, shown) = match label.rsplit_once(' ') {
-                Some((name, "ms")) => (name, milliseconds(value)),
+                Some((name, "ms")) => (name, milliseconds(value.as_f64())),
                 Some((name, "hz")) => (name, format!("{value} Hz")),
                 Some((name, "a")) => (name, format!("{value} A")),
                 Some((name, "percent")) => (name, format!("{value} %")),
@@ -89,17 +94,21 @@ fn plain(value: &Value) -> String {
 }
 
 /// The alarms of the last events that the program remembers.
-pub(super) fn alarms(events: &Told, names: &[&str]) -> Markup {
+pub(super) fn alarms(events: &Told<Vec<RecentView>>, names: &[&str]) -> Markup {
     let events = match events {
-        Ok(events) => list(events),
+        Ok(events) => events,
         Err(why) => return html! { p { (unread(why)) } },
     };
-    let concerns = |event: &&Value| event["drive"].as_str().is_none_or(|drive| names.contains(&drive));
-    let all: Vec<&Value> = events.iter().filter(|event| event["alarm"] == true).filter(concerns).collect();
+    let concerns = |event: &HappenedView| event.drive.as_deref().is_none_or(|drive| names.contains(&drive));
+    let all: Vec<HappenedView> = events
+        .iter()
+        .filter_map(|recent| recent.what.event())
+        .filter(|event| event.alarm && concerns(event))
+        .collect();
     let shown = all.iter().rev().take(ALARMS);
-    let row = |event: &&Value| {
-        let drive = event["drive"].as_str().unwrap_or("the program");
-        vec![cell(moment(&event["time_unix_ms"])), cell(drive), cell(text(&event["text"]))]
+    let row = |event: &HappenedView| {
+        let drive = event.drive.as_deref().unwrap_or("the program");
+        vec![cell(moment(event.time_unix_ms)), cell(drive), cell(&event.text)]
     };
     html! {
         @if all.is_empty() { p { "None among the last " (output::counted(events.len(), "event", "events")) " that the program remembers." } }

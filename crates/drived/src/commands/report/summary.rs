@@ -6,11 +6,13 @@ use serde_json::Value;
 
 use super::{
     drive::UNWATCHED,
-    gather::{DriveTold, Gathered, LEFT_OUT},
-    line::KINDS,
+    gather::{DriveTold, Gathered, LEFT_OUT, Told},
     words::{cell, count, list, share, table, text, unread},
 };
-use crate::client;
+use crate::{
+    client,
+    plant::views::{LineDetailView, LineLink},
+};
 
 /// Exchanges that go wrong more often than this deserve a word: one in a hundred.
 const OFTEN: u64 = 100;
@@ -115,9 +117,9 @@ fn of_drive(drive: &DriveTold) -> Vec<Finding> {
         told.push(Finding { grade, rank: usize::MAX, what: what.to_owned(), more });
     };
     let settings = drive.settings.as_ref();
-    if settings.is_ok_and(|told| told["feed"]["in_time"] == false) {
+    if settings.is_ok_and(|told| told.feed.is_some_and(|feed| !feed.in_time)) {
         say(Grade::Worth, "the communication watchdog may run out between two frames", String::new());
-    } else if settings.is_ok_and(|told| told["watchdog_armed"] == false) {
+    } else if settings.is_ok_and(|told| told.watchdog_armed == Some(false)) {
         say(Grade::Worth, "the communication watchdog is off", UNWATCHED.to_owned());
     }
     for warning in drive.faults.iter().flat_map(|faults| list(&faults["warnings"])) {
@@ -136,31 +138,29 @@ fn of_drive(drive: &DriveTold) -> Vec<Finding> {
     told
 }
 
-fn of_line(line: &Result<Value, String>) -> Vec<Markup> {
-    let line = match line {
-        Ok(line) => line,
+fn of_line(detail: &Told<LineDetailView>) -> Vec<Markup> {
+    let LineDetailView { line, planned, .. } = match detail {
+        Ok(detail) => detail,
         Err(why) => return vec![html! { "a line: " (unread(why)) }],
     };
     let mut told = Vec::new();
-    let mut say = |what: Markup| told.push(html! { "line " (text(&line["name"])) ": " (what) });
-    if line["link"] != "connected" {
+    let mut say = |what: Markup| told.push(html! { "line " (line.name) ": " (what) });
+    if line.link == LineLink::Away {
         say(
-            html! { strong { "its port is away" } ": " (line["error"].as_str().unwrap_or("no reason is known")) },
+            html! { strong { "its port is away" } ": " (line.error.as_deref().unwrap_or("no reason is known")) },
         );
     }
-    let exchanges = count(&line["exchanges"]);
-    for (key, name) in KINDS {
-        let number = count(&line["errors"][key]);
-        if number * OFTEN > exchanges {
-            say(html! { (share(number, exchanges)) " of the exchanges: " (name) });
+    for (_, name, number) in line.errors.of_exchanges() {
+        if number * OFTEN > line.exchanges {
+            say(html! { (share(number, line.exchanges)) " of the exchanges: " (name) });
         }
     }
-    if count(&line["errors"]["foreign"]) > 0 {
+    if line.errors.foreign.is_some_and(|count| count > 0) {
         say(html! { "frames of somebody else were heard: a second master may be on it" });
     }
-    let planned = line["planned"]["utilisation_percent"].as_f64().unwrap_or_default();
-    if planned > 100.0 {
-        say(html! { "the settings ask for more than the line has: " (cell(format!("{planned:.0} %"))) });
+    if planned.utilisation_percent > 100.0 {
+        let percent = format!("{:.0} %", planned.utilisation_percent);
+        say(html! { "the settings ask for more than the line has: " (percent) });
     }
     told
 }

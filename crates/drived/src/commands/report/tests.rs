@@ -20,6 +20,7 @@ use super::{
 use crate::{
     config::LinePart,
     drive_spec::DriveName,
+    plant::views::LineLink,
     simulated::{self, SetUp},
 };
 
@@ -147,9 +148,9 @@ async fn answer_times_are_those_of_the_simulator_and_each_slave_has_its_picture(
     bench.machine(Family::Atv21).mute();
     let gathered = bench.read(false).await;
     let line = gathered.lines[0].as_ref().unwrap();
-    for slave in line["slaves"].as_array().unwrap().iter().filter(|slave| slave["slave"] != 1) {
-        let half = slave["answer_ms"]["p50"].as_f64().unwrap();
-        assert!((25.0..28.2).contains(&half), "{slave}");
+    for slave in line.line.slaves.iter().filter(|slave| slave.slave != 1) {
+        let half = slave.answer_ms.unwrap().p50;
+        assert!((25.0..28.2).contains(&half), "{slave:?}");
     }
     let html = html(&gathered);
     let answers = &html[html.find("How long answers took").unwrap()..html.find("Errors by kind").unwrap()];
@@ -177,15 +178,17 @@ async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
         drive.view["identity"]["model"] = name.into();
         drive.view["watchdog"] = serde_json::json!({"check": "broken", "why": name});
         drive.faults = Err(name.to_owned());
-        drive.settings = Ok(serde_json::json!({"settings": {"commanders": {"only": [name]}}}));
+        let settings = &mut drive.settings.as_mut().unwrap().settings;
+        settings.commanders = drive_fleet::Commanders::Only(vec![name.to_owned()]);
     }
     let line = gathered.lines[0].as_mut().unwrap();
-    line["name"] = name.into();
-    line["slaves"][0]["drive"] = name.into();
-    line["error"] = name.into();
-    line["link"] = "away".into();
-    gathered.events =
-        Ok(serde_json::json!([{"time_unix_ms": 1, "drive": name, "alarm": true, "text": name}]));
+    line.line.name = name.to_owned();
+    line.line.slaves[0].drive = Some(name.to_owned());
+    line.line.error = Some(name.to_owned());
+    line.line.link = LineLink::Away;
+    let event = serde_json::json!([{"kind": "event", "revision": 1, "time_unix_ms": 1, "drive": name,
+        "event": "lost", "silent_for_ms": 1, "order": 1, "cause": {"by": "drive"}, "alarm": true, "text": name}]);
+    gathered.events = Ok(serde_json::from_value(event).unwrap());
     let notes = [name.to_owned()];
     let written = Local::now().fixed_offset();
     let page = Page { title: name, notes: &notes, source: name, written, gathered: &gathered };

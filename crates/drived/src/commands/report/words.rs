@@ -46,8 +46,8 @@ pub(super) fn cell(text: impl Render) -> Markup {
 }
 
 /// A time in milliseconds, as a person compares it; a dash where there is none.
-pub(super) fn milliseconds(value: &Value) -> String {
-    match value.as_f64() {
+pub(super) fn milliseconds(time: impl Into<Option<f64>>) -> String {
+    match time.into() {
         None => "–".to_owned(),
         Some(time) if time < 10.0 => format!("{time:.2} ms"),
         Some(time) if time < 1_000.0 => format!("{time:.1} ms"),
@@ -56,8 +56,8 @@ pub(super) fn milliseconds(value: &Value) -> String {
 }
 
 /// A span of time: `34 s`, `5 min`, `12 h`.
-pub(super) fn span(milliseconds: &Value) -> String {
-    milliseconds.as_u64().map_or_else(|| "an unknown time".to_owned(), client::age)
+pub(super) fn span(milliseconds: impl Into<Option<u64>>) -> String {
+    milliseconds.into().map_or_else(|| "an unknown time".to_owned(), client::age)
 }
 
 /// A share of a whole, in per cent; a dash where there is no whole.
@@ -71,13 +71,14 @@ pub(super) fn share(part: u64, whole: u64) -> String {
 }
 
 /// A share that is told in per cent.
-pub(super) fn percent(value: &Value) -> String {
-    value.as_f64().map_or_else(|| "–".to_owned(), |share| format!("{share:.2} %"))
+pub(super) fn percent(share: f64) -> String {
+    format!("{share:.2} %")
 }
 
 /// A moment by this computer's clock.
-pub(super) fn moment(unix_ms: &Value) -> String {
-    let time = unix_ms.as_i64().and_then(DateTime::from_timestamp_millis);
+pub(super) fn moment(unix_ms: impl Into<Option<u64>>) -> String {
+    let time = unix_ms.into().and_then(|time| i64::try_from(time).ok());
+    let time = time.and_then(DateTime::from_timestamp_millis);
     time.map_or_else(
         || "an unknown time".to_owned(),
         |time| time.with_timezone(&Local).format("%Y-%m-%d %H:%M:%S").to_string(),

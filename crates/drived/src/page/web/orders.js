@@ -1,7 +1,7 @@
 // Commands on their way: sent once, followed until they are settled, told in words and time.
 
-import { path, read } from './api.js';
 import { el, setClass, setText } from './dom.js';
+import { follow } from './follow.js';
 import { clock, duration } from './format.js';
 import { askToken } from './login.js';
 import { named, t } from './texts.js';
@@ -10,7 +10,6 @@ import { command, outcome, word } from './words.js';
 
 const KEPT = 20;
 const SHOWN_MS = 12_000;
-const AGAIN_MS = 500;
 
 const orders = [];
 const listeners = new Set();
@@ -26,19 +25,21 @@ export function onOrder(listener) {
   return () => listeners.delete(listener);
 }
 
-/** Sends by `send`, and follows the command until its outcome is known. */
+/** Sends by `send`, and ends when the outcome is known; what becomes of it later is told all the same. */
 export async function carryOut(to, action, send) {
   const order = { to, action, at: Date.now(), outcome: 'pending' };
   orders.unshift(order);
   orders.length = Math.min(orders.length, KEPT);
   tell(order);
+  let answer;
   try {
-    take(order, await send());
-    await settle(order);
+    answer = await send();
+    take(order, answer);
   } catch (problem) {
-    fail(order, problem);
+    answer = fail(order, problem);
   }
   tell(order);
+  if (answer?.open) await settled(order, answer);
 }
 
 /** An order in words: "Start: confirmed at 14:03:22, after 0.4 s". */
@@ -56,13 +57,17 @@ export function isDone(order) {
   return order.outcome === 'confirmed';
 }
 
-async function settle(order) {
-  while (order.outcome === 'pending') {
-    tell(order);
-    await new Promise(over => setTimeout(over, AGAIN_MS));
-    take(order, await read(path('commands', order.id)));
-  }
-  order.endedAt = Date.now();
+function settled(order, answer) {
+  return new Promise(over => {
+    const isSettled = () => order.outcome !== 'pending' && over();
+    isSettled();
+    follow(answer, news => {
+      if (news.told) take(order, news.told);
+      if (news.gone) Object.assign(order, { outcome: 'unknown', text: news.gone, endedAt: Date.now() });
+      tell(order);
+      isSettled();
+    }).then(over);
+  });
 }
 
 function take(order, answer) {
@@ -74,10 +79,11 @@ function fail(order, problem) {
   if (problem.lacksRight) askToken();
   if (problem.document?.outcome) {
     take(order, { text: problem.message, ...problem.document });
-    return;
+    return problem.document;
   }
   const why = problem.status === 0 ? t('not_reached') : problem.message;
   Object.assign(order, { outcome: problem.status === 0 ? 'unknown' : 'not_sent', text: why, endedAt: Date.now() });
+  return undefined;
 }
 
 function tell(order) {

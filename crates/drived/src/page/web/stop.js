@@ -1,7 +1,8 @@
 // STOP ALL: sent at once, without a question, and followed until every drive is accounted for.
 
-import { commandId, path, post, read } from './api.js';
+import { commandId, post } from './api.js';
 import { el } from './dom.js';
+import { follow } from './follow.js';
 import { clock } from './format.js';
 import { askToken } from './login.js';
 import { plant } from './plant.js';
@@ -11,7 +12,6 @@ import { outcome } from './words.js';
 
 const AGAIN_MS = 1_000;
 const GIVE_UP_MS = 30_000;
-const LOOK_MS = 400;
 const NAMED = 12;
 
 const account = { phase: 'none' };
@@ -69,18 +69,15 @@ async function stopAll() {
   if (mine === run) await followUp(answer, mine);
 }
 
-/** Reads the account until nobody is left; what it said last stays when it cannot be read for a while. */
+/** Reads the account for as long as something may become of it; what it said last stays when it cannot be read. */
 async function followUp(answer, mine) {
   take(answer);
-  while (mine === run && account.drives.some(isOpen)) {
-    await pause(LOOK_MS);
-    try {
-      take(await read(`${path('commands', answer.id)}?wait=0`));
-      account.unreadable = false;
-    } catch {
-      if (!account.unreadable) show({ unreadable: true });
-    }
-  }
+  await follow(answer, news => {
+    const wasUnreadable = account.unreadable;
+    account.unreadable = !news.told;
+    if (news.told) take(news.told);
+    if (account.unreadable !== wasUnreadable) writeAccount();
+  }, () => mine === run);
 }
 
 function take(answer) {

@@ -316,7 +316,7 @@ impl CommandView {
         arrived: Instant,
     ) -> Self {
         let now = Instant::now();
-        let status = Some(Shown(member.snapshot()));
+        let status = Some(Shown::Live(member.snapshot()));
         let took_ms = Some(milliseconds(now.saturating_duration_since(arrived)));
         // A stop goes on until it is confirmed.
         let open = match outcome {

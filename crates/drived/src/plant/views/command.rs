@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Shown;
 use crate::plant::commands::{ActionWord, OutcomeWord};
 
 /// A command: for one drive, or with one entry for each of several.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct CommandView {
     pub(crate) id: String,
     /// The drive; absent where several are meant.
@@ -57,7 +57,7 @@ impl CommandView {
 }
 
 /// What became of a command for several drives: every drive is counted once.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct SeveralView {
     pub(crate) drives: Vec<CommandView>,
     pub(crate) confirmed: usize,

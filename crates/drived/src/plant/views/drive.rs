@@ -1,20 +1,23 @@
 //! One drive.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use drive_core::{Measurements, Status};
-use drive_fleet::{Commanders, DriveHandle, FrequencyLimits, Freshness, Snapshot};
+use drive_fleet::{
+    Commanders, DriveHandle, FrequencyLimits, Freshness, Snapshot,
+    view::{Judged, SnapshotView},
+};
 use schemars::JsonSchema;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use tokio::time::Instant;
 
 /// A drive: where it is, what it was told, and what is known of it.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct DriveView {
     pub(crate) line: String,
     pub(crate) slave: u8,
     /// The family, such as `atv312`.
-    pub(crate) family: &'static str,
+    pub(crate) family: Cow<'static, str>,
     /// Whether it may be commanded at all.
     pub(crate) control: bool,
     /// Who may command it; absent where everybody who may command may.
@@ -24,24 +27,29 @@ pub(crate) struct DriveView {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) limits: Option<FrequencyLimits>,
     #[serde(flatten)]
-    pub(crate) snapshot: Arc<Snapshot>,
+    pub(crate) snapshot: SnapshotView,
 }
 
 impl DriveView {
+    /// Its name.
+    pub(crate) fn name(&self) -> &str {
+        &self.snapshot.name
+    }
+
     /// A drive of a line as it is now.
     pub(crate) fn of(line: &str, drive: &DriveHandle) -> Self {
         let settings = drive.settings();
         Self {
             line: line.to_owned(),
             slave: drive.slave().number(),
-            family: drive.capabilities().key,
+            family: drive.capabilities().key.into(),
             control: settings.control,
             commanders: match &settings.commanders {
                 Commanders::Anyone => None,
                 Commanders::Only(names) => Some(names.clone()),
             },
             limits: (!settings.limits.is_empty()).then(|| settings.limits.clone()),
-            snapshot: drive.snapshot(),
+            snapshot: SnapshotView::from(&*drive.snapshot()),
         }
     }
 }
@@ -76,29 +84,47 @@ impl Gist {
 
 /// What a drive showed when a command ended, with the verdict on its age when this is read.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shown(pub(crate) Arc<Snapshot>);
+pub(crate) enum Shown {
+    /// Here.
+    Live(Arc<Snapshot>),
+    /// As it was told.
+    Told(Box<Judged<Status>>),
+}
 
-#[derive(Serialize, JsonSchema)]
-struct ShownObject<'a> {
-    quality: Freshness,
-    #[serde(flatten)]
-    status: Option<&'a Status>,
+impl Shown {
+    /// The status, if there is one.
+    pub(crate) fn status(&self) -> Option<&Status> {
+        match self {
+            Self::Live(snapshot) => snapshot.status.as_ref().map(|status| &*status.value),
+            Self::Told(told) => told.value.as_ref(),
+        }
+    }
 }
 
 impl Serialize for Shown {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self(snapshot) = self;
-        let status = snapshot.status.as_ref().map(|status| &*status.value);
-        ShownObject { quality: snapshot.freshness(Instant::now()), status }.serialize(serializer)
+        match self {
+            Self::Live(snapshot) => {
+                let quality = snapshot.freshness(Instant::now());
+                Judged { quality, value: self.status().cloned() }.serialize(serializer)
+            }
+            Self::Told(told) => told.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Shown {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Judged::deserialize(deserializer).map(|told| Self::Told(Box::new(told)))
     }
 }
 
 impl JsonSchema for Shown {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
+    fn schema_name() -> Cow<'static, str> {
         "Shown".into()
     }
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        ShownObject::json_schema(generator)
+        <Judged<Status>>::json_schema(generator)
     }
 }

@@ -2,13 +2,13 @@
 
 use drive_bus::record::{Ending, Exchange};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{LineView, MeasuredLineView, PlannedLineView};
 use crate::json::{microseconds, unix};
 
 /// A line with what it was planned to be, what was measured on it, and its last exchanges.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct LineDetailView {
     #[serde(flatten)]
     pub(crate) line: LineView,
@@ -19,7 +19,7 @@ pub(crate) struct LineDetailView {
 }
 
 /// A request and what was heard of its answer.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct ExchangeView {
     /// When the request was sent.
     pub(crate) time_unix_ms: u64,
@@ -36,7 +36,7 @@ pub(crate) struct ExchangeView {
 }
 
 /// How an exchange ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum ResultWord {
     Ok,
@@ -75,6 +75,21 @@ impl ExchangeView {
         }
     }
 }
+
+drive_core::named! { ResultWord {
+    Ok => "ok",
+    Exception => "exception",
+    NoAnswer => "no answer",
+    Damaged => "damaged",
+    Mismatched => "mismatched",
+    Doubted => "doubted",
+    Busy => "busy",
+    Broadcast => "broadcast",
+    PutAside => "put aside",
+    GivenUp => "given up",
+    LineLost => "line lost",
+    Other => "other",
+} }
 
 impl ResultWord {
     const fn of(ending: Ending) -> Self {

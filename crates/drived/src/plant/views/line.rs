@@ -6,7 +6,7 @@ use drive_bus::{
 };
 use drive_fleet::{DriveHandle, LinePlan};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     json::{microseconds, milliseconds},
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A line, and what was counted on it since it was opened.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct LineView {
     pub(crate) name: String,
     /// As `--line` takes it.
@@ -40,7 +40,7 @@ pub(crate) struct LineView {
 }
 
 /// Whether the port is there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LineLink {
     Connected,
@@ -49,7 +49,7 @@ pub(crate) enum LineLink {
 }
 
 /// What went wrong, by kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct LineErrors {
     pub(crate) no_answer: u64,
     /// Answers that failed their check.
@@ -69,7 +69,7 @@ pub(crate) struct LineErrors {
 }
 
 /// A slave that was asked.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct SlaveView {
     pub(crate) slave: u8,
     /// The drive; absent where none of the configuration has this address.
@@ -91,7 +91,7 @@ pub(crate) struct SlaveView {
 }
 
 /// How long answers took.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct AnswerTimes {
     pub(crate) p50: f64,
     pub(crate) p99: f64,
@@ -121,6 +121,27 @@ impl LineView {
 }
 
 impl LineErrors {
+    /// The kinds of errors of one exchange: the key of each, what it is called, and how many there were.
+    pub(crate) const fn of_exchanges(&self) -> [(&'static str, &'static str, u64); 5] {
+        [
+            ("no_answer", "no answer", self.no_answer),
+            ("damaged", "damaged", self.damaged),
+            ("late", "late", self.late),
+            ("mismatched", "not fitting", self.mismatched),
+            ("exception", "exception", self.exception),
+        ]
+    }
+
+    /// The kinds that there were, in words.
+    pub(crate) fn in_words(&self) -> String {
+        let of_line = [("foreign", self.foreign), ("own echo", self.echo)]
+            .map(|(word, count)| (word, count.unwrap_or(0)));
+        let all = self.of_exchanges().map(|(_, word, count)| (word, count)).into_iter().chain(of_line);
+        let some: Vec<String> =
+            all.filter(|(_, count)| *count > 0).map(|(word, count)| format!("{count} {word}")).collect();
+        if some.is_empty() { "none".to_owned() } else { some.join(", ") }
+    }
+
     fn of_line(stats: &Stats) -> Self {
         let sum = stats.slaves.values().map(Self::of_slave).fold(Self::default(), |sum, of| Self {
             no_answer: sum.no_answer + of.no_answer,

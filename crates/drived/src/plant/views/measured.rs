@@ -9,12 +9,12 @@ use drive_bus::{
 use drive_core::Class;
 use drive_fleet::{DriveHandle, DriveSettings, LinePlan, WatchdogCheck};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{json::milliseconds, line_spec};
 
 /// What the plan says of a line whose drives all live and run.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct PlannedLineView {
     /// One status of every drive.
     pub(crate) cycle_ms: f64,
@@ -27,7 +27,7 @@ pub(crate) struct PlannedLineView {
 }
 
 /// What was measured on a line since it was opened.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct MeasuredLineView {
     /// For how long.
     pub(crate) elapsed_ms: u64,
@@ -67,7 +67,7 @@ pub(crate) struct MeasuredLineView {
 }
 
 /// Durations, in milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct TimesView {
     pub(crate) count: u64,
     pub(crate) min: f64,
@@ -77,7 +77,7 @@ pub(crate) struct TimesView {
 }
 
 /// How a slave answered.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct AnswersView {
     pub(crate) slave: u8,
     /// Requests that were answered, with an exception too.
@@ -90,7 +90,7 @@ pub(crate) struct AnswersView {
 }
 
 /// One step of a histogram.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct StepView {
     /// Where it ends, and the next one begins.
     pub(crate) up_to_ms: f64,
@@ -98,7 +98,7 @@ pub(crate) struct StepView {
 }
 
 /// What a drive was told when the fleet was started, and what the plan makes of it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct SettingsView {
     pub(crate) settings: DriveSettings,
     /// How old its status becomes at the most while it runs; absent where the line has more to do than it can.
@@ -119,7 +119,7 @@ pub(crate) struct SettingsView {
 }
 
 /// How a communication watchdog is fed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct FeedView {
     /// Its time.
     pub(crate) time_ms: f64,

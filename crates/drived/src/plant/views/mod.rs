@@ -8,22 +8,26 @@ mod exchange;
 mod line;
 mod measured;
 mod notice;
+#[cfg(test)]
+mod tests;
+
+use std::borrow::Cow;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub(crate) use self::{
     command::{CommandView, SeveralView},
     drive::{DriveView, Gist, Shown},
-    exchange::{ExchangeView, LineDetailView},
-    line::{LineLink, LineView},
-    measured::{MeasuredLineView, PlannedLineView, SettingsView},
-    notice::NoticeView,
+    exchange::{ExchangeView, LineDetailView, ResultWord},
+    line::{AnswerTimes, LineErrors, LineLink, LineView, SlaveView},
+    measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
+    notice::{HappenedView, NoticeView},
 };
 use crate::{config::Group, doors::Rights};
 
 /// Everything at one moment.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct StateView {
     /// The last revision that is in it: events after this one complete it.
     pub(crate) revision: u64,
@@ -36,9 +40,9 @@ pub(crate) struct StateView {
 }
 
 /// The program that answers, and what it lets the asker do.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct DaemonView {
-    pub(crate) version: &'static str,
+    pub(crate) version: Cow<'static, str>,
     pub(crate) started_unix_ms: u64,
     /// Whether its drives are simulated.
     pub(crate) demo: bool,

@@ -1,17 +1,19 @@
 //! What happens to the program itself.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tokio::time::Instant;
 
 use crate::json::unix;
 
 /// Something that concerns no drive alone.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct NoticeView {
     pub(crate) time_unix_ms: u64,
     /// What, in one word.
-    pub(crate) event: &'static str,
+    pub(crate) event: Cow<'static, str>,
     /// Whether somebody has to see to it.
     pub(crate) alarm: bool,
     /// The same in words.
@@ -20,6 +22,24 @@ pub(crate) struct NoticeView {
 
 impl NoticeView {
     pub(crate) fn new(event: &'static str, alarm: bool, text: impl Into<String>) -> Self {
-        Self { time_unix_ms: unix(Instant::now()), event, alarm, text: text.into() }
+        Self { time_unix_ms: unix(Instant::now()), event: event.into(), alarm, text: text.into() }
+    }
+}
+
+/// What happened to a drive or to the program, as far as somebody reads it who does not know each kind.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct HappenedView {
+    pub(crate) time_unix_ms: u64,
+    /// Absent where it concerns no drive alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) drive: Option<String>,
+    pub(crate) alarm: bool,
+    pub(crate) text: String,
+}
+
+impl From<NoticeView> for HappenedView {
+    fn from(notice: NoticeView) -> Self {
+        let NoticeView { time_unix_ms, alarm, text, .. } = notice;
+        Self { time_unix_ms, drive: None, alarm, text }
     }
 }

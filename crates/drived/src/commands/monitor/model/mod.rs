@@ -5,7 +5,6 @@ mod plant;
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
 use tokio::time::Instant;
 
 pub(super) use self::plant::{Connection, Plant};
@@ -15,23 +14,31 @@ use super::{
     drive::Drive,
     happening::{Happening, Kind},
 };
+use crate::{
+    client::Heard,
+    plant::{
+        history::HistoryView,
+        recent::RecentView,
+        views::{LineDetailView, LineView, StateView},
+    },
+};
 
 /// How many stops are told of at a time: the newest.
 const ACCOUNTS: usize = 3;
 
 /// What comes in besides keys.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) enum News {
     /// The whole state, and what happened before.
-    State { state: Value, recent: Value },
+    State { state: Box<StateView>, recent: Vec<RecentView> },
     /// An event of the stream.
-    Event { kind: String, data: Value },
+    Heard(Heard),
     /// The connection is gone; it is tried again.
     Interrupted(String),
     /// The last ten minutes of a drive.
-    History { drive: String, history: Value },
+    History { drive: String, history: HistoryView },
     /// A line with its last exchanges.
-    Line { name: String, line: Value },
+    Line(Box<LineDetailView>),
     /// What has become of a stop.
     Stop { number: u64, progress: Progress },
 }
@@ -83,7 +90,7 @@ pub(super) struct Model {
     /// Whether the curves have the whole screen.
     pub(super) curves_alone: bool,
     /// A line with its last exchanges.
-    pub(super) line: Option<(String, Value)>,
+    pub(super) line: Option<Box<LineDetailView>>,
     /// The newest last.
     pub(super) accounts: Vec<Account>,
     stops: u64,
@@ -114,15 +121,15 @@ impl Model {
 
     pub(super) fn take(&mut self, news: News, now: Instant) {
         match news {
-            News::State { state, recent } => self.plant.begin(state, &recent, now),
-            News::Event { kind, data } => self.plant.take(&kind, data, now),
+            News::State { state, recent } => self.plant.begin(*state, &recent, now),
+            News::Heard(heard) => self.plant.take(heard, now),
             News::Interrupted(why) => self.plant.interrupted(why, now),
             News::History { drive, history } => {
                 if self.view == View::Drive(drive) {
-                    self.curves.take(&history);
+                    self.curves.take(history);
                 }
             }
-            News::Line { name, line } => self.line = Some((name, line)),
+            News::Line(line) => self.line = Some(line),
             News::Stop { number, progress } => {
                 let known = self.accounts.iter_mut().find(|account| account.number == number);
                 let Some(account) = known else { return };
@@ -231,4 +238,4 @@ impl Model {
 }
 
 /// The lines by their names.
-pub(super) type Lines = BTreeMap<String, Value>;
+pub(super) type Lines = BTreeMap<String, LineView>;

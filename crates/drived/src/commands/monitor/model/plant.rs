@@ -2,13 +2,18 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use serde_json::Value;
+use serde_json::json;
 use tokio::time::Instant;
 
 use super::{
     super::{drive::Drive, happening::Happening},
     Lines,
 };
+use crate::{
+    client::Heard,
+    plant::{recent::RecentView, views::StateView},
+};
+
 /// How many things that happened are kept.
 const KEPT: usize = 2_000;
 
@@ -83,21 +88,15 @@ impl Plant {
     }
 
     /// Begins anew with a whole state, and with what happened until then.
-    pub(super) fn begin(&mut self, state: Value, recent: &Value, now: Instant) {
-        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-        let all = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    pub(super) fn begin(&mut self, state: StateView, recent: &[RecentView], now: Instant) {
         self.connection = Connection::Live;
         self.heard = now;
-        self.may_stop = state["daemon"]["rights"]["stop"] == true;
-        self.is_demo = state["daemon"]["demo"] == true;
-        self.drives = all(&state["drives"]).into_iter().filter_map(|drive| Drive::told(drive, now)).collect();
-        self.lines = all(&state["lines"]).into_iter().map(|line| (text(&line["name"]), line)).collect();
-        let groups = all(&state["groups"]).into_iter();
-        self.groups = groups
-            .map(|group| (text(&group["name"]), all(&group["drives"]).iter().map(text).collect()))
-            .collect();
-        let recent = recent.as_array().into_iter().flatten();
-        let told: VecDeque<_> = recent.filter_map(|one| Happening::told(&text(&one["kind"]), one)).collect();
+        self.may_stop = state.daemon.rights.stop;
+        self.is_demo = state.daemon.demo;
+        self.drives = state.drives.into_iter().filter_map(|drive| Drive::told(json!(drive), now)).collect();
+        self.lines = state.lines.into_iter().map(|line| (line.name.clone(), line)).collect();
+        self.groups = state.groups.into_iter().map(|group| (group.name, group.drives)).collect();
+        let told: VecDeque<_> = recent.iter().filter_map(|one| Happening::lately(&one.what)).collect();
         // A daemon that was started anew does not know what the one before it told.
         let oldest = told.front().map_or(u64::MAX, |one| one.unix_ms);
         self.happenings.retain(|one| one.unix_ms < oldest);
@@ -105,30 +104,31 @@ impl Plant {
         self.trim();
     }
 
-    pub(super) fn take(&mut self, kind: &str, data: Value, now: Instant) {
+    pub(super) fn take(&mut self, heard: Heard, now: Instant) {
         self.heard = now;
-        match kind {
-            "drive" => {
-                let Some(drive) = Drive::told(data, now) else { return };
+        match heard {
+            Heard::Drive(drive) => {
+                let Some(drive) = Drive::told(json!(drive), now) else { return };
                 match self.drives.iter_mut().find(|known| known.name == drive.name) {
                     Some(known) => *known = drive,
                     None => self.drives.push(drive),
                 }
             }
-            "line" => {
-                let name = data["name"].as_str().unwrap_or_default().to_owned();
-                self.lines.insert(name, data);
+            Heard::Line(line) => {
+                self.lines.insert(line.name.clone(), *line);
             }
-            "command" | "event" => {
-                let Some(one) = Happening::told(kind, &data) else { return };
-                match self.happenings.iter_mut().rev().find(|known| known.is_same(&one)) {
-                    Some(known) => *known = one,
-                    None => self.happenings.push_back(one),
-                }
-                self.trim();
-            }
-            _ => {}
+            Heard::Command(command) => self.add(Happening::commanded(&command)),
+            Heard::Event(event) => self.add(Happening::happened(&event)),
+            Heard::Reset | Heard::Other => {}
         }
+    }
+
+    fn add(&mut self, one: Happening) {
+        match self.happenings.iter_mut().rev().find(|known| known.is_same(&one)) {
+            Some(known) => *known = one,
+            None => self.happenings.push_back(one),
+        }
+        self.trim();
     }
 
     pub(super) fn interrupted(&mut self, why: String, now: Instant) {

@@ -9,7 +9,6 @@ use ratatui::{
     text::{Line, Span},
     widgets::Paragraph,
 };
-use serde_json::Value;
 use tokio::time::Instant;
 
 use super::{
@@ -21,6 +20,7 @@ use crate::{
     drive_cells::{bar, colour, control, direction, hertz},
     logging::escaped,
     output,
+    plant::views::{LineLink, LineView},
 };
 
 /// A name is not made shorter than this.
@@ -263,25 +263,22 @@ const fn is_number(column: usize) -> bool {
 
 /// The lines, those that are away first.
 fn lines(model: &Model, width: usize) -> Vec<Line<'static>> {
-    let away = |line: &Value| line["link"] == "away";
+    let away = |line: &LineView| line.link == LineLink::Away;
     let all = || model.plant.lines.iter();
     let told = all().filter(|(_, line)| away(line)).chain(all().filter(|(_, line)| !away(line)));
     let connected = model.plant.is_connected();
-    let told = told.map(|(name, line)| {
-        let number = |key: &str| line[key].as_f64().unwrap_or_default();
-        match away(line) {
-            true => {
-                let why = line["error"].as_str().map_or_else(|| "its port is not there".to_owned(), escaped);
-                Line::styled(fitted(&format!("{name}: AWAY, {why}"), width), alarm())
-            }
-            false => {
-                let (used, stop) = (number("utilisation_percent"), number("worst_case_stop_ms"));
-                let text = match connected {
-                    true => format!("{name}: {used:.0} % used, a stop waits {stop:.0} ms at most"),
-                    false => format!("{name}: (was {used:.0} % used)"),
-                };
-                Line::styled(fitted(&text, width), Style::new().add_modifier(Modifier::DIM))
-            }
+    let told = told.map(|(name, line)| match away(line) {
+        true => {
+            let why = line.error.as_deref().map_or_else(|| "its port is not there".to_owned(), escaped);
+            Line::styled(fitted(&format!("{name}: AWAY, {why}"), width), alarm())
+        }
+        false => {
+            let (used, stop) = (line.utilisation_percent, line.worst_case_stop_ms);
+            let text = match connected {
+                true => format!("{name}: {used:.0} % used, a stop waits {stop} ms at most"),
+                false => format!("{name}: (was {used:.0} % used)"),
+            };
+            Line::styled(fitted(&text, width), Style::new().add_modifier(Modifier::DIM))
         }
     });
     told.collect()

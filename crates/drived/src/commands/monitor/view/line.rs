@@ -8,24 +8,15 @@ use ratatui::{
     style::{Style, Stylize as _},
     text::{Line, Span},
 };
-use serde_json::Value;
 
 use super::{
     super::{model::Model, words},
     document::{Document, alarm, old},
 };
-use crate::logging::escaped;
-
-/// What an exchange on a line may end by besides an answer.
-const ERRORS: [(&str, &str); 7] = [
-    ("no_answer", "no answer"),
-    ("damaged", "damaged"),
-    ("late", "late"),
-    ("mismatched", "not fitting"),
-    ("exception", "exception"),
-    ("foreign", "foreign"),
-    ("echo", "own echo"),
-];
+use crate::{
+    logging::escaped,
+    plant::views::{AnswerTimes, AnswersView, ExchangeView, LineLink, LineView, ResultWord, TimesView},
+};
 
 /// The longest bar of the histogram, and where its bars end, in milliseconds.
 const BAR: usize = 40;
@@ -34,7 +25,7 @@ const ENDS: [f64; 15] =
 
 pub(super) fn draw(model: &mut Model, name: &str, frame: &mut Frame<'_>, area: Rect) {
     let mut document = Document::new(usize::from(area.width));
-    let known = model.line.as_ref().filter(|(known, _)| known == name).map(|(_, line)| line);
+    let known = model.line.as_ref().filter(|known| known.line.name == name);
     match (known, model.plant.lines.get(name)) {
         (detail, Some(line)) => {
             let lines: Vec<&String> = model.plant.lines.keys().collect();
@@ -45,71 +36,49 @@ pub(super) fn draw(model: &mut Model, name: &str, frame: &mut Frame<'_>, area: R
             }
             summary(&mut document, line);
             if let Some(detail) = detail {
-                lateness(&mut document, &detail["measured"]["lag_ms"]);
-                histogram(&mut document, &detail["measured"]["answers"]);
+                if let Some(late) = &detail.measured.lag_ms {
+                    lateness(&mut document, late);
+                }
+                histogram(&mut document, &detail.measured.answers);
             }
             slaves(&mut document, line);
-            last(&mut document, detail);
+            last(&mut document, detail.map_or(&[], |detail| &detail.last));
         }
         (_, None) => document.say("the daemon has no such line any more. Esc: back", Style::new()),
     }
     document.draw(model, frame, area);
 }
 
-fn summary(document: &mut Document, line: &Value) {
-    let text = |key: &str| line[key].as_str().map(escaped);
-    let time = |key: &str| line[key].as_u64().map(|time| words::time(Duration::from_millis(time)));
-    let percent = |key: &str| line[key].as_f64().map(|share| format!("{share:.0} %"));
-    if line["link"] == "away" {
-        let why = text("error").unwrap_or_else(|| "its port is not there".to_owned());
+fn summary(document: &mut Document, line: &LineView) {
+    let time = |milliseconds| words::time(Duration::from_millis(milliseconds));
+    if line.link == LineLink::Away {
+        let why = line.error.as_deref().map_or_else(|| "its port is not there".to_owned(), escaped);
         document.say(&format!("AWAY: {why}"), alarm());
     }
-    document.pair(
-        "port",
-        Some([text("port"), text("protocol")].into_iter().flatten().collect::<Vec<_>>().join(", ")),
-    );
-    let since = percent("utilisation_since_opening_percent");
-    let used = percent("utilisation_percent")
-        .zip(since)
-        .map(|(now, all)| format!("{now} lately, {all} since it was opened"));
-    document.pair("utilisation", used);
-    document.pair(
-        "a stop waits",
-        time("worst_case_stop_ms").map(|time| format!("{time} at most, whatever happens")),
-    );
-    document.pair(
-        "cycle",
-        time("cycle_ms").map(|time| format!("{time} for one status of every drive, by the plan")),
-    );
-    document.pair("exchanges", line["exchanges"].as_u64().map(|count| count.to_string()));
-    document.pair("errors", Some(errors(&line["errors"])));
+    document.pair("port", Some(format!("{}, {}", escaped(&line.port), escaped(&line.protocol))));
+    let (now, all) = (line.utilisation_percent, line.utilisation_since_opening_percent);
+    document.pair("utilisation", Some(format!("{now:.0} % lately, {all:.0} % since it was opened")));
+    let stop = time(line.worst_case_stop_ms);
+    document.pair("a stop waits", Some(format!("{stop} at most, whatever happens")));
+    let cycle = time(line.cycle_ms);
+    document.pair("cycle", Some(format!("{cycle} for one status of every drive, by the plan")));
+    document.pair("exchanges", Some(line.exchanges.to_string()));
+    document.pair("errors", Some(line.errors.in_words()));
 }
 
 /// How much later than the line allowed requests were sent: what this host costs.
-fn lateness(document: &mut Document, late: &Value) {
-    let time = |key: &str| late[key].as_f64().map(|time| format!("{time:.2} ms"));
-    let told = time("p50").zip(time("p99")).zip(time("max"));
-    let told = told.map(|((usual, rare), most)| format!("usually {usual}, 1 % above {rare}, {most} at most"));
-    document.pair("sent too late by", told);
-}
-
-/// The kinds of errors that were counted.
-fn errors(counted: &Value) -> String {
-    let counts = ERRORS.iter().filter_map(|(key, word)| Some((word, counted[*key].as_u64()?)));
-    let some: Vec<String> =
-        counts.filter(|(_, count)| *count > 0).map(|(word, count)| format!("{count} {word}")).collect();
-    if some.is_empty() { "none".to_owned() } else { some.join(", ") }
+fn lateness(document: &mut Document, late: &TimesView) {
+    let TimesView { p50, p99, max, .. } = late;
+    let told = format!("usually {p50:.2} ms, 1 % above {p99:.2} ms, {max:.2} ms at most");
+    document.pair("sent too late by", Some(told));
 }
 
 /// How long the drives of the line took to answer, all of them together.
-fn histogram(document: &mut Document, answers: &Value) {
+fn histogram(document: &mut Document, answers: &[AnswersView]) {
     let mut counts = [0_u64; ENDS.len() + 1];
-    let steps =
-        answers.as_array().into_iter().flatten().filter_map(|slave| slave["times"].as_array()).flatten();
-    for step in steps {
-        let end = step["up_to_ms"].as_f64().unwrap_or_default();
-        if let Some(sum) = counts.get_mut(ENDS.partition_point(|bound| *bound < end)) {
-            *sum += step["count"].as_u64().unwrap_or_default();
+    for step in answers.iter().flat_map(|slave| &slave.times) {
+        if let Some(sum) = counts.get_mut(ENDS.partition_point(|bound| *bound < step.up_to_ms)) {
+            *sum += u64::from(step.count);
         }
     }
     let most = counts.iter().copied().max().unwrap_or_default();
@@ -132,49 +101,39 @@ fn histogram(document: &mut Document, answers: &Value) {
     }
 }
 
-fn slaves(document: &mut Document, line: &Value) {
+fn slaves(document: &mut Document, line: &LineView) {
     document.heading("drives");
-    for slave in line["slaves"].as_array().into_iter().flatten() {
-        let name = slave["drive"].as_str().map_or_else(|| "no drive".to_owned(), escaped);
-        let time = |key: &str| slave["answer_ms"][key].as_f64().map(|time| format!("{time:.1} ms"));
-        let away = slave["off_line"] == true;
-        let next = slave["next_probe_ms"].as_u64().map(|next| words::time(Duration::from_millis(next)));
-        let state = match away {
+    for slave in &line.slaves {
+        let name = slave.drive.as_deref().map_or_else(|| "no drive".to_owned(), escaped);
+        let next = slave.next_probe_ms.map(|next| words::time(Duration::from_millis(next)));
+        let state = match slave.off_line {
             true => {
                 format!("OFF-LINE, only probed, next in {}", next.unwrap_or_else(|| "a while".to_owned()))
             }
             false => "answers".to_owned(),
         };
-        let times = [("usually", "p50"), ("1 % above", "p99"), ("longest", "max")];
-        let times = times.iter().filter_map(|(word, key)| Some(format!("{word} {}", time(key)?)));
+        let times = slave.answer_ms.map(|AnswerTimes { p50, p99, max }| {
+            format!("usually {p50:.1} ms, 1 % above {p99:.1} ms, longest {max:.1} ms")
+        });
         let parts = [
-            format!("{} {name}: {state}", slave["slave"]),
-            times.collect::<Vec<_>>().join(", "),
-            format!("{} exchanges", slave["exchanges"]),
-            format!("errors: {}", errors(&slave["errors"])),
+            Some(format!("{} {name}: {state}", slave.slave)),
+            times,
+            Some(format!("{} exchanges", slave.exchanges)),
+            Some(format!("errors: {}", slave.errors.in_words())),
         ];
-        let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        document.say(&parts.join("; "), if away { alarm() } else { Style::new() });
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        document.say(&parts.join("; "), if slave.off_line { alarm() } else { Style::new() });
     }
 }
 
 /// The last exchanges, the newest first.
-fn last(document: &mut Document, line: Option<&Value>) {
+fn last(document: &mut Document, last: &[ExchangeView]) {
     document.heading("last exchanges, the newest first");
-    let last = line.and_then(|line| line["last"].as_array()).map_or(&[][..], Vec::as_slice);
     for exchange in last.iter().rev() {
-        let text = |key: &str| exchange[key].as_str().map(escaped).unwrap_or_default();
-        let at = exchange["time_unix_ms"].as_u64().map(words::clock).unwrap_or_default();
-        let result = text("result");
-        let answer =
-            if text("answer").is_empty() { String::new() } else { format!(" → {}", text("answer")) };
-        let took = exchange["took_ms"].as_f64().unwrap_or_default();
-        let told = format!(
-            "{at} slave {}: {} {took:.1} ms: {}{answer}",
-            exchange["slave"],
-            words::spoken(&result),
-            text("request")
-        );
-        document.say(&told, if result == "ok" { Style::new() } else { alarm() });
+        let ExchangeView { time_unix_ms, slave, request, answer, result, took_ms } = exchange;
+        let answer = if answer.is_empty() { String::new() } else { format!(" → {}", escaped(answer)) };
+        let (at, request) = (words::clock(*time_unix_ms), escaped(request));
+        let told = format!("{at} slave {slave}: {result} {took_ms:.1} ms: {request}{answer}");
+        document.say(&told, if *result == ResultWord::Ok { Style::new() } else { alarm() });
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures as somebody expects them who stands before the plant.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use drive_fleet::{Concern, ConcernKind, view::ConcernView};
@@ -16,17 +16,24 @@ use super::{
     },
     draw,
 };
+use crate::{
+    client::Heard,
+    plant::{self, views::CommandView},
+};
 
 /// A running drive as the daemon tells it.
 fn drive(name: &str) -> Value {
-    json!({
-        "name": name, "line": "north", "slave": 1, "family": "atv312", "control": true, "link": "connected",
+    let mut drive = plant::testing::told(name);
+    let more = json!({
         "status": {"quality": "good", "age_ms": 120, "state": "running", "direction": "forward",
                    "output_frequency_hz": 29.5, "current_a": 3.2, "control": "bus", "warning": false,
                    "raw": [{"address": 3201, "code": "ETA", "value": 1575}]},
-        "measurements": {"quality": "good", "age_ms": 2_000, "torque_percent": 40.0, "running_time_h": 1200.5},
+        "measurements": {"quality": "good", "age_ms": 2_000, "torque_percent": 40.0, "running_time_h": 1200.5,
+                         "before_trip": false, "raw": []},
         "setpoint": {"frequency_hz": 30.0},
-    })
+    });
+    drive.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    drive
 }
 
 /// The same with something else.
@@ -50,8 +57,8 @@ fn tripped(name: &str) -> Value {
     drive["fault"] = json!({
         "code": 9, "mnemonic": "OLF", "meaning": "motor overload", "remedy": "let the motor cool down",
         "by_watchdog": false, "time_unix_ms": 1_700_000_000_000_u64,
-        "before": {"state": "running", "direction": "forward", "output_frequency_hz": 48.5, "current_a": 9.9},
-        "at_trip": {"state": "fault", "output_frequency_hz": 12.5},
+        "before": {"state": "running", "direction": "forward", "output_frequency_hz": 48.5, "current_a": 9.9, "raw": []},
+        "at_trip": {"state": "fault", "output_frequency_hz": 12.5, "raw": []},
     });
     drive["concerns"] = concern(ConcernKind::Tripped, "9 OLF: motor overload");
     drive
@@ -66,20 +73,44 @@ fn lost(name: &str) -> Value {
     drive
 }
 
+fn errors(no_answer: u64) -> Value {
+    json!({"no_answer": no_answer, "damaged": 0, "late": 0, "mismatched": 0, "exception": 0})
+}
+
 fn state(drives: &[Value]) -> Value {
     json!({
-        "revision": 7, "daemon": {"demo": false, "rights": {"view": true, "stop": true}}, "drives": drives,
+        "revision": 7, "time_unix_ms": 1_700_000_000_000_u64,
+        "daemon": {"version": "0.1.0", "started_unix_ms": 1_700_000_000_000_u64, "demo": false, "caller": "local",
+                   "rights": {"view": true, "stop": true, "operate": false, "engineer": false}}, "drives": drives,
         "lines": [{"name": "north", "link": "connected", "utilisation_percent": 68.2, "worst_case_stop_ms": 608,
                    "port": "/dev/ttyUSB0,19200,8E1", "protocol": "rtu", "exchanges": 1_234, "cycle_ms": 888,
-                   "utilisation_since_opening_percent": 61.0, "errors": {"no_answer": 3, "damaged": 0},
+                   "utilisation_since_opening_percent": 61.0, "errors": errors(3),
                    "slaves": [
-                       {"slave": 1, "drive": "pump 1", "exchanges": 900, "off_line": false, "errors": {"no_answer": 0},
+                       {"slave": 1, "drive": "pump 1", "exchanges": 900, "off_line": false, "errors": errors(0), "probes": 0, "timeout_ms": 100,
                         "answer_ms": {"p50": 8.1, "p99": 12.0, "max": 30.0}},
                        {"slave": 3, "drive": "pump 3", "exchanges": 34, "off_line": true, "next_probe_ms": 3_200,
-                        "errors": {"no_answer": 3}},
+                        "errors": errors(3), "probes": 9, "timeout_ms": 100},
                    ]}],
         "groups": [{"name": "fans", "drives": ["fan 1"]}],
     })
+}
+
+fn told(state: Value, recent: Value) -> News {
+    let state = serde_json::from_value(state).unwrap_or_else(|error| panic!("{error}"));
+    News::State { state, recent: serde_json::from_value(recent).unwrap_or_else(|error| panic!("{error}")) }
+}
+
+/// A stop of which this is told, and what every command tells.
+fn command(told: Value) -> Arc<CommandView> {
+    let mut command = json!({
+        "id": "c-1", "action": "stop", "command": "ramp stop", "caller": "local", "origin": "socket uid 0",
+        "outcome": "pending", "open": false, "time_unix_ms": 1_700_000_000_000_u64, "refused": 0, "failed": 0,
+    });
+    command.as_object_mut().unwrap().extend(told.as_object().unwrap().clone());
+    for drive in command["drives"].as_array_mut().into_iter().flatten() {
+        *drive = json!(super::tests::command(drive.clone()));
+    }
+    serde_json::from_value(command).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The monitor, what it was told and when.
@@ -92,12 +123,12 @@ impl Monitor {
     fn of(drives: &[Value]) -> Self {
         let now = Instant::now();
         let mut model = Model::new("a test".to_owned(), now);
-        model.take(News::State { state: state(drives), recent: json!([]) }, now);
+        model.take(told(state(drives), json!([])), now);
         Self { model, now }
     }
 
     fn tell(&mut self, kind: &str, data: Value) {
-        self.model.take(News::Event { kind: kind.to_owned(), data }, self.now);
+        self.model.take(News::Heard(Heard::of(kind, data).unwrap()), self.now);
     }
 
     fn wait(&mut self, seconds: u64) {
@@ -158,7 +189,7 @@ fn a_stale_value_is_in_brackets_with_its_age_and_never_shown_as_live() {
     monitor.wait(9);
     monitor.tell("tick", json!({}));
     assert!(monitor.row("pump 2", 80).contains("30 s old"), "ages go on");
-    monitor.model.take(News::Event { kind: "drive".to_owned(), data: drive("pump 2") }, monitor.now);
+    monitor.tell("drive", drive("pump 2"));
     assert!(monitor.row("pump 2", 80).contains("live"));
 }
 
@@ -175,7 +206,7 @@ fn everything_is_old_as_soon_as_the_connection_is_gone_and_live_again_with_the_n
     );
     assert!(!screen.contains("live") && screen.contains("(was 68 % used)"), "{screen}");
     let state = state(&[drive("pump 1")]);
-    monitor.model.take(News::State { state, recent: json!([]) }, monitor.now);
+    monitor.model.take(told(state, json!([])), monitor.now);
     let screen = monitor.screen(80, 24);
     assert!(!screen.contains("NOT CONNECTED") && screen.contains(" 29.5/30.0"), "{screen}");
 }
@@ -281,7 +312,7 @@ fn a_stop_is_counted_until_every_drive_is_accounted_for() {
         let drives = drives.map(|(drive, outcome)| json!({"drive": drive, "outcome": outcome}));
         let answer = json!({"id": "c-1", "outcome": "pending", "drives": drives.collect::<Vec<_>>(),
                             "confirmed": confirmed, "pending": pending, "not_reachable": not_reachable});
-        News::Stop { number: 1, progress: Progress::Answer(answer) }
+        News::Stop { number: 1, progress: Progress::Answer(command(answer)) }
     };
     monitor.model.take(told(["pending", "confirmed", "pending"], 1, 1, 1), monitor.now);
     let screen = monitor.screen(80, 24);
@@ -320,7 +351,7 @@ fn a_stop_of_one_drive_that_is_lost_is_counted_as_not_reachable() {
     monitor.press(KeyCode::Down);
     monitor.control('t');
     let answer = json!({"id": "c-1", "drive": "pump 1", "outcome": "pending"});
-    monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(answer) }, monitor.now);
+    monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(command(answer)) }, monitor.now);
     let screen = monitor.screen(80, 24);
     assert!(screen.contains("0 confirmed, 0 pending, 1 not reachable"), "{screen}");
 }
@@ -353,7 +384,13 @@ fn the_last_ten_minutes_of_a_drive_are_drawn_and_read_at_a_cursor_in_units() {
     torque[1_199] = Value::Null;
     let history = json!({"step_ms": 500, "time_unix_ms": times, "frequency_hz": ramp(50.0), "setpoint_hz": ramp(50.0),
                          "current_a": ramp(4.0), "torque_percent": torque});
-    monitor.model.take(News::History { drive: "pump 1".to_owned(), history: history.clone() }, monitor.now);
+    monitor.model.take(
+        News::History {
+            drive: "pump 1".to_owned(),
+            history: serde_json::from_value(history.clone()).unwrap(),
+        },
+        monitor.now,
+    );
     let screen = monitor.screen(80, 24);
     assert!(screen.contains("-10 min") && screen.contains("50 Hz"), "{screen}");
     assert!(screen.contains("50.0 Hz, setpoint 50.0 Hz, 4.0 A"), "{screen}");
@@ -380,14 +417,17 @@ fn a_line_tells_how_it_is_used_what_went_wrong_and_who_is_off_it() {
     let mut monitor = Monitor::of(&[drive("pump 1")]);
     monitor.press(KeyCode::Char('2'));
     let mut line = state(&[])["lines"][0].clone();
+    line["planned"] =
+        json!({"cycle_ms": 888.0, "utilisation_percent": 70.0, "all_stopped_ms": 2_000.0, "stop_ms": 608.0});
     line["measured"] = json!({
+        "elapsed_ms": 60_000, "utilisation_percent": 61.0, "stop_ms": 300.0, "retries": 0, "noise_bytes": 0, "lost": 0,
         "lag_ms": {"count": 934, "min": 0.0, "p50": 0.05, "p99": 0.4, "max": 3.25},
-        "answers": [{"slave": 1, "times": [{"up_to_ms": 7.17, "count": 30}, {"up_to_ms": 8.0, "count": 10}]},
-                    {"slave": 3, "times": [{"up_to_ms": 9.22, "count": 10}]}],
+        "answers": [{"slave": 1, "answered": 40, "went_offline": 0, "times": [{"up_to_ms": 7.17, "count": 30}, {"up_to_ms": 8.0, "count": 10}]},
+                    {"slave": 3, "answered": 10, "went_offline": 1, "times": [{"up_to_ms": 9.22, "count": 10}]}],
     });
     line["last"] = json!([{"time_unix_ms": 1_700_000_000_000_u64, "slave": 3, "request": "03 03 0C 81", "answer": "",
                            "result": "no_answer", "took_ms": 100.5}]);
-    monitor.model.take(News::Line { name: "north".to_owned(), line }, monitor.now);
+    monitor.model.take(News::Line(serde_json::from_value(line).unwrap()), monitor.now);
     let screen = monitor.screen(100, 40);
     for expected in [
         "68 % lately, 61 % since it was opened",
@@ -411,16 +451,18 @@ fn events_tell_who_asked_from_where_what_came_of_it_and_how_long_it_took_also_fr
     let at = 1_700_000_000_000_u64;
     let recent = json!([
         {"revision": 3, "kind": "event", "time_unix_ms": at, "drive": "pump 1", "event": "tripped", "alarm": true,
+         "order": 1, "cause": {"by": "drive"},
+         "fault": {"by_watchdog": false, "time_unix_ms": at, "at_trip": {"state": "fault", "raw": []}},
          "text": "tripped: fault 9 OLF"},
         {"revision": 4, "kind": "command", "id": "c-1", "time_unix_ms": at + 1, "drive": "pump 1", "action": "stop",
-         "command": "ramp stop", "caller": "operator", "origin": "page 10.0.0.7", "outcome": "pending"},
+         "command": "ramp stop", "caller": "operator", "origin": "page 10.0.0.7", "outcome": "pending", "open": true},
     ]);
-    model.take(News::State { state: state(&[drive("pump 1")]), recent }, now);
+    model.take(told(state(&[drive("pump 1")]), recent), now);
     let mut monitor = Monitor { model, now };
     monitor.tell(
         "command",
         json!({"id": "c-1", "time_unix_ms": at + 1, "drive": "pump 1", "action": "stop", "command": "ramp stop",
-               "caller": "operator", "origin": "page 10.0.0.7", "outcome": "confirmed", "took_ms": 420}),
+               "caller": "operator", "origin": "page 10.0.0.7", "outcome": "confirmed", "open": false, "took_ms": 420}),
     );
     monitor.press(KeyCode::Char('3'));
     let screen = monitor.screen(100, 24);
@@ -543,7 +585,7 @@ proptest! {
         let [confirmed, pending, silent] = counts;
         let answer = json!({"id": "c-1", "outcome": "pending", "drives": [{"drive": "pump 17", "outcome": "pending"}],
                             "confirmed": confirmed, "pending": pending, "not_reachable": silent});
-        monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(answer) }, monitor.now);
+        monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(command(answer)) }, monitor.now);
         let text = monitor.screen(width, 24).split_whitespace().collect::<Vec<_>>().join(" ");
         let whole = format!("{confirmed} confirmed, {pending} pending, {silent} not reachable");
         prop_assert!(text.contains(&whole), "{text}");

@@ -9,7 +9,7 @@ use drive_core::{
 };
 use drive_families::Family;
 
-use crate::commands::param::brief;
+use crate::registers::brief;
 
 /// What the registers of a drive held at a time.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -149,7 +149,7 @@ impl Line {
 }
 
 fn span(row: &Row) -> String {
-    match crate::commands::param::range(row) {
+    match crate::registers::range(row) {
         range if range.is_empty() => "expected a number in its unit or a hexadecimal word".to_owned(),
         range => format!("expected {range}"),
     }

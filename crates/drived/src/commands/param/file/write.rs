@@ -10,9 +10,9 @@ use drive_core::registers::Part;
 
 use super::{Backup, Entry};
 use crate::{
-    commands::param::factory,
     failure::Failure,
     kept::{Kept, Readers},
+    registers::factory,
 };
 
 /// How a backup begins. Only a file that begins so is overwritten by the next one.

@@ -7,12 +7,10 @@ use drive_core::{
 use serde_json::{Value, json};
 
 use crate::{
-    commands::param::{
-        file::{Backup, Entry},
-        range,
-    },
+    commands::param::file::{Backup, Entry},
     failure::Failure,
     output::Table,
+    registers::range,
 };
 
 /// What is to be done to one drive.

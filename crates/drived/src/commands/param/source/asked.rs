@@ -4,7 +4,12 @@ use drive_core::{ErrorKind, Row};
 use serde_json::json;
 
 use super::{Source, Unread, Unwritten};
-use crate::{client::path_of, failure::Failure, one_drive::may_have_written};
+use crate::{
+    client::path_of,
+    failure::Failure,
+    one_drive::may_have_written,
+    plant::{commands::OutcomeWord, parameters::ParameterView},
+};
 
 impl Source {
     /// Reads one register, when its turn comes.
@@ -15,15 +20,17 @@ impl Source {
                 _ => Unread::Refused(error.to_string()),
             }),
             Self::OfDaemon { daemon, view } => {
-                let name = view["name"].as_str().unwrap_or_default();
+                let name = view.name();
                 let path = path_of(&["drives", name, "parameters", &row.address.to_string()]);
                 let answer = daemon.get(&path).await;
                 let answer = answer.map_err(|failure| Unread::Silent(failure.to_string()))?;
-                let word = answer.body["raw"].as_u64().and_then(|raw| u16::try_from(raw).ok());
-                word.filter(|_| answer.status.is_success()).ok_or_else(|| {
-                    let why = answer.failure().to_string();
-                    if answer.body["reason"] == "drive" { Unread::Refused(why) } else { Unread::Silent(why) }
-                })
+                let is_refused = answer.reason().as_deref() == Some("drive");
+                let failed = |failure: Failure| match is_refused {
+                    true => Unread::Refused(failure.to_string()),
+                    false => Unread::Silent(failure.to_string()),
+                };
+                let row = answer.done::<ParameterView>().map_err(failed)?;
+                row.raw.ok_or_else(|| Unread::Silent("the daemon tells no word".to_owned()))
             }
         }
     }
@@ -52,7 +59,7 @@ impl Source {
                 }
             }
             Self::OfDaemon { daemon, view } => {
-                let name = view["name"].as_str().unwrap_or_default();
+                let name = view.name();
                 let path = path_of(&["drives", name, "parameters", &row.address.to_string()]);
                 let body = json!({ "value": format!("0x{word:04X}"), "only_at_standstill": true });
                 let answer = daemon.put(&path, &body).await;
@@ -77,11 +84,11 @@ impl Source {
                 Ok(format!("; saves counted: {saves}"))
             }
             Self::OfDaemon { daemon, view } => {
-                let name = view["name"].as_str().unwrap_or_default();
+                let name = view.name();
                 let answer =
                     daemon.post(&(path_of(&["drives", name, "save"]) + "?wait=30s"), &json!({})).await?;
-                match answer.body["outcome"].as_str() {
-                    Some("confirmed") => Ok(String::new()),
+                match answer.command() {
+                    Some(command) if command.outcome == OutcomeWord::Confirmed => Ok(String::new()),
                     _ => Err(answer.failure()),
                 }
             }

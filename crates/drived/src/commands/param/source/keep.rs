@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use chrono::{SecondsFormat, Utc};
 use drive_core::ErrorKind;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{Source, Unread};
 use crate::{
@@ -85,16 +85,14 @@ impl Source {
                 })
             }
             Self::OfDaemon { view, .. } => {
+                let drive = json!(view);
                 let text = |value: &Value| value.as_str().map(str::to_owned);
-                let identity = &view["identity"];
+                let identity = &drive["identity"];
                 Ok(Head {
                     name,
                     family,
-                    line: text(&view["line"]).unwrap_or_default(),
-                    slave: view["slave"]
-                        .as_u64()
-                        .and_then(|slave| u8::try_from(slave).ok())
-                        .unwrap_or_default(),
+                    line: view.line.clone(),
+                    slave: view.slave,
                     vendor: text(&identity["vendor"]),
                     model: text(&identity["model"]),
                     firmware: text(&identity["firmware"]),

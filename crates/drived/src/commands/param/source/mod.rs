@@ -5,16 +5,16 @@ mod keep;
 
 use drive_core::SlaveAddress;
 use drive_families::Family;
-use serde_json::Value;
 
 use super::file::{Backup, Head};
 use crate::{
-    client::{Daemon, DaemonArgs, Target, path_of},
+    client::{Daemon, DaemonArgs, wanted},
     drive_options::OptionArgs,
     drive_spec::{self, DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
     one_drive::OneDrive,
+    plant::views::DriveView,
 };
 
 /// Where the drives are.
@@ -39,7 +39,7 @@ pub(super) enum Named {
 /// One drive that can be asked.
 pub(crate) enum Source {
     OnLine(Box<OneDrive>),
-    OfDaemon { daemon: Box<Daemon>, view: Value },
+    OfDaemon { daemon: Box<Daemon>, view: Box<DriveView> },
 }
 
 /// Why a register could not be read.
@@ -73,31 +73,8 @@ impl SourceArgs {
             return Ok(names.into_iter().map(Named::OnLine).collect());
         }
         let state = self.daemon.connect().await?.state().await?;
-        let drives = || state["drives"].as_array().into_iter().flatten();
-        let mut named = Vec::new();
-        let mut add = |is_wanted: &dyn Fn(&Value) -> bool| {
-            for name in drives().filter(|drive| is_wanted(drive)).filter_map(|drive| drive["name"].as_str()) {
-                let one = Named::OfDaemon(name.to_owned());
-                if !named.contains(&one) {
-                    named.push(one);
-                }
-            }
-        };
-        if all {
-            add(&|_| true);
-        }
-        for word in words {
-            match Target::find(&state, word) {
-                Ok(target) => {
-                    add(&|drive| drive["name"].as_str().is_some_and(|name| target.has(&state, name)));
-                }
-                Err(_) if drives().any(|drive| drive["line"] == **word) => {
-                    add(&|drive| drive["line"] == **word);
-                }
-                Err(failure) => return Err(failure),
-            }
-        }
-        Ok(named)
+        let drives = if all { state.drives.iter().collect() } else { wanted(&state, words)? };
+        Ok(drives.into_iter().map(|drive| Named::OfDaemon(drive.name().to_owned())).collect())
     }
 
     /// The one drive that a word names.
@@ -139,7 +116,7 @@ impl SourceArgs {
             (Named::OnLine(_), None) => Err(crate::one_drive::unnamed()),
             (Named::OfDaemon(name), _) => {
                 let mut daemon = self.daemon.connect().await?;
-                let view = daemon.get(&path_of(&["drives", name])).await?.done()?;
+                let view = daemon.read(&["drives", name]).await?;
                 Ok(Source::OfDaemon { daemon: Box::new(daemon), view })
             }
         }
@@ -161,8 +138,7 @@ impl Source {
         match self {
             Self::OnLine(one) => Ok(one.name.family),
             Self::OfDaemon { view, .. } => {
-                let key = view["family"].as_str().unwrap_or_default();
-                key.parse().map_err(|error| Failure::Input(format!("the daemon's drive: {error}")))
+                view.family.parse().map_err(|error| Failure::Input(format!("the daemon's drive: {error}")))
             }
         }
     }
@@ -170,7 +146,7 @@ impl Source {
     pub(super) fn name(&self) -> String {
         match self {
             Self::OnLine(one) => one.name.to_string(),
-            Self::OfDaemon { view, .. } => view["name"].as_str().unwrap_or_default().to_owned(),
+            Self::OfDaemon { view, .. } => view.name().to_owned(),
         }
     }
 
