@@ -45,6 +45,13 @@ impl Slave {
         self.address
     }
 
+    /// When the last of its values was asked for after which another, different answer to the same question came: it may have
+    /// been that of an earlier one, so that what was asked for then counts for nothing. `None`: there was none.
+    #[must_use]
+    pub fn retracted(&self) -> Option<Instant> {
+        self.handle.shared.master().retracted(self.address)
+    }
+
     /// This slave under other terms.
     #[must_use]
     pub fn with_terms(mut self, terms: Terms) -> Self {

@@ -245,6 +245,8 @@ pub struct SlaveStats {
     pub late: u64,
     /// Answers that came sooner than a line can carry request and answer: those that come twice, mostly.
     pub early: u64,
+    /// Values after which another answer to the same question came, so that they may have been those of an earlier one.
+    pub retracted: u64,
     /// Intact frames with another function than was asked for.
     pub wrong_function: u64,
     /// Intact frames with the function that was asked for, and another count, address or value.
@@ -368,6 +370,18 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// Whether everything that came as an answer came sooner than the configured speed can carry it, so that nothing was taken
+    /// for one: three times at least, and nothing else. The far end is faster then than it is said to be, an adapter without a
+    /// UART or a program, and [`far_end_paces`](crate::LineConfig::far_end_paces) is to be `Some(false)`; or the speed is set
+    /// too low.
+    #[must_use]
+    pub fn is_faster_than_configured(&self) -> bool {
+        let early: u64 = self.slaves.values().map(|slave| slave.early).sum();
+        let in_time: u64 =
+            self.slaves.values().map(|slave| slave.outcomes.answered + slave.outcomes.exceptions).sum();
+        early >= 3 && in_time == 0
+    }
+
     /// One class.
     #[must_use]
     pub fn class(&self, class: Class) -> &ClassStats {

@@ -36,6 +36,7 @@ async fn in_a_hundred_stalls_no_value_is_told_to_be_younger_than_it_is() {
             said.send(Instant::now()).unwrap();
             theirs.write_all(&answer).await.unwrap();
             // Nobody reads it meanwhile.
+            #[expect(clippy::disallowed_methods, reason = "it is to block the runtime")]
             thread::sleep((1 + stall % 20) * MS);
         }
     });

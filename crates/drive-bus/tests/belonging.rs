@@ -475,3 +475,24 @@ fn a_modbus_tcp_answer_that_lay_in_the_socket_before_its_request_was_sent_is_non
     assert_eq!(script.hear(&guess[7..]), Step::More);
     assert_eq!(script.hear(&answer(number.wrapping_add(2), 3)), right(3));
 }
+
+#[test]
+fn a_far_end_that_is_faster_than_it_is_said_to_be_is_told_and_read_when_that_is_set() {
+    // An adapter without a UART: what it answers is there before a line could carry it.
+    let hurries = |config: LineConfig| {
+        let mut line = ByHand::new(config);
+        line.ask(1, 1, READ, Terms::default());
+        let until = line.now + 5_000 * MS;
+        while let Some(request) = line.next_sent(until) {
+            let answer = words(&vec![7; asked(&request).into()]);
+            line.hears(MS, &rtu::frame(1, &answer));
+        }
+        line
+    };
+    let mut told = hurries(config());
+    assert!(told.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    assert!(told.master.stats(told.now).is_faster_than_configured());
+    let mut set = hurries(LineConfig { far_end_paces: Some(false), ..config() });
+    assert_eq!(set.ended(), Some((1, read(&[7, 7]))));
+    assert!(!set.master.stats(set.now).is_faster_than_configured());
+}

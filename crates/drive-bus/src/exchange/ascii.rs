@@ -29,7 +29,7 @@ use self::{
     frame::{LINE_FEED, MAX_FRAME},
 };
 use super::{
-    Failure, Machine, Step, Stray,
+    Failure, Frame, Machine, Step, Stray,
     echo::{Echo, EchoState, MAYBE_ECHO},
 };
 use crate::answer;
@@ -74,6 +74,8 @@ pub struct Ascii {
     receiver: Receiver,
     last_character: Option<Instant>,
     strays: Vec<Stray>,
+    /// The answer that came last.
+    taken: Option<Frame>,
 }
 
 #[derive(Debug)]
@@ -106,6 +108,7 @@ impl Ascii {
             receiver: Receiver::default(),
             last_character: None,
             strays: Vec::new(),
+            taken: None,
         }
     }
 
@@ -133,8 +136,10 @@ impl Ascii {
                 return Step::More;
             }
         }
+        let frame = Frame::of(&pdu);
         match answer::check(&current.request, pdu) {
             Ok(answer) => {
+                self.taken = Some(frame);
                 if self.echo == EchoState::Unknown && !current.disturbed {
                     self.echo = EchoState::Absent;
                 }
@@ -302,6 +307,10 @@ impl Machine for Ascii {
 
     fn confuses_late_answers(&self) -> bool {
         true
+    }
+
+    fn taken(&self) -> Option<Frame> {
+        self.taken
     }
 
     fn echo_is_unknown(&self) -> bool {

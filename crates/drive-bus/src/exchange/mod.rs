@@ -15,6 +15,7 @@ pub mod unitelway;
 use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
+use crc::{CRC_16_MODBUS, Crc};
 use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response};
@@ -34,6 +35,8 @@ pub(crate) fn of(config: &LineConfig) -> Box<dyn Machine> {
         Protocol::UniTelway(settings) => Box::new(unitelway::UniTelway::new(serial, settings, chunk_gap)),
     }
 }
+
+const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
 /// Exception 0Bh, gateway target device failed to respond (Modbus Application Protocol V1.1b3, section 7).
 pub(crate) const NOBODY_ANSWERED: u8 = 0x0B;
@@ -71,6 +74,23 @@ pub enum Failure {
     Doubted(&'static str),
 }
 
+/// What an intact frame is told by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Frame {
+    /// What it answers.
+    pub shape: Shape,
+    /// A check over all of it.
+    pub check: u16,
+}
+
+impl Frame {
+    /// The frame with this PDU.
+    #[must_use]
+    pub fn of(pdu: &[u8]) -> Self {
+        Self { shape: Shape::heard(pdu), check: CHECK.checksum(pdu) }
+    }
+}
+
 /// What came in and was no part of the exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stray {
@@ -80,8 +100,8 @@ pub enum Stray {
         slave: u8,
         /// Its function code.
         function: u8,
-        /// The shape of the answer that it is, or that will follow it.
-        shape: Shape,
+        /// The shape of the answer that it is, or that will follow it, and what it says.
+        frame: Frame,
         /// Another master's request.
         is_request: bool,
         /// Its transaction number, where the protocol has one.
@@ -93,8 +113,8 @@ pub enum Stray {
     Early {
         /// Its address.
         slave: u8,
-        /// Its shape.
-        shape: Shape,
+        /// Its shape, and what it says.
+        frame: Frame,
     },
     /// Bytes that make no frame.
     Noise(usize),
@@ -106,9 +126,9 @@ impl Stray {
     /// An intact frame with this PDU.
     pub(crate) fn frame(slave: u8, pdu: &[u8]) -> Self {
         let function = pdu.first().copied().unwrap_or_default();
-        let shape = Shape::heard(pdu);
+        let frame = Frame::of(pdu);
         let nobody = function & 0x80 != 0 && pdu.get(1) == Some(&NOBODY_ANSWERED);
-        Self::Frame { slave, function, shape, is_request: Shape::is_request(pdu), number: None, nobody }
+        Self::Frame { slave, function, frame, is_request: Shape::is_request(pdu), number: None, nobody }
     }
 }
 
@@ -195,6 +215,11 @@ pub trait Machine: Send {
     /// late answers.
     fn shape(&self, pdu: &[u8]) -> Shape {
         Shape::of_answer_to(pdu)
+    }
+
+    /// What the answer that was taken last said, where a later frame can be another answer to the same question.
+    fn taken(&self) -> Option<Frame> {
+        None
     }
 
     /// The transaction number of the exchange that began last, where the protocol has one.

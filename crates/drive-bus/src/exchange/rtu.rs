@@ -18,7 +18,7 @@ pub(crate) use self::frame::{MAX_FRAME, OVERHEAD};
 pub use self::frame::{frame, is_frame};
 
 use super::{
-    Failure, Machine, Step, Stray,
+    Failure, Frame, Machine, Step, Stray,
     echo::{Echo, EchoState},
     pace::Pace,
 };
@@ -52,6 +52,8 @@ pub struct Rtu {
     early: usize,
     last_byte: Option<Instant>,
     strays: Vec<Stray>,
+    /// The answer that came last.
+    taken: Option<Frame>,
 }
 
 #[derive(Debug)]
@@ -87,6 +89,7 @@ impl Rtu {
             early: 0,
             last_byte: None,
             strays: Vec::new(),
+            taken: None,
         }
     }
 
@@ -204,6 +207,10 @@ impl Machine for Rtu {
 
     fn confuses_late_answers(&self) -> bool {
         true
+    }
+
+    fn taken(&self) -> Option<Frame> {
+        self.taken
     }
 
     fn echo_is_unknown(&self) -> bool {

@@ -11,7 +11,7 @@ use tokio_modbus::{
     prelude::{ConformityLevel, DeviceIdObject, ReadDeviceIdentificationResponse},
 };
 
-use super::{Failure, Machine, Step, Stray};
+use super::{Failure, Frame, Machine, Step, Stray};
 use crate::shape::Shape;
 
 /// The function code under which a UNI-TE request itself travels in a [`Request::Custom`]: the data are its code and its
@@ -151,7 +151,7 @@ impl Machine for UniTelway {
             drive_unitelway::Stray::Frame { slave, function } => Stray::Frame {
                 slave,
                 function,
-                shape: Shape::ANY,
+                frame: Frame { shape: Shape::ANY, check: 0 },
                 is_request: false,
                 number: None,
                 nobody: false,

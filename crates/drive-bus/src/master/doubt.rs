@@ -4,11 +4,14 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::{config::DOUBLE, shape::Shape};
+use crate::{config::DOUBLE, exchange::Frame, shape::Shape};
 
 /// How long anything strange is remembered. Longer than a serial server or a gateway usually keeps an answer (its own
 /// timeouts are seconds), and it costs only a word more in a read.
-const MEMORY: Duration = Duration::from_secs(60);
+pub(super) const MEMORY: Duration = Duration::from_secs(60);
+
+/// What comes later than this is no second answer to what was taken.
+const LONGEST_DOUBLE: Duration = Duration::from_secs(1);
 
 /// How many shapes are remembered: the reads that a family has in rotation, in all their lengths, and some writes. There are
 /// thirty thousand slaves on a thousand lines.
@@ -19,7 +22,31 @@ const MOST: usize = 16;
 pub(super) struct Doubt {
     known: Vec<Known>,
     strange_until: Option<Instant>,
+    /// Something came that nothing explains: answers may come twice here.
+    unexplained_until: Option<Instant>,
+    /// The answer that was taken last, and when the same came before.
+    taken: Option<Taken>,
     held_until: Option<Instant>,
+}
+
+/// An answer that was taken.
+#[derive(Debug, Clone, Copy)]
+struct Taken {
+    frame: Frame,
+    at: Instant,
+    asked_at: Instant,
+    same_before: Option<Instant>,
+}
+
+/// What an intact frame is that was no answer to what was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Heard {
+    /// It was owed.
+    pub(super) was_owed: bool,
+    /// The answer that was taken last, once more, so much later.
+    pub(super) again_after: Option<Duration>,
+    /// Another answer to the same question: what was taken then may have been that to an earlier one.
+    pub(super) withdraws: Option<Instant>,
 }
 
 /// One shape that a coming answer should not have.
@@ -57,8 +84,9 @@ impl Doubt {
         });
     }
 
-    /// An intact frame came that was no answer to what was asked, or another master's request for one. True: it was owed.
-    pub(super) fn heard(&mut self, now: Instant, shape: Shape, is_request: bool) -> bool {
+    /// An intact frame came that was no answer to what was asked, or another master's request for one.
+    pub(super) fn heard(&mut self, now: Instant, frame: Frame, is_request: bool) -> Heard {
+        let shape = frame.shape;
         self.strange_until = Some(now + MEMORY);
         let is_it = |known: &Known| {
             known.owed && !is_request && (known.shape == shape || shape.is_refusal_of(known.shape))
@@ -72,23 +100,53 @@ impl Doubt {
             let heard = Known::come(shape, now + DOUBLE, now + MEMORY);
             self.remember(Known { will_come: is_request, ..heard });
         }
-        was_owed
+        if was_owed {
+            return Heard { was_owed, ..Heard::default() };
+        }
+        self.unexplained_until = Some(now + MEMORY);
+        let taken = self.taken.filter(|taken| {
+            !is_request
+                && taken.frame.shape == shape
+                && now.saturating_duration_since(taken.at) <= LONGEST_DOUBLE
+        });
+        let Some(taken) = taken else { return Heard::default() };
+        let same = taken.frame.check == frame.check;
+        Heard {
+            was_owed,
+            again_after: if same {
+                Some(now - taken.at)
+            } else {
+                taken.same_before.map(|before| taken.at - before)
+            },
+            withdraws: (!same).then_some(taken.asked_at),
+        }
     }
 
-    /// An answer of this shape was taken. It may come twice within `double`. A protocol without shapes has its own proofs.
-    pub(super) fn answered(&mut self, now: Instant, shape: Shape, double: Duration) {
+    /// This answer was taken.
+    pub(super) fn took(&mut self, now: Instant, frame: Frame, asked_at: Instant) {
+        let same = self.taken.filter(|taken| taken.frame == frame && now - taken.at <= LONGEST_DOUBLE);
+        self.taken = Some(Taken { frame, at: now, asked_at, same_before: same.map(|same| same.at) });
+    }
+
+    /// An answer of this shape was taken. It may come twice within `double`, and on this line answers were seen to come again
+    /// after `again`. A protocol without shapes has its own proofs.
+    pub(super) fn answered(&mut self, now: Instant, shape: Shape, double: Duration, again: Option<Duration>) {
         if shape == Shape::ANY {
             return;
         }
         self.known.retain(|known| known.avoid > now && (known.shape != shape || known.will_come));
         let strange = self.is_strange(now);
-        let wait = if strange { now + DOUBLE } else { now };
+        // An answer that is late is late once, and then no reason any more to wait.
+        let owes = self.known.iter().any(|known| known.owed);
+        let unexplained = self.unexplained_until.is_some_and(|until| until > now);
+        let wait = now + again.or((unexplained || owes).then_some(DOUBLE)).unwrap_or_default();
         self.remember(Known::come(shape, wait, now + if strange { MEMORY } else { double }));
     }
 
     /// Anything may have come meanwhile: nothing is asked until `until`.
     pub(super) fn hold(&mut self, now: Instant, until: Instant) {
         self.strange_until = Some(now + MEMORY);
+        self.unexplained_until = Some(now + MEMORY);
         self.held_until = Some(until);
     }
 

@@ -151,7 +151,8 @@ impl FarEnd {
         if owed == 0 || owed < self.serves {
             return None;
         }
-        let asks_whether = !self.exactly || self.in_vain % ASK_AGAIN == 0 && self.gateway_may_change();
+        let asks_whether =
+            !self.exactly || self.in_vain.is_multiple_of(ASK_AGAIN) && self.gateway_may_change();
         if asks_whether && reads && owed == self.serves {
             return None;
         }

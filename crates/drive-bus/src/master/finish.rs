@@ -29,7 +29,7 @@ impl<C> Master<C> {
             return self.throw_away(now, &flight, &result);
         }
         let result = self.believe(now, &flight, result);
-        let (result, nobody) = self.from_gateway(now, &flight, result);
+        let (result, nobody) = self.gateway_says(now, &flight, result);
         self.record.ended(now, slave, flight.started, Ending::of(&result));
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
@@ -108,7 +108,7 @@ impl<C> Master<C> {
     }
 
     /// What a gateway says for a slave that has not answered is no answer of it.
-    fn from_gateway(
+    fn gateway_says(
         &mut self,
         now: Instant,
         flight: &Flight<C>,
@@ -149,7 +149,9 @@ impl<C> Master<C> {
     }
 
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
-        let double = self.config.double_window;
+        let again = self.again.filter(|(_, until)| *until > now).map(|(again, _)| again);
+        let double = self.config.double_window.max(again.unwrap_or_default());
+        let taken = self.exchange.taken();
         let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
         let characters = self.config.characters(self.config.answer_len(expected));
         let took = self.exchange.took();
@@ -169,7 +171,10 @@ impl<C> Master<C> {
             Ok(_) => {
                 station.stats.outcomes.answered += 1;
                 if confuses {
-                    station.doubt.answered(now, flight.shape, double);
+                    station.doubt.answered(now, flight.shape, double, again);
+                    if let Some(frame) = taken {
+                        station.doubt.took(now, frame, flight.asked_at);
+                    }
                     self.fresh.answered(flight.slave, flight.shape);
                 }
             }

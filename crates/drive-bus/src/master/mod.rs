@@ -28,8 +28,8 @@ use tokio_modbus::Request;
 
 use crate::{
     answer,
-    config::{LineConfig, SlaveSettings},
-    exchange::{self, Answer, Failure, Machine, Step, Stray},
+    config::{self, LineConfig, SlaveSettings},
+    exchange::{self, Answer, Failure, Frame, Machine, Step, Stray},
     pdu,
     record::{Ending, Exchange, Record},
     schedule::{Entry, Rules, Schedule, Ticket},
@@ -38,6 +38,7 @@ use crate::{
 };
 
 use aside::Aside;
+use doubt::Heard;
 use far_end::FarEnd;
 use fresh::Fresh;
 use offline::Offline;
@@ -52,6 +53,9 @@ pub type Outcome = Result<Answer, PortError>;
 /// 31 drives.
 const AGING: Duration = Duration::from_secs(1);
 
+/// How much later than it was seen to come again an answer may come again: as much as the time of a host varies.
+const AGAIN: Duration = Duration::from_millis(5);
+
 /// The machine of one line. `C` is whoever waits for an answer.
 pub struct Master<C> {
     config: LineConfig,
@@ -61,6 +65,8 @@ pub struct Master<C> {
     stations: BTreeMap<u8, Box<Station>>,
     /// Those that do not answer: they are probed.
     offline: Offline,
+    /// After how long answers were seen to come again, and until when that is remembered.
+    again: Option<(Duration, Instant)>,
     /// What the last port may have left behind, and whether this one is mute.
     fresh: Fresh,
     /// What the gateway still owes, if there is one.
@@ -188,6 +194,7 @@ impl<C> Master<C> {
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
             offline: Offline::default(),
+            again: None,
             fresh: Fresh::default(),
             far_end: FarEnd::new(config.far_end()),
             flight: None,
@@ -482,19 +489,20 @@ impl<C> Master<C> {
             match stray {
                 Stray::Echo => self.stats.echoes += 1,
                 Stray::Noise(bytes) => self.stats.noise_bytes += bytes as u64,
-                Stray::Early { slave, shape } => {
+                Stray::Early { slave, frame } => {
                     let station = self.station(slave);
                     station.stats.early += 1;
-                    station.doubt.heard(now, shape, false);
+                    let heard = station.doubt.heard(now, frame, false);
+                    self.note_heard(now, slave, heard);
                 }
-                Stray::Frame { slave, function, shape, is_request, number, nobody } => {
-                    let given_up = self.far_end.heard(now, slave, number, shape, nobody);
+                Stray::Frame { slave, function, frame, is_request, number, nobody } => {
+                    let given_up = self.far_end.heard(now, slave, number, frame.shape, nobody);
                     let was_owed = given_up.is_some();
                     if was_owed && !nobody && number.is_some() && self.stations.contains_key(&slave) {
                         self.note_alive(now, slave);
                     }
                     self.nobody_answered(now, given_up.unwrap_or_default());
-                    self.count_frame(now, (slave, function, shape, is_request), was_owed);
+                    self.count_frame(now, (slave, function, frame, is_request), was_owed);
                 }
             }
         }
@@ -503,12 +511,12 @@ impl<C> Master<C> {
     fn count_frame(
         &mut self,
         now: Instant,
-        (slave, function, shape, is_request): (u8, u8, Shape, bool),
+        (slave, function, frame, is_request): (u8, u8, Frame, bool),
         was_owed: bool,
     ) {
         if let Some(flight) = self.flight.as_mut().filter(|flight| flight.slave == slave) {
             // Two masters have asked for the same; whose answer comes first nobody knows.
-            flight.suspect |= is_request && shape == flight.shape;
+            flight.suspect |= is_request && frame.shape == flight.shape;
         }
         let asked = self.flight.as_ref().filter(|flight| flight.slave == slave);
         let asked = asked.map(|flight| flight.request.function_code().value());
@@ -517,7 +525,8 @@ impl<C> Master<C> {
             self.stats.foreign += 1;
             return;
         };
-        let late = confuses && station.doubt.heard(now, shape, is_request);
+        let heard = if confuses { station.doubt.heard(now, frame, is_request) } else { Heard::default() };
+        let late = heard.was_owed;
         if was_owed && !late {
             station.stats.late += 1;
             return;
@@ -532,6 +541,26 @@ impl<C> Master<C> {
             Some(_) => station.stats.wrong_count += 1,
             None => self.stats.foreign += 1,
         }
+        self.note_heard(now, slave, heard);
+    }
+
+    /// What a frame says of those before it.
+    fn note_heard(&mut self, now: Instant, slave: u8, heard: Heard) {
+        if let Some(after) = heard.again_after {
+            let known = self.again.filter(|(_, until)| *until > now).map(|(again, _)| again);
+            self.again =
+                Some((known.unwrap_or(config::DOUBLE).max(after * 5 / 4 + AGAIN), now + doubt::MEMORY));
+        }
+        if let Some(asked_at) = heard.withdraws {
+            let station = self.station(slave);
+            station.stats.retracted += 1;
+            station.retracted = Some(asked_at);
+        }
+    }
+
+    /// When the last value of a slave was asked for that another answer has withdrawn.
+    pub(crate) fn retracted(&self, slave: u8) -> Option<Instant> {
+        self.stations.get(&slave)?.retracted
     }
 
     /// The next call that has ended.

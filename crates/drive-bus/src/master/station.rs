@@ -31,6 +31,8 @@ pub(super) struct Station {
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
     pub(super) doubt: Doubt,
+    /// When the last of its values was asked for that was withdrawn.
+    pub(super) retracted: Option<Instant>,
     failures: u32,
     /// It was heard when its time was over.
     slow: bool,
@@ -48,6 +50,7 @@ impl Station {
             stats: SlaveStats::default(),
             ready_at: None,
             doubt: Doubt::default(),
+            retracted: None,
             failures: 0,
             slow: false,
             last_read: None,

@@ -53,7 +53,6 @@ pub(crate) fn poll_read_now(
 }
 
 /// A connection is to end with a reset, not with what may still be on its way.
-#[cfg_attr(not(feature = "tcp"), expect(clippy::missing_const_for_fn, reason = "there are no connections"))]
 pub(crate) fn reset_when_dropped(stream: &BoxedStream) {
     #[cfg(feature = "tcp")]
     if let Some(stream) = (stream.as_ref() as &dyn Any).downcast_ref::<tokio::net::TcpStream>() {

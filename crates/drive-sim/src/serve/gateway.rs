@@ -1,7 +1,7 @@
 //! A gateway with a stranger's habits: a box between a network and the line, which serves one request after another and
 //! waits for drives that do not answer.
 
-use std::{collections::VecDeque, io, sync::Arc, time::Duration};
+use std::{collections::VecDeque, io, pin::pin, sync::Arc, time::Duration};
 
 use crc::{CRC_16_MODBUS, Crc};
 use tokio::{
@@ -163,6 +163,7 @@ async fn serve(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) 
     let begun = Instant::now();
     let mut received = Vec::new();
     let mut replayed = behind.replayed();
+    let mut again = VecDeque::new();
     loop {
         if !habits.replays_when_asked {
             to.write_all(&std::mem::take(&mut replayed)).await?;
@@ -171,21 +172,52 @@ async fn serve(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) 
             if let Some(request) = Asked::take(habits.rtu, &mut received)? {
                 break request;
             }
-            if from.read_buf(&mut received).await? == 0 {
-                return Ok(());
+            tokio::select! {
+                read = from.read_buf(&mut received) => {
+                    if read? == 0 {
+                        return Ok(());
+                    }
+                }
+                () = due(&again) => {}
             }
+            give_again(&mut again, &mut to).await?;
         };
         if habits.mute_after.is_some_and(|age| begun.elapsed() >= age) {
             continue;
         }
         to.write_all(&std::mem::take(&mut replayed)).await?;
-        let Some(answer) = behind.serve(&request).await else { continue };
+        let mut serving = pin!(behind.serve(&request));
+        let answer = loop {
+            tokio::select! {
+                answer = &mut serving => break answer,
+                () = due(&again) => give_again(&mut again, &mut to).await?,
+            }
+        };
+        let Some(answer) = answer else { continue };
+        give_again(&mut again, &mut to).await?;
         to.write_all(&answer).await?;
-        if let Some(after) = habits.doubles_after {
-            sleep(after).await;
-            to.write_all(&answer).await?;
-        }
+        again.extend(habits.doubles_after.map(|after| (Instant::now() + after, answer)));
     }
+}
+
+/// When the next answer is given once more.
+async fn due(again: &VecDeque<(Instant, Vec<u8>)>) {
+    match again.front() {
+        Some((at, _)) => sleep_until(*at).await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Gives once more what is due.
+async fn give_again(
+    again: &mut VecDeque<(Instant, Vec<u8>)>,
+    to: &mut (impl AsyncWrite + Unpin),
+) -> io::Result<()> {
+    while again.front().is_some_and(|(at, _)| *at <= Instant::now()) {
+        let Some((_, answer)) = again.pop_front() else { break };
+        to.write_all(&answer).await?;
+    }
+    Ok(())
 }
 
 impl Behind {

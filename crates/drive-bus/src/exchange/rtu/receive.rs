@@ -10,7 +10,7 @@ use super::{
 use crate::{
     answer::{self, Extent},
     exchange::{
-        Failure, Step, Stray,
+        Failure, Frame, Step, Stray,
         echo::{Echo, EchoState, MAYBE_ECHO},
     },
     shape::Shape,
@@ -68,7 +68,7 @@ impl Rtu {
             return None;
         }
         if is_early {
-            self.strays.push(Stray::Early { slave: current.slave, shape: Shape::heard(&pdu) });
+            self.strays.push(Stray::Early { slave: current.slave, frame: Frame::of(&pdu) });
             return None;
         }
         if equals && self.echo == EchoState::Unknown && current.slave != 0 {
@@ -77,6 +77,7 @@ impl Rtu {
         }
         match answer::check(&current.request, pdu.clone()) {
             Ok(answer) => {
+                self.taken = Some(Frame::of(&pdu));
                 if self.another_follows(&pdu) {
                     self.judge(self.received.len());
                     self.current = None;
@@ -164,7 +165,7 @@ impl Rtu {
                     let is_early = dropped.len() - rest.len() < early;
                     match self.current.as_mut().filter(|current| current.slave == slave) {
                         Some(_) if is_early && !Shape::is_request(pdu) => {
-                            self.strays.push(Stray::Early { slave, shape: Shape::heard(pdu) });
+                            self.strays.push(Stray::Early { slave, frame: Frame::of(pdu) });
                         }
                         ours => {
                             if let Some(current) = ours {

@@ -1,0 +1,77 @@
+//! A far end that gives each answer twice, later than any repetition on a wire; and what a single late answer costs.
+
+#![cfg(feature = "tcp")]
+
+mod support;
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{Class, SerialSettings, Terms};
+use drive_sim::{Gateway, SimLine, Wiring, models::atv312::Atv312};
+use support::{MS, by_hand::ByHand, read, rig::Random};
+use tokio::time::sleep;
+use tokio_modbus::Request;
+
+const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
+/// The acceleration ramp, which can be set to anything.
+const ACC: u16 = 9001;
+
+#[tokio::test(start_paused = true)]
+async fn of_a_far_end_that_doubles_late_the_first_is_withdrawn_and_no_other_is_taken() {
+    let (mut asked, mut told, mut wrong) = (0, 0, 0);
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let simulated = SimLine::new(Wiring::rtu(SERIAL));
+        let drive = simulated.add(1, Atv312::under_bus_control()).unwrap();
+        let habits = Gateway { rtu: true, doubles_after: Some(100 * MS), ..Gateway::default() };
+        let line = Line::over(simulated.behind(habits).connect(), LineConfig::stream(SERIAL));
+        let mut slave = line.slave(1).with_terms(Terms::of(Class::Status).sparing((seed % 2) as u8));
+        let mut wrong_here = 0;
+        for value in 1..=215 {
+            assert!(drive.poke(ACC, value));
+            asked += 1;
+            if let Ok(words) = read(&mut slave, ACC, 1).await {
+                told += 1;
+                if words[0] != value {
+                    wrong_here += 1;
+                    // The true answer is still to come, and tells.
+                    sleep(300 * MS).await;
+                    let asked_at = drive_core::Port::asked_at(&slave);
+                    assert!(slave.retracted() >= asked_at, "{value} of seed {seed}: {:?}", line.stats());
+                }
+            }
+            sleep(Duration::from_millis(random.below(120))).await;
+        }
+        assert!(wrong_here <= 1, "{wrong_here} wrong, seed {seed}");
+        assert!(line.stats().slaves[&1].retracted >= wrong_here);
+        wrong += wrong_here;
+    }
+    println!("{asked} asked, {told} told, {wrong} of them wrong and withdrawn");
+    assert!(told * 10 > asked * 9, "{told} of {asked}");
+}
+
+#[test]
+fn after_one_late_answer_what_cannot_differ_waits_for_nothing() {
+    const READ: Request<'static> = Request::ReadHoldingRegisters(3201, 1);
+    let mut line =
+        ByHand::new(LineConfig { retries: 0, double_window: 50 * MS, ..LineConfig::stream(SERIAL) });
+    line.ask(0, 1, READ, Terms::default());
+    let request = line.sent();
+    let until = line.now + 600 * MS;
+    assert_eq!(line.next_sent(until), None);
+    line.now = until;
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    line.hears(MS, &drive_bus::exchange::rtu::frame(request[0], &[3, 2, 0, 1]));
+    line.now += 1_000 * MS;
+    // The measurements of an Altivar 21 are sixteen reads of one word each.
+    let begun = line.now;
+    for call in 1..=16 {
+        line.ask(call, 1, READ, Terms::of(Class::Background));
+        let request = line.sent();
+        line.answers(&request, &[3, 2, 0, call as u8]);
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+    }
+    let exchange = SERIAL.characters(8 + 7) + support::by_hand::RESPONSE + SERIAL.t3_5();
+    assert!(line.now - begun <= exchange * 16 + MS, "{:?}", line.now - begun);
+}
