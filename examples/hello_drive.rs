@@ -28,7 +28,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let ran = run(&mut drive).await;
     println!("stopping: {}", drive.stop(StopMode::Ramp).await?);
     ran?;
-    while !drive.status().await?.is_standstill() {
+    while !drive.status().await?.is_undriven() {
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
     println!("after:    {}", drive.status().await?);

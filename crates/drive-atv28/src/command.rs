@@ -2,16 +2,16 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress,
-    State, Status, StopMode, Withdrawn,
-    drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
+    BroadcastWrite, Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Refusal, Result,
+    SlaveAddress, State, Status, StopMode, Verdict, Withdrawn,
+    drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
 
 use crate::{
     Atv28,
     reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK, raw_command},
     registers::{CMD, ETA, IOLR, LFR, LFRD},
-    words::{ControlWord, ExtendedStatus, LogicIo, StatusWord},
+    words::{ControlWord, LogicIo, StatusWord},
 };
 
 /// What decides the reference where the drive does not follow the bus.
@@ -21,12 +21,15 @@ pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
 };
 
 impl<P: Port> Atv28<P> {
+    /// The stop of bit 12 beside every bit as it stands. A word whose answer was lost may still be on its way: the stop goes out
+    /// behind it.
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let is_run = |held| ControlWord::from_bits_retain(held).is_run();
         let held = self.read_control().await?;
         let status = self.read_status(Class::Command).await?;
-        if !is_run(held) {
-            return Ok(Withdrawn::Nothing(status));
+        if !is_run(held) && (self.own.lease().is_none() || self.own.has_arrived()) {
+            self.own.end();
+            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
         if let Some(reason) = FastWords::of_raw(&status.raw).state_words().refuses_withdrawal() {
             return Err(Error::Unsupported { what: "withdrawal of the run command", reason });
@@ -35,44 +38,38 @@ impl<P: Port> Atv28<P> {
         let held = self.read_control().await.map_err(Error::after_write)?;
         let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
         if !is_run(held) {
-            return Ok(Withdrawn::Ended(status));
+            self.own.end();
+            return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
         }
         let (slave, command) = (self.registers.slave(), Command::Withdraw);
         Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None })
     }
 
     /// Reads the fast set, in two exchanges: seven words are the most that one carries.
-    async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
+    pub(crate) async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
         let mut calls = self.registers.at(class);
         let first = calls.read_array(FIRST_BLOCK.0).await?;
         let second = calls.read_array(SECOND_BLOCK.0).await?;
         Ok(FastWords::of(first, second))
     }
 
-    /// The fast set for whoever watches, with `CMD` where only that tells what the drive does.
-    pub(crate) async fn watch(&mut self) -> Result<Status> {
-        let status = self.read_status(Class::Status).await?;
-        let words = FastWords::of_raw(&status.raw);
-        // The status is good without it.
-        if self.needs_control(words.state_words())
-            && let Ok(held) = self.registers.at(Class::Status).read(CMD).await
-        {
-            self.command = Some(ControlWord::from_bits_retain(held));
-            return Ok(self.status_of(&words));
-        }
-        Ok(status)
+    /// The fast set as a status.
+    pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
+        self.registers.begin_snapshot();
+        let words = self.fast_words(class).await?;
+        // A stop that was just written may not show yet.
+        let fresh = |command: ControlWord| class == Class::Command && command.is_stop();
+        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
+        self.command = self.command.filter(held);
+        self.control = Some(words.state_words().control());
+        self.motion = self.see_shaft(&words, self.registers.snapshot_time());
+        let status = self.status_of(&words);
+        Ok(Status { verdict: self.verdict(&words), ..status })
     }
 
-    /// A motor that slows down to stop looks like one that slows down to a lower setpoint, and one that stands at a setpoint
-    /// of zero, or after `tLS`, like a stopped one.
-    fn needs_control(&self, words: StatusWords) -> bool {
-        let by_bus = words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus;
-        let slows_down = !words.is_turning() || words.eti.contains(ExtendedStatus::DECELERATING);
-        by_bus && self.command.is_none_or(|command| command.is_run() && slows_down)
-    }
-
-    fn status_of(&self, words: &FastWords) -> Status {
-        Status { at: self.registers.snapshot_time(), ..words.status(self.command) }
+    pub(crate) fn status_of(&self, words: &FastWords) -> Status {
+        let at = self.registers.snapshot_time();
+        Status { at, motion: self.motion, ..words.status(self.command) }
     }
 }
 
@@ -84,20 +81,18 @@ impl<P: Port> Drivecom for Atv28<P> {
         self.registers.slave()
     }
 
+    fn own_run(&mut self) -> &mut OwnRun {
+        &mut self.own
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
-        self.registers.begin_snapshot();
-        let words = self.fast_words(class).await?;
-        // A stop that was just written may not show yet.
-        let fresh = |command: ControlWord| class == Class::Command && command.is_stop();
-        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
-        self.command = self.command.filter(held);
-        self.control = Some(words.state_words().control());
-        Ok(self.status_of(&words))
+        self.fast_status(class).await
     }
 
     /// Remembers the word as the one that the drive holds; while the outcome is not known, none is.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         self.command = None;
+        self.last_written = Some(ControlWord::from_bits_retain(word));
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
@@ -105,7 +100,7 @@ impl<P: Port> Drivecom for Atv28<P> {
             (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
             (_, Effect::Level) => calls.write(CMD, word).await?,
         }
-        self.command = Some(ControlWord::from_bits_retain(word));
+        (self.command, self.command_is_read) = (self.last_written, false);
         Ok(())
     }
 
@@ -122,21 +117,26 @@ impl<P: Port> Drivecom for Atv28<P> {
         let mut calls = self.registers.at(Class::Command);
         let negative = calls.read(LFR).await?.cast_signed() < 0 || calls.read(LFRD).await?.cast_signed() < 0;
         Ok(negative.then_some(Refusal::Settings(
-            "a reference on the bus (LFr or LFRD) is negative: give a setpoint in its unit first",
+            "a reference on the bus (LFr or LFRD) is negative: stop the motor, and give a setpoint in its unit first",
         )))
     }
 
     async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<RunShown> {
         let words = FastWords::of_raw(&status.raw);
-        let follows = self.follows(&words).await?;
+        let in_force = self.follows(&words).await?;
         // The last thing that is read: a stop of somebody else that came before shows in it.
         let held = self.read_control().await?;
         *status = self.status_of(&words);
         status.raw.push(raw_command(held));
-        let reverse = ControlWord::from_bits_retain(word).contains(ControlWord::REVERSE);
-        let direction = if reverse { Direction::Reverse } else { Direction::Forward };
+        let direction = ControlWord::from_bits_retain(word).direction();
         let shown = words.state_words().shows_run(direction, words.reference());
-        Ok(if held == word && follows { shown } else { RunShown::NotYet })
+        if held != word || in_force.is_none() || shown == RunShown::NotYet {
+            return Ok(RunShown::NotYet);
+        }
+        // The setpoint that the run command found is the one that it is to follow from now on.
+        self.given = in_force;
+        status.verdict = Some(Verdict::InForce);
+        Ok(shown)
     }
 
     async fn prevents_run(&mut self, status: &Status) -> Option<Refusal> {
@@ -144,23 +144,34 @@ impl<P: Port> Drivecom for Atv28<P> {
         if let Some(reason) = words.state_words().prevents_run() {
             return Some(reason);
         }
-        (self.follows(&words).await == Ok(false)).then_some(OTHER_REFERENCE)
+        (self.follows(&words).await == Ok(None)).then_some(OTHER_REFERENCE)
     }
 
-    /// Whether the level of an input counts on this drive, or its edge, no register tells.
-    async fn refuses_reset(&mut self, _: &Status) -> Result<Option<Refusal>> {
-        const ASKED: Refusal = Refusal::Overridden {
-            by: "a run command of the terminals (LI1 or LI2)",
-            remedy: "open the input first: it might start the motor",
+    /// Any word of the bus takes command from whoever has it, as at the twin's level L1. And which input gives a run command on this
+    /// drive, and whether its level counts or its edge, no register tells: none is closed.
+    async fn refuses_reset(&mut self, status: &Status) -> Result<Option<Refusal>> {
+        const TAKES_COMMAND: Refusal = Refusal::Overridden {
+            by: "whoever has command, for any word of the bus takes it from him,",
+            remedy: "stop the motor by the bus first, which says whom it takes command from, or reset the fault at the drive",
         };
-        let inputs = LogicIo::from_bits_retain(self.registers.at(Class::Command).read(IOLR).await?);
-        Ok(inputs.intersects(LogicIo::LI1 | LogicIo::LI2).then_some(ASKED))
+        const CLOSED: [Refusal; 6] = [
+            closed("a logic input that may give a run command (LI1 is closed)"),
+            closed("a logic input that may give a run command (LI2 is closed)"),
+            closed("a logic input that may give a run command (LI3 is closed)"),
+            closed("a logic input that may give a run command (LI4 is closed)"),
+            closed("a logic input that may give a run command (LI5 is closed)"),
+            closed("a logic input that may give a run command (LI6 is closed)"),
+        ];
+        if FastWords::of_raw(&status.raw).state_words().control() != Control::Bus {
+            return Ok(Some(TAKES_COMMAND));
+        }
+        let inputs = self.registers.at(Class::Command).read(IOLR).await? & LogicIo::INPUTS.bits();
+        let lowest = usize::try_from(inputs.trailing_zeros()).ok();
+        Ok(lowest.and_then(|input| CLOSED.get(input)).copied())
     }
 
     async fn read_control(&mut self) -> Result<u16> {
-        let held = self.registers.at(Class::Command).read(CMD).await?;
-        self.command = Some(ControlWord::from_bits_retain(held));
-        Ok(held)
+        self.read_held(Class::Command).await.map(|(held, _)| held)
     }
 
     fn last_control(&self) -> Option<Control> {
@@ -181,6 +192,10 @@ impl<P: Port> Drivecom for Atv28<P> {
         let forced_local = !words.eta.contains(StatusWord::NOT_FORCED_LOCAL);
         (forced_local && words.is_driving()).then(|| Refusal::NotInControl(words.control()))
     }
+}
+
+const fn closed(by: &'static str) -> Refusal {
+    Refusal::Overridden { by, remedy: "open the input first: it might start the motor" }
 }
 
 /// The write that stops all drives on a line, by the words of the chart: the others would enable a drive that is merely

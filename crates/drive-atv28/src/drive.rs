@@ -4,14 +4,16 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Identity, Intent, Lease, Measurements, Percent,
-    Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Withdrawn, Written,
+    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Ground, Identity, Intent, Lease, Measurements,
+    Percent, Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Withdrawn,
+    Written,
     drivecom::{self, StatusWords},
     registers::{Register, access::Readable},
 };
 
 use crate::{
     Atv28, FAULTS, WARNINGS, command,
+    proof::Doubt,
     reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK},
     registers::{DP1, DP2, DP3, DP4, ETA, INV, IOLR, OPR, OTR, RFRD, RTH},
     setpoint::Limits,
@@ -23,17 +25,32 @@ impl<P: Port> Drive for Atv28<P> {
     drive_core::told_by!(registers);
 
     fn lease(&self) -> Option<Lease> {
-        self.lease
+        self.own.lease()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.lease = Some(lease);
+        self.own.adopt(lease);
+        // What the drive holds is read with the next status.
+        self.command = None;
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.shaft.set_coast_time(time);
     }
 
     fn forget(&mut self) {
         self.limits = Limits::default();
         self.command = None;
         self.control = None;
+        self.lfr = None;
+        self.doubt = Doubt::default();
+        if self.own.lease().is_none() {
+            self.given = None;
+        }
     }
 
     /// Two exchanges, and a third one, for `CMD`, where the words alone do not tell whether a run command is in force: the

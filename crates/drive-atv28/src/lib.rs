@@ -7,6 +7,7 @@ mod faults;
 mod intent;
 mod lists;
 mod parameters;
+mod proof;
 mod reading;
 pub mod registers;
 mod restoring;
@@ -14,12 +15,16 @@ mod setpoint;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Lease, Port, Registers, Row, SerialSettings, SlaveAddress,
-    StopMode, serial::CharacterFormat,
+    Capabilities, Control, ExceptionMeaning, Ground, Motion, OwnRun, Port, Registers, Row, SerialSettings,
+    Shaft, SlaveAddress, StopMode, Turns, serial::CharacterFormat,
 };
 
 pub use crate::{faults::FAULTS, faults::WARNINGS, registers::ROWS};
-use crate::{setpoint::Limits, words::ControlWord};
+use crate::{
+    proof::{Doubt, INJECTION_TIME},
+    setpoint::Limits,
+    words::ControlWord,
+};
 
 /// What an Altivar 28 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
@@ -53,11 +58,26 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv28<P> {
     registers: Registers<P>,
-    /// The run command of this side that stands, or may.
-    lease: Option<Lease>,
+    /// The run command of this side.
+    own: OwnRun,
+    shaft: Shaft,
+    /// What the shaft did at the last status.
+    motion: Motion,
+    turns: Turns,
+    doubt: Doubt,
+    /// What a contract rests on that was found otherwise and not told yet.
+    changed: Vec<Ground>,
+    /// The register and the word of the setpoint that is to be in force.
+    given: Option<(u16, u16)>,
+    /// `LFr` as it was read or written last.
+    lfr: Option<u16>,
     limits: Limits,
     /// The control word that the drive was last seen to hold; `None` when that is not known.
     command: Option<ControlWord>,
+    /// Whether that was read, and not only written.
+    command_is_read: bool,
+    /// The control word that this side wrote last.
+    last_written: Option<ControlWord>,
     /// Who commanded when it was last read.
     control: Option<Control>,
 }
@@ -71,11 +91,22 @@ impl<P: Port> Atv28<P> {
     /// The drive with this address. Nothing is sent.
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress) -> Self {
+        let mut shaft = Shaft::new();
+        shaft.set_injection_time(Some(INJECTION_TIME));
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            lease: None,
+            own: OwnRun::new(),
+            shaft,
+            motion: Motion::NotKnown,
+            turns: Turns::default(),
+            doubt: Doubt::default(),
+            changed: Vec::new(),
+            given: None,
+            lfr: None,
             limits: Limits::default(),
             command: None,
+            command_is_read: false,
+            last_written: None,
             control: None,
         }
     }

@@ -67,12 +67,18 @@ impl FastWords {
     pub(crate) fn status(&self, command: Option<ControlWord>) -> Status {
         let state = self.state_words();
         Status {
-            output_frequency: Some(Frequency::from_decihertz(self.word(RFR).cast_signed().unsigned_abs())),
+            output_frequency: Some(self.output()),
+            reference: Some(self.reference()),
             current: Some(Current::from_deciamperes(u32::from(self.word(LCR)))),
             fault_code: state.is_tripped().then(|| self.word(LFT)),
             raw: self.raw(),
             ..state.status(command)
         }
+    }
+
+    /// The output frequency.
+    pub(crate) fn output(&self) -> Frequency {
+        Frequency::from_decihertz(self.word(RFR).cast_signed().unsigned_abs())
     }
 
     /// The reference before the ramp.

@@ -1,9 +1,14 @@
 //! Setpoints: `LFr` in hertz, `LFRD` in rpm, both as magnitudes. The direction is the run command's.
 
+use std::time::Duration;
+
 use drive_core::{
-    Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
+    Class, Command, Confirming, Control, Error, Frequency, Ground, Port, Result, Setpoint, SetpointProblem,
+    Speed,
     drivecom::{self, ChartState, Drivecom, follows_frequency, follows_speed},
 };
+
+use tokio::time::Instant;
 
 use crate::{
     Atv28,
@@ -13,10 +18,14 @@ use crate::{
     words::ControlWord,
 };
 
+/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the terminal may
+/// change them.
+const LIMITS_HOLD: Duration = Duration::from_secs(10);
+
 /// The drive's own limits, read when the first setpoint needs them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Limits {
-    frequency: Option<(Frequency, Frequency)>,
+    pub(crate) frequency: Option<((Frequency, Frequency), Instant)>,
     speed: Option<(Speed, Speed)>,
 }
 
@@ -30,13 +39,33 @@ impl<P: Port> Atv28<P> {
                 word => (LFRD, word),
             },
         };
-        // A run command may stand from before, of which nothing but CMD tells.
-        if self.command.is_none() {
-            self.read_control().await?;
-        }
+        let word =
+            if self.is_negative().await? { word.cast_signed().wrapping_neg().cast_unsigned() } else { word };
         self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
+        self.given = Some((register.address(), word));
+        if register.address() == LFR.address() {
+            self.lfr = Some(word);
+        }
+        let word = word.cast_signed().unsigned_abs();
         let frequency = (register.address() == LFR.address()).then(|| Frequency::from_decihertz(word));
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
+    }
+
+    /// Whether the reference that stands turns the motor against its run command, as another master may have left it: a setpoint
+    /// leaves that as it is, while the motor is driven or might be. One for a motor that nothing runs has no sign.
+    async fn is_negative(&mut self) -> Result<bool> {
+        let words = self.fast_words(Class::Command).await?;
+        let (held, lfr) = self.read_held(Class::Command).await?;
+        let (state, command) = (words.state_words(), ControlWord::from_bits_retain(held));
+        let by_bus = state.control() == Control::Bus;
+        let enabled = state.chart() == Some(ChartState::OperationEnabled);
+        if !state.is_driving() && !(enabled && by_bus && command.is_run()) {
+            return Ok(false);
+        }
+        if by_bus && enabled && words.reference() != Frequency::ZERO {
+            return Ok(state.asks_for() != command.direction());
+        }
+        Ok(lfr.cast_signed() < 0)
     }
 
     /// Sees the setpoint in force: the motor that runs by a command of the bus follows it, and one that somebody else runs
@@ -51,7 +80,7 @@ impl<P: Port> Atv28<P> {
                 _ if refusal.is_some() => false,
                 _ if !self.runs_by_bus(&words) => return Ok(()),
                 Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
-                None => self.follows_speed().await?,
+                None => self.follows_speed().await?.1,
             };
             if follows {
                 return Ok(());
@@ -64,19 +93,23 @@ impl<P: Port> Atv28<P> {
         }
     }
 
-    /// Whether the drive follows the reference of the bus: `FrH` is `LFr` between the limits, or, where a speed was given,
-    /// `FRHD` is `LFRD`.
-    pub(crate) async fn follows(&mut self, words: &FastWords) -> Result<bool> {
-        let asked = self.registers.at(Class::Command).read(LFR).await?.cast_signed().unsigned_abs();
+    /// The reference of the bus that the drive follows, its register and its word: `FrH` is `LFr` between the limits, or, where a
+    /// speed was given, `FRHD` is `LFRD`.
+    pub(crate) async fn follows(&mut self, words: &FastWords) -> Result<Option<(u16, u16)>> {
+        let (_, lfr) = self.read_held(Class::Command).await?;
         let limits = self.frequency_limits().await?;
-        let asked = Frequency::from_decihertz(asked);
-        Ok(follows_frequency(words.reference(), asked, limits) || self.follows_speed().await?)
+        let asked = Frequency::from_decihertz(lfr.cast_signed().unsigned_abs());
+        if follows_frequency(words.reference(), asked, limits) {
+            return Ok(Some((LFR.address(), lfr)));
+        }
+        let (lfrd, follows) = self.follows_speed().await?;
+        Ok(follows.then_some((LFRD.address(), lfrd)))
     }
 
-    async fn follows_speed(&mut self) -> Result<bool> {
+    async fn follows_speed(&mut self) -> Result<(u16, bool)> {
         // LFRD, FRHD.
         let [lfrd, frhd] = self.registers.at(Class::Command).read_array(LFRD.address()).await?;
-        Ok(follows_speed(frhd, lfrd))
+        Ok((lfrd, follows_speed(frhd, lfrd)))
     }
 
     /// Whether a run command of the bus is in force.
@@ -106,15 +139,24 @@ impl<P: Port> Atv28<P> {
         drivecom::speed_word(speed, limits).map_err(|problem| self.setpoint(setpoint, problem))
     }
 
-    /// HSP and LSP, which follow each other.
+    /// HSP and LSP, which follow each other, where they were not read lately.
     async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
-        if let Some(limits) = self.limits.frequency {
-            return Ok(limits);
+        match self.limits.frequency {
+            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(limits),
+            _ => self.read_frequency_limits(Class::Command).await,
         }
-        let words: [u16; 2] = self.registers.at(Class::Command).read_array(HSP.address()).await?;
+    }
+
+    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<(Frequency, Frequency)> {
+        let words: [u16; 2] = self.registers.at(class).read_array(HSP.address()).await?;
         let [high, low] = words.map(Frequency::from_decihertz);
         let limits = (low, high);
-        self.limits.frequency = Some(limits);
+        let before = self.limits.frequency.replace((limits, Instant::now()));
+        if before.is_some_and(|(before, _)| before != limits) {
+            // The same limits in rpm.
+            self.limits.speed = None;
+            self.changed(Ground::Limits);
+        }
         Ok(limits)
     }
 

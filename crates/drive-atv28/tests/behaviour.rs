@@ -5,8 +5,8 @@ use std::time::Duration;
 use drive_atv28::{Atv28, CAPABILITIES, ROWS};
 use drive_bus::{Line, Slave};
 use drive_core::{
-    Command, Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Frequency, Reaction, Refusal,
-    Row, Setpoint, SetpointProblem, Speed, State, StopMode,
+    Command, Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Frequency, Motion, Reaction,
+    Refusal, Row, Setpoint, SetpointProblem, Speed, State, StopMode,
 };
 use drive_sim::{Panel, SimSlave, models};
 use drive_testing::bench;
@@ -73,7 +73,13 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
         // The injection lasts as long as its bit.
         let injects = mode == StopMode::DcInjection;
         machine.wait_until(|seen| seen.shaft_frequency == 0 && seen.running == injects).await;
-        assert_eq!(drive.status().await.unwrap().is_standstill(), !injects, "{mode}");
+        // Of a motor that was cut nothing tells when it has come to rest, and direct current has a time for it.
+        let motion = match mode {
+            StopMode::Ramp | StopMode::Fast => Motion::AtRest,
+            StopMode::Freewheel => Motion::Coasting,
+            StopMode::DcInjection => Motion::Braking,
+        };
+        assert_eq!(drive.status().await.unwrap().motion, motion, "{mode}");
         // And it starts again, through the chart where the stop left it.
         drive.start(Direction::Forward).await.unwrap();
         machine.wait_until(|seen| seen.output_frequency == 5_000).await;
@@ -119,13 +125,20 @@ async fn a_trip_is_told_with_its_meaning_and_reset_without_a_restart() {
 #[tokio::test(start_paused = true)]
 async fn past_faults_are_the_history() {
     let (mut drive, machine, _line) = rig();
+    // The terminals command from power-up on, and a reset takes it from nobody.
+    machine.trip(9);
+    let error = drive.reset_faults().await.unwrap_err();
+    assert!(matches!(error, Error::Refused { reason: Refusal::Overridden { .. }, .. }), "{error}");
+    assert!(commands(&machine).is_empty());
+    drive.stop(StopMode::Ramp).await.unwrap();
+    drive.reset_faults().await.unwrap();
     for code in [9, 23] {
         machine.trip(code);
         drive.reset_faults().await.unwrap();
     }
     let faults = drive.faults().await.unwrap();
     assert!(faults.present.is_empty());
-    assert_eq!(faults.history.iter().map(|fault| fault.code).collect::<Vec<_>>(), [9]);
+    assert_eq!(faults.history.iter().map(|fault| fault.code).collect::<Vec<_>>(), [9, 9]);
 }
 
 #[tokio::test(start_paused = true)]

@@ -124,7 +124,7 @@ async fn the_sample_of_function_03_is_what_a_status_sends_first() {
         ("02 03 01C2 0007", "02 03 0E 01F4 FE0C 1234 002A 0FA3 0037 0028"),
         ("02 03 01C9 0004", "02 03 08 0000 8627 4010 0000"),
         // Whether it runs or comes down, CMD tells.
-        ("02 03 0190 0001", "02 03 02 080F"),
+        ("02 03 0190 0002", "02 03 04 080F 0000"),
     ]);
     let mut drive = Atv28::new(line.slave(2), slave(2));
     let status = drive.status().await.unwrap();

@@ -1,17 +1,19 @@
 //! Who commands the drive: giving control to the bus when asked, and giving it back.
 
+use std::ops::RangeInclusive;
+
 use drive_core::{
     Class, Command, Confirming, Control, Effect, Error, Port, Result, Status,
-    drivecom::{self, Drivecom},
+    drivecom::{self, Drivecom, StatusWords},
     registers::{Register, access::WriteStopped},
 };
 
 use crate::{
     Atv312,
     reading::FastWords,
-    registers::{CCS, CD1, CD2, CHCF, DCI, FR1, FR2, FST, LAC, LFR, LRS3, PS2, PS4, RFC, SA2},
+    registers::{CCS, CD1, CD2, CHCF, DCI, FLOC, FR1, FR2, FST, LAC, LFR, LRS3, PS2, PS4, RFC, SA2},
     settings::{CD13, CD14, COMMAND_BY_MODBUS, REFERENCE_1, REFERENCE_BY_MODBUS, SEPARATE},
-    words::{AccessLevel, ExtendedStatus3},
+    words::{AccessLevel, ExtendedStatus3, StatusWord},
 };
 
 /// `LAC` = L3.
@@ -47,6 +49,9 @@ impl<P: Port> Atv312<P> {
     /// does not name the bus as its command source afterwards.
     pub async fn set_up_bus_control(&mut self) -> Result<Status> {
         const COMMAND: Command = Command::Configure("bus control set-up");
+        if let Some(reason) = self.refuses_writes() {
+            return Err(self.refused(COMMAND, reason));
+        }
         self.check_standing(COMMAND).await?;
         // The control word that was written last acts as soon as the channel is ours.
         self.write_control(Class::Command, drivecom::DISABLE_VOLTAGE, Effect::Level).await?;
@@ -80,6 +85,9 @@ impl<P: Port> Atv312<P> {
     /// [`release`](drive_core::Drive::release).
     pub(crate) async fn give_control_back(&mut self) -> Result<Status> {
         const COMMAND: Command = Command::Release;
+        if let Some(reason) = self.refuses_writes() {
+            return Err(self.refused(COMMAND, reason));
+        }
         let words = self.check_standing(COMMAND).await?;
         if words.state_words().control() != Control::Bus && self.set_up_before.is_empty() {
             // The reference may be the bus's all the same: whoever commands finds no setpoint of before.
@@ -124,6 +132,23 @@ impl<P: Port> Atv312<P> {
             self.change(command, COMMAND_BY_TERMINALS).await?;
         }
         Ok(())
+    }
+
+    /// Whether the local command is that of the terminals, and not of keys, which do not tell what they ask for.
+    pub(crate) async fn is_commanded_by_terminals(&mut self, words: StatusWords) -> Result<bool> {
+        const ANALOG_INPUTS: RangeInclusive<u16> = 1..=3;
+        let mut calls = self.registers.at(Class::Command);
+        if !words.eta.contains(StatusWord::NOT_FORCED_LOCAL) {
+            return Ok(ANALOG_INPUTS.contains(&calls.read(FLOC).await?));
+        }
+        let selection = ExtendedStatus3::from_bits_retain(calls.read(LRS3).await?);
+        let pick = |bit, pair: [Register<WriteStopped>; 2]| pair[usize::from(selection.contains(bit))];
+        if calls.read(CHCF).await? == SEPARATE {
+            let channel = calls.read(pick(ExtendedStatus3::COMMAND_2, [CD1, CD2])).await?;
+            return Ok(channel == COMMAND_BY_TERMINALS);
+        }
+        let channel = calls.read(pick(ExtendedStatus3::REFERENCE_2, [FR1, FR2])).await?;
+        Ok(ANALOG_INPUTS.contains(&channel))
     }
 
     /// A fresh look whether the settings may be changed.

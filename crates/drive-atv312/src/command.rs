@@ -3,8 +3,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Command, Control, Direction, Effect, Error, Port, Refusal, Result, SlaveAddress, State, Status,
-    StopMode, Stopped, Withdrawn,
+    Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result,
+    SlaveAddress, State, Status, StopMode, Stopped, Verdict, Withdrawn,
     drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
     registers::{Register, access::ReadWrite},
 };
@@ -12,9 +12,9 @@ use drive_core::{
 use crate::{
     Atv312,
     reading::{FIRST, FastWords, raw_command},
-    registers::{CMD, ETA, IOLR, LFRD, LFT, RRS, TCC},
+    registers::{CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
     settings::{Controls, Known},
-    words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
+    words::{AccessLevel, ControlWord, ExtendedControl, StatusWord},
 };
 
 /// What decides the reference where the drive follows another one than the bus and does not tell which.
@@ -33,7 +33,8 @@ impl<P: Port> Atv312<P> {
         stopped
     }
 
-    /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel.
+    /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel. Where operation
+    /// is not enabled, as after a trip, no bit acts on the motor.
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let unsupported = |reason| Err(Error::Unsupported { what: "withdrawal of the run command", reason });
         self.read_settings(Class::Command).await?;
@@ -41,28 +42,37 @@ impl<P: Port> Atv312<P> {
         let status = self.fast_status(Class::Command).await?;
         let settings = &self.known.settings;
         if !settings.meaning(held).is_run() {
-            return Ok(Withdrawn::Nothing(status));
+            // One whose answer was lost may still be on its way: the word goes out behind it.
+            if self.own.lease().is_none() || self.own.has_arrived() {
+                self.own.end();
+                return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
+            }
         }
-        if settings.others().contains(ControlWord::STOP) {
+        let words = FastWords::in_status(&status).state_words();
+        let enabled = words.chart() == Some(ChartState::OperationEnabled);
+        if settings.others().contains(ControlWord::STOP) && enabled {
             return unsupported(
                 "a function is assigned to bit 12 of CMD, and no other bit ends a run command alone",
             );
         }
-        let words = FastWords::in_status(&status).state_words();
         let manages_channels = settings.level() != Some(AccessLevel::L3);
         if let Some(reason) = words.refuses_withdrawal().filter(|_| manages_channels) {
             return unsupported(reason);
         }
+        let word = match settings.others().contains(ControlWord::STOP) {
+            true => settings.kept(held),
+            false => held | ControlWord::STOP.bits(),
+        };
         self.held = None;
-        self.registers.at(Class::Command).write(CMD, held | ControlWord::STOP.bits()).await?;
+        self.last_written = Some(word);
+        self.registers.at(Class::Command).write(CMD, word).await?;
         let held = self.read_controls(Class::Command).await.map_err(Error::after_write)?.command;
         let status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
-        let stands = self.known.settings.meaning(held).is_run();
-        if stands {
-            Err(self.not_confirmed(Command::Withdraw, status, None))
-        } else {
-            Ok(Withdrawn::Ended(status))
+        if self.known.settings.meaning(held).is_run() {
+            return Err(self.not_confirmed(Command::Withdraw, status, None));
         }
+        self.own.end();
+        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 
     /// Reads the fast words in a class, without making a status of them.
@@ -82,42 +92,15 @@ impl<P: Port> Atv312<P> {
         };
         self.held = self.held.filter(held);
         self.control = Some(words.state_words().control());
-        Ok(self.status_of(&words))
+        self.motion = self.see_shaft(&words, self.registers.snapshot_time());
+        let status = self.status_of(&words);
+        Ok(Status { verdict: self.verdict(&words), ..status })
     }
 
-    fn status_of(&self, words: &FastWords) -> Status {
+    pub(crate) fn status_of(&self, words: &FastWords) -> Status {
         let command = self.held.map(|held| self.known.settings.meaning(held));
-        Status { at: self.registers.snapshot_time(), ..words.status(self.known.resolution, command) }
-    }
-
-    /// The fast set for whoever watches: one exchange, and a second one, for the control variables, where these words alone
-    /// do not tell the frequency or whether a run command is in force. While a motor runs whose settings are not known, each
-    /// further one reads one of them, so that its stop is the one that is asked for.
-    pub(crate) async fn watch(&mut self) -> Result<Status> {
-        let mut status = self.fast_status(Class::Status).await?;
-        let words = FastWords::in_status(&status);
-        if self.needs_controls(words.state_words(), &status) {
-            // The status is good without them.
-            if self.read_controls(Class::Status).await.is_ok() {
-                status = self.status_of(&words);
-            }
-        } else if self.known.seen && status.state == State::Running {
-            self.read_a_setting(Class::Status).await;
-        }
-        self.known.seen = true;
-        Ok(status)
-    }
-
-    /// Whether only `CMD` tells what the drive does: a motor that slows down to stop looks like one that slows down to a
-    /// lower setpoint, and one that stands at a setpoint of zero, or after `tLS`, like a stopped one.
-    fn needs_controls(&self, words: StatusWords, status: &Status) -> bool {
-        let by_bus = words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus;
-        let slows_down = !words.is_turning() || words.eti.contains(ExtendedStatus::DECELERATING);
-        let unclear = match self.held.map(|held| self.known.settings.meaning(held)) {
-            None => true,
-            Some(command) => command.is_run() && slows_down,
-        };
-        by_bus && unclear || status.output_frequency.is_none()
+        let at = self.registers.snapshot_time();
+        Status { at, motion: self.motion, ..words.status(self.known.resolution, command) }
     }
 
     pub(crate) fn refused(&self, command: Command, reason: Refusal) -> Error {
@@ -129,9 +112,9 @@ impl<P: Port> Atv312<P> {
         Error::NotConfirmed { slave, command, status, because }
     }
 
-    /// Remembers what the drive holds.
+    /// Remembers what the drive holds, as it has just confirmed.
     pub(crate) fn hold(&mut self, word: u16) {
-        self.held = Some(word);
+        (self.held, self.held_is_read) = (Some(word), false);
         self.high_bits = word & self.known.settings.assignable();
     }
 
@@ -157,7 +140,9 @@ impl<P: Port> Atv312<P> {
         } else if controls.cmi.contains(ExtendedControl::LOCK) {
             Some(Refusal::Settings("the drive is locked on standstill (CMI bit 13): clear that bit"))
         } else if controls.reference.cast_signed() < 0 || rpm.cast_signed() < 0 {
-            Some(Refusal::Settings("the reference on the bus is negative: give a setpoint before the start"))
+            Some(Refusal::Settings(
+                "the reference on the bus is negative: stop the motor, and give a setpoint before the start",
+            ))
         } else {
             None
         })
@@ -166,6 +151,14 @@ impl<P: Port> Atv312<P> {
     /// A run command of the terminals that acts as soon as they command, because the level of their inputs counts and not an
     /// edge (`tCC`, `tCt`, p. 33).
     pub(crate) async fn terminals_ask_for_run(&mut self) -> Result<Option<Refusal>> {
+        self.inputs_ask_for_run(None).await
+    }
+
+    /// The same once this register is written: `tCC` puts `rrS` and `tCt` back to their factory setting.
+    pub(crate) async fn inputs_ask_for_run(
+        &mut self,
+        written: Option<(u16, u16)>,
+    ) -> Result<Option<Refusal>> {
         const TWO_WIRE: u16 = 0;
         const TRANSITION: u16 = 1;
         const LI1: u16 = 129;
@@ -175,13 +168,30 @@ impl<P: Port> Atv312<P> {
         };
         let mut calls = self.registers.at(Class::Command);
         let [tcc, tct] = calls.read_array(TCC.address()).await?;
-        if tcc != TWO_WIRE || tct == TRANSITION {
+        let after = |register: u16, word| match written {
+            Some((at, written)) if at == register => written,
+            _ => word,
+        };
+        let rewired = written.is_some_and(|(at, _)| at == TCC.address());
+        let edge =
+            after(TCT.address(), tct) == TRANSITION || rewired && after(TCC.address(), tcc) == TWO_WIRE;
+        if after(TCC.address(), tcc) != TWO_WIRE || edge {
             return Ok(None);
         }
-        let reverse = calls.read(RRS).await?.checked_sub(LI1).filter(|&input| input < 6);
+        let reverse = calls.read(RRS).await?;
         let inputs = calls.read(IOLR).await?;
-        let closed = inputs & 1 == 1 || reverse.is_some_and(|input| inputs >> input & 1 == 1);
-        Ok(closed.then_some(ASKED))
+        let closed =
+            |source: u16| source.checked_sub(LI1).is_some_and(|input| input < 6 && inputs >> input & 1 == 1);
+        let runs = closed(LI1) || closed(reverse) || closed(after(RRS.address(), reverse));
+        Ok(runs.then_some(ASKED))
+    }
+
+    /// Why nothing but a stop is written to this drive: it has said that it is another one.
+    pub(crate) const fn refuses_writes(&self) -> Option<Refusal> {
+        match self.known.kind {
+            Some(Recognised::NotMine { it_is }) => Some(Refusal::AnotherDrive(it_is)),
+            _ => None,
+        }
     }
 }
 
@@ -191,6 +201,14 @@ impl<P: Port> Drivecom for Atv312<P> {
 
     fn address(&self) -> SlaveAddress {
         self.registers.slave()
+    }
+
+    fn own_run(&mut self) -> &mut OwnRun {
+        &mut self.own
+    }
+
+    fn as_written(&self, word: u16) -> u16 {
+        word | self.known.settings.kept(self.high_bits)
     }
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
@@ -204,9 +222,10 @@ impl<P: Port> Drivecom for Atv312<P> {
 
     /// The bits that have another function in this drive stay as it holds them, and the channels with the bus.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
-        let word = word | self.known.settings.kept(self.high_bits);
+        let word = self.as_written(word);
         // Not known while the outcome is not known.
         self.held = None;
+        self.last_written = Some(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
@@ -219,6 +238,10 @@ impl<P: Port> Drivecom for Atv312<P> {
     }
 
     async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>> {
+        self.recognise_itself().await?;
+        if let Some(reason) = self.refuses_writes() {
+            return Ok(Some(reason));
+        }
         self.read_settings(Class::Command).await?;
         let controls = self.read_controls(Class::Command).await?;
         let words = FastWords::in_status(status).state_words();
@@ -249,21 +272,28 @@ impl<P: Port> Drivecom for Atv312<P> {
         self.frequency_limits().await?;
         let mut controls = self.read_controls(Class::Command).await?;
         let mut follows = self.follows_frequency(&words, controls.reference).await?;
+        let mut in_force = (LFR.address(), controls.reference);
         if !follows {
-            follows = self.follows_speed().await?;
+            let (lfrd, by_speed) = self.follows_speed().await?;
+            (follows, in_force) = (by_speed, (LFRD.address(), lfrd));
             // The last thing that is read: a stop of somebody else that came before shows in it.
             controls = self.read_controls(Class::Command).await?;
         }
         let fault_code = status.fault_code;
         *status = Status { fault_code, ..self.status_of(&words) };
         status.raw.push(raw_command(controls.command));
-        if controls.command != word | self.known.settings.kept(self.high_bits) {
+        if controls.command != self.as_written(word) {
             return Ok(RunShown::NotYet);
         }
-        let reverse = ControlWord::from_bits_retain(word).contains(ControlWord::REVERSE);
-        let direction = if reverse { Direction::Reverse } else { Direction::Forward };
+        let direction = ControlWord::from_bits_retain(word).direction();
         let shown = words.state_words().shows_run(direction, words.reference());
-        Ok(if follows { shown } else { RunShown::NotYet })
+        if !follows || shown == RunShown::NotYet {
+            return Ok(RunShown::NotYet);
+        }
+        // The setpoint that the run command found is the one that it is to follow from now on.
+        self.given = Some(in_force);
+        status.verdict = Some(Verdict::InForce);
+        Ok(shown)
     }
 
     async fn prevents_run(&mut self, status: &Status) -> Option<Refusal> {
@@ -274,13 +304,30 @@ impl<P: Port> Drivecom for Atv312<P> {
         let controls = self.read_controls(Class::Command).await.ok()?;
         let other = self.other_reference().await.ok()?;
         let follows = self.follows_frequency(&words, controls.reference).await.ok()?
-            || self.follows_speed().await.ok()?;
+            || self.follows_speed().await.ok()?.1;
         other.or((!follows).then_some(OTHER_REFERENCE))
     }
 
-    async fn refuses_reset(&mut self, _: &Status) -> Result<Option<Refusal>> {
+    /// What the inputs ask for counts only where the terminals command then. Keys and another bus do not tell what they ask for;
+    /// and at L1 and L2 the reset itself would take command from whoever has it, without anybody having asked for that.
+    async fn refuses_reset(&mut self, status: &Status) -> Result<Option<Refusal>> {
+        const TAKES_COMMAND: Refusal = Refusal::Overridden {
+            by: "whoever has command, for at LAC = L1 and L2 any word of the bus takes it from him,",
+            remedy: "stop the motor by the bus first, which says whom it takes command from, or reset the fault at the drive",
+        };
+        if let Some(reason) = self.refuses_writes() {
+            return Ok(Some(reason));
+        }
         self.read_settings(Class::Command).await?;
-        self.terminals_ask_for_run().await
+        let words = FastWords::in_status(status).state_words();
+        match (words.control(), self.known.settings.level()) {
+            (Control::Bus, _) => Ok(None),
+            (_, level) if level != Some(AccessLevel::L3) => Ok(Some(TAKES_COMMAND)),
+            (Control::Local, _) if self.is_commanded_by_terminals(words).await? => {
+                self.terminals_ask_for_run().await
+            }
+            (somebody, _) => Ok(Some(Refusal::NotInControl(somebody))),
+        }
     }
 
     async fn read_control(&mut self) -> Result<u16> {

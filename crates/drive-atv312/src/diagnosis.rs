@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Result, Row,
-    Setpoint, Speed, Voltage, drivecom::StatusWords,
+    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Recognised,
+    Result, Row, Setpoint, Speed, Voltage, drivecom::StatusWords,
 };
 use tokio_modbus::prelude::ReadCode;
 
@@ -31,27 +31,27 @@ impl<P: Port> Atv312<P> {
         self.collect(&mut raw, &[IOLR.row()]).await?;
         self.collect(&mut raw, &[RFRD.row(), FRHD.row()]).await?;
         self.collect(&mut raw, &[THR.row()]).await?;
-        let word =
-            |row: &Row| raw.iter().find(|word| word.address == row.address).map_or(0, |word| word.value);
-        let percent = |row: &Row| Percent::from_hundredths(i32::from(word(row)) * 100);
+        let word = |row: &Row| raw.iter().find(|word| word.address == row.address).map(|word| word.value);
+        let percent = |row: &Row| word(row).map(|word| Percent::from_hundredths(i32::from(word) * 100));
         // Whether torque and power have a sign, as of a motor that feeds back, is not printed: a word that would be
         // negative is left to the raw words.
-        let driving = |row: &Row| (word(row).cast_signed() >= 0).then(|| percent(row));
-        let speed = Speed::from_rpm(u32::from(word(RFRD.row()).cast_signed().unsigned_abs()));
-        let io = LogicIo::from_bits_retain(word(IOLR.row()));
+        let driving =
+            |row: &Row| percent(row).filter(|_| word(row).is_some_and(|word| word.cast_signed() >= 0));
+        let speed = |word: u16| Speed::from_rpm(u32::from(word.cast_signed().unsigned_abs()));
+        let io = word(IOLR.row()).map(LogicIo::from_bits_retain);
         let outputs = LogicIo::R1 | LogicIo::R2 | LogicIo::LO | LogicIo::ANALOG_OUTPUT;
         Ok(Measurements {
-            reference: Some(Setpoint::Frequency(Frequency::from_decihertz(word(FRH.row())))),
+            reference: word(FRH.row()).map(|word| Setpoint::Frequency(Frequency::from_decihertz(word))),
             // At high resolution the word counts a frequency, and the motor's poles are no register.
-            speed: (resolution == Resolution::Normal).then_some(speed),
-            line_voltage: Some(Voltage::from_decivolts(u32::from(word(ULN.row())))),
+            speed: word(RFRD.row()).filter(|_| resolution == Resolution::Normal).map(speed),
+            line_voltage: word(ULN.row()).map(|word| Voltage::from_decivolts(u32::from(word))),
             torque: driving(OTR.row()),
             power_share: driving(OPR.row()),
-            drive_thermal: Some(percent(THD.row())),
-            motor_thermal: Some(percent(THR.row())),
-            running_time: Some(Duration::from_secs(u64::from(word(RTH.row())) * 3_600)),
-            inputs: Some((io - outputs).bits()),
-            outputs: Some((io & outputs).bits()),
+            drive_thermal: percent(THD.row()),
+            motor_thermal: percent(THR.row()),
+            running_time: word(RTH.row()).map(|word| Duration::from_secs(u64::from(word) * 3_600)),
+            inputs: io.map(|io| (io - outputs).bits()),
+            outputs: io.map(|io| (io & outputs).bits()),
             raw,
             at: self.registers.snapshot_time(),
             ..Measurements::default()
@@ -116,6 +116,7 @@ impl<P: Port> Atv312<P> {
             self.collect(&mut codes, &[row]).await?;
         }
         identity.codes = codes;
+        self.known.kind = Some(recognised(&identity));
         Ok(identity)
     }
 
@@ -123,13 +124,59 @@ impl<P: Port> Atv312<P> {
     async fn collect(&mut self, raw: &mut Vec<RawWord>, rows: &[&'static Row]) -> Result<()> {
         let Some(first) = rows.first() else { return Ok(()) };
         let count = u16::try_from(rows.len()).unwrap_or(u16::MAX);
-        let words = self.registers.at(Class::Background).read_words(first.address, count).await?;
-        raw.extend(rows.iter().zip(words).map(|(row, value)| RawWord {
-            address: row.address,
-            code: row.code,
-            value,
-        }));
+        let mut calls = self.registers.at(Class::Background);
+        let words = self.known.absent.read(&mut calls, first.address, count).await?;
+        let there = rows.iter().zip(words).filter_map(|(row, word)| Some((row, word?)));
+        raw.extend(there.map(|(row, value)| RawWord { address: row.address, code: row.code, value }));
         Ok(())
+    }
+
+    /// Asks the drive what it is, once, where nobody has.
+    pub(crate) async fn recognise_itself(&mut self) -> Result<()> {
+        if self.known.kind.is_none() {
+            let asked = self.registers.at(Class::Command).identification(ReadCode::Basic).await;
+            let identity = match asked {
+                Err(Error::Exception { .. }) => Identity::default(),
+                asked => asked?,
+            };
+            self.known.kind = Some(recognised(&identity));
+        }
+        Ok(())
+    }
+}
+
+/// What function 43/14 or `TSP` say of the family: the reference begins with it (BBV52816 p. 14), `TSP` is 128 (p. 26). An
+/// Altivar 31, which has all but three of these registers at the same addresses, is not told from it.
+pub(crate) fn recognised(identity: &Identity) -> Recognised {
+    const OTHERS: &[(&str, &str)] = &[
+        ("ATV212", "an Altivar 212, which no family here fits"),
+        ("ATV21", "an Altivar 21: the family atv21 fits"),
+        ("ATV28", "an Altivar 28: the family atv28 fits"),
+        ("ATV58", "an Altivar 58: the family atv58 fits"),
+        ("ATV61", "an Altivar 61, which no family here fits"),
+        ("ATV71", "an Altivar 71, which no family here fits"),
+        ("ATV32", "an Altivar 32, which no family here fits"),
+        ("ATV12", "an Altivar 12, which no family here fits"),
+        ("ATV", "another Altivar, which no family here fits"),
+    ];
+    let model = identity.model.as_deref().unwrap_or_default();
+    let tsp = identity.codes.iter().find(|word| word.address == TSP.address()).map(|word| word.value);
+    if model.starts_with("ATV312") {
+        return Recognised::Mine;
+    }
+    if model.starts_with("ATV31") {
+        return Recognised::CannotTell;
+    }
+    if let Some(&(_, it_is)) = OTHERS.iter().find(|(prefix, _)| model.starts_with(prefix)) {
+        return Recognised::NotMine { it_is };
+    }
+    match tsp {
+        Some(128) => Recognised::Mine,
+        // "An ASCII letter" (p. 26).
+        Some(letter) if u8::try_from(letter).is_ok_and(|letter| letter.is_ascii_alphabetic()) => {
+            Recognised::NotMine { it_is: "a product that TSP does not call an Altivar 312" }
+        }
+        _ => Recognised::CannotTell,
     }
 }
 

@@ -4,12 +4,15 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Lease, Measurements, Port, Reaction,
-    Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written, drivecom,
+    BroadcastWrite, Class, Direction, Drive, Faults, Ground, Identity, Intent, Lease, Measurements, Port,
+    Reaction, Recognised, Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn,
+    Written, drivecom,
 };
 
 use crate::{
     Atv312, command,
+    diagnosis::recognised,
+    proof::Doubt,
     registers::{ATR, ETA},
     settings::Known,
     words::ControlWord,
@@ -20,17 +23,35 @@ impl<P: Port> Drive for Atv312<P> {
     drive_core::told_by!(registers);
 
     fn lease(&self) -> Option<Lease> {
-        self.lease
+        self.own.lease()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.lease = Some(lease);
+        self.own.adopt(lease);
+        // What the drive holds is read with the next status.
+        self.held = None;
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+    }
+
+    fn recognise(&self, identity: &Identity) -> Recognised {
+        recognised(identity)
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.shaft.set_coast_time(time);
     }
 
     fn forget(&mut self) {
         self.known = Known::default();
         self.held = None;
         self.control = None;
+        self.doubt = Doubt::default();
+        if self.own.lease().is_none() {
+            self.given = None;
+        }
     }
 
     /// W3201 to W3206 in one exchange. Where these words alone do not tell the frequency or whether a run command is in
@@ -71,6 +92,9 @@ impl<P: Port> Drive for Atv312<P> {
         self.give_setpoint(setpoint).await
     }
 
+    /// Where the bus commands nothing else starts by it. At L3 the inputs count where the terminals command; keys and another
+    /// bus do not tell what they ask for. At L1 and L2 it is refused where somebody else commands, since the word would take
+    /// command from him.
     async fn reset_faults(&mut self) -> Result<Status> {
         drivecom::reset_fault(self).await
     }

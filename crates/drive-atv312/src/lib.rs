@@ -8,6 +8,7 @@ mod drive;
 mod faults;
 mod intent;
 mod parameters;
+mod proof;
 mod reading;
 mod reference;
 pub mod registers;
@@ -17,15 +18,19 @@ mod settings;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Lease, Port, Registers, Row, SlaveAddress, StopMode,
+    Capabilities, Control, ExceptionMeaning, Ground, Motion, OwnRun, Port, Registers, Row, Shaft,
+    SlaveAddress, StopMode, Turns,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
 
-use crate::settings::Known;
 pub use crate::{
     faults::{FAULTS, PastFault, WARNINGS},
     registers::ROWS,
+};
+use crate::{
+    proof::{Doubt, Grounds, INJECTION_TIME},
+    settings::Known,
 };
 
 /// What an Altivar 312 can do.
@@ -60,11 +65,27 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv312<P> {
     registers: Registers<P>,
-    /// The run command of this side that stands, or may.
-    lease: Option<Lease>,
+    /// The run command of this side.
+    own: OwnRun,
+    shaft: Shaft,
+    /// What the shaft did at the last status.
+    motion: Motion,
+    turns: Turns,
+    doubt: Doubt,
+    /// What the contract rests on, and whether there is one: the watchdog was armed.
+    grounds: Grounds,
+    armed: bool,
+    /// What of it was found otherwise and not told yet.
+    changed: Vec<Ground>,
+    /// The register and the word of the setpoint that is to be in force.
+    given: Option<(u16, u16)>,
     known: Known,
     /// The control word that the drive was last seen to hold; `None` when that is not known.
     held: Option<u16>,
+    /// Whether that was read, and not only written.
+    held_is_read: bool,
+    /// The control word that this side wrote last.
+    last_written: Option<u16>,
     /// Its bits 11 to 15 as they were last known: one of them may say who commands.
     high_bits: u16,
     /// Who commanded when it was last read.
@@ -87,11 +108,23 @@ impl<P: Port> Atv312<P> {
     /// The drive with this address. Nothing is sent.
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress) -> Self {
+        let mut shaft = Shaft::new();
+        shaft.set_injection_time(Some(INJECTION_TIME));
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, exception_meaning),
-            lease: None,
+            own: OwnRun::new(),
+            shaft,
+            motion: Motion::NotKnown,
+            turns: Turns::default(),
+            doubt: Doubt::default(),
+            grounds: Grounds::default(),
+            armed: false,
+            changed: Vec::new(),
+            given: None,
             known: Known::default(),
             held: None,
+            held_is_read: false,
+            last_written: None,
             high_bits: 0,
             control: None,
             set_up_before: Vec::new(),

@@ -3,17 +3,18 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Confirming, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, Watchdog,
-    WatchdogCapability, Written,
+    Class, Command, Confirming, Control, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, State,
+    Watchdog, WatchdogCapability, Written,
     drivecom::ChartState,
     registers::{Access, Storage, refuse_commands},
 };
 
 use crate::{
     Atv312,
-    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN},
+    proof::Grounds,
+    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address},
     settings::Known,
-    words::{ExtendedControl, ExtendedStatus},
+    words::{ControlWord, ExtendedControl, ExtendedStatus},
 };
 
 /// What the EEPROM takes in its life (p. 20).
@@ -37,6 +38,30 @@ pub(crate) const WATCHDOG: WatchdogCapability = WatchdogCapability {
     wears: false,
 };
 
+/// What decides who commands, what the inputs and keys do, and what stops: a run command that waits for control acts by it.
+const MOVES_CONTROL: [u16; 20] = [
+    address::LAC,
+    address::CHCF,
+    address::COP,
+    address::RFC,
+    address::FR1,
+    address::FR2,
+    address::CCS,
+    address::CD1,
+    address::CD2,
+    address::FLO,
+    address::FLOC,
+    address::LCC_KEYS,
+    address::TCC,
+    address::TCT,
+    address::RRS,
+    address::ROT,
+    address::FST,
+    address::NST,
+    address::DCI,
+    address::CFG,
+];
+
 impl<P: Port> Atv312<P> {
     /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs, and so is
     /// `CMI`, whose bits give the held reference another unit and a stopped drive its lock. `AdC` is refused while operation
@@ -52,6 +77,14 @@ impl<P: Port> Atv312<P> {
             if row.address == ADC.address() && words.chart() == Some(ChartState::OperationEnabled) {
                 return Err(self.refused(command, INJECTS));
             }
+        }
+        if let Some(reason) = self.refuses_writes() {
+            return Err(self.refused(command, reason));
+        }
+        if MOVES_CONTROL.contains(&row.address)
+            && let Some(reason) = self.refuses_move(row, word).await?
+        {
+            return Err(self.refused(command, reason));
         }
         match self.write_row(row, word).await {
             // It falls back to nO as soon as the time is reset (p. 55).
@@ -90,6 +123,9 @@ impl<P: Port> Atv312<P> {
         if self.saves >= EEPROM_LIFE {
             return Err(self.refused(Command::Persist, Refusal::EepromLife));
         }
+        if let Some(reason) = self.refuses_save().await? {
+            return Err(self.refused(Command::Persist, reason));
+        }
         let cmi = self.held_cmi().await?;
         let save = (cmi | ExtendedControl::SAVE).bits();
         let edge = self.registers.at(Class::Background).edge().write(CMI, save).await;
@@ -124,6 +160,33 @@ impl<P: Port> Atv312<P> {
         Err(self.not_confirmed(Command::Persist, status, None))
     }
 
+    /// Why nothing is saved now: while `ETI` bit 0 is set the drive may take no stop (p. 22), so the motor stands, and no run
+    /// command of the bus might turn it.
+    async fn refuses_save(&mut self) -> Result<Option<Refusal>> {
+        if let Some(reason) = self.refuses_writes() {
+            return Ok(Some(reason));
+        }
+        let words = self.check_standing(Command::Persist).await?.state_words();
+        self.read_settings(Class::Background).await?;
+        let held = self.read_controls(Class::Background).await?.command;
+        let runs =
+            self.known.settings.meaning(held).is_run() && words.chart() == Some(ChartState::OperationEnabled);
+        let asked = if words.control() == Control::Bus { None } else { self.terminals_ask_for_run().await? };
+        Ok(runs.then_some(Refusal::State(State::Running)).or(asked))
+    }
+
+    /// Why a setting that moves control is not written now: somebody's run command might act by it.
+    async fn refuses_move(&mut self, row: &Row, word: u16) -> Result<Option<Refusal>> {
+        const STANDS: Refusal = Refusal::Settings(
+            "CMD holds a run command, which may act when control moves: stop the motor first",
+        );
+        let held = self.read_controls(Class::Background).await?.command;
+        if ControlWord::from_bits_retain(held).is_run() {
+            return Ok(Some(STANDS));
+        }
+        self.inputs_ask_for_run(Some((row.address, word))).await
+    }
+
     /// What `CMI` holds, without the two orders: one that still waits there is not given again with what is written back.
     async fn held_cmi(&mut self) -> Result<ExtendedControl> {
         let cmi = ExtendedControl::from_bits_retain(self.registers.at(Class::Background).read(CMI).await?);
@@ -134,15 +197,20 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
         let mut calls = self.registers.at(Class::Background);
         let timeout = calls.read(TTO).await?;
-        let reaction = reaction(calls.read(SLL).await?);
+        let sll = calls.read(SLL).await?;
         let unwatched =
             ExtendedControl::from_bits_retain(calls.read(CMI).await?).contains(ExtendedControl::NO_TIMEOUT);
+        self.grounds = Grounds { time_out: Some(timeout), reaction: Some(sll), unwatched: Some(unwatched) };
+        let reaction = reaction(sll);
         let off = unwatched || reaction == Reaction::Ignore;
         Ok(Watchdog { timeout: (!off).then(|| STEP * u32::from(timeout)), reaction: Some(reaction) })
     }
 
     /// Sets the three, reads them back and compares.
     pub(crate) async fn set_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        if let Some(reason) = self.refuses_writes() {
+            return Err(self.refused(Command::ArmWatchdog, reason));
+        }
         let Some(sll) = reaction_code(reaction) else {
             return Err(Error::Unsupported {
                 what: "this reaction of the watchdog",
@@ -151,6 +219,7 @@ impl<P: Port> Atv312<P> {
         };
         let tto = self.time_out_counts(timeout)?;
         let current = self.read_watchdog().await?;
+        self.armed = reaction != Reaction::Ignore;
         let wanted =
             Watchdog { timeout: (reaction != Reaction::Ignore).then_some(timeout), reaction: Some(reaction) };
         if current == wanted {

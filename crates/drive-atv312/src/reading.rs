@@ -12,7 +12,7 @@ use drive_core::{
 
 use crate::{
     registers::{CMD, ETA, ETI, FRH, LCR, OTR, RFR},
-    words::{ControlWord, ExtendedStatus},
+    words::{ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
 };
 
 /// The first word of the block.
@@ -32,6 +32,11 @@ pub(crate) enum Resolution {
 }
 
 impl Resolution {
+    /// By bit 9 of `CMI`.
+    pub(crate) const fn of(cmi: ExtendedControl) -> Self {
+        if cmi.contains(ExtendedControl::HIGH_RESOLUTION) { Self::High } else { Self::Normal }
+    }
+
     /// The magnitude of a signed frequency word.
     pub(crate) const fn frequency(self, word: u16) -> Frequency {
         let counts = word.cast_signed().unsigned_abs();
@@ -93,6 +98,21 @@ impl FastWords {
         StatusWords::new(self.word(ETA), self.word(ETI))
     }
 
+    /// The output frequency.
+    pub(crate) fn output(&self, resolution: Resolution) -> Frequency {
+        resolution.frequency(self.word(RFR))
+    }
+
+    /// What of these words is another question when it is another: not the alarm, and not how far a ramp is.
+    pub(crate) fn question(&self) -> (u16, u16, u16) {
+        let passing = ExtendedStatus::TRANSIENT
+            | ExtendedStatus::MOTOR_THERMAL_ALARM
+            | ExtendedStatus::BRAKING_ALARM
+            | ExtendedStatus::CURRENT_LIMIT;
+        let StatusWords { eta, eti } = self.state_words();
+        ((eta - StatusWord::ALARM).bits(), (eti - passing).bits(), self.word(FRH))
+    }
+
     /// Why a setting cannot be changed now.
     pub(crate) fn refuses_settings(&self) -> Option<Refusal> {
         let words = self.state_words();
@@ -113,6 +133,7 @@ impl FastWords {
         Status {
             output_frequency: resolution.map(|resolution| resolution.frequency(output)),
             current: Some(Current::from_deciamperes(u32::from(self.word(LCR)))),
+            reference: Some(self.reference()),
             raw: self.raw(),
             ..self.state_words().status(command)
         }

@@ -11,6 +11,7 @@ use crate::{
     command::OTHER_REFERENCE,
     reading::{FastWords, Resolution},
     registers::{LFR, LFRD},
+    settings::Controls,
     words::{AccessLevel, ControlWord, StatusWord},
 };
 
@@ -20,11 +21,13 @@ impl<P: Port> Atv312<P> {
         if let Some(reason) = self.known.settings.refuses_reference() {
             return Err(self.refused(Command::Setpoint(setpoint), reason));
         }
-        // A run command may stand from before, of which nothing but CMD tells.
-        if self.held.is_none() {
-            self.read_controls(Class::Command).await?;
+        if let Some(reason) = self.refuses_writes() {
+            return Err(self.refused(Command::Setpoint(setpoint), reason));
         }
-        let resolution = self.resolution(Class::Command).await?;
+        let words = self.fast_words(Class::Command).await?;
+        // What a count is, and which way the reference that stands turns the motor, another master may have changed.
+        let controls = self.read_controls(Class::Command).await?;
+        let resolution = controls.resolution();
         let (register, word) = match setpoint {
             Setpoint::Frequency(frequency) => (LFR, self.frequency_word(frequency, resolution).await?),
             // No speed is no frequency too, and FRHD would not tell it from a speed that nobody gave.
@@ -33,9 +36,14 @@ impl<P: Port> Atv312<P> {
                 word => (LFRD, word),
             },
         };
+        let word = if self.is_negative(&words, &controls).await? { negative(word) } else { word };
         // Both are images of the one reference of the bus, so a later setpoint of either kind takes the place of one
         // that still waits.
         self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
+        self.given = Some((register.address(), word));
+        if register.address() == LFR.address() {
+            self.known.lfr = Some(word);
+        }
         let frequency = (register.address() == LFR.address()).then(|| resolution.frequency(word));
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
     }
@@ -51,7 +59,7 @@ impl<P: Port> Atv312<P> {
             let follows = match frequency {
                 _ if !running => false,
                 Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
-                None => self.follows_speed().await?,
+                None => self.follows_speed().await?.1,
             };
             if follows {
                 return Ok(());
@@ -66,6 +74,30 @@ impl<P: Port> Atv312<P> {
                 because => Err(self.not_confirmed(Command::Setpoint(setpoint), status, because)),
             };
         }
+    }
+
+    /// Whether the reference that stands turns the motor against its run command: a setpoint leaves that as it is, while the motor
+    /// is driven or might be. One for a motor that nothing runs has no sign.
+    async fn is_negative(&mut self, words: &FastWords, controls: &Controls) -> Result<bool> {
+        let state = words.state_words();
+        let by_bus = state.control() == Control::Bus;
+        let command = self.known.settings.meaning(controls.command);
+        let enabled = state.chart() == Some(ChartState::OperationEnabled);
+        if !state.is_driving() && !(enabled && (!by_bus || command.is_run())) {
+            return Ok(false);
+        }
+        if by_bus && enabled && words.reference() != Frequency::ZERO {
+            return Ok(state.asks_for() != command.direction());
+        }
+        // Of a command that is not in CMD, LFr or LFRD tells, whichever the drive follows.
+        let negative = |word: u16| word.cast_signed() < 0;
+        let lfr = controls.reference;
+        let limits = self.frequency_limits().await?;
+        if lfr != 0 && follows_frequency(words.reference(), controls.resolution().frequency(lfr), limits) {
+            return Ok(negative(lfr));
+        }
+        let (lfrd, follows) = self.follows_speed().await?;
+        Ok(negative(if follows || lfr == 0 { lfrd } else { lfr }))
     }
 
     /// Whose the drive is, where its reference is his too: at L3 that of the command channel is another matter.
@@ -109,4 +141,9 @@ impl<P: Port> Atv312<P> {
     const fn bad_setpoint(&self, setpoint: Setpoint, problem: SetpointProblem) -> Error {
         Error::Setpoint { slave: self.registers.slave(), setpoint, problem }
     }
+}
+
+/// The same magnitude the other way.
+const fn negative(word: u16) -> u16 {
+    word.cast_signed().wrapping_neg().cast_unsigned()
 }

@@ -2,15 +2,21 @@
 //! [`forget`](drive_core::Drive::forget): what the control word's bits do, where command and reference come from, what
 //! replaces a reference, the limits.
 
+use std::time::Duration;
+
 use drive_core::{
-    Class, Error, ErrorKind, Frequency, Port, Refusal, Result, SelfRestart, Speed, StopMode,
+    Absent, Class, Error, ErrorKind, Frequency, Ground, Port, Recognised, Refusal, Result, SelfRestart,
+    Speed, StopMode,
     drivecom::{self, StopWord},
     registers::{Register, access::Kind},
 };
+use tokio::time::Instant;
 
 use crate::{
     Atv312,
+    proof::Facts,
     reading::Resolution,
+    reference::{ANALOG_INPUTS, SILENT},
     registers::{
         ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, NST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
     },
@@ -37,6 +43,10 @@ const LI1: u16 = 129;
 pub(crate) const CD13: u16 = CD11 + 2;
 /// Cd14.
 pub(crate) const CD14: u16 = CD11 + 3;
+
+/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
+/// change them.
+const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
 /// A block of consecutive settings, and when it counts.
 type Block = (u16, u16, When);
@@ -72,6 +82,7 @@ const BLOCKS: &[Block] = &[
     (address::PIF, 1, Always),
     (address::JOG, 1, Always),
     (address::ATR, 1, Always),
+    (address::ADC, 1, Always),
 ];
 /// The blocks that decide a stop: at L1 and L2, and at L3, where any bit above the chart's may have got another meaning.
 const FOR_A_STOP: (usize, usize) = (2, 13);
@@ -94,7 +105,14 @@ const FUNCTIONS: [u16; 10] = [
 pub(crate) struct Known {
     pub(crate) resolution: Option<Resolution>,
     pub(crate) settings: Settings,
-    pub(crate) frequencies: Option<(Frequency, Frequency)>,
+    /// `LSP` and `HSP`, and when they were read.
+    pub(crate) frequencies: Option<((Frequency, Frequency), Instant)>,
+    /// `LFr` as it was read or written last.
+    pub(crate) lfr: Option<u16>,
+    /// Whether it is an Altivar 312, once it was asked.
+    pub(crate) kind: Option<Recognised>,
+    /// The registers that this drive lacks.
+    pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,
     /// Whether a status was read since, so that the next one has time for a setting.
     pub(crate) seen: bool,
@@ -125,6 +143,16 @@ impl Settings {
 
     pub(crate) fn is_complete(&self) -> bool {
         self.next_block().is_none()
+    }
+
+    /// Whether a block is not known yet that the drive has not refused.
+    pub(crate) fn can_learn(&self) -> bool {
+        !self.refused && !self.is_complete()
+    }
+
+    /// How many blocks there are.
+    pub(crate) const fn blocks(&self) -> usize {
+        BLOCKS.len()
     }
 
     fn next_block(&self) -> Option<(usize, Block)> {
@@ -201,6 +229,17 @@ impl Settings {
             3 => (StopMode::DcInjection, "Stt makes the normal stop a DC injection stop"),
             _ => return Err("Stt holds a stop type that the manual does not list"),
         })
+    }
+
+    /// How the drive stops when a run command goes, where that is known.
+    pub(crate) fn known_stop(&self) -> Option<StopMode> {
+        let known = self.knows_stop() && self.at(address::STT).is_some();
+        self.normal_stop().ok().map(|(mode, _)| mode).filter(|_| known)
+    }
+
+    /// Whether a logic input injects direct current.
+    pub(crate) fn injects_by_input(&self) -> bool {
+        self.word(DCI).checked_sub(LI1).is_some_and(|bit| bit < 6)
     }
 
     /// Whether the fast stop or the injection acts by its bit.
@@ -386,6 +425,32 @@ impl Settings {
         functions.into_iter().map(|function| (function, self.at(function).unwrap_or(0)))
     }
 
+    /// What decides the reference instead of the bus, as far as settings and `facts` tell it: the settings, a preset speed, the
+    /// other channel, a summing input.
+    pub(crate) fn overrides(&self, facts: &Facts, held: u16) -> Option<Refusal> {
+        const SUMMED: Refusal = Refusal::Overridden {
+            by: "a summing input (SA2, AI2 as the drive leaves the factory, or SA3)",
+            remedy: "set SA2 and SA3 to nO",
+        };
+        let preset = facts.inputs.and_then(|inputs| self.selected_preset(inputs, held));
+        let second = facts.second.unwrap_or_else(|| self.has_second_reference());
+        let channel = facts.second.and_then(|second| self.refuses_channel(second));
+        // Only to reference 1 is something summed (p. 42).
+        let adds = |source: &u16| match *source {
+            0 => false,
+            // What the potentiometer or another bus adds is not told.
+            source => {
+                !ANALOG_INPUTS.contains(&source)
+                    || facts.analog.is_some_and(|inputs| {
+                        let input = source.checked_sub(1).and_then(|input| inputs.get(usize::from(input)));
+                        input.is_none_or(|input| input.cast_signed().unsigned_abs() > SILENT)
+                    })
+            }
+        };
+        let summed = (!second && self.summed().iter().any(adds)).then_some(SUMMED);
+        self.refuses_reference().or(preset).or(channel).or(summed)
+    }
+
     /// What is summed to reference 1.
     pub(crate) fn summed(&self) -> [u16; 2] {
         [SA2, SA3].map(|input| self.word(input))
@@ -431,23 +496,53 @@ impl<P: Port> Atv312<P> {
     }
 
     pub(crate) async fn read_setting(&mut self, class: Class) -> Result<()> {
-        let Some((index, (first, count, _))) = self.known.settings.next_block() else { return Ok(()) };
-        let words = self.registers.at(class).read_words(first, count).await?;
+        let Some((index, block)) = self.known.settings.next_block() else { return Ok(()) };
+        let words = self.read_block(class, block).await?;
         let settings = &mut self.known.settings;
-        settings.words.extend((first..=u16::MAX).zip(words));
+        settings.words.extend(words);
         settings.blocks = index + 1;
         Ok(())
     }
 
-    /// `LSP` to `HSP`, both within `tFr`: the three follow each other, one exchange once.
-    pub(crate) async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
-        if let Some(limits) = self.known.frequencies {
-            return Ok(limits);
+    /// Reads a block of the settings that is known already, and remembers what is otherwise.
+    pub(crate) async fn read_setting_again(&mut self, class: Class, index: usize) -> Result<()> {
+        let settings = &self.known.settings;
+        let known = |&&(first, ..): &&Block| settings.at(first).is_some();
+        let Some(&block) = BLOCKS.get(index).filter(known) else { return Ok(()) };
+        for (address, word) in self.read_block(class, block).await? {
+            let known = self.known.settings.words.iter_mut().find(|(at, _)| *at == address);
+            if let Some((_, known)) = known.filter(|(_, known)| *known != word) {
+                *known = word;
+                self.changed(Ground::Inputs);
+            }
         }
-        let words: [u16; 3] = self.registers.at(Class::Command).read_array(TFR.address()).await?;
+        Ok(())
+    }
+
+    /// The words of a block that this drive has. A function that it does not have is assigned to nothing.
+    async fn read_block(&mut self, class: Class, (first, count, _): Block) -> Result<Vec<(u16, u16)>> {
+        let words = self.known.absent.read(&mut self.registers.at(class), first, count).await?;
+        Ok((first..=u16::MAX).zip(words).filter_map(|(at, word)| Some((at, word?))).collect())
+    }
+
+    /// `LSP` to `HSP`, both within `tFr`: the three follow each other, one exchange where they were not read lately.
+    pub(crate) async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
+        match self.known.frequencies {
+            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(limits),
+            _ => self.read_frequency_limits(Class::Command).await,
+        }
+    }
+
+    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<(Frequency, Frequency)> {
+        let words: [u16; 3] = self.registers.at(class).read_array(TFR.address()).await?;
         let [tfr, hsp, lsp] = words.map(Frequency::from_decihertz);
         let limits = (lsp, hsp.min(tfr));
-        self.known.frequencies = Some(limits);
+        let before = self.known.frequencies.replace((limits, Instant::now()));
+        if before.is_some_and(|(before, _)| before != limits) {
+            // The same limits in rpm.
+            self.known.speeds = None;
+            self.changed(Ground::Limits);
+        }
         Ok(limits)
     }
 
@@ -465,8 +560,10 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn read_controls(&mut self, class: Class) -> Result<Controls> {
         let [command, reference, _, cmi] = self.registers.at(class).read_array(CMD.address()).await?;
         self.hold(command);
+        self.held_is_read = true;
         let controls = Controls { command, reference, cmi: ExtendedControl::from_bits_retain(cmi) };
-        self.known.resolution = Some(controls.resolution());
+        self.known.lfr = Some(reference);
+        self.take_extended(controls.cmi);
         Ok(controls)
     }
 }
@@ -482,8 +579,7 @@ pub(crate) struct Controls {
 
 impl Controls {
     pub(crate) const fn resolution(&self) -> Resolution {
-        let high = self.cmi.contains(ExtendedControl::HIGH_RESOLUTION);
-        if high { Resolution::High } else { Resolution::Normal }
+        Resolution::of(self.cmi)
     }
 }
 

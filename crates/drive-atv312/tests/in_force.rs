@@ -191,7 +191,7 @@ async fn a_status_at_rest_is_one_exchange_and_of_a_motor_that_runs_two_until_its
         Asked::Read(Class::Status, CMD, 4),
         "the resolution, and whether a run command is in force"
     );
-    assert_eq!(asked.len(), 30 + 1 + 15, "each block once");
+    assert_eq!(asked.len(), 30 + 1 + 16, "each block once");
     assert!(asked.windows(2).all(|pair| pair.iter().any(is_status)), "never two behind one status");
 }
 
@@ -359,7 +359,7 @@ async fn nothing_is_released_or_reset_while_a_level_at_the_terminals_would_start
         let mut drive = drive(&[&FOR_THE_BUS, &STANDS, inputs]);
         assert!(overridden_by(&drive.release().await.unwrap_err(), "terminals"));
         assert_eq!(drive.into_port().written(), []);
-        let mut drive = self::drive(&[&FOR_THE_BUS, &[(3201, 0x0208), (3206, 0x0006)], inputs]);
+        let mut drive = self::drive(&[&FOR_THE_BUS, &[(3201, 0x0208), (3206, 0x0006), (8423, 1)], inputs]);
         assert!(overridden_by(&drive.reset_faults().await.unwrap_err(), "terminals"));
         assert_eq!(drive.into_port().written(), []);
     }

@@ -2,13 +2,13 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Direction, Effect, Error, Frequency, Port, RawWord, Refusal, Result, SlaveAddress, Status,
-    StopMode,
+    Class, Command, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result,
+    SlaveAddress, Status, StopMode, Verdict, Withdrawn,
     drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
 
 use crate::{
-    Atv58,
+    Atv58, CAPABILITIES,
     reading::Words,
     registers::{CMD, W401, W458, W483},
 };
@@ -31,6 +31,67 @@ impl<P: Port> Atv58<P> {
                 reason: "the drive's map names no bit of the control word for it",
             }),
         }
+    }
+
+    /// The fast set as a status, without the verdict.
+    pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
+        let map = self.map;
+        self.registers.begin_snapshot();
+        let ordinary = [Some(map.status), map.output_frequency, map.current];
+        // The reference confirms a command, and costs a status nothing where it stands beside the other words.
+        let span = |word: &u16| {
+            ordinary.iter().flatten().all(|other| other.abs_diff(*word) < CAPABILITIES.read_words)
+        };
+        let reference = map.reference.filter(|word| class == Class::Command || span(word));
+        let fast = ordinary.into_iter().chain([reference]);
+        let addresses: Vec<u16> = fast.flatten().collect();
+        let mut calls = self.registers.at(class);
+        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
+        if words.is_tripped(&map) {
+            words.append(&mut calls, map.input_words, W483.address(), 1).await?;
+        }
+        // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
+        // that it holds tells the stop from the run.
+        if self.stops_by_ramp && words.chart(&map) == Some(ChartState::OperationEnabled) {
+            words.append(&mut calls, false, CMD.address(), 1).await?;
+        }
+        let status = Status { at: self.registers.snapshot_time(), ..words.status(&map) };
+        Ok(Status { motion: self.see_shaft(&status), ..status })
+    }
+
+    /// A drive that has left "operation enabled", such as a tripped one, has its run command taken back by "disable voltage",
+    /// which moves nothing there. For one that has not, the manual names no word that ends it and nothing else.
+    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
+        let unsupported = Err(Error::Unsupported {
+            what: "withdrawal of the run command",
+            reason: "the manual names no word that ends it and nothing else",
+        });
+        let is_run = |held: u16| held & drivecom::ENABLE_OPERATION == drivecom::ENABLE_OPERATION;
+        let status = self.read_status(Class::Command).await?;
+        let chart = status.raw(self.map.status).and_then(ChartState::of);
+        let (held, _) = self.read_held(Class::Command).await?;
+        if !is_run(held) && (self.own.lease().is_none() || self.own.has_arrived()) {
+            self.own.end();
+            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
+        }
+        let turns = status.output_frequency.is_none_or(|output| output != Frequency::ZERO);
+        match chart {
+            Some(ChartState::Fault) => {}
+            None | Some(ChartState::OperationEnabled | ChartState::FaultReactionActive) => {
+                return unsupported;
+            }
+            Some(_) if turns => return unsupported,
+            Some(_) => {}
+        }
+        self.write_control(Class::Command, drivecom::DISABLE_VOLTAGE, Effect::Level).await?;
+        let (held, _) = self.read_held(Class::Command).await.map_err(Error::after_write)?;
+        let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
+        if is_run(held) {
+            let (slave, command) = (self.registers.slave(), Command::Withdraw);
+            return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None });
+        }
+        self.own.end();
+        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 
     /// The control word of a stop; `None` where there is none.
@@ -56,36 +117,29 @@ impl<P: Port> Drivecom for Atv58<P> {
         self.registers.slave()
     }
 
+    fn own_run(&mut self) -> &mut OwnRun {
+        &mut self.own
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
-        let map = self.map;
-        self.registers.begin_snapshot();
-        // A command is confirmed by the reference too.
-        let reference = map.reference.filter(|_| class == Class::Command);
-        let fast = [Some(map.status), map.output_frequency, map.current, reference];
-        let addresses: Vec<u16> = fast.into_iter().flatten().collect();
-        let mut calls = self.registers.at(class);
-        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
-        if words.is_tripped(&map) {
-            words.append(&mut calls, map.input_words, W483.address(), 1).await?;
-        }
-        // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
-        // that it holds tells the stop from the run.
-        if self.stops_by_ramp && words.chart(&map) == Some(ChartState::OperationEnabled) {
-            words.append(&mut calls, false, CMD.address(), 1).await?;
-        }
-        let at = self.registers.snapshot_time();
-        Ok(Status { at, ..words.status(&map) })
+        let status = self.fast_status(class).await?;
+        Ok(Status { verdict: self.verdict(&status), ..status })
     }
 
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         self.stops_by_ramp = Some(word) == self.map.ramp_stop;
+        self.last_written = Some(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
-            (Class::Stop, _) => calls.write_word(CMD.address(), word).await,
-            (_, Effect::Edge) => calls.edge().write(CMD, word).await,
-            (_, Effect::Level) => calls.write(CMD, word).await,
+            (Class::Stop, _) => calls.write_word(CMD.address(), word).await?,
+            (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
+            (_, Effect::Level) => calls.write(CMD, word).await?,
         }
+        // Only what was read tells that another word has taken its place.
+        let run = word & drivecom::ENABLE_OPERATION == drivecom::ENABLE_OPERATION;
+        self.seen.held = self.seen.held.filter(|_| run).map(|(_, reference)| (word, reference));
+        Ok(())
     }
 
     async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
@@ -94,7 +148,9 @@ impl<P: Port> Drivecom for Atv58<P> {
         }
         // A sign that somebody else left would turn the direction round.
         let negative = self.registers.at(Class::Command).read(W401).await?.cast_signed() < 0;
-        Ok(negative.then_some(Refusal::Settings("the reference W401 is negative: give a setpoint first")))
+        Ok(negative.then_some(Refusal::Settings(
+            "the reference W401 is negative: stop the motor, and give a setpoint",
+        )))
     }
 
     /// The drive shows a run command by holding it in the state "operation enabled", not in forced local mode, with a motor
@@ -102,7 +158,7 @@ impl<P: Port> Drivecom for Atv58<P> {
     async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<RunShown> {
         let follows = self.follows(status).await?;
         // The last thing that is read: a stop of somebody else that came before shows in it.
-        let value = self.read_control().await?;
+        let (value, reference) = self.read_held(Class::Command).await?;
         status.raw.push(RawWord { address: CMD.address(), code: CMD.row().code, value });
         if value != word || status.control.is_some() || !follows {
             return Ok(RunShown::NotYet);
@@ -110,12 +166,18 @@ impl<P: Port> Drivecom for Atv58<P> {
         let stands = status.output_frequency == Some(Frequency::ZERO);
         let reverse = self.map.reverse_command & word != 0;
         let asked = if reverse { Direction::Reverse } else { Direction::Forward };
-        Ok(match status.direction {
+        let shown = match status.direction {
             _ if stands && self.asks_for_nothing(status) => RunShown::InForce,
             _ if stands => RunShown::NotYet,
             Some(direction) if direction != asked => RunShown::TurningRound,
             _ => RunShown::InForce,
-        })
+        };
+        if shown != RunShown::NotYet {
+            // The setpoint that the run command found is the one that it is to follow from now on.
+            self.given = Some(reference);
+            status.verdict = Some(Verdict::InForce);
+        }
+        Ok(shown)
     }
 
     async fn prevents_run(&mut self, status: &Status) -> Option<Refusal> {
@@ -126,7 +188,24 @@ impl<P: Port> Drivecom for Atv58<P> {
     }
 
     async fn read_control(&mut self) -> Result<u16> {
-        self.registers.at(Class::Command).read(CMD).await
+        self.read_held(Class::Command).await.map(|(held, _)| held)
+    }
+
+    /// The card gives no word of the terminals: while local control is forced, or might be, one of their inputs may start the
+    /// motor once the fault is gone.
+    async fn refuses_reset(&mut self, status: &Status) -> Result<Option<Refusal>> {
+        const FORCED: Refusal = Refusal::Overridden {
+            by: "a run command of the terminals, whose inputs no word tells, while local control is forced,",
+            remedy: "give control back to the line first, or reset the fault at the drive",
+        };
+        const NOT_TOLD: Refusal = Refusal::Settings(
+            "the drive's map names no bit that tells whether local control is forced: name it (`remote`), or reset the fault at the drive",
+        );
+        Ok(match status.control {
+            Some(_) => Some(FORCED),
+            None if self.map.remote == 0 => Some(NOT_TOLD),
+            None => None,
+        })
     }
 
     fn stop_word(&self, mode: StopMode) -> StopWord {

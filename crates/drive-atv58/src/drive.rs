@@ -1,16 +1,18 @@
 //! The [`Drive`] of this family.
 
+use std::time::Duration;
+
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease, Measurements,
-    Port, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Withdrawn, Written,
-    drivecom::{self, ChartState, Drivecom},
-    registers::refuse_commands,
+    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Ground, Identity, Intent, Lease,
+    Measurements, Port, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
+    WatchdogCapability, Withdrawn, Written, drivecom, registers::refuse_commands,
 };
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{
     Atv58,
+    proof::Seen,
     reading::Words,
     registers::{CMD, W401, W402, W463},
     watchdog,
@@ -21,21 +23,46 @@ impl<P: Port> Drive for Atv58<P> {
     drive_core::told_by!(registers);
 
     fn lease(&self) -> Option<Lease> {
-        self.lease
+        self.own.lease()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.lease = Some(lease);
+        self.own.adopt(lease);
+        // What the drive holds is read with the next status.
+        self.seen = Seen::default();
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+    }
+
+    /// What the card says of itself over UNI-TELWAY begins with the family's name.
+    fn recognise(&self, identity: &Identity) -> Recognised {
+        match identity.model.as_deref() {
+            Some(model) if model.starts_with("ATV58") => Recognised::Mine,
+            Some(model) if model.starts_with("ATV") => {
+                Recognised::NotMine { it_is: "another Altivar than an Altivar 58" }
+            }
+            _ => Recognised::CannotTell,
+        }
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.shaft.set_coast_time(time);
     }
 
     fn forget(&mut self) {
         self.limits = None;
+        self.seen = Seen::default();
+        if self.own.lease().is_none() {
+            self.given = None;
+        }
     }
 
     /// One exchange with the default map, and a second one for W483 when the drive has tripped. Of several fault bits
     /// [`Status::fault_code`] is the lowest; [`faults`](Drive::faults) has all.
     async fn status(&mut self) -> Result<Status> {
-        self.read_status(Class::Status).await
+        self.watch().await
     }
 
     /// Two exchanges with the default map: the mapped words, and W463 to W466, whose content is not known.
@@ -73,23 +100,17 @@ impl<P: Port> Drive for Atv58<P> {
         drivecom::stop(self, mode).await
     }
 
-    /// A drive that has left "operation enabled", such as a tripped one, has no run command any more. For one that has not the
-    /// manual names no word that ends it and nothing else.
+    /// 0000h to a drive that has left "operation enabled", such as a tripped one. For one that has not the manual names no word
+    /// that ends a run command and nothing else.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
-        let status = self.read_status(Class::Command).await?;
-        match status.raw(self.map.status).and_then(ChartState::of) {
-            None | Some(ChartState::OperationEnabled) => Err(Error::Unsupported {
-                what: "withdrawal of the run command",
-                reason: "the manual names no word that ends it and nothing else",
-            }),
-            Some(_) => Ok(Withdrawn::Nothing(status)),
-        }
+        self.withdraw_run().await
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         self.give_setpoint(setpoint).await
     }
 
+    /// Refused while local control is forced, or the map names no bit that tells: the inputs of the terminals are no words.
     async fn reset_faults(&mut self) -> Result<Status> {
         drivecom::reset_fault(self).await
     }

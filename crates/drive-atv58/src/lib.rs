@@ -5,6 +5,7 @@ mod command;
 mod diagnostics;
 mod drive;
 mod intent;
+mod proof;
 mod reading;
 pub mod registers;
 mod setpoint;
@@ -14,12 +15,14 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, Class, ExceptionMeaning, Frequency, Lease, Port, Registers, Result, Row, SerialSettings,
-    SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Capabilities, Class, ExceptionMeaning, Frequency, Ground, OwnRun, Port, Registers, Result, Row,
+    SerialSettings, Shaft, SlaveAddress, StopMode, Turns, WatchdogCapability, serial::CharacterFormat,
 };
 
+use tokio::time::Instant;
+
 pub use crate::{diagnostics::Counters, registers::ROWS, settings::Atv58Map};
-use crate::{reading::Words, registers::W483, words::FaultRegister};
+use crate::{proof::Seen, reading::Words, registers::W483, words::FaultRegister};
 
 /// The card's message watch over RTU and UNI-TELWAY, fixed as far as its manual says (VVDED397054 p. 24/48).
 pub const MESSAGE_WATCH: Duration = Duration::from_secs(10);
@@ -77,11 +80,20 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv58<P> {
     registers: Registers<P>,
-    /// The run command of this side that stands, or may.
-    lease: Option<Lease>,
+    /// The run command of this side.
+    own: OwnRun,
+    shaft: Shaft,
+    turns: Turns,
+    seen: Seen,
+    /// What a contract rests on that was found otherwise and not told yet.
+    changed: Vec<Ground>,
+    /// The word of the setpoint that is to be in force.
+    given: Option<u16>,
+    /// The control word that this side wrote last.
+    last_written: Option<u16>,
     map: Atv58Map,
-    /// Low and high speed, read when the first setpoint needs them.
-    limits: Option<(Frequency, Frequency)>,
+    /// Low and high speed, and when they were read.
+    limits: Option<((Frequency, Frequency), Instant)>,
     /// Whether the ramp stop was the last word that was written.
     stops_by_ramp: bool,
 }
@@ -103,7 +115,13 @@ impl<P: Port> Atv58<P> {
     pub fn with_map(port: P, slave: SlaveAddress, map: Atv58Map) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            lease: None,
+            own: OwnRun::new(),
+            shaft: Shaft::new(),
+            turns: Turns::default(),
+            seen: Seen::default(),
+            changed: Vec::new(),
+            given: None,
+            last_written: None,
             map,
             limits: None,
             stops_by_ramp: false,

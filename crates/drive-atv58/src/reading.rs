@@ -93,6 +93,7 @@ impl Words {
                 .at(map.output_frequency)
                 .map(|word| Frequency::from_decihertz(word.cast_signed().unsigned_abs())),
             current: self.at(map.current).map(|word| Current::from_deciamperes(u32::from(word))),
+            reference: self.at(map.reference).map(Frequency::from_decihertz),
             at_reference: self.flag(map, map.at_reference),
             warning: self.flag(map, map.alarm),
             fault_code: self

@@ -1,11 +1,20 @@
 //! Setpoints: `W401`, in counts of the map.
 
+use std::time::Duration;
+
 use drive_core::{
-    Class, Command, Confirming, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem, Status,
+    Class, Command, Confirming, Error, Frequency, Ground, Port, Refusal, Result, Setpoint, SetpointProblem,
+    Status,
     drivecom::{ChartState, Drivecom, ENABLE_OPERATION, follows_frequency},
 };
 
+use tokio::time::Instant;
+
 use crate::{Atv58, command::OTHER_REFERENCE, reading::Words, registers::W401};
+
+/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the terminal may
+/// change them.
+const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
 impl<P: Port> Atv58<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
@@ -24,6 +33,7 @@ impl<P: Port> Atv58<P> {
         let count = i16::try_from(scaled / 100);
         let count =
             count.map_err(|_| Error::Setpoint { slave, setpoint, problem: SetpointProblem::TooLarge })?;
+        let count = if self.is_negative().await? { -count } else { count };
         if let Some((low, high)) = self.speed_limits().await?
             && (frequency < low || frequency > high)
         {
@@ -32,7 +42,20 @@ impl<P: Port> Atv58<P> {
         }
         let mut calls = self.registers.at(Class::Command).replacing(W401.address());
         calls.write(W401, count.cast_unsigned()).await?;
+        self.given = Some(count.cast_unsigned());
+        self.seen.held = self.seen.held.map(|(held, _)| (held, count.cast_unsigned()));
         self.see_setpoint(setpoint).await.map_err(Error::after_write)
+    }
+
+    /// Whether the reference that stands turns the motor against its run command, as another master may have left it: a setpoint
+    /// leaves that as it is, while the motor turns or might. One for a motor that nothing runs has no sign.
+    async fn is_negative(&mut self) -> Result<bool> {
+        let status = self.read_status(Class::Command).await?;
+        let (_, reference) = self.read_held(Class::Command).await?;
+        let chart = status.raw(self.map.status).and_then(ChartState::of);
+        let turns = status.output_frequency.is_none_or(|output| output != Frequency::ZERO);
+        let enabled = chart.is_none_or(|chart| chart == ChartState::OperationEnabled);
+        Ok(reference.cast_signed() < 0 && (turns || enabled))
     }
 
     /// Sees the setpoint in force: a motor that runs follows it, and local control is not forced. What one that stands will
@@ -61,12 +84,17 @@ impl<P: Port> Atv58<P> {
     /// Whether the drive follows the reference of the bus, as far as the map names the word that tells.
     pub(crate) async fn follows(&mut self, status: &Status) -> Result<bool> {
         let Some(reference) = self.reference(status) else { return Ok(true) };
-        let counts =
-            u64::from(self.registers.at(Class::Command).read(W401).await?.cast_signed().unsigned_abs());
-        let asked = (counts * 100).checked_div(u64::from(self.map.reference_counts_per_hertz)).unwrap_or(0);
-        let asked = Frequency::from_centihertz(u32::try_from(asked).unwrap_or(u32::MAX));
+        let (_, w401) = self.read_held(Class::Command).await?;
+        let asked = self.reference_of(w401);
         let limits = self.speed_limits().await?.unwrap_or((asked, asked));
         Ok(follows_frequency(reference, asked, limits))
+    }
+
+    /// What a word of W401 asks for, in size.
+    pub(crate) fn reference_of(&self, w401: u16) -> Frequency {
+        let counts = u64::from(w401.cast_signed().unsigned_abs());
+        let asked = (counts * 100).checked_div(u64::from(self.map.reference_counts_per_hertz)).unwrap_or(0);
+        Frequency::from_centihertz(u32::try_from(asked).unwrap_or(u32::MAX))
     }
 
     /// Whether the reference before the ramp is zero, so that nothing turns.
@@ -79,12 +107,21 @@ impl<P: Port> Atv58<P> {
     }
 
     async fn speed_limits(&mut self) -> Result<Option<(Frequency, Frequency)>> {
-        let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
-        if self.limits.is_none() {
-            let words = Words::read(&mut self.registers.at(Class::Command), false, &[low, high]).await?;
-            let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
-            self.limits = frequency(low).zip(frequency(high));
+        match self.limits {
+            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(Some(limits)),
+            _ => self.read_limits(Class::Command).await,
         }
-        Ok(self.limits)
+    }
+
+    pub(crate) async fn read_limits(&mut self, class: Class) -> Result<Option<(Frequency, Frequency)>> {
+        let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
+        let words = Words::read(&mut self.registers.at(class), false, &[low, high]).await?;
+        let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
+        let Some(limits) = frequency(low).zip(frequency(high)) else { return Ok(None) };
+        let before = self.limits.replace((limits, Instant::now()));
+        if before.is_some_and(|(before, _)| before != limits) {
+            self.changed(Ground::Limits);
+        }
+        Ok(Some(limits))
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use drive_atv58::{Atv58, Atv58Map, CAPABILITIES, ROWS};
 use drive_bus::{Line, LineConfig, Protocol, Slave, protocol::UniTelwaySettings};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, Frequency, Reaction, Refusal, Row, Setpoint,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Motion, Reaction, Refusal, Row, Setpoint,
     SetpointProblem, Speed, State, StopMode, Watchdog,
 };
 use drive_sim::{Panel, SimLine, SimSlave, Wiring, models};
@@ -79,7 +79,8 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
             );
         }
         machine.wait_until(|seen| seen.shaft_frequency == 0 && !seen.running).await;
-        assert!(drive.status().await.unwrap().is_standstill(), "{mode}");
+        let motion = if mode == StopMode::Freewheel { Motion::Coasting } else { Motion::AtRest };
+        assert_eq!(drive.status().await.unwrap().motion, motion, "{mode}");
         drive.start(Direction::Forward).await.unwrap();
         machine.wait_until(|seen| seen.output_frequency == 5_000).await;
     }

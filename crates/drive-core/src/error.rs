@@ -192,6 +192,9 @@ pub enum Refusal {
     EepromLife,
     /// The motor runs and this needs it stopped.
     MotorRunning,
+    /// The drive has said that it is another one than its family's, in these words: it is read, and stopped when that is asked
+    /// for, and nothing else is written.
+    AnotherDrive(&'static str),
 }
 
 impl Refusal {
@@ -209,6 +212,7 @@ impl Refusal {
             Self::NothingToSave => "nothing_to_save",
             Self::EepromLife => "eeprom_life",
             Self::MotorRunning => "motor_running",
+            Self::AnotherDrive(_) => "another_drive",
         }
     }
 }
@@ -265,6 +269,7 @@ impl fmt::Display for Refusal {
                 "the saves that were counted have used up the EEPROM's life: replace the drive, or correct the count",
             ),
             Self::MotorRunning => f.write_str("the motor runs: stop it first"),
+            Self::AnotherDrive(it_is) => write!(f, "the drive says that it is {it_is}; change the family that is set for it"),
         }
     }
 }

@@ -77,6 +77,12 @@ impl OwnRun {
         self.lease
     }
 
+    /// Whether the drive has shown that it took it.
+    #[must_use]
+    pub const fn has_arrived(&self) -> bool {
+        self.arrived
+    }
+
     /// A run command is about to be written.
     pub const fn give(&mut self, lease: Lease) {
         if self.arrived {

@@ -206,6 +206,13 @@ impl Status {
             (Motion::NotKnown, _) => false,
         }
     }
+
+    /// Whether the drive gives the motor no torque, and none is to be expected: it [stands](Self::is_standstill), or its output was
+    /// cut and [the shaft may coast](Motion::Coasting).
+    #[must_use]
+    pub fn is_undriven(&self) -> bool {
+        self.is_standstill() || self.motion == Motion::Coasting
+    }
 }
 
 impl fmt::Display for Status {

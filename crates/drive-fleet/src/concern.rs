@@ -244,7 +244,7 @@ impl Snapshot {
             },
             ConcernKind::WatchdogNotInForce => {
                 let waits = matches!(self.watchdog, WatchdogCheck::WaitsForStandstill(_));
-                let turns = status.is_some_and(|status| !status.value.is_standstill());
+                let turns = status.is_some_and(|status| !status.value.is_undriven());
                 (None, (waits && turns && self.link == Link::Connected).then_some(None)?)
             }
             ConcernKind::Lost => (heard, (self.link == Link::Lost && !was_moving).then(error)?),

@@ -100,8 +100,8 @@ impl Rig {
         .await
     }
 
-    /// Polls until the drive shows standstill.
+    /// Polls until the drive shows standstill, or that it has cut the output of a motor that may coast.
     pub async fn until_standstill(&mut self) -> Status {
-        self.until("standstill", Status::is_standstill).await
+        self.until("standstill", Status::is_undriven).await
     }
 }

@@ -9,6 +9,8 @@ use super::{
 use crate::{
     confirm::Confirming,
     error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
+    lease::Lease,
+    own_run::OwnRun,
     port::{Class, Effect},
     setpoint::{Command, Direction, StopMode},
     status::{Control, State, Status},
@@ -65,6 +67,15 @@ pub trait Drivecom: Send {
 
     /// The slave, for errors.
     fn address(&self) -> SlaveAddress;
+
+    /// The run command of this side. The sequences here keep it: given before it is written, ended when a stop or a reset in
+    /// its place was seen.
+    fn own_run(&mut self) -> &mut OwnRun;
+
+    /// The control word as [`write_control`](Self::write_control) writes it, with the bits that have another meaning.
+    fn as_written(&self, word: u16) -> u16 {
+        word
+    }
 
     /// Reads the fast set in this class.
     async fn read_status(&mut self, class: Class) -> Result<Status>;
@@ -156,7 +167,15 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                 let run = step == ENABLE_OPERATION;
                 given |= run;
                 let step = if run { word } else { step };
-                match drive.write_control(Class::Command, step, Effect::Level).await {
+                if run {
+                    let word = drive.as_written(word);
+                    drive.own_run().give(Lease::new(direction, word));
+                }
+                let written = drive.write_control(Class::Command, step, Effect::Level).await;
+                if run {
+                    keep_lease(drive.own_run(), &written);
+                }
+                match written {
                     Err(error) if exception(&error) == Some(BUSY) => {
                         climb.forget_written();
                         true
@@ -192,6 +211,18 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
         status = read.map_err(|error| if given { error.after_write() } else { error })?;
     };
     Err(Error::NotConfirmed { slave, command, status: Box::new(status), because })
+}
+
+/// What became of the write of a run command, for its lease. A drive that has only acknowledged it may take it later.
+fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
+    match written {
+        Ok(()) => own.was_written(),
+        Err(error) if exception(error) == Some(ACKNOWLEDGED) => {}
+        Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
+            own.was_not_written()
+        }
+        Err(_) => {}
+    }
 }
 
 /// A climb from where the drive stands, or why there is none.
@@ -247,6 +278,7 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
             }
         }
         if shown {
+            drive.own_run().end();
             let taken_from = before.filter(|_| status.control == Some(Control::Bus));
             return Ok(Stopped { taken_from, ..stopped(stop, status) });
         }
@@ -320,6 +352,7 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     loop {
         status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
         if healthy(&status) {
+            drive.own_run().end();
             return Ok(status);
         }
         if !confirming.again().await {
@@ -377,6 +410,9 @@ mod tests {
         /// The exceptions that the next writes end in, none of them carried out but the one behind 05.
         exceptions: Vec<u8>,
         classes: Vec<Class>,
+        own: OwnRun,
+        /// The lease at each write.
+        leases: Vec<Option<Lease>>,
     }
 
     impl Chart {
@@ -393,6 +429,8 @@ mod tests {
                 mute_from: usize::MAX,
                 exceptions: Vec::new(),
                 classes: Vec::new(),
+                own: OwnRun::new(),
+                leases: Vec::new(),
             }
         }
 
@@ -408,6 +446,10 @@ mod tests {
 
         fn address(&self) -> SlaveAddress {
             SlaveAddress::try_from(1).unwrap()
+        }
+
+        fn own_run(&mut self) -> &mut OwnRun {
+            &mut self.own
         }
 
         async fn read_status(&mut self, class: Class) -> Result<Status> {
@@ -426,6 +468,7 @@ mod tests {
         async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
             assert_eq!(effect == Effect::Edge, word == FAULT_RESET);
             self.classes.push(class);
+            self.leases.push(self.own.lease());
             let exception = (!self.exceptions.is_empty()).then(|| self.exceptions.remove(0));
             let refused = exception.map(|code| Error::Exception {
                 slave: self.address(),
@@ -502,6 +545,30 @@ mod tests {
             start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap();
             assert_eq!(drive.written, written, "{eta:04X}h");
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_lease_begins_before_its_run_command_is_written_and_ends_with_a_stop_that_was_seen() {
+        let mut drive = Chart::at(0x0040);
+        start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap();
+        let lease = Some(Lease::new(Direction::Forward, ENABLE_OPERATION));
+        assert_eq!(drive.leases, [None, None, lease]);
+        let mut deaf = Chart { deaf: true, ..drive };
+        stop(&mut deaf, StopMode::Fast).await.unwrap_err();
+        assert_eq!(deaf.own.lease(), lease, "a stop that does not show ends nothing");
+        deaf.deaf = false;
+        stop(&mut deaf, StopMode::Fast).await.unwrap();
+        assert_eq!(deaf.own.lease(), None);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_run_command_that_the_drive_refuses_makes_no_lease_and_one_that_nobody_knows_of_does() {
+        let mut refused = Chart { exceptions: vec![4], ..Chart::at(0x0023) };
+        start(&mut refused, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+        assert_eq!(refused.own.lease(), None);
+        let mut unseen = Chart { mute_from: 2, ..Chart::at(0x0023) };
+        start(&mut unseen, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
+        assert!(unseen.own.lease().is_some());
     }
 
     #[tokio::test(start_paused = true)]

@@ -11,6 +11,9 @@ use super::{
 use crate::{
     error::Refusal,
     intent::Intent,
+    lease::Lease,
+    motion::Output,
+    own_run::{Evidence, RunWord, Told},
     setpoint::{Direction, StopMode},
     status::{Control, State, Status},
     units::Frequency,
@@ -100,6 +103,22 @@ impl ControlWord {
         } else {
             return None;
         })
+    }
+
+    /// Which way it turns the motor, at a reference without a sign.
+    #[must_use]
+    pub const fn direction(self) -> Direction {
+        if self.contains(Self::REVERSE) { Direction::Reverse } else { Direction::Forward }
+    }
+
+    /// Whether, held by the drive, it is the run command of this lease.
+    #[must_use]
+    pub fn stands_for(self, lease: Lease) -> RunWord {
+        match self.is_run() {
+            true if self.direction() == lease.direction => RunWord::Stands,
+            true => RunWord::Another,
+            false => RunWord::Gone,
+        }
     }
 
     /// Whether it holds one of the stops that keep operation enabled.
@@ -281,17 +300,105 @@ impl StatusWords {
         }
     }
 
+    /// Which way the reference asks the motor to turn, the run command's direction taken into account.
+    #[must_use]
+    pub const fn asks_for(self) -> Direction {
+        if self.eti.contains(ExtendedStatus::REVERSE_REQUESTED) {
+            Direction::Reverse
+        } else {
+            Direction::Forward
+        }
+    }
+
+    /// What these words show of the output. `command` is the control word that the drive was last seen to hold; `ramps`: the
+    /// normal stop is known to bring the motor down; `braked`: the status before showed it being brought down.
+    #[must_use]
+    pub fn output(
+        self,
+        command: Option<ControlWord>,
+        frequency: Option<Frequency>,
+        ramps: bool,
+        braked: bool,
+    ) -> Output {
+        let at = frequency.unwrap_or(Frequency::from_centihertz(1));
+        // Zero is no output also where the words say that the motor is driven: as in a quick stop that has ended.
+        let fed = self.is_turning();
+        let Some(chart) = self.chart() else { return Output::NotKnown };
+        if self.eti.contains(ExtendedStatus::DC_INJECTION) {
+            return Output::Injection;
+        }
+        match chart {
+            ChartState::OperationEnabled if fed => {
+                let stops =
+                    command.filter(|_| self.control() == Control::Bus).is_some_and(ControlWord::is_stop);
+                let fast = self.eti.contains(ExtendedStatus::FAST_STOP);
+                if stops || fast { Output::Braking(at) } else { Output::Driven }
+            }
+            _ if fed => Output::Braking(at),
+            // A ramp has ended, or a run command stands and asks for nothing.
+            ChartState::OperationEnabled if ramps || braked => Output::None,
+            ChartState::QuickStopActive => Output::None,
+            ChartState::SwitchedOn | ChartState::Fault if braked => Output::None,
+            _ => Output::Cut,
+        }
+    }
+
+    /// What these words say of a run command of this side, with `frh`, the reference before the ramp. Whether the word stands,
+    /// and whether that reference is the bus's, is the family's to add.
+    #[must_use]
+    pub fn evidence(self, lease: Lease, frh: Frequency) -> Evidence {
+        const SIGN: Refusal = Refusal::Overridden {
+            by: "the sign of the reference, which another master has turned round,",
+            remedy: "stop the motor, and give a setpoint",
+        };
+        let control = self.control();
+        let command = (control != Control::Bus).then_some(Refusal::NotInControl(control));
+        let turned = frh != Frequency::ZERO && self.asks_for() != lease.direction;
+        Evidence {
+            word: RunWord::NotTold,
+            command: Told::unless(command),
+            output: self.told_output(frh),
+            reference: Told::unless(turned.then_some(SIGN)),
+        }
+    }
+
+    /// Whether the motor is driven or may be. A reference of zero asks for nothing.
+    fn told_output(self, frh: Frequency) -> Told {
+        const STOPPED: Refusal = Refusal::Overridden {
+            by: "a stop at the drive, by an input (FSt, dCI, nSt), a key, or after tLS at low speed,",
+            remedy: "see which one it is, release it, and start again",
+        };
+        const LOCKED: Refusal = Refusal::Overridden {
+            by: "a stop that has disabled operation, by the freewheel input (nSt), the stop of three wires, or a parameter,",
+            remedy: "see which one it is, release it, and start again",
+        };
+        const STOP_KEY: Refusal =
+            Refusal::Overridden { by: "the STOP key of the drive", remedy: "start again when it may turn" };
+        let Some(chart) = self.chart() else { return Told::NotTold };
+        let driven = self.is_turning() && !self.is_stopping() || frh == Frequency::ZERO && !self.is_driving();
+        Told::unless(match chart {
+            ChartState::Fault | ChartState::FaultReactionActive => Some(Refusal::Tripped),
+            ChartState::NotReadyToSwitchOn => Some(Refusal::State(State::NotReady)),
+            _ if self.eta.contains(StatusWord::STOP_KEY) => Some(STOP_KEY),
+            ChartState::OperationEnabled if driven => None,
+            ChartState::OperationEnabled => Some(STOPPED),
+            ChartState::QuickStopActive => Some(Refusal::State(State::QuickStop)),
+            ChartState::SwitchOnDisabled | ChartState::ReadyToSwitchOn | ChartState::SwitchedOn => {
+                Some(LOCKED)
+            }
+        })
+    }
+
     /// How a run command in this direction shows, the bus being the source of the reference too. A reference of zero asks
     /// for no direction.
     #[must_use]
     pub fn shows_run(self, direction: Direction, reference: Frequency) -> RunShown {
-        let asked = self.eti.contains(ExtendedStatus::REVERSE_REQUESTED);
         let enabled = self.control() == Control::Bus && self.chart() == Some(ChartState::OperationEnabled);
         if !enabled || self.is_stopping() {
             RunShown::NotYet
         } else if reference == Frequency::ZERO {
             RunShown::InForce
-        } else if !self.is_turning() || asked != (direction == Direction::Reverse) {
+        } else if !self.is_turning() || self.asks_for() != direction {
             RunShown::NotYet
         } else if self.eta.direction() != direction {
             RunShown::TurningRound

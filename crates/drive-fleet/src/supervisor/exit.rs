@@ -52,7 +52,7 @@ impl Supervisor {
         let started = self.started_here || self.is_starting();
         // Rule 1 ends with its confirmation, whatever the policy.
         let stopping = self.stopping.is_some();
-        let turns = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        let turns = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
         let (policy, adopted) = (self.settings.on_exit, self.settings.on_exit_adopted);
         let release = matches!(policy, OnExit::Release(_));
         match (policy, adopted) {

@@ -500,13 +500,12 @@ impl Supervisor {
 
     /// Whether the drive's words show that the motor is not driven.
     fn stands(&self) -> bool {
-        self.link == Link::Connected
-            && self.status.as_ref().is_some_and(|status| status.value.is_standstill())
+        self.link == Link::Connected && self.status.as_ref().is_some_and(|status| status.value.is_undriven())
     }
 
     /// Whether the drive is asked at the faster period.
     fn is_busy(&self) -> bool {
-        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
         self.link == Link::Connected && (moving || self.active.is_some() || self.stopping.is_some())
     }
 

@@ -109,7 +109,7 @@ impl Supervisor {
                 },
             );
         }
-        if status.value.is_standstill() && !self.is_starting() {
+        if status.value.is_undriven() && !self.is_starting() {
             self.started_here = false;
         }
         self.check_limit("current", {
@@ -203,7 +203,7 @@ impl Supervisor {
 
     /// A motor that turns without the watchdog of its contract is an alarm.
     pub(super) fn tell_watchdog(&mut self) {
-        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
         if let Some(why) = self.checks.not_in_force(moving && self.link == Link::Connected) {
             self.emit_shown(EventKind::WatchdogNotInForce(why), Cause::Found);
         }

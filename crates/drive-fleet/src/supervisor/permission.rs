@@ -124,7 +124,7 @@ impl Supervisor {
             Order::Release => Some(Job::Release),
             Order::Persist => Some(Job::Persist),
             Order::Setpoint { setpoint, until } => {
-                if status.is_standstill() {
+                if status.is_undriven() {
                     if until == Until::AtReference {
                         return Err(Refusal::State(status.state).into());
                     }
@@ -201,7 +201,7 @@ impl Supervisor {
     }
 
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
-        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_standstill());
+        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
         let last = self.given.filter(|_| moving);
         self.settings.limits.allow(now, setpoint, last).map_err(Refused::Limit)
     }

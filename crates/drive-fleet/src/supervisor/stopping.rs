@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Frequency, Result, Setpoint, State, Status, StopMode, Stopped};
+use drive_core::{
+    Command, Error, ErrorKind, Frequency, Motion, Result, Setpoint, State, Status, StopMode, Stopped,
+};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
@@ -217,8 +219,12 @@ impl Supervisor {
     /// What a new status says of a stop under way.
     pub(super) fn judge_stop(&mut self, now: Instant) {
         let Some(status) = self.status.as_ref().map(|status| &*status.value) else { return };
-        let (stands, runs) = (status.is_standstill(), status.state == State::Running);
-        let at_zero = stands || status.output_frequency == Some(Frequency::ZERO);
+        let (stands, runs) = (status.is_undriven(), status.state == State::Running);
+        // No output is no standstill: direct current brakes a motor that still turns.
+        let at_zero = match status.motion {
+            Motion::NotKnown => stands || status.output_frequency == Some(Frequency::ZERO),
+            _ => status.is_standstill(),
+        };
         let Some(stopping) = &mut self.stopping else { return };
         if stopping.attempts > 0 && at_zero && stopping.used == StopMode::DcInjection {
             // Some drives inject for as long as they are told to, and heat a motor that stands: their ramp ends it.

@@ -82,6 +82,8 @@ impl Contract {
     pub async fn has_the_history_that_it_claims(&self) {
         let (mut rig, length) = (self.rig(), usize::from(self.capabilities.fault_history));
         let Some(trip) = self.trip else { return };
+        // A reset takes command from nobody: a drive whose terminals command from power-up on is told first.
+        rig.drive.stop(StopMode::Ramp).await.expect("it takes a stop");
         for _ in 0..length + 2 {
             rig.machine.trip(trip);
             reset(&mut rig).await;

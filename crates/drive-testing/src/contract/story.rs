@@ -71,7 +71,11 @@ async fn it_stops_by_each_mode_that_it_claims_and_by_another_for_the_rest(rig: &
         assert_ne!(stopped.status.state, State::Running, "{mode}");
         if stopped.mode == StopMode::DcInjection {
             // Some drives inject for as long as they are told to.
-            rig.until("no output", |status| status.output_frequency == Some(Frequency::ZERO)).await;
+            rig.until("the motor is held", |status| match status.motion {
+                Motion::NotKnown => status.output_frequency == Some(Frequency::ZERO),
+                _ => status.is_standstill(),
+            })
+            .await;
             rig.drive.stop(StopMode::Ramp).await.expect("it ends the injection");
         }
         // Of a motor whose output was cut nobody knows when it stands.

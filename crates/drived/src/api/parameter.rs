@@ -138,7 +138,7 @@ async fn standing(drive: &DriveHandle) -> Result<(), Problem> {
         return Err(Problem::refused(&Refused::Stale));
     };
     match &snapshot.status {
-        Some(status) if status.value.is_standstill() => Ok(()),
+        Some(status) if status.value.is_undriven() => Ok(()),
         _ => Err(Problem::refused(&Refused::Because(Refusal::MotorRunning))),
     }
 }

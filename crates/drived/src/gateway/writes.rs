@@ -516,7 +516,7 @@ fn pending(drive: &DriveHandle) -> Refusal {
 fn stands(drive: &DriveHandle) -> bool {
     let snapshot = drive.snapshot();
     let status = snapshot.fresh_status(Instant::now());
-    status.is_some_and(drive_core::Status::is_standstill) && snapshot.stop.is_none() && !snapshot.started_here
+    status.is_some_and(drive_core::Status::is_undriven) && snapshot.stop.is_none() && !snapshot.started_here
 }
 
 fn shows_fault(drive: &DriveHandle) -> bool {

@@ -104,6 +104,6 @@ impl Unit {
     /// Whether the drive itself says that its motor is not driven.
     pub(super) fn stands(&self) -> bool {
         let snapshot = self.handle.snapshot();
-        snapshot.stop.is_none() && snapshot.status.as_ref().is_some_and(|status| status.value.is_standstill())
+        snapshot.stop.is_none() && snapshot.status.as_ref().is_some_and(|status| status.value.is_undriven())
     }
 }

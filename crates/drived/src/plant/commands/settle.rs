@@ -26,7 +26,7 @@ fn verdict_of(action: Action, snapshot: &Snapshot, ended: Instant) -> Option<Out
     if !is_newer {
         return None;
     }
-    let stands = snapshot.stop.is_none() && status.is_standstill();
+    let stands = snapshot.stop.is_none() && status.is_undriven();
     let either = |is_so: bool| Some(if is_so { OutcomeWord::Confirmed } else { OutcomeWord::NotConfirmed });
     match action {
         Action::Stop(_) => stands.then_some(OutcomeWord::Confirmed),

@@ -80,7 +80,7 @@ impl Change {
         let drive = self.removed_drive().and_then(|name| fleet.drive(name));
         let status = drive.and_then(|drive| drive.snapshot().status.clone());
         match status {
-            Some(status) if !status.value.is_standstill() => format!("{self}: it shows {}", status.value),
+            Some(status) if !status.value.is_undriven() => format!("{self}: it shows {}", status.value),
             _ => self.to_string(),
         }
     }

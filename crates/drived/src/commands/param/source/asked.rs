@@ -44,7 +44,7 @@ impl Source {
         match self {
             Self::OnLine(one) => {
                 match one.drive.status().await {
-                    Ok(status) if status.is_standstill() => {}
+                    Ok(status) if status.is_undriven() => {}
                     Ok(status) => {
                         let why =
                             format!("parameters are restored at standstill, and the drive shows {status}");
