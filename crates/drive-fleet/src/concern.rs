@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use crate::{
     outcome::Tenths,
-    snapshot::{Freshness, IdentityCheck, Link, Snapshot, WatchdogCheck},
+    snapshot::{Freshness, IdentityCheck, Link, Snapshot, Trip, WatchdogCheck},
 };
 
 /// How badly something troubles.
@@ -224,7 +224,7 @@ impl Snapshot {
             ConcernKind::Tripped => {
                 let shown = status.filter(|status| status.value.is_fault())?;
                 let trip = self.present_trip();
-                let fault = trip.and_then(|trip| trip.fault());
+                let fault = trip.and_then(Trip::fault);
                 let unread = || shown.value.fault_code.map(|code| format!("fault {code}"));
                 let told = fault.map(|fault| match fault.entry {
                     Some(_) => fault.to_string(),

@@ -254,6 +254,7 @@ type Next =
 
 /// What a reader of events gets.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(clippy::large_enum_variant, reason = "nearly all that is received are events")]
 pub enum Received {
     /// An event.
     Event(Event),

@@ -88,7 +88,7 @@ fn the_stop_key_stops_every_motor_while_a_search_is_typed_and_counts_them_until_
     let plant = Plant::start("monitor-stop");
     plant.turn();
     let mut monitor = plant.monitor(80, 24);
-    monitor.wait_until("two that run", |screen| screen.matches("Running fwd").count() == 2);
+    monitor.wait_until("two that run", |screen| screen.matches("running fwd").count() == 2);
     monitor.press("/2");
     monitor.wait_for("search: 2_");
     monitor.press(STOP_ALL);
@@ -109,13 +109,13 @@ fn the_key_of_one_drive_stops_that_one_alone() {
     let plant = Plant::start("monitor-one");
     plant.turn();
     let mut monitor = plant.monitor(60, 20);
-    monitor.wait_until("two that run", |screen| screen.matches("Running fwd").count() == 2);
+    monitor.wait_until("two that run", |screen| screen.matches("running fwd").count() == 2);
     monitor.press("\u{1b}[B\u{1b}[B");
     monitor.wait_for("▸ pump 2");
     monitor.press(STOP_THIS);
     monitor.wait_for("STOP pump 2");
     let screen = monitor.wait_for("1 confirmed, 0 pending, 0 not reachable");
-    assert!(screen.contains("Running fwd"), "{screen}");
+    assert!(screen.contains("running fwd"), "{screen}");
     monitor.press("q");
     assert_eq!(monitor.end().0, Some(0));
 }
@@ -125,7 +125,7 @@ fn a_terminal_that_is_held_holds_up_no_stop() {
     let plant = Plant::start("monitor-held");
     plant.turn();
     let mut monitor = plant.monitor(120, 40);
-    monitor.wait_until("two that run", |screen| screen.matches("Running fwd").count() == 2);
+    monitor.wait_until("two that run", |screen| screen.matches("running fwd").count() == 2);
     monitor.hold(true);
     monitor.press(STOP_ALL);
     while !plant.stands() {}

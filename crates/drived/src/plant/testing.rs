@@ -79,6 +79,7 @@ impl Plant {
 /// A drive with every pair of troubles, which came in either order: what is known of it, as the API tells it, and its worst
 /// trouble in words.
 pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json::Value, String)> {
+    type Trouble = Box<dyn Fn(&mut Snapshot)>;
     let shown = |snapshot: &mut Snapshot, change: fn(&mut Status)| {
         let timed = snapshot.status.as_mut().expect("it has a status");
         let mut status = Status::clone(&timed.value);
@@ -89,7 +90,7 @@ pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json:
         |alarm, now| PendingStop { mode: StopMode::Ramp, since: now, attempts: 3, taken: false, alarm };
     let error = || Error::Unsupported { what: "a test", reason: "it is one" };
     let identity = || Arc::new(Identity::default());
-    let troubles: Vec<Box<dyn Fn(&mut Snapshot)>> = vec![
+    let troubles: Vec<Trouble> = vec![
         Box::new(move |drive| drive.stop = Some(stop(true, now))),
         Box::new(move |drive| drive.stop = Some(stop(false, now))),
         Box::new(move |drive| drive.run_command_stands = Some(error())),
