@@ -243,7 +243,6 @@ fn a_command_is_audited_with_its_caller_and_a_token_names_the_commander() {
         "socket uid ",
         "token panel added",
         "token panel removed",
-        "login_failed",
         "\"outcome\":\"confirmed\"",
         "\"kind\":\"outcome\"",
         "pump 2: exit",
@@ -251,6 +250,11 @@ fn a_command_is_audited_with_its_caller_and_a_token_names_the_commander() {
         assert!(log.contains(told), "{told}: {log}");
     }
     assert!(!log.contains(&secret[4..]), "no secret in a log");
+    let refused = std::fs::read_to_string(in_folder("audit.refused")).expect("it is there");
+    assert!(refused.contains("login_failed") && !refused.contains(&secret[4..]), "{refused}");
+    let shown = with_config(&["audit", "show", "--caller", "panel", "--about", "pump 2"]);
+    let shown = shown.assert_done();
+    assert!(shown.contains("POST /api/v1/drives/pump 2/stop") && !shown.contains("local"), "{shown}");
     let verified = with_config(&["audit", "verify"]);
     assert!(verified.assert_done().contains("unbroken"), "{verified:?}");
     std::fs::write(&audit, log.replacen("pump%202", "pump%201", 1)).expect("it can be written");
