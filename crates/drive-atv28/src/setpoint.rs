@@ -59,7 +59,7 @@ impl<P: Port> Atv28<P> {
         let (state, command) = (words.state_words(), ControlWord::from_bits_retain(held));
         let by_bus = state.control() == Control::Bus;
         let enabled = state.chart() == Some(ChartState::OperationEnabled);
-        if !state.is_driving() && !(enabled && by_bus && command.is_run()) {
+        if !(state.is_driving() || enabled && by_bus && command.is_run()) {
             return Ok(false);
         }
         if by_bus && enabled && words.reference() != Frequency::ZERO {

@@ -83,7 +83,7 @@ impl<P: Port> Atv312<P> {
         let by_bus = state.control() == Control::Bus;
         let command = self.known.settings.meaning(controls.command);
         let enabled = state.chart() == Some(ChartState::OperationEnabled);
-        if !state.is_driving() && !(enabled && (!by_bus || command.is_run())) {
+        if !(state.is_driving() || enabled && (!by_bus || command.is_run())) {
             return Ok(false);
         }
         if by_bus && enabled && words.reference() != Frequency::ZERO {

@@ -219,7 +219,7 @@ fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
         Ok(()) => own.was_written(),
         Err(error) if exception(error) == Some(ACKNOWLEDGED) => {}
         Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
-            own.was_not_written()
+            own.was_not_written();
         }
         Err(_) => {}
     }
