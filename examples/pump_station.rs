@@ -271,7 +271,7 @@ mod tests {
         let carry_on = async {
             tokio::select! {
                 _ = second.wait_until(|pump| pump.setpoint == Some(all_it_can)) => {}
-                _ = third.wait_until(|pump| pump.started_here && pump.stop.is_none()) => {}
+                _ = third.wait_until(|pump| pump.started_here() && pump.stop.is_none()) => {}
             }
         };
         timeout(REACTION, carry_on).await.unwrap_or_else(|_| panic!("run {run}: nobody has noticed"));

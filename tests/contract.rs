@@ -1,6 +1,7 @@
 //! What every family promises of itself, through `dyn Drive` and the same door as families from outside.
 
 use drive_families::Family;
+use drive_testing::mutants::Mutant;
 use support::contracts::contract;
 
 #[tokio::test(start_paused = true)]
@@ -57,4 +58,35 @@ async fn a_drive_that_stands_or_runs_takes_as_many_exchanges_as_are_claimed() {
     for family in Family::ALL {
         contract(family).takes_the_exchanges_that_it_claims().await;
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn no_disobedient_drive_and_no_lost_answer_makes_a_family_say_what_is_not_so() {
+    let mut complaints = Vec::new();
+    for family in Family::ALL {
+        let its = contract(family).complaints().await;
+        complaints.extend(its.iter().map(|complaint| format!("{family}: {complaint}")));
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+/// Faults that one family cannot show: without a reading that is done once nothing is forgotten.
+const CANNOT_SHOW: &[(Family, Mutant)] = &[
+    (Family::Omron3g3ev, Mutant::ForgetForgetsNothing),
+    (Family::Atv28, Mutant::ForgetForgetsNothing),
+    (Family::Atv58, Mutant::ForgetForgetsNothing),
+];
+
+#[tokio::test(start_paused = true)]
+async fn the_contract_complains_of_every_family_that_breaks_it() {
+    let mut unseen = Vec::new();
+    for family in Family::ALL {
+        for mutant in Mutant::ALL {
+            let shows = !CANNOT_SHOW.contains(&(family, mutant));
+            if shows && mutant.of(contract(family)).complaints().await.is_empty() {
+                unseen.push(format!("{family}: {mutant:?}"));
+            }
+        }
+    }
+    assert!(unseen.is_empty(), "not seen: {unseen:#?}");
 }

@@ -56,7 +56,9 @@ async fn a_drive_that_is_added_is_watched_and_the_others_keep_their_snapshots() 
     assert_eq!(added, Ok(()));
     connected(&plant, "3").await;
     let after = plant.drive("1").snapshot();
-    assert!(after.counters.polls >= before.counters.polls && after.started_here && after.counters.lost == 0);
+    assert!(
+        after.counters.polls >= before.counters.polls && after.started_here() && after.counters.lost == 0
+    );
     let names: Vec<_> = plant.fleet.drives().iter().map(|drive| drive.name().to_string()).collect();
     assert_eq!(names, ["1", "2", "3"]);
     let replanned = plant.fleet.plan("line 0").expect("it is a line");
@@ -99,7 +101,7 @@ async fn a_running_drive_that_is_removed_ends_by_its_policy_and_the_others_go_on
     plant.events_so_far().await;
     let report = group.stop(StopMode::Ramp).await;
     assert_eq!((report.confirmed, report.unconfirmed.len()), (vec!["2".into()], 1));
-    plant.event("the others' events", |kind| matches!(kind, EventKind::StopConfirmed)).await;
+    plant.event("the others' events", |kind| matches!(kind, EventKind::StopConfirmed { .. })).await;
 }
 
 #[tokio::test(start_paused = true)]
@@ -114,7 +116,7 @@ async fn other_settings_leave_the_motor_its_task_and_its_snapshot() {
     assert_eq!(*plant.drive("1").settings(), settings);
     sleep(20 * SECOND).await;
     let after = plant.drive("1").snapshot();
-    assert!(after.started_here && after.max_age == 5 * SECOND && after.counters.lost == 0);
+    assert!(after.started_here() && after.max_age == 5 * SECOND && after.counters.lost == 0);
     let polls = after.counters.polls - before;
     assert!((18..=23).contains(&polls), "{polls} statuses in 20 s, one each second");
     assert_eq!(Plant::writes(&plant.sites[0].simulated.slave(1).expect("it is there")), writes);

@@ -39,7 +39,7 @@ async fn rule_1_a_stop_is_repeated_until_the_drive_confirms_it_and_ends_in_an_al
         plant.event("the alarm", |kind| matches!(kind, EventKind::StopUnconfirmed { .. })).await;
         assert!(plant.motor().snapshot().stop.is_some(), "{family}: it goes on");
         plant.machine().unmute();
-        plant.event("the confirmation", |kind| *kind == EventKind::StopConfirmed).await;
+        plant.event("the confirmation", |kind| matches!(kind, EventKind::StopConfirmed { .. })).await;
         assert!(!plant.machine().observe().running, "{family}");
         assert_eq!(plant.motor().snapshot().stop, None);
     })
@@ -157,10 +157,11 @@ async fn rule_3_nothing_is_confirmed_that_the_machine_does_not_do() {
             );
         }
         // These read more of what their commands mean; the Altivar 21 word by word, so that its answers cannot be told
-        // apart and each loss costs the late window.
+        // apart and each loss costs the late window: of its 1 s a start that proves both sources, FA00 and the reference is rarely
+        // done, and says that it expired.
         let least = match family {
             Family::Atv28 | Family::Atv58 => 20,
-            Family::Atv21 => 4,
+            Family::Atv21 => 3,
             _ => 8,
         };
         assert!(confirmed >= least, "{family}: {confirmed} of 40 got through a line that loses a tenth");
@@ -254,7 +255,7 @@ async fn rule_5_nothing_restarts_after_a_power_cycle() {
         sleep(60 * SECOND).await;
         assert!(!plant.machine().observe().running, "{family}");
         plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
-        assert!(!plant.motor().snapshot().started_here, "{family}");
+        assert!(!plant.motor().snapshot().started_here(), "{family}");
     })
     .await;
 }
@@ -336,7 +337,7 @@ async fn rule_7_a_running_state_is_adopted_and_nothing_is_written_until_somebody
         sleep(60 * SECOND).await;
         assert_eq!(Plant::writes(plant.machine()), writes, "{family}");
         assert_eq!(plant.machine().observe().output_frequency, 3_000, "{family}");
-        assert!(!plant.motor().snapshot().started_here, "{family}");
+        assert!(!plant.motor().snapshot().started_here(), "{family}");
         assert!(plant.motor().set_setpoint(Frequency::from_hertz(25)).await.is_confirmed(), "{family}");
         plant.machine().wait_until(|machine| machine.output_frequency == 2_500).await;
         assert!(plant.motor().stop(StopMode::Ramp).await.is_confirmed(), "{family}");

@@ -48,7 +48,7 @@ async fn no_stop_is_lost_beside_a_branch_that_is_ready() {
                 let started = motor.start_at(Direction::Forward, Frequency::from_hertz(1)).await;
                 assert!(started.is_confirmed(), "{started}");
                 stop_beside_what_is_ready(&plant, layer, first).await;
-                let stands = motor.wait_until(|known| known.stop.is_none() && !known.started_here);
+                let stands = motor.wait_until(|known| known.stop.is_none() && !known.started_here());
                 if timeout(5 * SECOND, stands).await.is_err() {
                     lost += 1;
                     assert!(motor.stop(StopMode::Ramp).await.is_confirmed());

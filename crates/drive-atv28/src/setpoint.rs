@@ -78,7 +78,8 @@ impl<P: Port> Atv28<P> {
             let refusal = words.state_words().refuses_reference();
             let follows = match frequency {
                 _ if refusal.is_some() => false,
-                _ if !self.runs_by_bus(&words) => return Ok(()),
+                _ if !self.runs_by_bus(&words) && self.holds_setpoint().await? => return Ok(()),
+                _ if !self.runs_by_bus(&words) => false,
                 Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
                 None => self.follows_speed().await?.1,
             };
@@ -91,6 +92,13 @@ impl<P: Port> Atv28<P> {
                 return Err(Error::NotConfirmed { slave, command, status, because });
             }
         }
+    }
+
+    /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
+    async fn holds_setpoint(&mut self) -> Result<bool> {
+        let Some((register, word)) = self.given else { return Ok(false) };
+        let held = self.registers.at(Class::Command).read_words(register, 1).await?;
+        Ok(held.first() == Some(&word))
     }
 
     /// The reference of the bus that the drive follows, its register and its word: `FrH` is `LFr` between the limits, or, where a

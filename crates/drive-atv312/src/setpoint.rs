@@ -70,10 +70,21 @@ impl<P: Port> Atv312<P> {
             let other = self.refuses_reference(&words).or(self.other_reference().await?);
             let because = if running { other.or(Some(OTHER_REFERENCE)) } else { other };
             return match because {
-                None => Ok(()),
-                because => Err(self.not_confirmed(Command::Setpoint(setpoint), status, because)),
+                None if self.holds_setpoint().await? => Ok(()),
+                None if confirming.again().await => continue,
+                because => {
+                    let because = because.or(Some(OTHER_REFERENCE));
+                    Err(self.not_confirmed(Command::Setpoint(setpoint), status, because))
+                }
             };
         }
+    }
+
+    /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
+    async fn holds_setpoint(&mut self) -> Result<bool> {
+        let Some((register, word)) = self.given else { return Ok(false) };
+        let held = self.registers.at(Class::Command).read_words(register, 1).await?;
+        Ok(held.first() == Some(&word))
     }
 
     /// Whether the reference that stands turns the motor against its run command: a setpoint leaves that as it is, while the motor

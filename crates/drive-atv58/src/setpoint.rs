@@ -70,7 +70,8 @@ impl<P: Port> Atv58<P> {
             let runs = enabled && turns && self.read_control().await? & ENABLE_OPERATION == ENABLE_OPERATION;
             // It is told only while local control is forced, in which no reference of the line counts.
             let forced = status.control.map(Refusal::NotInControl);
-            if forced.is_none() && (!runs || self.follows(&status).await?) {
+            let is_seen = if runs { self.follows(&status).await? } else { self.holds_setpoint().await? };
+            if forced.is_none() && is_seen {
                 return Ok(());
             }
             if forced.is_some() || !confirming.again().await {
@@ -79,6 +80,12 @@ impl<P: Port> Atv58<P> {
                 return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because });
             }
         }
+    }
+
+    /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
+    async fn holds_setpoint(&mut self) -> Result<bool> {
+        let held = self.registers.at(Class::Command).read(W401).await?;
+        Ok(Some(held) == self.given)
     }
 
     /// Whether the drive follows the reference of the bus, as far as the map names the word that tells.

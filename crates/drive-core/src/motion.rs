@@ -172,7 +172,9 @@ impl Shaft {
 
     fn without_output(&mut self, at: Instant, cut: bool) -> Motion {
         self.past = match self.past {
-            Past::Driven { still: false, .. } | Past::Braked { still: false } if cut => Past::Coasts(at),
+            // Whoever was driven and is without an output was not seen to be brought down: a ramp, or a cut between two looks.
+            Past::Driven { still: false, .. } => Past::Coasts(at),
+            Past::Braked { still: false } if cut => Past::Coasts(at),
             coasts @ Past::Coasts(since)
                 if self.coast_time.is_none_or(|time| at.saturating_duration_since(since) < time) =>
             {
@@ -200,6 +202,13 @@ mod tests {
         assert_eq!(shaft.see(after(90), Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
         shaft.set_coast_time(Some(Duration::from_secs(60)));
         assert_eq!(shaft.see(after(91), Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_was_driven_and_has_no_output_at_the_next_look_may_coast_whoever_ended_it() {
+        let (mut shaft, now) = (Shaft::new(), Instant::now());
+        shaft.see(now, Output::Driven, FIFTY);
+        assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
     }
 
     #[tokio::test(start_paused = true)]

@@ -6,6 +6,7 @@ use std::{fmt, time::Duration};
 use tokio::time::Instant;
 
 use crate::{
+    error::Refusal,
     lease::Verdict,
     motion::Motion,
     named::Word,
@@ -189,6 +190,25 @@ impl Status {
     #[must_use]
     pub const fn is_fault(&self) -> bool {
         self.state.is_fault()
+    }
+
+    /// Whether the words that it sent are some that its manual explains.
+    #[must_use]
+    pub const fn is_explained(&self) -> bool {
+        !matches!(self.state, State::Unknown)
+    }
+
+    /// Why no drive is to be moved that shows this, whatever its family: it has tripped, or it is in a state from which none
+    /// starts. Who commands it is for the family to judge.
+    #[must_use]
+    pub fn bars_motion(&self) -> Option<Refusal> {
+        match self.state {
+            State::Fault | State::FaultReaction => {
+                Some(self.fault_code.filter(|&code| code != 0).map_or(Refusal::Tripped, Refusal::Fault))
+            }
+            State::Unknown | State::NotReady => Some(Refusal::State(self.state)),
+            _ => None,
+        }
     }
 
     /// Whether the motor stands: at rest, or held there by direct current. A reading of [`motion`](Self::motion); of a drive

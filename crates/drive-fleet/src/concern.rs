@@ -89,6 +89,9 @@ table! {
     /// It has tripped.
     Tripped: "tripped", "tripped", Alarm, false,
         "remove the cause, then reset it";
+    /// The run command of this side stands and something else decides: it may act again by itself.
+    RunSuspended: "run_suspended", "its run command is not in force, the motor may start by it", Alarm, false,
+        "see what decides instead; the run command is withdrawn, unless that was accepted";
     /// Another drive than before answers at its address.
     IdentityChanged: "identity_changed", "another drive than before answers at its address", Alarm, false,
         "see which drive it is, then accept its identity";
@@ -210,7 +213,7 @@ impl Snapshot {
 
     fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
         let status = self.status.as_ref();
-        let was_moving = self.started_here || status.is_some_and(|status| status.value.state.is_moving());
+        let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_standstill());
         let heard = status.map(|status| status.at);
         let error = || self.error.as_ref().map(ToString::to_string);
         let (since, detail) = match kind {
@@ -231,6 +234,11 @@ impl Snapshot {
                     None => format!("fault {}", fault.code),
                 });
                 (trip.map(|trip| trip.at), told.or_else(unread))
+            }
+            ConcernKind::RunSuspended => {
+                let because =
+                    self.suspended.filter(|_| !status.is_some_and(|status| status.value.is_fault()))?;
+                (None, Some(because.to_string()))
             }
             ConcernKind::IdentityChanged => match &self.identity {
                 IdentityCheck::Changed { remembered, found } => {

@@ -7,8 +7,8 @@ use std::{
 };
 
 use drive_core::{
-    Command, Control, Current, Error, Identity, Percent, SelfRestart, Setpoint, State, Status, StopMode,
-    Watchdog,
+    Command, Control, Current, Error, Ground, Identity, Motion, Percent, Refusal, SelfRestart, Setpoint,
+    State, Status, StopMode, Watchdog,
 };
 use tokio::{sync::broadcast, time::Instant};
 
@@ -210,7 +210,22 @@ pub enum EventKind {
         outcome: Outcome,
     },
     /// A stop is confirmed: the drive shows standstill.
-    StopConfirmed,
+    StopConfirmed {
+        /// The mode by which it was stopped.
+        mode: StopMode,
+        /// What is known of the shaft: at rest, held there, or without an output and perhaps coasting.
+        motion: Motion,
+    },
+    /// **Alarm**: the output is cut, braked or held though a run command of this side stands in the drive. It may start the motor
+    /// when what cuts it goes away, so that it is withdrawn unless the settings accept that.
+    OutputBlocked(Refusal),
+    /// **Alarm**: the motor follows another reference than that of the bus though a run command of this side stands. It is
+    /// withdrawn unless the settings accept that.
+    ReferenceTaken(Refusal),
+    /// **Alarm**: another command took the place of the run command of this side, or decides instead of it.
+    CommandOverridden(Refusal),
+    /// What a contract with the drive rests on has changed without this side: it is looked at anew.
+    ContractChanged(Ground),
     /// Other settings hold from now on: these.
     Reconfigured(Vec<&'static str>),
     /// What was done to it when the fleet shut down.
@@ -250,7 +265,11 @@ impl EventKind {
             Self::StopModeReplaced { .. } => "stop mode replaced",
             Self::StopTookCommand(_) => "stop took command",
             Self::StopUnconfirmed { .. } => "stop unconfirmed",
-            Self::StopConfirmed => "stop confirmed",
+            Self::StopConfirmed { .. } => "stop confirmed",
+            Self::OutputBlocked(_) => "output blocked",
+            Self::ReferenceTaken(_) => "reference taken",
+            Self::CommandOverridden(_) => "command overridden",
+            Self::ContractChanged(_) => "contract changed",
             Self::Reconfigured(_) => "reconfigured",
             Self::Exit(_) => "exit",
             Self::Removed(_) => "removed",
@@ -276,6 +295,9 @@ impl EventKind {
                 | Self::WatchdogNotInForce(_)
                 | Self::StopUnconfirmed { .. }
                 | Self::RunCommandStands(_)
+                | Self::OutputBlocked(_)
+                | Self::ReferenceTaken(_)
+                | Self::CommandOverridden(_)
                 | Self::RestartsItself { accepted: false, .. }
                 | Self::Limit { exceeded: true, .. }
                 | Self::Warning { present: true }
@@ -346,7 +368,14 @@ impl fmt::Display for EventKind {
                 write!(f, " since {} after {attempts} attempts: {outcome}", Tenths(*since))
             }
             Self::Exit(action) | Self::Removed(action) => write!(f, ": {action}"),
-            Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed => Ok(()),
+            Self::StopConfirmed { motion: Motion::Coasting, .. } => write!(f, ": {}", Motion::Coasting),
+            Self::OutputBlocked(because)
+            | Self::ReferenceTaken(because)
+            | Self::CommandOverridden(because) => {
+                write!(f, ": {because}")
+            }
+            Self::ContractChanged(ground) => write!(f, ": {ground}"),
+            Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed { .. } => Ok(()),
         }
     }
 }

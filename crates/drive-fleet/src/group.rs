@@ -386,7 +386,7 @@ async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Ou
         let status = snapshot.fresh_status(Instant::now());
         status.is_some_and(|status| has_reached(setpoint, status))
     };
-    let there = member.wait_until(|snapshot| is_there(snapshot) || !snapshot.started_here);
+    let there = member.wait_until(|snapshot| is_there(snapshot) || !snapshot.started_here());
     let outcome = match timeout(after, there).await {
         Ok(snapshot) if is_there(&snapshot) => Outcome::Confirmed,
         Ok(_) => Outcome::NotConfirmed(Unconfirmed::Stopped),

@@ -39,7 +39,6 @@ impl GroupStop {
     }
 
     /// The stop of each drive that may be commanded.
-    #[must_use]
     pub fn each(&self) -> &[(Arc<str>, StopTicket)] {
         &self.each
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Current, Identity, Percent, Reaction, StopMode, Watchdog};
+use drive_core::{Current, Identity, Lack, Percent, Reaction, StopMode, Watchdog};
 
 use crate::limits::FrequencyLimits;
 
@@ -57,6 +57,10 @@ pub struct DriveSettings {
     /// drive that has another such setting active is refused.
     #[cfg_attr(feature = "serde", serde(default))]
     pub accept_self_restart: Vec<String>,
+    /// What a run command of this side may lack for a while and then act again by itself, such as `output` where a guard cuts the
+    /// output and gives it back. Anything else that keeps it from acting has it withdrawn.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub accept_resume: Vec<Lack>,
     /// What it said it was, from an earlier run; `None`: what it says first is remembered.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub identity: Option<Identity>,
@@ -81,6 +85,7 @@ impl DriveSettings {
             ("on_exit_watchdog", self.on_exit_watchdog != other.on_exit_watchdog),
             ("on_loss", self.on_loss != other.on_loss),
             ("on_fault", self.on_fault != other.on_fault),
+            ("accept_resume", self.accept_resume != other.accept_resume),
             ("on_control_taken", self.on_control_taken != other.on_control_taken),
             ("accept_self_restart", self.accept_self_restart != other.accept_self_restart),
         ];
@@ -106,6 +111,7 @@ impl DriveSettings {
             on_fault: OnFault::default(),
             on_control_taken: OnControlTaken::default(),
             accept_self_restart: Vec::new(),
+            accept_resume: Vec::new(),
             identity: None,
             watchdog_before: None,
         }

@@ -7,8 +7,8 @@ use std::{
 };
 
 use drive_core::{
-    Control, Error, Fault, Faults, Frequency, Identity, Measurements, SelfRestart, Setpoint, State, Status,
-    StopMode, Watchdog,
+    Control, Error, Fault, Faults, Frequency, Identity, Lease, Measurements, Motion, Refusal, SelfRestart,
+    Setpoint, Status, StopMode, Watchdog,
 };
 use tokio::time::Instant;
 
@@ -272,8 +272,10 @@ pub struct Snapshot {
     pub exceeded: Vec<Limit>,
     /// A stop that is not confirmed yet.
     pub stop: Option<PendingStop>,
-    /// Whether this fleet started the motor and has not seen it stand since.
-    pub started_here: bool,
+    /// The run command of this side that stands in the drive, or may: the motor may turn, now or later, because of it.
+    pub lease: Option<Lease>,
+    /// What keeps it from acting, as the last status has it.
+    pub suspended: Option<Refusal>,
     /// Why a start would be refused, whoever asks for it and whatever the setpoint; `None` when it would be sent.
     pub start_refused: Option<Refused>,
     /// The last trips, the newest last.
@@ -289,6 +291,12 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// Whether a run command of this side stands in the drive, or may.
+    #[must_use]
+    pub const fn started_here(&self) -> bool {
+        self.lease.is_some()
+    }
+
     /// The verdict on the status at `now`.
     #[must_use]
     pub fn freshness(&self, now: Instant) -> Freshness {
@@ -343,7 +351,7 @@ impl Snapshot {
 /// Whether a status shows that the output has reached a setpoint; without a setpoint, whether the drive says so itself.
 #[must_use]
 pub fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
-    if status.state != State::Running || status.at_reference == Some(false) {
+    if status.motion != Motion::Driven || status.at_reference == Some(false) {
         return false;
     }
     let near = if status.at_reference.is_some() { NEAR_WITH_SLIP } else { NEAR };

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Drive, Setpoint, StopMode, Withdrawn};
+use drive_core::{Drive, Setpoint, StopMode};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -87,6 +87,11 @@ impl Task {
         loop {
             if let Some(accepted) = desk.accepts.take() {
                 drive.accept_self_restart(&accepted.iter().map(String::as_str).collect::<Vec<_>>());
+            }
+            // Also what a call that was dropped has left.
+            desk.supervisor.handle_lease(drive.lease());
+            if let Some(ground) = drive.take_changed() {
+                desk.supervisor.handle_changed(Instant::now(), ground);
             }
             let step = desk.supervisor.next(Instant::now());
             desk.publish();
@@ -302,7 +307,7 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
     }
     match job {
         Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
-        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await.map(Withdrawn::into_status)),
+        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
         Job::Start(direction) => Reply::Ordered(drive.start(direction).await),
         Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
         Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),

@@ -19,8 +19,8 @@ use std::{
 };
 
 use drive_core::{
-    Command, Control, Error, ErrorKind, Fault, Identity, Measurements, SelfRestart, Setpoint, State, Status,
-    StopMode, Watchdog,
+    Command, Control, Error, ErrorKind, Fault, Ground, Identity, Measurements, Motion, Refusal, SelfRestart,
+    Setpoint, State, Status, StopMode, Watchdog,
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use tokio::time::Instant;
@@ -107,7 +107,7 @@ impl SnapshotView {
             reached: snapshot.has_reached_setpoint(now),
             fault: snapshot.present_trip().map(TripView::from),
             stop: snapshot.stop,
-            started_here: snapshot.started_here,
+            started_here: snapshot.started_here(),
             start_refused: snapshot.start_refused(now).map(ToString::to_string),
             starts_by_itself: restarts.map(|all| all.iter().map(|one| one.code.to_owned()).collect()),
             identity: snapshot.identity.clone(),
@@ -121,6 +121,22 @@ impl SnapshotView {
 impl From<&Snapshot> for SnapshotView {
     fn from(snapshot: &Snapshot) -> Self {
         Self::of(snapshot, Instant::now())
+    }
+}
+
+/// Why something is not so, as programs read it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub struct RefusalView {
+    /// In one word.
+    pub reason: String,
+    /// In a sentence.
+    pub text: String,
+}
+
+impl From<&Refusal> for RefusalView {
+    fn from(refusal: &Refusal) -> Self {
+        Self { reason: refusal.word().to_owned(), text: refusal.to_string() }
     }
 }
 
@@ -348,7 +364,32 @@ pub enum Happened {
         attempts: u32,
         known: OutcomeView,
     },
-    StopConfirmed,
+    StopConfirmed {
+        /// The mode by which it was stopped.
+        mode: StopMode,
+        /// What is known of the shaft.
+        motion: Motion,
+    },
+    /// The output is cut though a run command of this side stands.
+    OutputBlocked {
+        /// What decides instead.
+        because: RefusalView,
+    },
+    /// Another reference is followed though a run command of this side stands.
+    ReferenceTaken {
+        /// What decides instead.
+        because: RefusalView,
+    },
+    /// Another command decides instead of the run command of this side.
+    CommandOverridden {
+        /// What decides instead.
+        because: RefusalView,
+    },
+    /// What a contract with the drive rests on has changed.
+    ContractChanged {
+        /// What.
+        ground: Ground,
+    },
     Reconfigured {
         settings: Vec<String>,
     },
@@ -416,7 +457,11 @@ impl From<&EventKind> for Happened {
                 attempts: *attempts,
                 known: outcome.into(),
             },
-            EventKind::StopConfirmed => Self::StopConfirmed,
+            EventKind::StopConfirmed { mode, motion } => Self::StopConfirmed { mode: *mode, motion: *motion },
+            EventKind::OutputBlocked(because) => Self::OutputBlocked { because: because.into() },
+            EventKind::ReferenceTaken(because) => Self::ReferenceTaken { because: because.into() },
+            EventKind::CommandOverridden(because) => Self::CommandOverridden { because: because.into() },
+            EventKind::ContractChanged(ground) => Self::ContractChanged { ground: *ground },
             EventKind::Reconfigured(settings) => {
                 Self::Reconfigured { settings: settings.iter().map(|name| (*name).to_owned()).collect() }
             }

@@ -16,6 +16,8 @@ pub mod babble;
 pub mod bench;
 pub mod contract;
 pub mod frames;
+pub mod mutants;
+pub mod recorder;
 pub mod referee;
 pub mod rig;
 pub mod words;

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_core::{
-    Error, ErrorKind, ExceptionMeaning, Identity, Result, SelfRestart, Watchdog, WatchdogCapability,
+    Error, ErrorKind, ExceptionMeaning, Ground, Identity, Result, SelfRestart, Watchdog, WatchdogCapability,
 };
 use tokio::time::Instant;
 
@@ -16,6 +16,9 @@ use crate::{
 
 /// Until a check that failed is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
+
+/// How often a drive may refuse that its watchdog is set up, a second apart, until that is an alarm.
+const REFUSALS: u8 = 10;
 
 /// The part of a watchdog's time after which it is fed by a frame of its own, if no poll has fed it: a half. The
 /// plan counts on the same part.
@@ -41,6 +44,10 @@ pub(crate) struct Checks {
     found: Option<Watchdog>,
     /// It was written here.
     written: bool,
+    /// The contract was written, once, and the drive has kept something else: it is not written again, for that may wear its EEPROM.
+    in_vain: bool,
+    /// How often the drive has refused the write at standstill.
+    refusals: u8,
     /// What an earlier run found, and did not live to put back.
     inherited: Option<WatchdogBefore>,
     /// That it is not as it should be while the motor turns has been told.
@@ -71,6 +78,8 @@ impl Checks {
             armed: false,
             found: None,
             written: false,
+            in_vain: false,
+            refusals: 0,
             inherited: settings.watchdog_before.clone(),
             told: false,
             heard: None,
@@ -99,6 +108,7 @@ impl Checks {
         if settings.watchdog != self.contract {
             self.contract = settings.watchdog;
             self.armed = false;
+            (self.in_vain, self.refusals) = (false, 0);
             self.watchdog_at = Some(now);
             self.watchdog = match self.contract {
                 Some(_) => WatchdogCheck::Unchecked,
@@ -122,6 +132,21 @@ impl Checks {
             Some(_) => WatchdogCheck::Unchecked,
             None => WatchdogCheck::NoContract { found: None },
         };
+    }
+
+    /// What this rests on has changed without this side: it is read anew.
+    pub(crate) fn changed(&mut self, now: Instant, ground: Ground) {
+        match ground {
+            Ground::Watchdog => {
+                self.watchdog_at = Some(now);
+                self.watchdog = match self.contract {
+                    Some(_) => WatchdogCheck::Unchecked,
+                    None => WatchdogCheck::NoContract { found: None },
+                };
+            }
+            Ground::Inputs => self.restarts_at = Some(now),
+            _ => {}
+        }
     }
 
     /// The drive received a frame and answered.
@@ -260,6 +285,7 @@ impl Checks {
             Some(remembered) if *remembered != found => {
                 let remembered = Arc::clone(remembered);
                 (self.found, self.written, self.inherited) = (None, false, None);
+                (self.in_vain, self.refusals) = (false, 0);
                 self.identity =
                     IdentityCheck::Changed { remembered: Arc::clone(&remembered), found: Arc::clone(&found) };
                 Some(EventKind::IdentityChanged { remembered, found })
@@ -326,12 +352,13 @@ impl Checks {
                 let before = self.to_keep(watchdog);
                 Some(EventKind::WatchdogVerified { watchdog, written, before })
             }
-            Ok(watchdog) if control && self.settable && !written => {
+            Ok(watchdog) if control && self.settable && !written && !self.in_vain => {
                 self.watchdog = WatchdogCheck::WaitsForStandstill(watchdog);
                 None
             }
             Ok(watchdog) => {
-                let reason = match (written, self.settable) {
+                self.in_vain |= written;
+                let reason = match (written || self.in_vain, self.settable) {
                     (true, _) => "it was written and reads back so",
                     (false, true) => "the drive is only read",
                     (false, false) => "the bus cannot set it, set it at the drive",
@@ -344,10 +371,11 @@ impl Checks {
                 self.watchdog = WatchdogCheck::Unchecked;
                 None
             }
-            // While the motor turns the drive may refuse; it is tried again at standstill.
+            // While the motor turns the drive may refuse; it is tried again at standstill, and not for ever.
             Err(Error::Exception { meaning: ExceptionMeaning::NotNow, .. } | Error::Refused { .. })
-                if written =>
+                if written && self.refusals < REFUSALS =>
             {
+                self.refusals += 1;
                 self.watchdog_at = Some(now + AGAIN);
                 None
             }

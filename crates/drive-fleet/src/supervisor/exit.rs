@@ -49,10 +49,10 @@ impl Supervisor {
         }
         self.exits_by = why;
         self.refuse_queue();
-        let started = self.started_here || self.is_starting();
+        let started = self.lease.is_some() || self.is_starting();
         // Rule 1 ends with its confirmation, whatever the policy.
         let stopping = self.stopping.is_some();
-        let turns = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
+        let turns = self.turns();
         let (policy, adopted) = (self.settings.on_exit, self.settings.on_exit_adopted);
         let release = matches!(policy, OnExit::Release(_));
         match (policy, adopted) {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::{
     Direction, Error, Faults, Identity, Measurements, Reaction, Result, SelfRestart, Setpoint, Status,
-    StopMode, Stopped, Watchdog,
+    StopMode, Stopped, Watchdog, Withdrawn,
 };
 use tokio::time::Instant;
 
@@ -88,7 +88,7 @@ impl Job {
 #[derive(Debug)]
 pub(crate) enum Reply {
     Stopped(Result<Stopped>),
-    Withdrawn(Result<Status>),
+    Withdrawn(Result<Withdrawn>),
     /// Of a start, a reset or a release.
     Ordered(Result<Status>),
     Setpoint(Result<()>),
@@ -108,7 +108,8 @@ impl Reply {
     pub(crate) fn error(&self) -> Option<&Error> {
         let error = match self {
             Self::Stopped(result) => result.as_ref().err(),
-            Self::Withdrawn(result) | Self::Ordered(result) | Self::Status(result) => result.as_ref().err(),
+            Self::Withdrawn(result) => result.as_ref().err(),
+            Self::Ordered(result) | Self::Status(result) => result.as_ref().err(),
             Self::Setpoint(result) | Self::KeptAlive(result) => result.as_ref().err(),
             Self::Saved(result) => result.as_ref().err(),
             Self::Identity(result) => result.as_ref().err(),

@@ -25,7 +25,10 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Control, Error, ErrorKind, Measurements, PortError, Status, WatchdogCapability};
+use drive_core::{
+    Control, Error, ErrorKind, Ground, Lack, Lease, Measurements, PortError, Refusal, Status,
+    WatchdogCapability,
+};
 use tokio::time::Instant;
 
 use self::{
@@ -133,9 +136,14 @@ pub(crate) struct Supervisor {
     exit: Exit,
     /// Why it ends.
     exits_by: Policy,
-    started_here: bool,
     /// Who asked for the last start that was sent.
     started_by: Option<CallId>,
+    /// The run command of this side that stands in the drive, or may, as the family keeps it.
+    lease: Option<Lease>,
+    /// What the last status said of it that was told.
+    suspended: Option<(Lack, Refusal)>,
+    /// Somebody else has command, and the settings leave the run command as it is until it is in force again.
+    reported: bool,
     exceeded: BTreeMap<&'static str, Limit>,
     /// Who has taken control, until it is back.
     control_taken: Option<Control>,
@@ -188,8 +196,10 @@ impl Supervisor {
             withdrawal: None,
             exit: Exit::No,
             exits_by: Policy::Exit,
-            started_here: false,
             started_by: None,
+            lease: None,
+            suspended: None,
+            reported: false,
             exceeded: BTreeMap::new(),
             control_taken: None,
             acted: None,
@@ -415,6 +425,22 @@ impl Supervisor {
         self.check_stop_times(now);
     }
 
+    /// The run command of this side that stands, as the family keeps it.
+    pub(crate) fn handle_lease(&mut self, lease: Option<Lease>) {
+        self.changed |= self.lease != lease;
+        self.lease = lease;
+    }
+
+    /// What a contract with the drive rests on has changed without this side.
+    pub(crate) fn handle_changed(&mut self, now: Instant, ground: Ground) {
+        self.checks.changed(now, ground);
+        if matches!(ground, Ground::Units | Ground::Limits) {
+            // What it was counted in, or may be, is not what it was when it was given.
+            self.given = None;
+        }
+        self.emit_shown(EventKind::ContractChanged(ground), Cause::Drive);
+    }
+
     /// The job in flight was dropped: because the machine asked for it, or because its time was over.
     pub(crate) fn handle_dropped(&mut self) {
         self.in_flight = None;
@@ -454,7 +480,8 @@ impl Supervisor {
             exceeded: self.exceeded.values().copied().collect(),
             since: self.since.clone(),
             stop: self.stopping.as_ref().map(Stopping::pending),
-            started_here: self.started_here,
+            lease: self.lease,
+            suspended: self.suspended.map(|(_, because)| because),
             start_refused: self.start_refused(now),
             trips: Arc::clone(&self.trips),
             counters: self.counters,
@@ -501,6 +528,11 @@ impl Supervisor {
     /// Whether the drive's words show that the motor is not driven.
     fn stands(&self) -> bool {
         self.link == Link::Connected && self.status.as_ref().is_some_and(|status| status.value.is_undriven())
+    }
+
+    /// Whether the drive's words show that it drives the motor, or brings it down.
+    fn turns(&self) -> bool {
+        self.status.as_ref().is_some_and(|status| !status.value.is_undriven())
     }
 
     /// Whether the drive is asked at the faster period.

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_core::{Control, Error, Faults, Measurements, PortError, Result, State, Status};
+use drive_core::{Control, Error, Faults, Measurements, Motion, PortError, Result, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor};
@@ -83,7 +83,7 @@ impl Supervisor {
             self.checks.connected(now);
         }
         self.doubtful = false;
-        self.compare(now, before.as_ref().map(|before| &*before.value), &status.value, found);
+        self.compare(before.as_ref().map(|before| &*before.value), &status.value, found);
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
             let unheard = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
@@ -109,9 +109,6 @@ impl Supervisor {
                 },
             );
         }
-        if status.value.is_undriven() && !self.is_starting() {
-            self.started_here = false;
-        }
         self.check_limit("current", {
             let limit = self.settings.alarms.current;
             status
@@ -127,6 +124,7 @@ impl Supervisor {
             self.stop_by_policy(now, Asker::Policy(Policy::OnLoss), mode);
         }
         self.tell_watchdog();
+        self.judge_run(now);
         self.judge_stop(now);
         self.judge_order(now);
         if self.is_busy() {
@@ -134,12 +132,12 @@ impl Supervisor {
         }
     }
 
-    fn compare(&mut self, now: Instant, before: Option<&Status>, status: &Status, found: bool) {
+    fn compare(&mut self, before: Option<&Status>, status: &Status, found: bool) {
         let cause = if found { Cause::Found } else { Cause::Drive };
         if let Some(before) = before {
             let (from, to) = (before.state, status.state);
             if from != to {
-                let cause = if found { Cause::Found } else { self.cause_of(from, to) };
+                let cause = if found { Cause::Found } else { self.cause_of(before, status) };
                 self.emit_shown(EventKind::StateChanged { from, to }, cause.clone());
                 if before.is_fault() && !status.is_fault() {
                     self.emit_shown(EventKind::FaultCleared, cause);
@@ -163,10 +161,9 @@ impl Supervisor {
                     None => self.emit_shown(EventKind::ControlReturned, cause),
                 }
                 self.control_taken = None;
-                self.control_returned(now);
             }
             (None, None) => {}
-            (was, Some(is)) => {
+            (_, Some(is)) => {
                 // Whoever has control now may give another reference.
                 self.given = None;
                 let given = self.acted.as_ref().filter(|(job, _)| *job == Job::Release);
@@ -182,19 +179,16 @@ impl Supervisor {
                         self.emit_shown(EventKind::ControlTaken(is), cause);
                     }
                 }
-                if was.is_none() && (self.started_here || before.state == State::Running) {
-                    self.control_taken(now);
-                }
             }
         }
     }
 
     /// Why a state became another: by what was last written, if that does it; else the drive did it by itself.
-    fn cause_of(&self, from: State, to: State) -> Cause {
+    fn cause_of(&self, from: &Status, to: &Status) -> Cause {
         let Some((job, cause)) = &self.acted else { return Cause::Drive };
         let does_it = match job {
-            Job::Start(_) => !from.is_fault() && !to.is_fault() && from != State::Running,
-            Job::Stop(_) | Job::Withdraw => to != State::Running && !to.is_fault(),
+            Job::Start(_) => !from.is_fault() && !to.is_fault() && from.motion != Motion::Driven,
+            Job::Stop(_) | Job::Withdraw => !to.is_fault() && to.motion != Motion::Driven,
             Job::ResetFaults => from.is_fault() && !to.is_fault(),
             _ => false,
         };
@@ -211,11 +205,6 @@ impl Supervisor {
 
     fn record_trip(&mut self, now: Instant, trip: Trip) {
         self.counters.trips += 1;
-        if self.started_here
-            || trip.before.as_ref().is_some_and(|before| before.value.state == State::Running)
-        {
-            self.run_ended_by_trip(now);
-        }
         self.explanations = EXPLANATIONS;
         let cause = if trip.found { Cause::Found } else { Cause::Drive };
         self.emit_shown(EventKind::Tripped(Box::new(trip.clone())), cause);

@@ -113,7 +113,8 @@ impl Supervisor {
             return false;
         }
         let Some(active) = self.active.as_ref().filter(|active| is_it(&active.asker)) else {
-            return self.started_here && self.started_by == Some(id) && self.take_back(now);
+            let ours = self.lease.is_some() || self.is_starting();
+            return ours && self.started_by == Some(id) && self.take_back(now);
         };
         match active.phase {
             Phase::Prepare => {
@@ -165,6 +166,16 @@ impl Supervisor {
 
     pub(super) fn enqueue_reset(&mut self, now: Instant) {
         self.enqueue(now, Asker::Policy(Policy::OnFault), Order::ResetFaults, None);
+    }
+
+    /// Whether a start is on its way to the drive, or its outcome is looked for.
+    pub(super) fn is_being_started(&self) -> bool {
+        self.active.as_ref().is_some_and(|active| {
+            matches!(
+                active.phase,
+                Phase::Sending(Job::Start(_)) | Phase::Verifying { job: Job::Start(_), .. }
+            )
+        })
     }
 
     /// Whether a start is being carried out.
@@ -221,7 +232,6 @@ impl Supervisor {
             match self.allow(now, order, self.active.as_ref()) {
                 Ok(Some(job)) => {
                     if matches!(job, Job::Start(_)) {
-                        self.started_here = true;
                         self.started_by = self.active.as_ref().and_then(|active| active.asker.id());
                         // What is started anew is not to be withdrawn any more.
                         self.withdrawal = None;

@@ -1,6 +1,6 @@
 //! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings. To ask changes nothing.
 
-use drive_core::{Direction, Refusal, Setpoint, State, Status};
+use drive_core::{Direction, Refusal, Setpoint, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, orders::Active};
@@ -174,15 +174,8 @@ impl Supervisor {
     /// What holds for motion besides: a state that the manual explains, no fault, the watchdog armed. Who has control is
     /// for the family to judge, which reads it anew before a start: on some drives a command of the bus takes it.
     fn allow_motion(&self, now: Instant, status: &Status, active: Option<&Active>) -> Result<(), Blocked> {
-        if status.is_fault() {
-            return Err(status
-                .fault_code
-                .filter(|&code| code != 0)
-                .map_or(Refusal::Tripped, Refusal::Fault)
-                .into());
-        }
-        if matches!(status.state, State::Unknown | State::NotReady) {
-            return Err(Refusal::State(status.state).into());
+        if let Some(reason) = status.bars_motion() {
+            return Err(reason.into());
         }
         let unverified = Refused::WatchdogUnverified;
         match self.checks.watchdog() {

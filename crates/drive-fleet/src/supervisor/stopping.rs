@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{
-    Command, Error, ErrorKind, Frequency, Motion, Result, Setpoint, State, Status, StopMode, Stopped,
-};
+use drive_core::{Command, Error, ErrorKind, Frequency, Motion, Result, Setpoint, Status, StopMode, Stopped};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
@@ -17,6 +15,12 @@ use crate::{
 
 /// The shortest and the longest pause between two attempts of a stop.
 pub(super) const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
+
+/// How long direct current is held at the most: longer heats a motor that stands.
+const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
+
+/// By how much the output has to come down to count as coming down.
+const PROGRESS: Frequency = Frequency::from_centihertz(50);
 
 /// Longer than any exit: its own limit ends it.
 const EXIT: Duration = Duration::from_secs(86_400);
@@ -37,6 +41,10 @@ pub(super) struct Stopping {
     asker: Asker,
     /// The drive has shown that no run command is in force.
     taken: bool,
+    /// Since when the drive injects for it.
+    injects_since: Option<Instant>,
+    /// The lowest output since it was taken.
+    lowest: Option<Frequency>,
     /// When it is sent next; `None` while the drive has taken it.
     next_try: Option<Instant>,
     pause: Duration,
@@ -61,6 +69,28 @@ impl Stopping {
             attempts: self.begun,
             taken: self.taken,
             alarm: self.alarm_at.is_none(),
+        }
+    }
+
+    /// The motor stands, or nearly: what still acts is ended along the ramp.
+    fn go_on_by_ramp(&mut self, now: Instant) {
+        (self.mode, self.used) = (StopMode::Ramp, StopMode::Ramp);
+        self.taken = false;
+        self.next_try = Some(now);
+    }
+
+    /// The motor comes down by itself. As long as it does, its time begins anew: a long ramp is no alarm, a ramp that hangs is.
+    fn comes_down(&mut self, now: Instant, output: Option<Frequency>, standstill: Duration) {
+        let Some(output) = output else { return };
+        let is_progress = self
+            .lowest
+            .is_none_or(|lowest| output.centihertz() + PROGRESS.centihertz() <= lowest.centihertz());
+        if is_progress {
+            self.lowest = Some(output);
+            self.alarm_at = self.alarm_at.map(|at| at.max(now + standstill));
+            for waiter in &mut self.waiters {
+                waiter.until = waiter.until.max(now + standstill);
+            }
         }
     }
 
@@ -144,6 +174,8 @@ impl Supervisor {
                     begun: 0,
                     asker,
                     taken: false,
+                    injects_since: None,
+                    lowest: None,
                     next_try: Some(now),
                     pause: REPEAT.0,
                     error: None,
@@ -180,6 +212,9 @@ impl Supervisor {
                 let asked = stopping.mode;
                 let told = std::mem::replace(&mut stopping.used, used);
                 stopping.next_try = None;
+                if used == StopMode::DcInjection {
+                    stopping.injects_since.get_or_insert(now);
+                }
                 stopping.error = None;
                 stopping.pause = REPEAT.0;
                 if !stopping.taken {
@@ -219,29 +254,39 @@ impl Supervisor {
     /// What a new status says of a stop under way.
     pub(super) fn judge_stop(&mut self, now: Instant) {
         let Some(status) = self.status.as_ref().map(|status| &*status.value) else { return };
-        let (stands, runs) = (status.is_undriven(), status.state == State::Running);
-        // No output is no standstill: direct current brakes a motor that still turns.
-        let at_zero = match status.motion {
-            Motion::NotKnown => stands || status.output_frequency == Some(Frequency::ZERO),
-            _ => status.is_standstill(),
-        };
+        let (motion, output, standstill) =
+            (status.motion, status.output_frequency, self.settings.times.standstill);
         let Some(stopping) = &mut self.stopping else { return };
-        if stopping.attempts > 0 && at_zero && stopping.used == StopMode::DcInjection {
-            // Some drives inject for as long as they are told to, and heat a motor that stands: their ramp ends it.
-            (stopping.mode, stopping.used) = (StopMode::Ramp, StopMode::Ramp);
-            stopping.taken = false;
-            stopping.next_try = Some(now);
-        } else if stands && stopping.attempts > 0 {
-            let Some(stopping) = self.stopping.take() else { return };
-            self.given = None;
-            for waiter in stopping.waiters {
-                self.conclude(waiter.asker, Command::Stop(waiter.asked), None, Outcome::Confirmed);
-            }
-            self.emit_shown(EventKind::StopConfirmed, stopping.asker.cause());
-        } else if runs && stopping.taken {
-            stopping.taken = false;
-            stopping.next_try = Some(now);
+        if stopping.attempts == 0 {
+            return;
         }
+        let injects = stopping.used == StopMode::DcInjection;
+        let injected_for = stopping.injects_since.map(|since| now.saturating_duration_since(since));
+        match motion {
+            // Some drives inject for as long as they are told to, and heat a motor that stands: their ramp ends it.
+            Motion::Held | Motion::AtRest | Motion::Coasting if injects => stopping.go_on_by_ramp(now),
+            _ if injects && injected_for.is_some_and(|time| time >= INJECTION_AT_MOST) => {
+                stopping.go_on_by_ramp(now);
+            }
+            Motion::Held | Motion::AtRest => self.stop_confirmed(motion),
+            // The output is off, and no more is to be had: the shaft may coast.
+            Motion::Coasting if stopping.taken => self.stop_confirmed(motion),
+            Motion::Driven if stopping.taken => {
+                stopping.taken = false;
+                stopping.next_try = Some(now);
+            }
+            Motion::Braking if stopping.taken => stopping.comes_down(now, output, standstill),
+            _ => {}
+        }
+    }
+
+    fn stop_confirmed(&mut self, motion: Motion) {
+        let Some(stopping) = self.stopping.take() else { return };
+        self.given = None;
+        for waiter in stopping.waiters {
+            self.conclude(waiter.asker, Command::Stop(waiter.asked), None, Outcome::Confirmed);
+        }
+        self.emit_shown(EventKind::StopConfirmed { mode: stopping.used, motion }, stopping.asker.cause());
     }
 
     pub(super) fn check_stop_times(&mut self, now: Instant) {

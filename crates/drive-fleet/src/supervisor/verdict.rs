@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Control, Direction, Error, ErrorKind, Measurements, PortError, Result, Setpoint, State, Status, StopMode,
+    Control, Error, ErrorKind, Measurements, PortError, Result, SETTLED_WITHIN, Setpoint, Status, StopMode,
+    Verdict,
 };
 use tokio::time::Instant;
 
@@ -100,7 +101,14 @@ impl Supervisor {
                     Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
                     _ => None,
                 };
-                self.verify(now, job, error);
+                match job {
+                    // The family has looked for as long as it takes: nobody here knows better.
+                    Job::Start(_) if status.is_some() => {
+                        self.end_order(Outcome::NotConfirmed(Unconfirmed::Denied(error)));
+                        self.withdraw_start(now);
+                    }
+                    _ => self.verify(now, job, error),
+                }
                 if let Some(status) = status {
                     self.accept_status(now, status);
                 }
@@ -122,19 +130,56 @@ impl Supervisor {
         };
         match &mut active.phase {
             Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(_), .. } => {}
-            Phase::Awaiting { .. } => {
+            Phase::Awaiting { since, .. } => {
+                let after = now.saturating_duration_since(*since);
                 if has_reached(given, &status) {
                     self.end_order(Outcome::Confirmed);
+                } else if let Some(because) = status.verdict.and_then(|verdict| verdict.because()) {
+                    let last = self.status.as_ref().map(|status| status.seen(now));
+                    let because = Some(because);
+                    self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because }));
                 }
+            }
+            Phase::Verifying { job: Job::Start(_), error, until, seen, .. } => {
+                *seen = true;
+                let after = self.settings.times.effect.saturating_sub(until.saturating_duration_since(now));
+                let denied = denied(error);
+                self.judge_lost_start(now, status.verdict, after, denied);
             }
             Phase::Verifying { job, error, seen, .. } => {
                 *seen = true;
                 if shows(*job, &status) {
-                    match active.order {
-                        Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
-                        _ => self.end_order(Outcome::Confirmed),
-                    }
+                    self.end_order(Outcome::Confirmed);
                 } else if let Some(outcome) = denied(error) {
+                    self.end_order(outcome);
+                }
+            }
+        }
+    }
+
+    /// What the family says of a start whose answer was lost, so long after it.
+    fn judge_lost_start(
+        &mut self,
+        now: Instant,
+        verdict: Option<Verdict>,
+        after: Duration,
+        denied: Option<Outcome>,
+    ) {
+        let Some(active) = &self.active else { return };
+        match verdict {
+            Some(Verdict::InForce) => match active.order {
+                Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
+                _ => self.end_order(Outcome::Confirmed),
+            },
+            // A drive may take a while to show a word that it holds.
+            Some(Verdict::NotInForce { because, .. }) if after >= SETTLED_WITHIN => {
+                let last = self.status.as_ref().map(|status| status.seen(now));
+                let because = Some(because);
+                self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because }));
+                self.withdraw_start(now);
+            }
+            _ => {
+                if let Some(outcome) = denied {
                     self.end_order(outcome);
                 }
             }
@@ -203,10 +248,6 @@ impl Supervisor {
 /// Whether a status shows what a job was to bring about.
 fn shows(job: Job, status: &Status) -> bool {
     match job {
-        Job::Start(direction) => {
-            status.state == State::Running
-                && status.direction.is_none_or(|shown: Direction| shown == direction)
-        }
         Job::ResetFaults => !status.is_fault(),
         Job::Release => status.control.is_some_and(|control| control != Control::Bus),
         _ => false,

@@ -1,13 +1,18 @@
-//! Control that somebody else takes of a drive that runs by our command, and a trip of such a drive: the run command is
-//! withdrawn, so that nothing starts by it when he gives control back or resets the fault at the drive (rule 5).
+//! A run command of this side that stands and is not in force, as its family judges from each status: it is told, and
+//! withdrawn, so that nothing starts by it when what keeps it from acting goes away (rule 5).
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Result, Status, StopMode};
+use drive_core::{Command, Error, ErrorKind, Lack, Refusal, Result, Status, StopMode, Verdict, Withdrawn};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, stopping::REPEAT};
-use crate::{cause::Policy, event::EventKind, outcome::Outcome, settings::OnControlTaken};
+use crate::{
+    cause::{Cause, Policy},
+    event::EventKind,
+    outcome::Outcome,
+    settings::OnControlTaken,
+};
 
 /// Who withdraws and stops here, as events name it.
 const TAKEN: Asker = Asker::Policy(Policy::ControlTaken);
@@ -41,33 +46,63 @@ impl Withdrawal {
 }
 
 impl Supervisor {
-    /// Somebody else has taken control while the drive ran by our command.
-    pub(super) fn control_taken(&mut self, now: Instant) {
-        if self.settings.on_control_taken == OnControlTaken::Withdraw {
-            self.withdraw(now, TAKEN);
+    /// What a new status says of the run command of this side.
+    pub(super) fn judge_run(&mut self, now: Instant) {
+        let Some(status) = self.status.as_ref() else { return };
+        match status.value.verdict {
+            Some(Verdict::NotInForce { lacks, because }) => self.run_suspended(now, lacks, because),
+            Some(Verdict::InForce) => {
+                (self.suspended, self.reported) = (None, false);
+                // It could not be withdrawn, and acts again now.
+                if let Some(withdrawal) = self.withdrawal.take() {
+                    self.stop_by_policy(now, withdrawal.asker, StopMode::Ramp);
+                }
+            }
+            Some(_) => {}
+            None => {
+                (self.suspended, self.reported) = (None, false);
+                self.withdrawal = None;
+            }
         }
     }
 
-    /// The drive has tripped while it ran by our command. Where its own restart is accepted the command stands for that.
-    pub(super) fn run_ended_by_trip(&mut self, now: Instant) {
-        if self.settings.accept_self_restart.is_empty() {
-            self.withdraw(now, TRIPPED);
+    fn run_suspended(&mut self, now: Instant, lacks: Lack, because: Refusal) {
+        let tripped = matches!(because, Refusal::Tripped | Refusal::Fault(_));
+        // A trip, and who has taken control, are told as such.
+        let told_otherwise = tripped || matches!(because, Refusal::NotInControl(_));
+        if self.suspended.replace((lacks, because)) != Some((lacks, because))
+            && !self.ends_by_itself()
+            && !told_otherwise
+        {
+            let kind = match lacks {
+                Lack::Output => EventKind::OutputBlocked(because),
+                Lack::Reference => EventKind::ReferenceTaken(because),
+                _ => EventKind::CommandOverridden(because),
+            };
+            self.emit_shown(kind, Cause::Drive);
         }
+        let reports = self.settings.on_control_taken == OnControlTaken::Report;
+        self.reported |= reports && lacks == Lack::Command;
+        match (tripped, lacks) {
+            // Where its own restart is accepted the command stands for that.
+            (true, _) if !self.settings.accept_self_restart.is_empty() => {}
+            (true, _) => self.withdraw(now, TRIPPED),
+            (false, _) if self.reported => {}
+            (false, lack) if self.settings.accept_resume.contains(&lack) => {}
+            (false, _) => self.withdraw(now, TAKEN),
+        }
+    }
+
+    /// Whether a stop ends the run command anyhow, or a start is under way that has its own verdict.
+    fn ends_by_itself(&self) -> bool {
+        self.stopping.is_some() || self.is_being_started()
     }
 
     fn withdraw(&mut self, now: Instant, asker: Asker) {
-        // A stop that is under way ends the run command anyhow.
-        if self.settings.control && self.stopping.is_none() && self.withdrawal.is_none() {
+        if self.settings.control && !self.ends_by_itself() && self.withdrawal.is_none() {
             let alarm_at = Some(now + self.settings.times.stop_alarm);
             self.withdrawal =
                 Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at, stands: None });
-        }
-    }
-
-    /// Control is back. A run command that could not be withdrawn acts again now.
-    pub(super) fn control_returned(&mut self, now: Instant) {
-        if let Some(withdrawal) = self.withdrawal.take() {
-            self.stop_by_policy(now, withdrawal.asker, StopMode::Ramp);
         }
     }
 
@@ -76,15 +111,17 @@ impl Supervisor {
         due.then_some(Job::Withdraw)
     }
 
-    pub(super) fn handle_withdrawn(&mut self, now: Instant, result: Result<Status>) {
+    pub(super) fn handle_withdrawn(&mut self, now: Instant, result: Result<Withdrawn>) {
         let Some(withdrawal) = &mut self.withdrawal else { return };
         match result {
-            Ok(status) => {
+            Ok(withdrawn) => {
                 let asker = withdrawal.asker.clone();
                 self.withdrawal = None;
-                self.started_here = false;
-                self.conclude(asker, Command::Withdraw, None, Outcome::Confirmed);
-                self.accept_status(now, status);
+                // Of what did not stand nobody says that it was withdrawn.
+                if let Withdrawn::Ended(_) = withdrawn {
+                    self.conclude(asker, Command::Withdraw, None, Outcome::Confirmed);
+                }
+                self.accept_status(now, withdrawn.into_status());
             }
             Err(error) => {
                 let lacks = error.kind() == ErrorKind::Unsupported;

@@ -7,9 +7,9 @@ use std::{
 };
 
 use drive_core::{
-    Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Identity,
-    Measurements, Percent, PortError, RawWord, Reaction, Refusal, SelfRestart, SlaveAddress, Speed, State,
-    Status, StopMode, Watchdog,
+    Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Ground, Identity,
+    Lease, Measurements, Motion, Percent, PortError, RawWord, Reaction, Refusal, SelfRestart, SlaveAddress,
+    Speed, State, Status, StopMode, Watchdog,
 };
 use serde_json::{Value, from_value, json, to_value};
 use tokio::time::{Instant, advance};
@@ -22,6 +22,8 @@ use crate::{
     view::{EventView, Happened, SnapshotView},
 };
 
+const STOP_CONFIRMED: EventKind = EventKind::StopConfirmed { mode: StopMode::Ramp, motion: Motion::AtRest };
+
 static OLF: FaultEntry = FaultEntry::new(9, "OLF", "motor overload", "let the motor cool");
 
 fn is(told: impl serde::Serialize, expected: Value) {
@@ -30,7 +32,8 @@ fn is(told: impl serde::Serialize, expected: Value) {
 
 fn status(state: State) -> Timed<Status> {
     let frequency = Some(Frequency::from_hertz(30));
-    Timed::<Status>::new(Status { state, output_frequency: frequency, ..Status::default() }, Instant::now())
+    let status = Status { state, motion: Motion::Driven, output_frequency: frequency, ..Status::default() };
+    Timed::<Status>::new(status, Instant::now())
 }
 
 fn nothing_known() -> Snapshot {
@@ -50,7 +53,8 @@ fn nothing_known() -> Snapshot {
         exceeded: Vec::new(),
         since: Vec::new(),
         stop: None,
-        started_here: false,
+        lease: None,
+        suspended: None,
         start_refused: Some(Refused::NotConnected),
         trips: Arc::default(),
         counters: Counters::default(),
@@ -94,7 +98,8 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
         watchdog: WatchdogCheck::Verified(armed),
         self_restarts: Some([restart].into()),
         stop: Some(stop),
-        started_here: true,
+        lease: Some(Lease::new(Direction::Forward, 0x000F)),
+        suspended: None,
         start_refused: None,
         ..nothing_known()
     };
@@ -103,7 +108,8 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
         &snapshot,
         json!({
             "name": "pump 1", "link": "connected",
-            "status": {"quality": "good", "age_ms": 120, "state": "running", "output_frequency_hz": 30.0, "raw": []},
+            "status": {"quality": "good", "age_ms": 120, "state": "running", "motion": "driven",
+                "output_frequency_hz": 30.0, "raw": []},
             "measurements": {"quality": "good", "age_ms": 10_120, "before_trip": false, "torque_percent": 40.0, "raw": []},
             "setpoint": {"frequency_hz": 30.0}, "reached": true,
             "stop": {"mode": "ramp", "since_ms": 10_120, "attempts": 2, "taken": false, "alarm": true},
@@ -242,10 +248,8 @@ async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
     assert_eq!(told(EventKind::WatchdogBroken("not kept".to_owned()))["event"], "watchdog_broken");
 
     let hour = Duration::from_secs(3_600);
-    let event = Event {
-        wall: SystemTime::UNIX_EPOCH + hour,
-        ..Event::now("pump 1", EventKind::StopConfirmed, Cause::Drive)
-    };
+    let event =
+        Event { wall: SystemTime::UNIX_EPOCH + hour, ..Event::now("pump 1", STOP_CONFIRMED, Cause::Drive) };
     advance(Duration::from_secs(10)).await;
     assert_eq!(to_value(event).unwrap()["time_unix_ms"], 3_600_000, "the wall's clock as it stood then");
 }
@@ -325,7 +329,11 @@ fn every_kind() -> Vec<EventKind> {
         EventKind::StopModeReplaced { asked: StopMode::Ramp, used: StopMode::Freewheel, why: Some("Stt") },
         EventKind::StopTookCommand(Control::Terminals),
         EventKind::StopUnconfirmed { since: Duration::from_secs(2), attempts: 3, outcome: unknown.clone() },
-        EventKind::StopConfirmed,
+        STOP_CONFIRMED,
+        EventKind::OutputBlocked(Refusal::Tripped),
+        EventKind::ReferenceTaken(Refusal::MotorRunning),
+        EventKind::CommandOverridden(Refusal::NotInControl(Control::Panel)),
+        EventKind::ContractChanged(Ground::Limits),
         EventKind::Reconfigured(vec!["periods"]),
         EventKind::Exit(ExitAction::Stopped(unknown)),
         EventKind::Exit(ExitAction::TimeOver),
@@ -347,10 +355,7 @@ async fn an_event_of_every_kind_reads_back_as_it_was_told_with_its_fields_and_it
         assert_eq!(told["event"], name, "the name of a kind is the same in the log and in JSON");
         let fields = ["order", "time_unix_ms", "drive", "event", "alarm", "text", "cause", "words"];
         let others = told.as_object().unwrap().keys().filter(|key| !fields.contains(&key.as_str()));
-        let has_none = matches!(
-            event.kind,
-            EventKind::FaultCleared | EventKind::ControlReturned | EventKind::StopConfirmed
-        );
+        let has_none = matches!(event.kind, EventKind::FaultCleared | EventKind::ControlReturned);
         assert_eq!(others.count() == 0, has_none, "{told}");
         let read: EventView = from_value(told.clone()).unwrap_or_else(|error| panic!("{error}: {told}"));
         assert_eq!(read, EventView::from(&event));
@@ -435,7 +440,7 @@ fn settings_read_back_as_they_were_told_and_what_is_not_said_is_usual() {
         "alarms": {"current_a": 3.5}, "watchdog": {"time_ms": 10_000, "reaction": "ramp"},
         "on_exit": {"release": "fast"}, "on_exit_adopted": "report",
         "on_exit_watchdog": "restore_in_ram", "on_loss": {"stop": "ramp"}, "on_fault": "reset_watchdog_trip",
-        "on_control_taken": "withdraw", "accept_self_restart": []
+        "on_control_taken": "withdraw", "accept_self_restart": [], "accept_resume": []
     });
     is(&settings, told.clone());
     assert_eq!(from_value::<DriveSettings>(told).unwrap(), settings);

@@ -1,5 +1,6 @@
 //! What every family promises of itself: [`Contract`]. A family from outside runs it on itself as ours do.
 
+pub mod adversary;
 mod claims;
 mod story;
 mod words;

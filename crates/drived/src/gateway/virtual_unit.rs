@@ -170,7 +170,7 @@ impl Shown {
             | bit(self.live().is_some_and(Status::is_fault), 10)
             | bit(self.live().is_some_and(|status| status.warning == Some(true)), 11)
             | bit(self.snapshot.stop.is_some(), 12)
-            | bit(self.snapshot.started_here, 13)
+            | bit(self.snapshot.started_here(), 13)
     }
 
     fn state(&self) -> u16 {

@@ -3,7 +3,7 @@
 use std::{net::IpAddr, time::Duration};
 
 use drive_core::{
-    Class, Direction, Drive, Error, Intent, Row, Setpoint, State, StopMode, Terms, registers::Storage,
+    Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, registers::Storage,
     tokio_modbus::ExceptionCode,
 };
 use drive_families::Family;
@@ -314,7 +314,8 @@ impl Desk {
         let before = self.clients.write(peer, drive.name(), Word::Run);
         let snapshot = drive.snapshot();
         let status = snapshot.fresh_status(Instant::now());
-        let runs = snapshot.stop.is_none() && status.is_some_and(|status| status.state == State::Running);
+        let ours = status.and_then(|status| status.verdict).is_some_and(|verdict| verdict.is_in_force());
+        let runs = snapshot.stop.is_none() && ours;
         let same_way = status.is_some_and(|status| status.direction.is_none_or(|way| way == direction));
         if runs && same_way {
             return match setpoint.filter(|setpoint| snapshot.setpoint != Some(*setpoint)) {
@@ -479,7 +480,7 @@ impl Desk {
                 let Some(drive) = self.drives().into_iter().find(|drive| **drive.name() == *name) else {
                     continue;
                 };
-                if !drive.snapshot().started_here {
+                if !drive.snapshot().started_here() {
                     continue;
                 }
                 let text = format!("{peer} started it and has been silent for {limit:?}");
@@ -516,7 +517,7 @@ fn pending(drive: &DriveHandle) -> Refusal {
 fn stands(drive: &DriveHandle) -> bool {
     let snapshot = drive.snapshot();
     let status = snapshot.fresh_status(Instant::now());
-    status.is_some_and(drive_core::Status::is_undriven) && snapshot.stop.is_none() && !snapshot.started_here
+    status.is_some_and(drive_core::Status::is_undriven) && snapshot.stop.is_none() && !snapshot.started_here()
 }
 
 fn shows_fault(drive: &DriveHandle) -> bool {

@@ -3,7 +3,9 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{Control, Current, Error, Identity, SelfRestart, SerialSettings, State, Status, StopMode};
+use drive_core::{
+    Control, Current, Direction, Error, Identity, Lease, SelfRestart, SerialSettings, State, Status, StopMode,
+};
 use drive_families::Family;
 use drive_fleet::{
     Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, WatchdogCheck,
@@ -94,7 +96,9 @@ pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json:
         Box::new(move |drive| drive.stop = Some(stop(true, now))),
         Box::new(move |drive| drive.stop = Some(stop(false, now))),
         Box::new(move |drive| drive.run_command_stands = Some(error())),
-        Box::new(|drive| (drive.link, drive.started_here) = (Link::Lost, true)),
+        Box::new(|drive| {
+            (drive.link, drive.lease) = (Link::Lost, Some(Lease::new(Direction::Forward, 0x000F)));
+        }),
         Box::new(|drive| drive.link = Link::Lost),
         Box::new(|drive| drive.link = Link::Connecting),
         Box::new(move |drive| shown(drive, |status| status.state = State::Fault)),
@@ -148,7 +152,8 @@ fn untroubled(now: Instant) -> Snapshot {
         run_command_stands: None,
         exceeded: Vec::new(),
         stop: None,
-        started_here: false,
+        lease: None,
+        suspended: None,
         start_refused: None,
         trips: Arc::default(),
         counters: Counters::default(),

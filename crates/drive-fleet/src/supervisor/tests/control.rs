@@ -8,7 +8,7 @@ fn running(settings: DriveSettings) -> Rig {
     rig.pass(1_500 * MS);
     rig.order(run_at(40));
     rig.pass(1_500 * MS);
-    assert!(rig.snapshot().started_here);
+    assert!(rig.snapshot().started_here());
     rig.outputs.clear();
     rig.drive.log.clear();
     rig
@@ -55,7 +55,10 @@ fn control_that_a_drive_tells_only_when_somebody_else_has_it_is_seen_to_be_taken
 #[test]
 fn a_withdrawal_that_is_not_heard_is_repeated_and_becomes_an_alarm_in_its_time() {
     let mut rig = running(settings());
-    rig.machine.control_taken(rig.now);
+    rig.drive.status.control = Some(Control::Terminals);
+    while rig.machine.withdrawal.is_none() {
+        rig.pass(20 * MS);
+    }
     rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
     rig.pass(2_900 * MS);
     assert!(rig.drive.writes().iter().filter(|job| **job == Job::Withdraw).count() >= 3);
@@ -97,6 +100,64 @@ fn nothing_is_withdrawn_where_the_policy_says_so_or_the_drive_is_only_read_or_di
     standing.drive.status.control = Some(Control::Terminals);
     standing.pass(2_000 * MS);
     assert_eq!(standing.drive.writes(), []);
+}
+
+/// What a status says of the run command from now on, whatever else it shows.
+fn says(rig: &mut Rig, verdict: Verdict) {
+    rig.drive.says = Some(verdict);
+}
+
+const GUARD: Refusal = Refusal::Overridden { by: "a guard", remedy: "close it" };
+
+#[test]
+fn a_run_command_whose_output_is_cut_or_whose_reference_is_taken_is_told_and_withdrawn() {
+    for (lacks, name) in [(Lack::Output, "output blocked"), (Lack::Reference, "reference taken")] {
+        let mut rig = running(settings());
+        says(&mut rig, Verdict::lacks(lacks, GUARD));
+        rig.pass(2_000 * MS);
+        assert_eq!(rig.drive.writes(), [Job::Withdraw]);
+        assert_eq!(rig.events(), [name, "command"]);
+        assert_eq!(rig.snapshot().lease, None);
+    }
+}
+
+#[test]
+fn a_run_command_stands_through_a_cut_output_only_where_that_is_accepted_by_name() {
+    let accepts = DriveSettings { accept_resume: vec![Lack::Output], ..settings() };
+    let mut rig = running(accepts);
+    says(&mut rig, Verdict::lacks(Lack::Output, GUARD));
+    rig.drive.stand();
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+    assert_eq!(rig.snapshot().suspended, Some(GUARD));
+    assert!(rig.snapshot().started_here(), "it stands at standstill too");
+    says(&mut rig, Verdict::lacks(Lack::Reference, GUARD));
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw], "of the reference nobody said so");
+}
+
+#[test]
+fn a_trip_that_is_first_seen_at_the_return_of_a_drive_has_its_run_command_withdrawn() {
+    let mut rig = running(settings());
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(10_000 * MS);
+    rig.drive.failing = None;
+    rig.drive.trip(9);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Withdraw]);
+    assert_eq!(rig.snapshot().lease, None);
+}
+
+#[test]
+fn the_exit_stops_a_run_command_that_stands_though_the_motor_does_not_turn() {
+    let accepts = DriveSettings { accept_resume: vec![Lack::Output], ..settings() };
+    let mut rig = running(accepts);
+    says(&mut rig, Verdict::lacks(Lack::Output, GUARD));
+    rig.drive.stand();
+    rig.pass(2_000 * MS);
+    rig.machine.handle_exit(rig.now, Policy::Exit);
+    rig.pass(2_000 * MS);
+    assert!(rig.drive.writes().contains(&Job::Stop(StopMode::Ramp)), "{:?}", rig.drive.writes());
 }
 
 #[test]

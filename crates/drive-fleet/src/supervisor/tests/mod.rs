@@ -8,8 +8,9 @@ mod questions;
 mod stops;
 
 use drive_core::{
-    Command, Control, Direction, Exchange, Frequency, Identity, Measurements, PortError, Reaction, Refusal,
-    Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Watchdog, Written, registers::Storage,
+    Command, Control, Direction, Exchange, Frequency, Identity, Lack, Lease, Measurements, Motion, PortError,
+    Reaction, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Verdict, Watchdog,
+    Withdrawn, Written, registers::Storage,
 };
 
 use super::*;
@@ -41,6 +42,14 @@ struct Paper {
     /// Whether it has a word that withdraws a run command.
     withdraws: bool,
     self_restarts: Vec<SelfRestart>,
+    /// It confirms the write of its watchdog and keeps what it had.
+    keeps_watchdog: bool,
+    /// It refuses the write of its watchdog: not now.
+    refuses_watchdog: bool,
+    /// The run command of this side that it holds.
+    lease: Option<Lease>,
+    /// What its statuses say of that, whatever else they show.
+    says: Option<Verdict>,
     /// The content of every register.
     register: u16,
     log: Vec<Job>,
@@ -62,6 +71,7 @@ impl Paper {
                 output_frequency: Some(Frequency::ZERO),
                 control: Some(Control::Bus),
                 at_reference: Some(false),
+                motion: Motion::AtRest,
                 ..Status::default()
             },
             identity: Identity { model: Some("one".to_owned()), ..Identity::default() },
@@ -73,6 +83,10 @@ impl Paper {
             stops_by: None,
             withdraws: true,
             self_restarts: Vec::new(),
+            keeps_watchdog: false,
+            refuses_watchdog: false,
+            lease: None,
+            says: None,
             register: 0,
             log: Vec::new(),
         }
@@ -81,6 +95,7 @@ impl Paper {
     fn run(&mut self) {
         let reference = self.reference;
         self.status.state = State::Running;
+        self.status.motion = Motion::Driven;
         self.status.at_reference = Some(true);
         self.status.output_frequency = match reference {
             Some(drive_core::Setpoint::Frequency(frequency)) => Some(frequency),
@@ -90,6 +105,7 @@ impl Paper {
 
     fn stand(&mut self) {
         self.status.state = State::Ready;
+        self.status.motion = Motion::AtRest;
         self.status.at_reference = Some(false);
         self.status.output_frequency = Some(Frequency::ZERO);
     }
@@ -110,8 +126,24 @@ impl Paper {
         }
     }
 
+    /// As a family judges it: by who commands, whether it has tripped, and whether it runs.
+    fn verdict(&self) -> Option<Verdict> {
+        self.lease.map(|_| self.says.unwrap_or_else(|| self.shown()))
+    }
+
+    fn shown(&self) -> Verdict {
+        match (self.status.control, self.status.state) {
+            (_, State::Fault) => Verdict::lacks(Lack::Output, Refusal::Tripped),
+            (Some(other), _) if other != Control::Bus => {
+                Verdict::lacks(Lack::Command, Refusal::NotInControl(other))
+            }
+            (_, State::Running) => Verdict::InForce,
+            (_, state) => Verdict::lacks(Lack::Output, Refusal::State(state)),
+        }
+    }
+
     fn status(&mut self) -> Result<Status> {
-        let status = self.status.clone();
+        let status = Status { verdict: self.verdict(), ..self.status.clone() };
         self.result(status)
     }
 
@@ -122,6 +154,7 @@ impl Paper {
             Job::Stop(asked) => {
                 if reached && self.obeys {
                     self.stand();
+                    self.lease = None;
                 }
                 let (mode, instead) = match self.stops_by {
                     Some((mode, why)) if mode != asked => (mode, Some(why)),
@@ -133,7 +166,12 @@ impl Paper {
                 let (what, reason) = ("withdrawal of the run command", "a test");
                 Reply::Withdrawn(Err(Error::Unsupported { what, reason }))
             }
-            Job::Withdraw => Reply::Withdrawn(self.status()),
+            Job::Withdraw => {
+                if reached {
+                    self.lease = None;
+                }
+                Reply::Withdrawn(self.status().map(Withdrawn::Ended))
+            }
             Job::SelfRestarts => {
                 let restarts = self.self_restarts.clone();
                 Reply::SelfRestarts(self.result(restarts))
@@ -147,6 +185,7 @@ impl Paper {
                 if reached && self.obeys {
                     self.run();
                     self.status.direction = Some(direction);
+                    self.lease = Some(Lease::new(direction, 0x000F));
                 }
                 Reply::Ordered(self.status())
             }
@@ -171,8 +210,13 @@ impl Paper {
                 Reply::Ordered(self.status())
             }
             Job::Persist => Reply::Saved(self.result(1)),
+            Job::ArmWatchdog(..) if self.refuses_watchdog => {
+                let exchange = Exchange { function: 6, register: Some(6005) };
+                let meaning = drive_core::ExceptionMeaning::NotNow;
+                Reply::Watchdog(Err(Error::Exception { slave: slave(), exchange, code: 4, meaning }))
+            }
             Job::ArmWatchdog(timeout, reaction) => {
-                if reached {
+                if reached && !self.keeps_watchdog {
                     self.watchdog = Watchdog { timeout: Some(timeout), reaction: Some(reaction) };
                 }
                 let watchdog = self.watchdog;
@@ -267,6 +311,7 @@ impl Rig {
                     assert!(until.is_none_or(|until| until > self.now), "{job:?} would never be done");
                     self.now += 20 * MS;
                     let reply = self.drive.answer(job);
+                    self.machine.handle_lease(self.drive.lease);
                     self.machine.handle_reply(self.now, reply);
                 }
                 Step::Wait(_) if self.machine.turn() == Turn::Wanted => self.machine.grant_turn(),

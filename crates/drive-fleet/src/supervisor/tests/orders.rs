@@ -10,7 +10,7 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
     assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
     let setpoint = Frequency::from_hertz(40).into();
     assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint), Job::Start(Direction::Forward)]);
-    assert!(rig.snapshot().started_here);
+    assert!(rig.snapshot().started_here());
     assert_eq!(rig.snapshot().setpoint, Some(setpoint));
 }
 
@@ -146,4 +146,41 @@ fn an_overloaded_queue_says_so() {
     rig.pass(100 * MS);
     assert_eq!(rig.outcome(ids[19]), Some(&Outcome::Refused(Refused::QueueFull)));
     assert_eq!(rig.outcome(ids[0]), Some(&Outcome::Confirmed));
+}
+
+#[test]
+fn a_start_that_the_family_does_not_confirm_stays_so_whatever_state_the_drive_shows_afterwards() {
+    let mut rig = Rig::ready();
+    let id = rig.order(START);
+    let step = rig.machine.next(rig.now);
+    assert!(matches!(step, Step::Do { job: Job::Start(_), .. }), "{step:?}");
+    rig.drive.lease = Some(Lease::new(Direction::Forward, 0x000F));
+    rig.machine.handle_lease(rig.drive.lease);
+    rig.drive.run();
+    let because = Some(Refusal::Overridden { by: "another reference", remedy: "see to it" });
+    let (slave, command) = (slave(), Command::Start(Direction::Forward));
+    let status = Box::new(rig.drive.status.clone());
+    let error = Error::NotConfirmed { slave, command, status, because };
+    rig.machine.handle_reply(rig.now, Reply::Ordered(Err(error.clone())));
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::NotConfirmed(Unconfirmed::Denied(error))));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)], "it is taken back");
+}
+
+#[test]
+fn a_watchdog_that_keeps_something_else_is_written_once_and_not_for_ever() {
+    let mut rig = Rig::controlled();
+    rig.drive.keeps_watchdog = true;
+    rig.pass(600_000 * MS);
+    let written = rig.drive.log.iter().filter(|job| matches!(job, Job::ArmWatchdog(..))).count();
+    assert_eq!(written, 1);
+    assert!(matches!(rig.snapshot().watchdog, crate::snapshot::WatchdogCheck::Broken(_)));
+}
+
+#[test]
+fn a_watchdog_that_the_drive_refuses_at_standstill_is_an_alarm_and_not_waited_for_for_ever() {
+    let mut rig = Rig::controlled();
+    rig.drive.refuses_watchdog = true;
+    rig.pass(600_000 * MS);
+    assert!(rig.events().contains(&"watchdog broken"), "{:?}", rig.events());
 }

@@ -79,25 +79,105 @@ fn a_stop_mode_that_the_drive_replaces_is_told_with_the_reason_and_confirmed() {
 }
 
 #[test]
-fn whoever_stops_by_injection_ends_it_once_the_output_is_at_zero() {
-    for (state, output) in [
-        (State::Stopping, Some(Frequency::ZERO)),
-        (State::Ready, Some(Frequency::ZERO)),
-        (State::Ready, None),
-    ] {
+fn whoever_stops_by_injection_ends_it_once_the_motor_is_held_and_not_when_the_output_is_at_zero() {
+    for (state, motion) in
+        [(State::Stopping, Motion::Held), (State::Ready, Motion::AtRest), (State::Ready, Motion::Coasting)]
+    {
         let mut rig = Rig::ready();
         rig.drive.run();
         rig.pass(1_000 * MS);
         rig.drive.log.clear();
         let id = rig.stop(StopMode::DcInjection);
         assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
-        let braking = Status { state: State::Stopping, ..rig.drive.status.clone() };
-        rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::DcInjection, braking))));
-        rig.drive.status = Status { state, output_frequency: output, ..rig.drive.status.clone() };
+        let output_frequency = Some(Frequency::ZERO);
+        let braking = Status {
+            state: State::Stopping,
+            motion: Motion::Braking,
+            output_frequency,
+            ..rig.drive.status.clone()
+        };
+        let stopped = Stopped::by(StopMode::DcInjection, braking.clone());
+        rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
+        rig.drive.status = braking;
+        rig.pass(5_000 * MS);
+        assert_eq!(rig.drive.writes(), [], "no output is no standstill: it is braked still");
+        rig.drive.status = Status { state, motion, ..rig.drive.status.clone() };
         rig.pass(1_000 * MS);
         assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)], "{state}");
         assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed), "{state}");
     }
+}
+
+#[test]
+fn an_injection_of_which_nobody_knows_when_the_motor_stands_is_ended_before_it_heats_it() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    rig.stop(StopMode::DcInjection);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    let braking = Status { state: State::Stopping, motion: Motion::Braking, ..rig.drive.status.clone() };
+    let stopped = Stopped::by(StopMode::DcInjection, braking.clone());
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
+    rig.drive.status = braking;
+    rig.pass(40_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+}
+
+/// A stop that the drive has taken, of a motor at 50 Hz that comes down from now on.
+fn coming_down() -> (Rig, CallId) {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.outputs.clear();
+    let id = rig.stop(StopMode::Ramp);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    let braking = Status {
+        state: State::Stopping,
+        motion: Motion::Braking,
+        output_frequency: Some(Frequency::from_hertz(50)),
+        ..rig.drive.status.clone()
+    };
+    rig.drive.status = braking.clone();
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, braking))));
+    (rig, id)
+}
+
+#[test]
+fn a_ramp_of_three_minutes_is_no_alarm_as_long_as_the_motor_comes_down() {
+    let (mut rig, id) = coming_down();
+    for hertz in (0..50).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(3_600 * MS);
+    }
+    assert!(!rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    rig.drive.stand();
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+}
+
+#[test]
+fn a_ramp_that_hangs_is_an_alarm_in_its_time() {
+    let (mut rig, id) = coming_down();
+    rig.drive.status.output_frequency = Some(Frequency::from_hertz(7));
+    rig.pass(70_000 * MS);
+    assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))));
+}
+
+#[test]
+fn a_freewheel_is_confirmed_as_an_output_that_is_off_and_a_shaft_that_may_coast() {
+    let (mut rig, id) = coming_down();
+    rig.drive.status.motion = Motion::Coasting;
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    let told = rig.outputs.iter().find_map(|output| match output {
+        Output::Event(Happened { kind: kind @ EventKind::StopConfirmed { .. }, .. }) => {
+            Some(kind.to_string())
+        }
+        _ => None,
+    });
+    assert_eq!(told.as_deref(), Some("stop confirmed: output off, the shaft may coast"));
 }
 
 #[test]
@@ -148,7 +228,7 @@ fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
     rig.pass(1_000 * MS);
     let id = rig.stop(StopMode::Ramp);
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
-    rig.drive.status.state = State::Stopping;
+    (rig.drive.status.state, rig.drive.status.motion) = (State::Stopping, Motion::Braking);
     let stopping = rig.drive.status.clone();
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
     rig.pass(200 * MS);

@@ -154,6 +154,7 @@ pub(super) fn status_of(status: &Value) -> Option<Status> {
         current: read(&status["current_a"]),
         current_share: read(&status["current_percent"]),
         at_reference: status["at_reference"].as_bool(),
+        motion: read(&status["motion"]).unwrap_or_default(),
         warning: status["warning"].as_bool(),
         fault_code: read(&status["fault_code"]),
         control: word("control").and_then(|control| control.parse::<Control>().ok()),

@@ -70,7 +70,7 @@ async fn a_scada_that_walks_the_ladder_sees_each_step_and_its_motor_runs_and_sto
     // The word again, as one who writes cyclically does: it is confirmed, and changes nothing.
     assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
     let drive = plant.plant.fleet().drive("pump 1").unwrap();
-    assert!(drive.snapshot().started_here, "so that the policies of the exit hold for it");
+    assert!(drive.snapshot().started_here(), "so that the policies of the exit hold for it");
     assert_eq!(peer.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
     sleep(Duration::from_secs(10)).await;
     assert!(!plant.machines[0].observe().running);

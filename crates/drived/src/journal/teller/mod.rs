@@ -185,7 +185,7 @@ impl Teller {
                 let (since, attempts, outcome) = (*since, *attempts, outcome.to_string());
                 self.hold(now + MOMENT, drive, What::StopUnconfirmed { since, attempts, outcome });
             }
-            EventKind::StopConfirmed => {
+            EventKind::StopConfirmed { .. } => {
                 if let Some(since) = self.state(drive).stop_alarm.take() {
                     let after = Span(now.saturating_duration_since(since)).to_string();
                     self.say(

@@ -1,6 +1,6 @@
 //! What turns out later of a command whose outcome was not known.
 
-use drive_core::{Control, Setpoint, State};
+use drive_core::{Control, Setpoint};
 use drive_fleet::{DriveHandle, Snapshot};
 use tokio::time::Instant;
 
@@ -32,10 +32,8 @@ fn verdict_of(action: Action, snapshot: &Snapshot, ended: Instant) -> Option<Out
         Action::Stop(_) => stands.then_some(OutcomeWord::Confirmed),
         // The fleet takes such a start back, and repeats that until it is confirmed.
         Action::Start { .. } => stands.then_some(OutcomeWord::NotConfirmed),
-        Action::Reset => match status.state {
-            State::Unknown => None,
-            _ => either(!status.is_fault()),
-        },
+        Action::Reset if status.is_explained() => either(!status.is_fault()),
+        Action::Reset => None,
         Action::Release => status.control.and_then(|control| either(control != Control::Bus)),
         Action::Save => None,
         Action::Setpoint { setpoint, .. } => {

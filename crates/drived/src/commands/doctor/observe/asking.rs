@@ -7,7 +7,7 @@ use std::{
 
 use drive_bus::{Line, SlaveSettings};
 use drive_core::{
-    Class, Drive, Error, PortError, SlaveAddress, State, Terms,
+    Class, Drive, Error, PortError, SlaveAddress, Terms,
     tokio_modbus::{Request, client::Client as _},
 };
 use drive_families::{Family, Options};
@@ -257,8 +257,7 @@ impl Asking {
         self.note(asker, strays, false);
         match status {
             Ok(status) => {
-                let runs = matches!(status.state, State::Running | State::Stopping | State::QuickStop)
-                    || status.output_frequency.is_some_and(|frequency| frequency.centihertz() != 0);
+                let runs = !status.is_standstill();
                 let running = self.running.get_or_insert_default();
                 if runs {
                     running.insert(asker.slave)

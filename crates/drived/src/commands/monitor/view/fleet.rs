@@ -135,7 +135,7 @@ impl Row {
 /// The state, with the direction of a motor that turns or the mnemonic of the fault.
 fn state(drive: &Drive, is_live: bool) -> String {
     let status = drive.status.as_ref();
-    let turning = status.filter(|status| status.state.is_moving() && !drive.stop_is_pending());
+    let turning = status.filter(|status| !status.is_standstill() && !drive.stop_is_pending());
     let more = drive.fault().or_else(|| turning.map(|status| direction(status).to_owned()));
     let word = drive.state();
     match (&*word, more) {

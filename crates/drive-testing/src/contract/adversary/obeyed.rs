@@ -1,0 +1,203 @@
+//! What is sent, in which class, how often, and in which order; and what is claimed of a drive that keeps its words.
+
+use std::time::Duration;
+
+use drive_core::{Class, Direction, StopMode, Withdrawn};
+
+use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
+use crate::{
+    contract::Contract,
+    recorder::{Habit, Heard},
+};
+
+/// Which requests there were, for a complaint.
+fn told(heard: &[Heard]) -> String {
+    let one = |heard: &Heard| {
+        let what = if heard.writes() { "writes" } else { "reads" };
+        let register = heard.register.map_or_else(String::new, |register| format!(" {register}"));
+        format!("{what}{register} ({})", heard.class())
+    };
+    heard.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+impl Contract {
+    /// What a drive is sent that does as it is told.
+    pub(super) async fn obeyed(&self) -> Vec<Complaint> {
+        let mut complaints = self.classes().await;
+        complaints.extend(self.stop_before_all_else(true).await);
+        complaints.extend(self.stop_before_all_else(false).await);
+        complaints.extend(self.run_command_once().await);
+        complaints.extend(self.reset_is_an_edge().await);
+        complaints.extend(self.forgets().await);
+        complaints
+    }
+
+    /// Each method sets its class by itself.
+    async fn classes(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("each method travels in its class").await;
+        let lifetime = Some(Duration::from_secs(1));
+        stage.rig.drive.lifetimes_mut().command = lifetime;
+
+        let _ = stage.rig.drive.status().await;
+        stage.expect("a status", |heard| heard.class() == Class::Status && !heard.writes());
+        let _ = stage.rig.drive.measurements().await;
+        stage.expect("measurements", |heard| heard.class() <= Class::Status && !heard.writes());
+        let _ = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
+        let timely = |heard: &Heard| heard.class() == Class::Command && heard.terms.lifetime.is_some();
+        stage.expect("the write of a setpoint", |heard| !heard.writes() || timely(heard));
+        let _ = stage.rig.drive.start(Direction::Forward).await;
+        let heard = stage.witness.heard();
+        if heard.first().is_none_or(Heard::writes) {
+            stage.blame(format!("a start reads a fresh status before it writes: it {}", told(&heard)));
+        }
+        stage.expect("the write of a start", |heard| !heard.writes() || timely(heard));
+        let _ = stage.rig.drive.stop(StopMode::Ramp).await;
+        stage.expect("the write of a stop", |heard| !heard.writes() || heard.class() == Class::Stop);
+        stage.complaints
+    }
+
+    /// A stop is written before anything is read, whatever is known of the drive.
+    async fn stop_before_all_else(&self, seen_before: bool) -> Vec<Complaint> {
+        let mut stage = self.stage("a stop is written before anything is read").await;
+        if !seen_before {
+            stage.rig.drive.forget();
+        }
+        let _ = stage.rig.drive.stop(StopMode::Ramp).await;
+        let heard = stage.witness.heard();
+        if !heard.first().is_some_and(|first| first.writes() && first.class() == Class::Stop) {
+            stage.blame(format!("known before: {seen_before}; it {}", told(&heard)));
+        }
+        stage.complaints
+    }
+
+    /// A run command is written once.
+    async fn run_command_once(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("a run command is written once").await;
+        let Some(control) = self.control else { return Vec::new() };
+        let _ = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
+        stage.witness.from_now_on(Habit::Obeys);
+        let started = stage.rig.drive.start(Direction::Forward).await;
+        let words = stage.witness.written_to(control.register);
+        let runs = words.last().map_or(0, |last| words.iter().filter(|word| *word == last).count());
+        if runs != 1 {
+            stage.blame(format!("{started:?} after the control words {words:04X?}: {runs} run commands"));
+        }
+        stage.live(SETTLED).await;
+        if started.is_ok() && !stage.seen().running {
+            let seen = stage.seen();
+            stage.blame(format!("the start is confirmed and the motor does not run: {seen:?}"));
+        }
+        stage.complaints
+    }
+
+    /// A reset is written and cleared.
+    async fn reset_is_an_edge(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("a reset is one edge that is cleared").await;
+        let (Some(control), Some(trip)) = (self.control, self.trip) else { return Vec::new() };
+        // The bus has command: some drives give it to whoever wrote last, and a reset is no way to take it.
+        if stage.run().await.is_none() {
+            return stage.complaints;
+        }
+        stage.rig.machine.trip(trip);
+        stage.live(SETTLED).await;
+        let _ = stage.rig.drive.status().await;
+        stage.witness.from_now_on(Habit::Obeys);
+        let _ = stage.rig.drive.reset_faults().await;
+        let words = stage.witness.written_to(control.register);
+        let edge = words.split_last().is_some_and(|(last, before)| before.iter().any(|word| word != last));
+        if !edge {
+            stage.blame(format!("it wrote {words:04X?} and nothing after it"));
+        }
+        // What was there before must not come back in a reset that is held.
+        let resets = words.iter().filter(|word| words.last() != Some(*word)).count();
+        if resets > 1 && words.iter().collect::<std::collections::BTreeSet<_>>().len() == 2 {
+            stage.blame(format!("it wrote {words:04X?}: more than one edge"));
+        }
+        stage.complaints
+    }
+
+    /// What is read once is read again after `forget`.
+    async fn forgets(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("what was read once is read again after forget").await;
+        stage.rig.drive.forget();
+        let first = stage.reads_of_a_start().await;
+        let again = stage.reads_of_a_start().await;
+        stage.rig.drive.forget();
+        let after = stage.reads_of_a_start().await;
+        let missing: Vec<u16> = first
+            .iter()
+            .filter(|register| !again.contains(register) && !after.contains(register))
+            .copied()
+            .collect();
+        if !missing.is_empty() {
+            stage.blame(format!("registers {missing:?} were read at first, and not after forget"));
+        }
+        stage.complaints
+    }
+
+    /// What is claimed of a drive that acknowledges every write and keeps its words.
+    pub(super) async fn disobeyed(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("nothing is confirmed that the drive does not do").await;
+        let given = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
+        if given.is_err() {
+            stage.blame(format!("a plain setpoint is not confirmed: {given:?}"));
+        }
+        stage.witness.from_now_on(Habit::KeepsItsWords);
+        let (heard, other) = (stage.witness.clone(), stage.rig.drive.set_setpoint(OTHER.into()).await);
+        if other.is_ok() && heard.heard().iter().any(Heard::writes) {
+            stage.blame("a setpoint is confirmed to a drive that keeps another".to_owned());
+        }
+        if let Ok(status) = stage.rig.drive.start(Direction::Forward).await {
+            stage.blame(format!("a start is confirmed to a drive that keeps its word: {status}"));
+        }
+        stage.witness.from_now_on(Habit::Obeys);
+        if stage.run().await.is_some() {
+            stage.witness.from_now_on(Habit::KeepsItsWords);
+            if let Ok(stopped) = stage.rig.drive.stop(StopMode::Ramp).await {
+                let seen = stage.seen();
+                stage.blame(format!("a stop is confirmed to a drive that runs on: {stopped}; {seen:?}"));
+            }
+            let writes = stage.witness.heard().iter().filter(|heard| heard.writes()).count();
+            if writes < 2 {
+                stage.blame(format!(
+                    "a stop that does not show is written again: {writes} writes in its time"
+                ));
+            }
+            if let Ok(Withdrawn::Ended(status)) = stage.rig.drive.withdraw().await {
+                stage.blame(format!("a withdrawal is confirmed to a drive that runs on: {status}"));
+            }
+        }
+        stage.stop_at_last().await;
+        if let Some(trip) = self.trip {
+            stage.rig.machine.trip(trip);
+            stage.witness.from_now_on(Habit::KeepsItsWords);
+            if let Ok(status) = stage.rig.drive.reset_faults().await {
+                stage.blame(format!("a reset is confirmed to a drive that stays tripped: {status}"));
+            }
+        }
+        stage.complaints
+    }
+}
+
+impl Stage {
+    /// That all that was heard since the last question is so.
+    fn expect(&mut self, what: &str, is_so: impl Fn(&Heard) -> bool) {
+        let heard = self.witness.heard();
+        if heard.is_empty() || !heard.iter().all(is_so) {
+            self.blame(format!("{what}: it {}", told(&heard)));
+        }
+        self.witness.from_now_on(Habit::Obeys);
+    }
+
+    /// The registers that are read by a status, a setpoint and a start, in order. What only takes its turn is not among them.
+    async fn reads_of_a_start(&mut self) -> Vec<u16> {
+        self.witness.from_now_on(Habit::Obeys);
+        let _ = self.rig.drive.status().await;
+        let _ = self.rig.drive.set_setpoint(SETPOINT.into()).await;
+        let _ = self.rig.drive.start(Direction::Forward).await;
+        let heard = self.witness.heard();
+        let _ = self.rig.drive.stop(StopMode::Ramp).await;
+        self.live(SETTLED).await;
+        heard.iter().filter(|heard| !heard.writes()).filter_map(|heard| heard.register).collect()
+    }
+}

@@ -1,0 +1,84 @@
+//! Families that break their contract, each in one way: a [`Contract`](crate::Contract) that does not complain of one of them
+//! is no contract. Made from any family by a wrapper around its drive or its port.
+
+mod drive;
+mod port;
+
+use drive_core::{Drive, Port, SlaveAddress};
+
+use crate::contract::Contract;
+
+/// A way in which a family breaks its contract.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Mutant {
+    /// A start is confirmed by anything that the drive then says.
+    StartConfirmedByAnything,
+    /// A stop is confirmed by anything that the drive then says.
+    StopConfirmedByAnything,
+    /// The run command is written twice.
+    RunTwice,
+    /// A stop travels like a slow reading.
+    StopInTheBackground,
+    /// A status is read before a stop is written.
+    StopReadsFirst,
+    /// A stop is written once and not again.
+    StopOnce,
+    /// A reset is written and held.
+    ResetAsALevel,
+    /// A setpoint counts as held because it was sent.
+    SetpointNotCompared,
+    /// What was read once is never read again.
+    ForgetForgetsNothing,
+    /// A reset is confirmed because it was sent.
+    ResetConfirmedByAnything,
+    /// A run command that was withdrawn counts as gone because that was sent.
+    WithdrawalConfirmedByAnything,
+    /// Commands have no lifetime.
+    CommandsLiveForEver,
+    /// Whatever the drive says, the run command is in force.
+    AlwaysInForce,
+    /// Whatever the drive says, nobody knows whether the run command is in force.
+    NeverKnown,
+    /// `forget` ends the lease.
+    ForgetEndsTheLease,
+    /// A stop that was sent ends the lease.
+    StopSentEndsTheLease,
+    /// No output is standstill.
+    NoOutputIsStandstill,
+}
+
+impl Mutant {
+    /// All of them.
+    pub const ALL: [Self; 17] = [
+        Self::StartConfirmedByAnything,
+        Self::StopConfirmedByAnything,
+        Self::RunTwice,
+        Self::StopInTheBackground,
+        Self::StopReadsFirst,
+        Self::StopOnce,
+        Self::ResetAsALevel,
+        Self::SetpointNotCompared,
+        Self::ForgetForgetsNothing,
+        Self::ResetConfirmedByAnything,
+        Self::WithdrawalConfirmedByAnything,
+        Self::CommandsLiveForEver,
+        Self::AlwaysInForce,
+        Self::NeverKnown,
+        Self::ForgetEndsTheLease,
+        Self::StopSentEndsTheLease,
+        Self::NoOutputIsStandstill,
+    ];
+
+    /// The family of a contract with this fault in it.
+    #[must_use]
+    pub fn of(self, contract: Contract) -> Contract {
+        let Contract { open, control, .. } = contract;
+        let register = control.map(|control| control.register);
+        let open = move |port: Box<dyn Port>, slave: SlaveAddress| -> Box<dyn Drive> {
+            let (port, tap) = port::Faulty::before(self, port, register);
+            Box::new(drive::Faulty::new(self, open(Box::new(port), slave), tap))
+        };
+        Contract { open: Box::new(open), ..contract }
+    }
+}

@@ -1,0 +1,64 @@
+//! What is in force is decided by the families and by nobody above them: no source of the fleet or of the program compares a
+//! drive's [`State`](drive_core::State) to decide. Who shows states, by a word, a colour or a number for each, is listed here.
+
+use std::{fs, path::Path};
+
+/// Where a state is shown and nothing is decided by it.
+const SHOWS: &[&str] = &[
+    "drive-fleet/src/view.rs",
+    "drived/src/commands/demo/table.rs",
+    "drived/src/commands/monitor/drive.rs",
+    "drived/src/commands/monitor/words.rs",
+    "drived/src/commands/poll/json.rs",
+    "drived/src/commands/status.rs",
+    "drived/src/drive_cells.rs",
+    "drived/src/explain/words.rs",
+    "drived/src/gateway/virtual_unit.rs",
+    "drived/src/journal/words.rs",
+    "drived/src/metrics/drives.rs",
+    "drived/src/mqtt/discovery.rs",
+    "drived/src/simulated.rs",
+];
+
+fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+    for entry in fs::read_dir(folder).expect("it is a folder") {
+        let path = entry.expect("it can be read").path();
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        match path.is_dir() {
+            true if name != "tests" => sources(&path, found),
+            false if name.ends_with(".rs") && !name.contains("test") => found.push(path),
+            _ => {}
+        }
+    }
+}
+
+/// Whether a line names a state of a drive, outside its tests, comments and the states of other things.
+fn names_a_state(line: &str) -> bool {
+    let code = line.split("//").next().unwrap_or_default();
+    code.match_indices("State::").any(|(at, _)| {
+        let before = code[..at].chars().next_back();
+        let after = code[at + 7..].chars().next();
+        before.is_none_or(|before| !before.is_alphanumeric()) && after.is_some_and(char::is_uppercase)
+    }) || code.contains(".is_moving()")
+}
+
+#[test]
+fn nothing_above_a_family_decides_by_the_state_that_a_drive_shows() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
+    let mut offenders = Vec::new();
+    for owner in ["drive-fleet/src", "drived/src"] {
+        let mut files = Vec::new();
+        sources(&crates.join(owner), &mut files);
+        for file in files {
+            let name = file.strip_prefix(&crates).expect("it is below").to_string_lossy().replace('\\', "/");
+            if SHOWS.contains(&name.as_str()) {
+                continue;
+            }
+            let text = fs::read_to_string(&file).expect("it can be read");
+            let own = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+            let lines = own.lines().enumerate().filter(|(_, line)| names_a_state(line));
+            offenders.extend(lines.map(|(number, line)| format!("{name}:{}: {}", number + 1, line.trim())));
+        }
+    }
+    assert!(offenders.is_empty(), "{}", offenders.join("\n"));
+}
