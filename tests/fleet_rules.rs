@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
 use drive_core::{
-    Class, Direction, Frequency, Identity, Reaction, Refusal, SerialSettings, State, StopMode,
+    Class, Direction, Frequency, Identity, Motion, Reaction, Refusal, SerialSettings, State, StopMode,
     serial::CharacterFormat,
 };
 use drive_families::Family;
@@ -572,4 +572,25 @@ async fn rule_1_a_stop_that_is_the_first_thing_a_drive_hears_is_confirmed_when_t
         })
         .await;
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn rule_12_a_motor_whose_output_was_cut_is_at_rest_only_once_its_owners_coast_time_is_over() {
+    each(async |family| {
+        for coast in [None, Some(20 * SECOND)] {
+            let mut plant = Plant::single(family, |settings| settings.coast = coast);
+            plant.run_at(30).await;
+            if !family.capabilities().stop_modes.contains(&StopMode::Freewheel) {
+                return;
+            }
+            let outcome = plant.motor().stop(StopMode::Freewheel).await;
+            assert!(outcome.is_confirmed(), "{family}: {outcome}");
+            let motion = || plant.motor().snapshot().status.as_ref().map(|status| status.value.motion);
+            assert_eq!(motion(), Some(Motion::Coasting), "{family}: the shaft was at 30 Hz a moment ago");
+            sleep(30 * SECOND).await;
+            let rests = if coast.is_some() { Motion::AtRest } else { Motion::Coasting };
+            assert_eq!(motion(), Some(rests), "{family}, {coast:?}");
+        }
+    })
+    .await;
 }

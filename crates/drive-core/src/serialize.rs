@@ -80,12 +80,16 @@ pub mod duration_ms {
 }
 
 /// A time in milliseconds, or none.
-pub(crate) mod maybe_ms {
+pub mod maybe_ms {
     use super::{Deserialize, Deserializer, Duration};
 
-    pub(crate) use super::milliseconds as serialize;
+    pub use super::milliseconds as serialize;
 
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<Option<Duration>, D::Error> {
         Ok(Option::<u64>::deserialize(deserializer)?.map(Duration::from_millis))

@@ -425,14 +425,12 @@ fn check_watchdog(
 }
 
 fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
-    let Member { settings, mut drive, .. } = member;
+    let Member { settings, drive, .. } = member;
     let (slave, capabilities) = (drive.slave(), drive.capabilities());
     let broadcasts = StopMode::ALL
         .into_iter()
         .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
         .collect();
-    let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
-    drive.accept_self_restart(&accepted);
     let now = Instant::now();
     let (watchdog, communication_fault) = (drive.watchdog_capability(), capabilities.communication_fault);
     let supervisor = Supervisor::new(now, settings.clone(), watchdog, communication_fault);
@@ -442,6 +440,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     let (urgent, urgent_box) = mpsc::unbounded_channel();
     let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
+    let settings = Arc::new(settings);
     let desk = Desk {
         supervisor,
         events: events.clone(),
@@ -449,7 +448,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         exit,
         callers: BTreeMap::new(),
         askers: BTreeMap::new(),
-        accepts: None,
+        settings: Some(Arc::clone(&settings)),
     };
     let turns = Arc::clone(&line.turns);
     tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box, turns }.run());
@@ -459,7 +458,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         slave,
         capabilities,
         watchdog,
-        settings: RwLock::new(Arc::new(settings)),
+        settings: RwLock::new(settings),
         broadcasts,
         messages,
         urgent,

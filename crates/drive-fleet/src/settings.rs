@@ -61,6 +61,14 @@ pub struct DriveSettings {
     /// output and gives it back. Anything else that keeps it from acting has it withdrawn.
     #[cfg_attr(feature = "serde", serde(default))]
     pub accept_resume: Vec<Lack>,
+    /// How long the motor coasts at the most when its output is cut, as its owner knows; `None`: nobody knows, and a motor that
+    /// was cut may coast until it is driven again.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "coast_ms", default, skip_serializing_if = "Option::is_none", with = "drive_core::serialize::maybe_ms")
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
+    pub coast: Option<Duration>,
     /// What it said it was, from an earlier run; `None`: what it says first is remembered.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub identity: Option<Identity>,
@@ -86,6 +94,7 @@ impl DriveSettings {
             ("on_loss", self.on_loss != other.on_loss),
             ("on_fault", self.on_fault != other.on_fault),
             ("accept_resume", self.accept_resume != other.accept_resume),
+            ("coast", self.coast != other.coast),
             ("on_control_taken", self.on_control_taken != other.on_control_taken),
             ("accept_self_restart", self.accept_self_restart != other.accept_self_restart),
         ];
@@ -112,6 +121,7 @@ impl DriveSettings {
             on_control_taken: OnControlTaken::default(),
             accept_self_restart: Vec::new(),
             accept_resume: Vec::new(),
+            coast: None,
             identity: None,
             watchdog_before: None,
         }

@@ -85,8 +85,10 @@ impl Task {
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
         loop {
-            if let Some(accepted) = desk.accepts.take() {
-                drive.accept_self_restart(&accepted.iter().map(String::as_str).collect::<Vec<_>>());
+            if let Some(settings) = desk.settings.take() {
+                let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
+                drive.accept_self_restart(&accepted);
+                drive.set_coast_time(settings.coast);
             }
             // Also what a call that was dropped has left.
             desk.supervisor.handle_lease(drive.lease());
@@ -198,8 +200,8 @@ pub(crate) struct Desk {
     pub(crate) exit: watch::Sender<Option<ExitAction>>,
     pub(crate) callers: BTreeMap<CallId, Report>,
     pub(crate) askers: BTreeMap<CallId, oneshot::Sender<Result<Told, Refused>>>,
-    /// Which restarts the drive is to accept from its next call on.
-    pub(crate) accepts: Option<Vec<String>>,
+    /// What the drive itself is to know of its settings from its next call on.
+    pub(crate) settings: Option<Arc<DriveSettings>>,
 }
 
 impl Desk {
@@ -244,8 +246,8 @@ impl Desk {
             }
             Urgent::Withdraw(id) => self.supervisor.handle_withdrawal(now, id),
             Urgent::Settings(settings) => {
-                self.accepts = Some(settings.accept_self_restart.clone());
                 self.supervisor.handle_settings(now, &settings);
+                self.settings = Some(settings);
                 false
             }
             Urgent::Exit(why) => self.supervisor.handle_exit(now, why),

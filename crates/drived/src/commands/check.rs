@@ -283,6 +283,11 @@ fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
         false => format!("accepted by {accepted}"),
     };
     line("starts by itself", Some(accepted));
+    let resumes: Vec<String> = settings.accept_resume.iter().map(ToString::to_string).collect();
+    let resumes = (!resumes.is_empty())
+        .then(|| format!("goes on by itself when it has its {} again", resumes.join(" or its ")));
+    line("cut off", resumes);
+    line("coasts", settings.coast.map(|time| format!("at rest {time:?} after its output was cut")));
     lines
 }
 

@@ -104,7 +104,7 @@ pub(super) fn drive(
 }
 
 /// The keys of an entry that promise that something is done to the drive.
-fn acts(entry: &DriveEntry) -> [Option<(&'static str, Range<usize>)>; 11] {
+fn acts(entry: &DriveEntry) -> [Option<(&'static str, Range<usize>)>; 12] {
     let span = |key, span: Option<Range<usize>>| span.map(|span| (key, span));
     let on_exit = entry.on_exit.as_ref().filter(|policy| policy.get_ref().0.0 != Exit::Leave);
     let adopted = entry.on_exit_adopted.as_ref().filter(|policy| policy.get_ref().0.0 == Adopted::Stop);
@@ -114,6 +114,7 @@ fn acts(entry: &DriveEntry) -> [Option<(&'static str, Range<usize>)>; 11] {
         span("stop_mode", entry.stop_mode.as_ref().map(Spanned::span)),
         span("commanders", entry.commanders.as_ref().map(Spanned::span)),
         span("accept_self_restart", entry.accept_self_restart.as_ref().map(Spanned::span)),
+        span("accept_resume", entry.accept_resume.as_ref().map(Spanned::span)),
         span("on_exit", on_exit.map(Spanned::span)),
         span("on_exit_adopted", adopted.map(Spanned::span)),
         span("on_exit_watchdog", entry.on_exit_watchdog.as_ref().map(Spanned::span)),

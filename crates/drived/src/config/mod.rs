@@ -412,6 +412,10 @@ fn settings(
         accept_self_restart: said(entry, defaults, |entry| &entry.accept_self_restart)
             .cloned()
             .unwrap_or_default(),
+        accept_resume: said(entry, defaults, |entry| &entry.accept_resume)
+            .map(|lacks| lacks.iter().map(|lack| lack.0.0).collect())
+            .unwrap_or_default(),
+        coast: said(entry, defaults, |entry| &entry.coast).map(|time| time.0.0),
         ..DriveSettings::watched(name)
     };
     check_settings(&settings, capabilities, capability).map_err(|problem| {

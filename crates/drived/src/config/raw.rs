@@ -12,7 +12,7 @@ use super::{
     groups::Entries,
     mqtt::MqttEntry,
     values::{
-        AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LossPolicy,
+        AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LackValue, LossPolicy,
         OptionValue, Parsed, PercentValue, ReactionValue, TakenPolicy, WatchdogPolicy,
     },
 };
@@ -86,6 +86,9 @@ pub(super) struct DriveEntry {
     pub(super) on_fault: Option<Spanned<Parsed<FaultPolicy>>>,
     pub(super) on_control_taken: Option<Spanned<Parsed<TakenPolicy>>>,
     pub(super) accept_self_restart: Option<Spanned<Vec<String>>>,
+    pub(super) accept_resume: Option<Spanned<Vec<Parsed<LackValue>>>>,
+    /// How long the motor coasts at the most when its output is cut.
+    pub(super) coast: Option<Spanned<Parsed<Time>>>,
     /// As `--option` has them.
     #[serde(default)]
     pub(super) options: BTreeMap<Spanned<String>, Spanned<OptionValue>>,

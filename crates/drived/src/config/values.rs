@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use drive_core::{Current, Frequency, Percent, Reaction};
+use drive_core::{Current, Frequency, Lack, Percent, Reaction};
 use drive_fleet::{Band, OnControlTaken, OnExitWatchdog};
 use serde::{Deserialize, Deserializer, de};
 
@@ -119,6 +119,14 @@ words! {
     TakenPolicy(OnControlTaken):
     "withdraw" => OnControlTaken::Withdraw,
     "report" => OnControlTaken::Report
+}
+
+words! {
+    /// What a run command may lack for a while and then act again by itself.
+    LackValue(Lack):
+    "command" => Lack::Command,
+    "reference" => Lack::Reference,
+    "output" => Lack::Output
 }
 
 /// The value of a drive's option: a text or a whole number, read by the option itself.
