@@ -79,7 +79,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     refusals.extend([Refusal::EepromLife, Refusal::MotorRunning]);
     sentences.extend(refusals.iter().map(ToString::to_string));
     assert!(sentences.len() > 70, "only {} sentences were found", sentences.len());
-    for sentence in sentences {
-        assert!(french.contains(&format!("  '{sentence}': '")), "{sentence}");
-    }
+    let missing: Vec<String> =
+        sentences.into_iter().filter(|sentence| !french.contains(&format!("  '{sentence}': '"))).collect();
+    assert!(missing.is_empty(), "no French for: {missing:#?}");
 }

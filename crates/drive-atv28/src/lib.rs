@@ -20,11 +20,7 @@ use drive_core::{
 };
 
 pub use crate::{faults::FAULTS, faults::WARNINGS, registers::ROWS};
-use crate::{
-    proof::{Doubt, INJECTION_TIME},
-    setpoint::Limits,
-    words::ControlWord,
-};
+use crate::{proof::Doubt, setpoint::Limits, words::ControlWord};
 
 /// What an Altivar 28 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
@@ -91,12 +87,10 @@ impl<P: Port> Atv28<P> {
     /// The drive with this address. Nothing is sent.
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress) -> Self {
-        let mut shaft = Shaft::new();
-        shaft.set_injection_time(Some(INJECTION_TIME));
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
             own: OwnRun::new(),
-            shaft,
+            shaft: Shaft::new(),
             motion: Motion::NotKnown,
             turns: Turns::default(),
             doubt: Doubt::default(),

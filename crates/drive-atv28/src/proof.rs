@@ -1,8 +1,6 @@
 //! What proves a run command of this side from status to status, and what the shaft does: what the ordinary exchanges carry, and
 //! what takes a further one, never more than one behind a status.
 
-use std::time::Duration;
-
 use drive_core::{
     Class, Control, Evidence, Frequency, Ground, Motion, Port, Refusal, Result, RunWord, Status, Told,
     Verdict,
@@ -18,9 +16,6 @@ use crate::{
     words::{ControlWord, ExtendedStatus, StatusWord},
 };
 
-/// How long direct current is given to bring a motor to rest: as long as the twin keeps it at its full height (BBV51701 p. 40).
-/// The drive has no register for it.
-pub(crate) const INJECTION_TIME: Duration = Duration::from_secs(5);
 /// What has its turn: `CMD` with `LFr`, and the limits.
 const TURNS: usize = 2;
 

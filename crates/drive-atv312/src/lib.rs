@@ -29,7 +29,7 @@ pub use crate::{
     registers::ROWS,
 };
 use crate::{
-    proof::{Doubt, Grounds, INJECTION_TIME},
+    proof::{Doubt, Grounds},
     settings::Known,
 };
 
@@ -108,12 +108,10 @@ impl<P: Port> Atv312<P> {
     /// The drive with this address. Nothing is sent.
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress) -> Self {
-        let mut shaft = Shaft::new();
-        shaft.set_injection_time(Some(INJECTION_TIME));
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, exception_meaning),
             own: OwnRun::new(),
-            shaft,
+            shaft: Shaft::new(),
             motion: Motion::NotKnown,
             turns: Turns::default(),
             doubt: Doubt::default(),

@@ -1,8 +1,6 @@
 //! What proves a run command of this side from status to status, and what the shaft does: what the ordinary exchange carries,
 //! and what takes a further one, never more than one behind a status.
 
-use std::time::Duration;
-
 use drive_core::{
     Class, Control, Error, Evidence, Frequency, Ground, Motion, Output, Port, Refusal, RunWord, State,
     Status, StopMode, Told, Verdict,
@@ -19,9 +17,6 @@ use crate::{
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
 };
 
-/// How long direct current is given to bring a motor to rest: as long as the drive itself keeps it at its full height (`IdC`,
-/// p. 40). No time of the manual says when the shaft stands.
-pub(crate) const INJECTION_TIME: Duration = Duration::from_secs(5);
 /// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`.
 const TURNS: usize = 3;
 

@@ -57,7 +57,7 @@ pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use intent::Intent;
 pub use lease::{Ground, Lack, Lease, Recognised, Verdict, Withdrawn};
-pub use motion::{Motion, Output, Shaft};
+pub use motion::{INJECTION_TIME, Motion, Output, Shaft};
 pub use named::{NameError, is_name};
 pub use own_run::{Evidence, OwnRun, RunWord, Told};
 pub use port::{Class, Effect, Port, PortError, Terms};

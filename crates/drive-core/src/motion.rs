@@ -69,6 +69,10 @@ pub enum Output {
     NotKnown,
 }
 
+/// How long direct current is given to bring a motor to rest where nothing else is known: as long as an Altivar 312 keeps it at
+/// its full height (`IdC`, BBV51701 p. 40). No manual says when the shaft stands.
+pub const INJECTION_TIME: Duration = Duration::from_secs(5);
+
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Past {
@@ -87,7 +91,7 @@ enum Past {
 
 /// The shaft behind the output, from status to status. Pure: time is an argument. It is not forgotten when a line is lost: a
 /// motor that turned then may coast when the line is back.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Shaft {
     past: Past,
     /// Since when direct current flows into a motor that may turn.
@@ -98,11 +102,18 @@ pub struct Shaft {
     injection_time: Option<Duration>,
 }
 
+impl Default for Shaft {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Shaft {
     /// A shaft that was never seen to turn.
     #[must_use]
     pub const fn new() -> Self {
-        Self { past: Past::Unseen, injected_since: None, coast_time: None, injection_time: None }
+        let injection_time = Some(INJECTION_TIME);
+        Self { past: Past::Unseen, injected_since: None, coast_time: None, injection_time }
     }
 
     /// How long it coasts at the most, as its owner says; `None`: nobody knows.

@@ -65,7 +65,12 @@ pub struct DriveSettings {
     /// was cut may coast until it is driven again.
     #[cfg_attr(
         feature = "serde",
-        serde(rename = "coast_ms", default, skip_serializing_if = "Option::is_none", with = "drive_core::serialize::maybe_ms")
+        serde(
+            rename = "coast_ms",
+            default,
+            skip_serializing_if = "Option::is_none",
+            with = "drive_core::serialize::maybe_ms"
+        )
     )]
     #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
     pub coast: Option<Duration>,

@@ -131,6 +131,10 @@ async fn every_printed_write_is_answered_and_carried_out() {
     answered_on(&mut master, BUSY).await;
 }
 
+/// CMOD = 2 and FMOD = 4: serial communication (§6.2 p. 12).
+const BUS_HAS_COMMAND: (&str, &str) = ("01 03 0003 0001", "01 03 02 0002");
+const BUS_HAS_REFERENCE: (&str, &str) = ("01 03 0004 0001", "01 03 02 0004");
+
 #[tokio::test(start_paused = true)]
 async fn a_status_without_a_block_reads_the_output_frequency_as_in_7_4() {
     let (line, other_end) = scripted(&[
@@ -140,6 +144,9 @@ async fn a_status_without_a_block_reads_the_output_frequency_as_in_7_4() {
         ("01 03 FE45 0001", "01 03 02 0002"),
         // What the next stop keeps of it.
         ("01 03 FA00 0001", "01 03 02 C400"),
+        // Whether it has to claim command and reference by FA00: not where CMOD and FMOD give them to the bus.
+        BUS_HAS_COMMAND,
+        BUS_HAS_REFERENCE,
     ]);
     let status = Atv21::new(line.slave(1), bench::address(1)).status().await.unwrap();
     assert_eq!(status.output_frequency, Some(Frequency::from_hertz(60)));
@@ -209,7 +216,7 @@ async fn the_block_of_five_of_7_5_is_looked_at_and_not_used_because_its_current_
         .chain([BLOCK_OF_FIVE])
         .chain(held)
         .chain(STATUS)
-        .chain([held_for_the_stop])
+        .chain([held_for_the_stop, BUS_HAS_COMMAND, BUS_HAS_REFERENCE])
         .collect();
     let (line, other_end) = scripted(&script);
     let mut drive = Atv21::new(line.slave(1), bench::address(1));
@@ -319,6 +326,7 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
         ];
         // The priorities first, so that FE45 and FE46 tell who decides before anything runs.
         if authority == Authority::Priority {
+            script.extend([("01 03 0003 0001", "01 03 02 0000"), ("01 03 0004 0001", "01 03 02 0001")]);
             script.push(("01 06 FA00 C000", "01 06 FA00 C000"));
             script.extend([("01 03 FD01 0001", "01 03 02 4000"), ("01 03 FE45 0001", "01 03 02 0002")]);
         }

@@ -12,8 +12,8 @@ use super::{
     groups::Entries,
     mqtt::MqttEntry,
     values::{
-        AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LackValue, LossPolicy,
-        OptionValue, Parsed, PercentValue, ReactionValue, TakenPolicy, WatchdogPolicy,
+        AdoptedPolicy, BandValue, CurrentValue, ExitPolicy, FaultPolicy, FrequencyValue, LackValue,
+        LossPolicy, OptionValue, Parsed, PercentValue, ReactionValue, TakenPolicy, WatchdogPolicy,
     },
 };
 use crate::{drive_spec::DriveSpec, duration::Time, line_spec::LineSpec};
