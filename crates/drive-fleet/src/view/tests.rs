@@ -70,7 +70,7 @@ fn a_drive_that_was_never_seen_has_no_value() {
         json!({
             "name": "pump 1", "link": "connecting", "status": {"quality": "missing"},
             "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"},
-            "concerns": [{"kind": "never_seen", "rank": 14, "severity": "note", "wakes": false, "text": "not seen yet",
+            "concerns": [{"kind": "never_seen", "rank": 15, "severity": "note", "wakes": false, "text": "not seen yet",
                 "remedy": "wait, or look at its supply, its address and its cable"}],
             "watchdog": {"check": "no_contract"}, "start_refused": "the drive does not answer",
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}

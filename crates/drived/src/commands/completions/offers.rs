@@ -175,7 +175,8 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         // Numbers, times and texts are the person's own.
         (
             _,
-            "ADDRESS" | "ADDRESSES" | "MNEMONIC" | "N" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME" | "WORD",
+            "ADDRESS" | "ADDRESSES" | "HEAD" | "MNEMONIC" | "N" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME"
+            | "WORD",
         ) => Offers::default(),
         _ => Offers::default(),
     }

@@ -93,7 +93,13 @@ impl<T> From<Asked<T>> for Looks<T> {
 /// Whether a slave can be read as a drive of a family.
 pub(super) async fn status(line: &Line, family: Family, slave: SlaveAddress) -> Looks<()> {
     let mut drive = open(line, family, slave);
-    often(line, async || drive.status().await.map(drop)).await.into()
+    match often(line, async || drive.status().await).await {
+        // What it does not have is not in its status: a drive without a status word is none of the family.
+        Asked::Told(status) if !status.is_explained() => Looks::Unlike,
+        Asked::Told(_) => Looks::Like(()),
+        Asked::Refused(_) => Looks::Unlike,
+        Asked::Damaged(_) => Looks::Damaged,
+    }
 }
 
 /// What a drive of a family says it is, and how its watchdog is set, where it tells.

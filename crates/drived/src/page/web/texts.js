@@ -73,6 +73,7 @@ const TABLE = {
   concern_run_command_stands: ['a run command stands, the motor may start when control is given back', 'un ordre de marche subsiste, le moteur peut démarrer quand la commande est rendue'],
   concern_lost_running: ['lost while it was running, the motor may turn', 'perdu en marche, le moteur peut tourner'],
   concern_tripped: ['tripped', 'en défaut'],
+  concern_run_suspended: ['its run command is not in force, the motor may start by it', 'son ordre de marche n’est pas en vigueur, le moteur peut démarrer par lui'],
   concern_identity_changed: ['another drive than before answers at its address', 'un autre variateur qu’auparavant répond à son adresse'],
   concern_watchdog_broken: ['its watchdog is not as the contract says', 'sa surveillance n’est pas conforme au contrat'],
   concern_watchdog_not_in_force: ['its motor turns without the watchdog of its contract', 'son moteur tourne sans la surveillance de son contrat'],
