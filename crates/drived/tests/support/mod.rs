@@ -82,10 +82,10 @@ pub(crate) fn ask(port: u16, request: &str) -> String {
     answer
 }
 
-/// What is answered to somebody who asks a server of this machine, and ends the connection.
+/// What is answered to somebody who asks a server of this machine, and ends the connection. Not by HTTP/1.0, in which proxies ask.
 pub(crate) fn get(port: u16, path: &str, accept: &str) -> String {
     let request =
-        format!("GET {path} HTTP/1.0\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n");
+        format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nAccept: {accept}\r\nConnection: close\r\n\r\n");
     let answer = ask(port, &request);
     let (head, body) = answer.split_once("\r\n\r\n").expect("an answer has a head");
     assert!(head.lines().next().is_some_and(|first| first.ends_with("200 OK")), "{answer}");
