@@ -578,7 +578,7 @@ async fn rule_1_a_stop_that_is_the_first_thing_a_drive_hears_is_confirmed_when_t
 async fn rule_12_a_motor_whose_output_was_cut_is_at_rest_only_once_its_owners_coast_time_is_over() {
     each(async |family| {
         for coast in [None, Some(20 * SECOND)] {
-            let mut plant = Plant::single(family, |settings| settings.coast = coast);
+            let plant = Plant::single(family, |settings| settings.coast = coast);
             plant.run_at(30).await;
             if !family.capabilities().stop_modes.contains(&StopMode::Freewheel) {
                 return;

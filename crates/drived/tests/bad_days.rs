@@ -141,7 +141,9 @@ fn dead_drives_polled_as_fast_as_it_goes_are_told_once_each() {
         assert_eq!(poll.code, Some(1), "{poll:?}");
         let told =
             poll.out.lines().filter(|line| line.contains("no answer") || line.contains("off-line")).count();
-        assert!((3..=3).contains(&told), "{told} lines: {poll:?}");
+        // Behind TCP may be a gateway that keeps each question for seconds: whoever is not told of meanwhile is named at the end.
+        assert!(told <= 3, "{told} lines: {poll:?}");
+        assert!(poll.err.contains("no status from atv312@1, atv312@2, atv312@3"), "{poll:?}");
     }
 }
 

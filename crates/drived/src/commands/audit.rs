@@ -49,7 +49,7 @@ pub(crate) enum Command {
         #[arg(long)]
         refused: bool,
         /// How many, the newest
-        #[arg(long, value_name = "COUNT", default_value_t = 100)]
+        #[arg(long, value_name = "N", default_value_t = 100)]
         last: usize,
         #[command(flatten)]
         json: JsonArgs,

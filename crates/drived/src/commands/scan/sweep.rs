@@ -14,6 +14,9 @@ use super::{
 };
 use crate::{drive_spec::DriveName, failure::Failure, line_spec, one_drive};
 
+/// How long one look at a slave takes at the slowest settings: some watchdogs are not much longer.
+const LOOK: Duration = Duration::from_millis(600);
+
 /// The scan of a line.
 pub(super) struct Sweep<'a, Open> {
     plan: &'a Plan,
@@ -97,7 +100,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
         let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
         for family in Family::ALL {
-            let line = self.fed_line(step).await?;
+            let line = self.line_fed_for(step, LOOK).await?;
             let config = line.config();
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
                 continue;
@@ -110,14 +113,14 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                     continue;
                 }
             }
-            let line = self.fed_line(step).await?;
+            let line = self.line_fed_for(step, LOOK).await?;
             if let Looks::Like((likeness, watchdog)) = look::identity(&line, family, step.slave).await {
                 intervals.push((likeness.certain, interval(family, config.protocol.is_ascii(), watchdog)));
                 alike.push(likeness);
             } else {
                 is_damaged = true;
             }
-            let line = self.fed_line(step).await?;
+            let line = self.line_fed_for(step, LOOK).await?;
             is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;
         }
         if alike.iter().any(|likeness| likeness.certain) {
@@ -136,6 +139,11 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// The line at a step's settings, after those were fed who could not wait.
     async fn fed_line(&mut self, step: Step) -> Result<Line, Failure> {
         let ahead = self.plan.trials.get(step.trial).map(|trial| trial.silent(self.wait)).unwrap_or_default();
+        self.line_fed_for(step, ahead).await
+    }
+
+    /// The same before something that takes longer than to ask once.
+    async fn line_fed_for(&mut self, step: Step, ahead: Duration) -> Result<Line, Failure> {
         for _ in 0..self.feeding.len() {
             let at = self.at.as_ref().map(|(trial, _)| *trial);
             let Some(fed) = self.feeding.next(self.began.elapsed(), ahead, at) else { break };

@@ -168,6 +168,7 @@ export const SENTENCES_FR = {
   'the drive\'s map names no bit that tells whether local control is forced: name it (`remote`), or reset the fault at the drive': 'l’affectation du variateur ne nomme aucun bit qui dise si la commande locale est forcée : le nommer (`remote`), ou réarmer le défaut au variateur',
   'the reference W401 is negative: stop the motor, and give a setpoint': 'la référence W401 est négative : arrêter le moteur et donner une consigne',
   'the sign of the reference W401, which another master has turned round,': 'le signe de la référence W401, qu’un autre maître a inversé,',
+  'see what decides instead; the run command is withdrawn, unless that was accepted': 'voir ce qui décide à la place ; l’ordre de marche est retiré, sauf si cela a été accepté',
 
   // Altivar 312.
   'see which inputs and channels are in use (Fr1, Fr2, rFC, SA2, SA3, PS2 to PS16, JOG, PIF)': 'voir quelles entrées et quels canaux servent (Fr1, Fr2, rFC, SA2, SA3, PS2 à PS16, JOG, PIF)',
