@@ -45,10 +45,10 @@ impl Feeding {
     /// Whom to ask before something that takes so long: who would be late after it, those at the setting `at` first, because
     /// the line has it already. Whoever is asked at a setting has the others there asked too that are due soon.
     pub(super) fn next(&self, now: Duration, ahead: Duration, at: Option<usize>) -> Option<Fed> {
-        let until = now + ahead;
-        let is_due = |fed: &&Fed| fed.due <= until;
-        let soon = |fed: &&Fed| Some(fed.step.trial) == at && fed.due <= until + fed.interval / 4;
-        let anybody = self.0.iter().find(is_due)?;
+        // Whoever was fed a moment ago leaves the others their turn, however long it takes.
+        let until = |fed: &Fed| now + ahead.min(fed.interval / 2);
+        let soon = |fed: &&Fed| Some(fed.step.trial) == at && fed.due <= until(fed) + fed.interval / 4;
+        let anybody = self.0.iter().filter(|fed| fed.due <= until(fed)).min_by_key(|fed| fed.due)?;
         Some(*self.0.iter().find(soon).unwrap_or(anybody))
     }
 
