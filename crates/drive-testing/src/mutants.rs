@@ -1,4 +1,4 @@
-//! Families that break their contract, each in one way: a [`Contract`](crate::Contract) that does not complain of one of them
+//! Families that break their contract, each in one way: a [`Contract`] that does not complain of one of them
 //! is no contract. Made from any family by a wrapper around its drive or its port.
 
 mod drive;

@@ -5,7 +5,7 @@
 //! sequence, with the memory that edges and charts need. At each moment the manual of its [`Family`] is asked:
 //!
 //! - [`commander`]: who commands run and stop;
-//! - [`reference`]: which reference counts, its sign and its limits;
+//! - [`reference()`]: which reference counts, its sign and its limits;
 //! - [`order`]: what the drive has to do with the motor;
 //! - [`starts_by`]: whether a change starts the motor;
 //! - [`effects`]: what a write of the bus does to it;

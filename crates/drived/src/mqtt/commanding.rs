@@ -1,4 +1,4 @@
-//! What is asked through the broker, as the [desk](crate::desk) takes it.
+//! What is asked through the broker, as the [`desk`] takes it.
 //!
 //! MQTT says neither who sent a message nor that it comes once. So the last level of the topic names who asks, for the
 //! broker's access list to vouch for, and what the daemon says to itself tells how late the broker is.
