@@ -218,14 +218,14 @@ fn what_is_late_retained_or_of_an_unknown_age_moves_no_motor_and_is_said_so() {
         &written(command, start("a", ""), 1_500),
         &[],
         "expired",
-        "was to be carried out within 1s",
+        "was to be carried out within 1000 ms",
     );
     let patient = start("b", r#", "expires_in_ms": 10000"#);
     plant.publish_in_vain(
         &written(command, patient, 11_000),
         &[],
         "expired",
-        "was to be carried out within 10s",
+        "was to be carried out within 10000 ms",
     );
     let for_ever = start("c", r#", "expires_in_ms": 60000"#);
     plant.publish_in_vain(&written(command, for_ever, 0), &[], "refused", "expected 1 to 10000");
@@ -233,7 +233,7 @@ fn what_is_late_retained_or_of_an_unknown_age_moves_no_motor_and_is_said_so() {
         &written("Control/Setpoint", Raw::Double(30.0), 2_000),
         &[],
         "expired",
-        "within 1s",
+        "within 1000 ms",
     );
     plant.publish_in_vain(&written(command, start("d", ""), 0), &["-r"], "refused", "retained");
     let metric = Metric { name: Some(command.to_owned()), value: Some(start("e", "")), ..Metric::default() };
