@@ -244,7 +244,7 @@ fn what_is_late_retained_or_of_an_unknown_age_moves_no_motor_and_is_said_so() {
     let nameless = written(command, Raw::String(r#"{"action": "start"}"#.to_owned()), 0);
     plant.publish_in_vain(&nameless, &[], "refused", "expected an id");
     plant.publish_in_vain(
-        &written(command, Raw::String("start".to_owned()), 0),
+        &written(command, Raw::String("[\"start\"]".to_owned()), 0),
         &[],
         "refused",
         "expected an object",
