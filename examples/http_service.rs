@@ -112,7 +112,7 @@ fn find(fleet: &Fleet, name: &str) -> Result<DriveHandle, StatusCode> {
 /// Only what the drive's own words show is a success.
 fn answer(outcome: Outcome) -> (StatusCode, Json<Outcome>) {
     let code = match &outcome {
-        Outcome::Confirmed => StatusCode::OK,
+        Outcome::Confirmed | Outcome::Started(_) | Outcome::Stopped(_) => StatusCode::OK,
         Outcome::Refused(_) | Outcome::Expired => StatusCode::CONFLICT,
         _ => StatusCode::GATEWAY_TIMEOUT,
     };

@@ -3,7 +3,7 @@
 use drive_bus::{Line, LineConfig};
 use drive_core::{
     Direction::{Forward, Reverse},
-    Drive, Frequency, Intent, Speed, StopMode,
+    Drive, Frequency, Intent, Percent, Speed, StopMode,
 };
 use drive_families::{Family, Options};
 use drive_sim::{SimLine, SimSlave, Wiring, models};
@@ -113,10 +113,10 @@ async fn references_are_understood_in_the_unit_that_they_have_in_the_drive() {
     let (machine, mut drive) = drive(Family::Atv312);
     assert!(machine.poke(8_504, 1 << 9));
     assert_eq!(drive.intent(8_502, 1_638).await.unwrap(), Some(hertz(2_999)));
-    // n39 = 2: percent (3G3EV §2.1).
+    // n39 = 2: 30000 counts are 100 % (3G3EV §2.1).
     let (machine, mut drive) = self::drive(Family::Omron3g3ev);
     assert!(machine.poke(0x0127, 2));
-    assert!(drive.intent(0x0002, 3_000).await.is_err());
+    assert_eq!(drive.intent(0x0002, 3_000).await.unwrap(), Some(Setpoint(Percent::from_percent(10).into())));
 }
 
 /// Saving, locking, factory settings, PI references, outputs.

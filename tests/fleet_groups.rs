@@ -41,7 +41,11 @@ fn nobody_runs(plant: &Plant) -> bool {
 #[tokio::test(start_paused = true)]
 async fn a_group_starts_together_and_reaches_its_reference() {
     let plant = four().await;
-    plant.fleet.all().start(start(Duration::ZERO)).await.expect("all start");
+    let started = plant.fleet.all().start(start(Duration::ZERO)).await.expect("all start");
+    assert_eq!(started.len(), 4);
+    for (name, outcome) in started {
+        assert_eq!(outcome.to_string(), "confirmed: started forward at 30.00 Hz", "{name}");
+    }
     for drive in plant.fleet.drives() {
         // Where no bit tells it, it counts as reached a little before.
         let output = plant.machine_of(drive.name()).observe().output_frequency;
@@ -107,6 +111,24 @@ async fn when_one_does_not_start_the_others_are_stopped_again() {
     assert_eq!(names, ["3g3ev"]);
     assert!(stopped.is_confirmed(), "{stopped}");
     assert!(nobody_runs(&plant));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_group_that_failed_to_start_does_not_slow_a_freewheel_that_is_under_way() {
+    let plant = four().await;
+    let (stopped, tripped) = (plant.drive("atv312"), plant.machine_of("3g3ev").clone());
+    let machine = plant.machine_of("atv312").clone();
+    let motor = stopped.clone();
+    tokio::spawn(async move {
+        machine.wait_until(|machine| machine.running).await;
+        sleep(SECOND).await;
+        machine.mute();
+        let freewheel = motor.stop(StopMode::Freewheel);
+        tripped.trip(drives::a_trip(Family::Omron3g3ev));
+        let _outcome = freewheel.await;
+    });
+    plant.fleet.all().start(start(2 * SECOND)).await.expect_err("one trips");
+    assert_eq!(stopped.snapshot().stop.map(|stop| stop.mode), Some(StopMode::Freewheel));
 }
 
 #[tokio::test(start_paused = true)]
@@ -220,11 +242,8 @@ async fn a_start_at_a_setpoint_is_confirmed_in_force_and_not_only_at_its_referen
         let plant = Plant::single(family, |_| {});
         assert_eq!(plant.motor().ready(PATIENCE).await, Ok(()), "{family}");
         let setpoint = Frequency::from_hertz(30);
-        assert_eq!(
-            plant.motor().start_at(Direction::Forward, setpoint).await,
-            Outcome::Confirmed,
-            "{family}"
-        );
+        let outcome = plant.motor().start_at(Direction::Forward, setpoint).await;
+        assert_eq!(outcome.to_string(), "confirmed: started forward at 30.00 Hz", "{family}");
         let started = plant.machine().observe();
         assert!(started.running && started.output_frequency < 2_900, "{family}: {started:?}, on its way");
         let is_there = |snapshot: &Snapshot| snapshot.has_reached_setpoint(Instant::now()) == Some(true);
@@ -248,4 +267,61 @@ async fn the_stream_of_events_tells_what_recv_tells_and_ends_with_the_fleet() {
     );
     assert!(is(read.last().expect("events"), |kind| matches!(kind, EventKind::Exit(_))), "{read:?}");
     assert!(!read.contains(&Received::End));
+}
+
+/// A line of drives, of which these may not be commanded.
+async fn line_of(families: &[Family], read_only: &[u8]) -> Plant {
+    let member = |(family, address): (&Family, u8)| {
+        let name = address.to_string();
+        let settings = match read_only.contains(&address) {
+            true => DriveSettings::watched(name),
+            false => controlled(*family, &name),
+        };
+        (*family, address, settings)
+    };
+    let site = Site::new(common_settings(), families.iter().zip(1..).map(member).collect());
+    let plant = Plant::open(vec![site]).expect("it can be fed");
+    for drive in plant.fleet.drives() {
+        match drive.settings().control {
+            true => {
+                drive.ready(PATIENCE).await.expect("it gets ready");
+                let started = drive.start_at(Direction::Forward, Frequency::from_hertz(20)).await;
+                assert!(started.is_confirmed(), "{started}");
+            }
+            false => drop(drive.wait_until(|snapshot| snapshot.link == Link::Connected).await),
+        }
+    }
+    plant
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_by_broadcast_reaches_only_a_line_whose_drives_are_all_meant_may_all_be_commanded_and_all_take_it()
+ {
+    let mut broadcast = 0;
+    for family in Family::ALL {
+        let Some(mode) = family.capabilities().broadcast_stops.first().copied() else { continue };
+        let plant = line_of(&[family, family], &[]).await;
+        let report = plant.fleet.all().stop(mode).await;
+        assert_eq!(report.broadcasts.len(), 1, "{family}: all of a line");
+        assert!(report.is_confirmed() && nobody_runs(&plant), "{family}: {report}");
+        broadcast += 1;
+
+        let plant = line_of(&[family, family], &[]).await;
+        let report = plant.fleet.group(["1"]).expect("it is there").stop(mode).await;
+        assert_eq!(report.broadcasts.len(), 0, "{family}: one of two is not meant");
+        assert!(plant.machine_of("2").observe().running, "{family}: and is left alone");
+
+        let plant = line_of(&[family, family], &[2]).await;
+        let writes = Plant::writes(plant.machine_of("2"));
+        let report = plant.fleet.all().stop(mode).await;
+        assert_eq!(report.broadcasts.len(), 0, "{family}: one of two is only read");
+        assert_eq!(Plant::writes(plant.machine_of("2")), writes, "{family}");
+
+        let other = if family == Family::Omron3g3ev { Family::Atv312 } else { Family::Omron3g3ev };
+        let plant = line_of(&[family, other], &[]).await;
+        let report = plant.fleet.all().stop(mode).await;
+        assert_eq!(report.broadcasts.len(), 0, "{family}: to {other} the word means something else");
+        assert!(report.is_confirmed(), "{family}: {report}");
+    }
+    assert!(broadcast > 0, "no family takes one");
 }

@@ -110,7 +110,7 @@ async fn a_stop_of_31_running_drives_of_mixed_families_stops_the_living_in_the_b
     let member = |address: u8| {
         let family = families[usize::from(address) % families.len()];
         let periods =
-            Periods { running: 4 * SECOND, rest: 4 * SECOND, slow: Duration::ZERO, max_age: 15 * SECOND };
+            Periods { running: 4 * SECOND, rest: 4 * SECOND, slow: Duration::ZERO, max_age: 10 * SECOND };
         let settings = planned(family, format!("{family} {address}"));
         (family, address, DriveSettings { periods, watchdog: None, ..settings })
     };

@@ -97,7 +97,7 @@ async fn a_stop_is_in_force_long_before_the_motor_stands() {
             let at = Instant::now();
             assert_eq!(second.in_force().await, Outcome::Confirmed);
             assert!(at < begun + SECOND && plant.machine().observe().output_frequency > 4_000);
-            assert_eq!(stop.finished().await, Outcome::Confirmed);
+            assert!(stop.finished().await.is_confirmed());
         }
         assert_eq!(plant.machine().observe().output_frequency, 0);
     }
@@ -117,7 +117,7 @@ async fn a_start_is_taken_back_at_any_time_until_it_was_heard_and_not_after_that
             assert!(!plant.machine().observe().running, "{family}: dropped after {late:?}");
 
             let run = motor.run(Direction::Forward, Frequency::from_hertz(30));
-            assert_eq!(run.in_force().await, Outcome::Confirmed, "{family}");
+            assert!(run.in_force().await.started().is_some(), "{family}");
             drop(run);
             sleep(20 * SECOND).await;
             assert!(plant.machine().observe().running, "{family}: it was heard that it is in force");

@@ -5,18 +5,14 @@ use std::{fs, path::Path};
 
 /// Where a state is shown and nothing is decided by it.
 const SHOWS: &[&str] = &[
+    "drive-fleet/src/shows.rs",
     "drive-fleet/src/view.rs",
-    "drived/src/commands/demo/table.rs",
-    "drived/src/commands/monitor/drive.rs",
-    "drived/src/commands/monitor/words.rs",
     "drived/src/commands/poll/json.rs",
-    "drived/src/commands/status.rs",
-    "drived/src/drive_cells.rs",
-    "drived/src/explain/words.rs",
     "drived/src/gateway/virtual_unit.rs",
     "drived/src/journal/words.rs",
     "drived/src/metrics/drives.rs",
     "drived/src/mqtt/discovery.rs",
+    "drived/src/row/mod.rs",
     "drived/src/simulated.rs",
 ];
 

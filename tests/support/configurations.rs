@@ -82,10 +82,21 @@ const ATV21: &[Configuration] = &[
 ];
 
 /// Altivar 28, VVDED399092: terminals or line, the remote terminal above both.
-const ATV28: &[Configuration] = &[at(Family::Atv28, "as delivered", atv28, &[])];
+const ATV28: &[Configuration] = &[
+    at(Family::Atv28, "as delivered", atv28, &[]),
+    at(Family::Atv28, "3-wire, tCC 1", atv28, &["set tCC 1", "terminal LI1 on"]),
+    at(Family::Atv28, "keypad, tCC 2", atv28, &["set tCC 2"]),
+    at(Family::Atv28, "remote terminal, LCC 1", atv28, &["set LCC 1"]),
+    at(Family::Atv28, "tLS 2 s at LSP", atv28, &["set tLS 20"]),
+    at(Family::Atv28, "LSP 10 Hz, HSP 30 Hz", atv28, &["set LSP 10", "set HSP 30"]),
+];
 
 /// Altivar 58 with card, VVDED397054: forced local above the line.
-const ATV58: &[Configuration] = &[at(Family::Atv58, "as delivered", atv58, &[])];
+const ATV58: &[Configuration] = &[
+    at(Family::Atv58, "as delivered", atv58, &[]),
+    at(Family::Atv58, "W251 10 Hz, W250 30 Hz", atv58, &["set W251 100", "set W250 300"]),
+    at(Family::Atv58, "level", atv58, &["reading 2-wire level"]),
+];
 
 /// Altivar 312, BBV51701 p. 14–15, 27–28, 33, 35–44, 51.
 const ATV312: &[Configuration] = &[

@@ -6,7 +6,8 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{Frequency, Reaction, SerialSettings, WatchdogCapability, serial::CharacterFormat};
 use drive_families::Family;
 use drive_fleet::{
-    DriveHandle, DriveSettings, EventKind, Events, Fleet, FleetError, LineBudget, Received, WatchdogContract,
+    DriveHandle, DriveSettings, EventKind, Events, Fleet, FleetBuilder, FleetError, LineBudget, Received,
+    WatchdogContract,
 };
 use drive_sim::{SimLine, SimSlave, Wiring};
 use tokio::time::timeout;
@@ -95,7 +96,18 @@ impl Plant {
     /// # Errors
     /// What the fleet finds wrong.
     pub fn open(sites: Vec<Site>) -> Result<Self, FleetError> {
-        let mut builder = Fleet::builder();
+        Self::built(sites, Fleet::builder())
+    }
+
+    /// The same on lines that cannot keep what is wanted of them.
+    ///
+    /// # Errors
+    /// What else the fleet finds wrong.
+    pub fn open_whatever_the_plan(sites: Vec<Site>) -> Result<Self, FleetError> {
+        Self::built(sites, Fleet::builder().whatever_the_plan())
+    }
+
+    fn built(sites: Vec<Site>, mut builder: FleetBuilder) -> Result<Self, FleetError> {
         let mut machines = BTreeMap::new();
         let mut lines = Vec::new();
         for (number, site) in sites.iter().enumerate() {

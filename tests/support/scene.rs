@@ -29,6 +29,25 @@ pub struct Scene {
     twin: Twin,
 }
 
+/// What is around a drive and its twin.
+pub struct Around {
+    both: [(SimLine, String); 2],
+    family: Family,
+}
+
+impl Around {
+    /// As [`Scene::happens`].
+    ///
+    /// # Panics
+    /// When the simulator does not know it.
+    pub fn happens(&self, deed: &str) {
+        for (line, machine) in &self.both {
+            let told = line.control(&format!("{machine} {deed}"));
+            told.unwrap_or_else(|error| panic!("{} {deed}: {error}", self.family));
+        }
+    }
+}
+
 /// The same machine on a line of its own.
 struct Twin {
     machine: SimSlave,
@@ -55,11 +74,14 @@ impl Scene {
     /// # Panics
     /// When the simulator does not know it.
     pub fn happens(&self, deed: &str) {
-        for (line, machine) in [(&self.simulated, &self.machine), (&self.twin.simulated, &self.twin.machine)]
-        {
-            let told = line.control(&format!("{} {deed}", machine.name()));
-            told.unwrap_or_else(|error| panic!("{} {deed}: {error}", self.family));
-        }
+        self.around().happens(deed);
+    }
+
+    /// What is around both, for who makes something happen while a command is under way.
+    #[must_use]
+    pub fn around(&self) -> Around {
+        let both = [(&self.simulated, &self.machine), (&self.twin.simulated, &self.twin.machine)];
+        Around { both: both.map(|(line, machine)| (line.clone(), machine.name())), family: self.family }
     }
 
     /// Sets a setting at the drive and at its twin. False: it does not take the value.

@@ -54,18 +54,18 @@ impl<P: Port> Drive3g3ev<P> {
             self.read_command(Class::Command).await?;
         }
         let word = Command::run(direction) | self.inputs();
-        self.run.give(Lease::new(direction, word.bits()));
+        self.watch.run.give(Lease::new(direction, word.bits()));
         match self.write_command(word).await {
-            Ok(()) => self.run.was_written(),
+            Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out.
             Err(error @ Error::Exception { .. }) => {
                 if self.read_command(Class::Command).await.map_err(Error::after_write)?.value != word.bits() {
-                    self.run.was_not_written();
+                    self.watch.run.was_not_written();
                     return Err(error);
                 }
             }
             Err(error) if error.kind() == ErrorKind::NotSent => {
-                self.run.was_not_written();
+                self.watch.run.was_not_written();
                 return Err(error);
             }
             Err(error) => return Err(error),
@@ -155,7 +155,7 @@ impl<P: Port> Drive3g3ev<P> {
             };
             let revoked = self.command.is_none_or(|held| held.contains(Command::RUN));
             if !revoked {
-                self.run.end();
+                self.watch.run.end();
             }
             let runs = is_run(&status) && !status.is_fault();
             let local = status.control != Some(Control::Bus);
@@ -191,14 +191,14 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
-        let lease = self.run.lease();
+        let lease = self.watch.run.lease();
         let stands = held.contains(Command::RUN);
         let ours = lease.is_some_and(|lease| lease.word == held.bits())
             || commanded_by_other(&status) == Some(OTHER_COMMAND);
         // One that was not seen to arrive may come late: what stands is written again, and read after it.
         let may_come = !stands && lease.is_some();
         if !(may_come || stands && ours) {
-            self.run.end();
+            self.watch.run.end();
             return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
         self.write_command(held - Command::RUN).await?;
@@ -206,13 +206,14 @@ impl<P: Port> Drive3g3ev<P> {
         if self.command.is_none_or(|held| held.contains(Command::RUN)) {
             return Err(self.not_confirmed(Order::Withdraw, status, Some(OTHER_WORD)));
         }
-        self.run.end();
+        self.watch.run.end();
         Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 
     /// Writes 0001h and remembers the word; while the outcome is not known, none is.
     pub(crate) async fn write_command(&mut self, command: Command) -> Result<()> {
-        (self.command, self.proof.word) = (None, None);
+        self.command = None;
+        self.watch.run.sends(command.bits());
         self.registers.at(Class::Command).write(crate::registers::COMMAND, command.bits()).await?;
         self.command = Some(command);
         Ok(())
@@ -228,7 +229,8 @@ impl<P: Port> Drive3g3ev<P> {
         {
             return sent.map(Ok);
         }
-        (self.command, self.proof.word) = (Some(word), None);
+        self.command = Some(word);
+        self.watch.run.sends(word.bits());
         Ok(sent)
     }
 
@@ -241,9 +243,14 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn read_command(&mut self, class: Class) -> Result<RawWord> {
         let row = crate::registers::COMMAND.row();
         let value = self.registers.at(class).read_word(row.address).await?;
-        let held = Some(Command::from_bits_retain(value));
-        (self.command, self.proof.word) = (held, held);
+        self.holds(value);
         Ok(RawWord { address: row.address, code: row.code, value })
+    }
+
+    /// 0001h was read.
+    pub(crate) const fn holds(&mut self, word: u16) {
+        self.command = Some(Command::from_bits_retain(word));
+        self.watch.run.reads(word);
     }
 
     pub(crate) fn not_confirmed(&self, command: Order, status: Status, because: Option<Refusal>) -> Error {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Ground, Intent, Lease, Measurements, Port, Reaction,
+    Absent, BroadcastWrite, Class, Direction, Drive, Faults, Intent, Lease, Measurements, Port, Reaction,
     Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
 };
 
@@ -16,29 +16,23 @@ const LOOP_BACK: u16 = 0xA537;
 #[async_trait]
 impl<P: Port> Drive for Drive3g3ev<P> {
     drive_core::told_by!(registers);
+    drive_core::watched_by!(watch);
 
-    fn lease(&self) -> Option<Lease> {
-        self.run.lease()
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        Some((crate::Command::run(direction) | self.inputs()).bits())
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.run.adopt(lease);
+        self.watch.adopt(lease);
         (self.shown, self.proof) = (None, Proof::of_unknown(None));
     }
 
     fn forget(&mut self) {
         self.settings = Settings::default();
-        (self.command, self.shown, self.was_lost) = (None, None, true);
+        (self.command, self.shown) = (None, None);
+        self.watch.lose_sight();
         self.proof = Proof::of_unknown(self.proof.agreed());
-        self.skips_reserved = false;
-    }
-
-    fn take_changed(&mut self) -> Option<Ground> {
-        self.proof.changed.take()
-    }
-
-    fn set_coast_time(&mut self, time: Option<Duration>) {
-        self.shaft.set_coast_time(time);
+        self.absent = Absent::default();
     }
 
     /// Two exchanges, and one more for n39 the first time, for 0001h the first time and where the drive runs, turns or is
@@ -91,9 +85,9 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// that bit still names the bus and 0023h is what was written, or 0 at rest.
     ///
     /// # Errors
-    /// Also [`Refused`](drive_core::Error::Refused) when n39 was changed and the drive not switched off since, and [`Unsupported`](drive_core::Error::Unsupported) when n39 counts in percent: of
-    /// a frequency for which the manual names no register. [`set_reference_share`](Self::set_reference_share) takes
-    /// percents then.
+    /// Also [`Refused`](drive_core::Error::Refused) when n39 was changed and the drive not switched off since, and
+    /// [`Unsupported`](drive_core::Error::Unsupported) in hertz where n39 counts in percent (2, 3), of a frequency for which the
+    /// manual names no register, and in percent where it counts in hertz.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         self.give_setpoint(setpoint).await
     }
@@ -139,12 +133,14 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     /// # Errors
     /// Also [`Unsupported`](drive_core::Error::Unsupported) for 0001h, 0002h and 0900h, which have methods of their
-    /// own, and exception 22h ([`ExceptionMeaning::NotNow`](drive_core::ExceptionMeaning::NotNow)) for a constant while the motor runs.
+    /// own, and exception 22h ([`ExceptionMeaning::NotNow`](drive_core::ExceptionMeaning::NotNow)) for a constant while the motor
+    /// runs. What decides who commands and what the inputs do (n02, n06 to n08) is refused while a run command stands, and while an
+    /// input is on that may start the motor by its new function.
     async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
         self.change_parameter(row, word).await
     }
 
-    /// ENTER. The EEPROM takes 100 000 of them ([`EEPROM_LIFE`](crate::EEPROM_LIFE)); what this value has sent counts, also when its
+    /// ENTER, while the motor stands and no run command does. The EEPROM takes 100 000 of them ([`EEPROM_LIFE`](crate::EEPROM_LIFE)); what this value has sent counts, also when its
     /// outcome is unknown, and [`with_saves`](Self::with_saves) adds what came before.
     ///
     /// # Errors

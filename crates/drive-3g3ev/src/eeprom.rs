@@ -8,8 +8,8 @@ use drive_core::{
 use crate::{
     Drive3g3ev,
     command::is_run,
-    registers::{COMMAND, ENTER, N02, N06, N07, N08, REFERENCE, STATE},
-    words::{Command, DriveState},
+    registers::{COMMAND, ENTER, INPUT_TERMINALS, N02, N06, N07, N08, OUTPUT_FREQUENCY, REFERENCE},
+    words::Command,
 };
 
 /// Saves that the EEPROM takes in its life (§4.5).
@@ -20,6 +20,12 @@ const ENTER_WORD: u16 = 0;
 
 /// Who commands, and what the inputs do: n02, n06 to n08.
 const MOVE_CONTROL: [u16; 4] = [N02.address(), N06.address(), N07.address(), N08.address()];
+
+/// The manual lists no functions, and does not say whether their level counts or their edge.
+const INPUT_IS_ON: Refusal = Refusal::Overridden {
+    by: "an input that is on (002Bh, or bits 4 to 6 of 0001h), which may start the motor by another function,",
+    remedy: "open the inputs first",
+};
 
 /// What is known of the EEPROM.
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,10 +52,11 @@ impl<P: Port> Drive3g3ev<P> {
             });
         }
         if MOVE_CONTROL.contains(&row.address) {
-            let stands = Command::from_bits_retain(self.read_command(Class::Background).await?.value);
-            if stands.contains(Command::RUN) || is_run(&self.read_status(Class::Background).await?) {
-                // A run command that stands and does not act may act by it.
-                return Err(self.refused(Order::WriteParameter(row.address), Refusal::MotorRunning));
+            let order = Order::WriteParameter(row.address);
+            self.check_rest(order).await?;
+            let on = self.registers.at(Class::Background).read(INPUT_TERMINALS).await?;
+            if on != 0 || !self.inputs().is_empty() {
+                return Err(self.refused(order, INPUT_IS_ON));
             }
         }
         let outcome = self.registers.at(Class::Background).change_row(row, word).await;
@@ -62,10 +69,21 @@ impl<P: Port> Drive3g3ev<P> {
         };
         if may_have_changed && row.storage == Storage::RamUntilSaved {
             self.settings.written(row);
-            self.proof.settings = [None; 3];
+            self.watch.forget_settings();
             self.eeprom.changed = true;
         }
         outcome
+    }
+
+    /// Refuses what is done only to a motor that stands, and under no run command: one that does not act may act by it.
+    async fn check_rest(&mut self, order: Order) -> Result<()> {
+        let stands = Command::from_bits_retain(self.read_command(Class::Background).await?.value);
+        let status = self.read_status(Class::Background).await?;
+        let turns = status.raw(OUTPUT_FREQUENCY.address()) != Some(0);
+        if stands.contains(Command::RUN) || is_run(&status) || turns {
+            return Err(self.refused(order, Refusal::MotorRunning));
+        }
+        Ok(())
     }
 
     pub(crate) const fn assume_unsaved(&mut self) {
@@ -79,10 +97,7 @@ impl<P: Port> Drive3g3ev<P> {
         if self.eeprom.saves >= EEPROM_LIFE {
             return Err(self.refused(Order::Persist, Refusal::EepromLife));
         }
-        let state = DriveState::from_bits_retain(self.registers.at(Class::Background).read(STATE).await?);
-        if state.contains(DriveState::RUN) {
-            return Err(self.refused(Order::Persist, Refusal::MotorRunning));
-        }
+        self.check_rest(Order::Persist).await?;
         let outcome = self.registers.at(Class::Background).edge().write(ENTER, ENTER_WORD).await;
         let may_have_saved = match &outcome {
             Ok(()) => true,

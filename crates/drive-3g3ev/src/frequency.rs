@@ -1,6 +1,6 @@
 //! What a count of 0002h, 0023h and 0024h is: n39 (§2.1).
 
-use drive_core::{Frequency, Percent, SetpointProblem};
+use drive_core::{Frequency, Percent, Setpoint, SetpointProblem};
 
 /// What a count of a frequency is, by n39. With every one of them the drive keeps 0.1 Hz only (§2.1, note 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -73,14 +73,24 @@ impl FrequencyUnit {
         }
     }
 
-    /// The word for a share, if it has one: `None` in hertz, below zero, between two counts, or beyond a word.
-    pub(crate) fn share_word(self, share: Percent) -> Option<u16> {
-        let hundredths = share.hundredths();
+    /// The word for a share: none below zero, between two counts, or beyond a word. `None` in hertz.
+    pub(crate) fn share_word(self, share: Percent) -> Option<Result<u16, SetpointProblem>> {
+        let hundredths = i64::from(share.hundredths());
         let counts = match self {
-            Self::ThirtyThousandths => hundredths.checked_mul(3)?,
-            Self::PerMille if hundredths % 10 == 0 => hundredths / 10,
-            Self::Decihertz | Self::Centihertz | Self::PerMille => return None,
+            Self::ThirtyThousandths => hundredths * 3,
+            Self::PerMille if hundredths % 10 != 0 => return Some(Err(SetpointProblem::Resolution("0.1 %"))),
+            Self::PerMille => hundredths / 10,
+            Self::Decihertz | Self::Centihertz => return None,
         };
-        u16::try_from(counts).ok()
+        Some(u16::try_from(counts).map_err(|_| SetpointProblem::TooLarge))
+    }
+
+    /// The setpoint that a word stands for; `None` between two hundredths of a percent.
+    pub(crate) fn setpoint(self, word: u16) -> Option<Setpoint> {
+        if let Some(frequency) = self.frequency(word) {
+            return Some(frequency.into());
+        }
+        let share = self.share(word)?;
+        (self.share_word(share) == Some(Ok(word))).then_some(share.into())
     }
 }

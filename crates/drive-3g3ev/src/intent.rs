@@ -9,14 +9,13 @@ use crate::{
 };
 
 impl<P: Port> Drive3g3ev<P> {
-    /// Manual §5.1. What a count of the reference is, n39 says (§2.1); in percent it is not understood.
+    /// Manual §5.1. What a count of the reference is, n39 says (§2.1).
     pub(crate) async fn asked_by_another(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
         match register {
             COMMAND => Intent::understood(Command::from_bits_retain(word).intent()),
             REFERENCE => {
                 let unit = self.reference_unit(Order::Setpoint(Frequency::ZERO.into())).await?;
-                let frequency = unit.frequency(word);
-                Intent::understood(frequency.map(|frequency| Intent::Setpoint(frequency.into())))
+                Intent::understood(unit.setpoint(word).map(Intent::Setpoint))
             }
             OUTPUTS | ENTER => Intent::kept(),
             _ => Ok(None),

@@ -22,8 +22,8 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, OwnRun, Port, Reaction, Registers,
-    Row, SerialSettings, Shaft, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Reaction, Registers,
+    Row, SerialSettings, SlaveAddress, StopMode, Watch, WatchdogCapability, serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -63,6 +63,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     }),
     // BUS, bit E of 0021h.
     communication_fault: Some(0xE),
+    share_setpoint: true,
     persist: Some("ENTER, a write to 0900h"),
     broadcast_stops: &[StopMode::Ramp],
     turnaround: turnaround(2_400),
@@ -107,12 +108,8 @@ pub const fn turnaround(baud: u32) -> Duration {
 #[derive(Debug)]
 pub struct Drive3g3ev<P> {
     registers: Registers<P>,
-    /// The run command of this side that stands, or may.
-    run: OwnRun,
+    watch: Watch,
     proof: Proof,
-    shaft: Shaft,
-    /// The line was lost since the shaft was last seen.
-    was_lost: bool,
     settings: Settings,
     eeprom: Eeprom,
     /// The number of "fault reset" in n06 to n08, as its owner gave it.
@@ -121,8 +118,8 @@ pub struct Drive3g3ev<P> {
     command: Option<Command>,
     /// Whether the drive ran, in which direction, and who commanded it, when 0001h was last read for a status.
     shown: Option<(bool, Option<Direction>, Option<Control>)>,
-    /// Whether the drive has refused to read its reserved registers along.
-    skips_reserved: bool,
+    /// What this drive does not have, reserved registers among them.
+    absent: Absent,
 }
 
 impl<P: Port> Drive3g3ev<P> {
@@ -136,16 +133,14 @@ impl<P: Port> Drive3g3ev<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            run: OwnRun::new(),
+            watch: Watch::every(proof::STATUSES_PER_TURN),
             proof: Proof::default(),
-            shaft: Shaft::new(),
-            was_lost: false,
             settings: Settings::default(),
             eeprom: Eeprom::default(),
             fault_reset: None,
             command: None,
             shown: None,
-            skips_reserved: false,
+            absent: Absent::default(),
         }
     }
 

@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Class, Evidence, Frequency, Ground, Output, Port, Refusal, RunWord, Status, Told, Verdict};
+use drive_core::{Class, Evidence, Frequency, Ground, Output, Port, Refusal, Status, Told, Verdict};
 use tokio::time::Instant;
 
 use crate::{
@@ -17,8 +17,10 @@ use crate::{
     words::{Command, DriveState},
 };
 
-/// Statuses that pay for one exchange more.
-const PAID_BY: u16 = 10;
+/// Statuses of two exchanges each that pay for one more: a twentieth.
+pub(crate) const STATUSES_PER_TURN: u16 = 10;
+/// What has its turn: n39 and n40, n02, and 0001h with 0002h the other times.
+const TURNS: usize = 8;
 
 const NO_SUPPLY: Refusal = Refusal::Overridden {
     by: "a lack of voltage (bit 7 of 002Ch)",
@@ -36,18 +38,10 @@ const OTHER_SETPOINT: Refusal = Refusal::Overridden {
 /// What was last seen of what proves a run command.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Proof {
-    /// 0001h as it was last read.
-    pub(crate) word: Option<Command>,
     /// 0002h as it was last read.
     reference: Option<u16>,
     /// The reference that the run rests on: as this side gave it, or found it at the start.
     agreed: Option<u16>,
-    /// n39, n40 and n02 as they were last read.
-    pub(crate) settings: [Option<u16>; 3],
-    /// What was found otherwise, and not told yet.
-    pub(crate) changed: Option<Ground>,
-    statuses: u16,
-    turn: u16,
     /// 0001h and 0002h are to be looked at at once.
     urgent: bool,
     descent: Descent,
@@ -121,14 +115,13 @@ impl<P: Port> Drive3g3ev<P> {
     /// What a reading of the fast set says of the shaft and of the run command.
     pub(crate) fn tell(&mut self, status: &mut Status) {
         let now = Instant::now();
-        let counts = status.raw(address::OUTPUT_FREQUENCY).unwrap_or(0);
+        let counts = status.raw(address::OUTPUT_FREQUENCY);
         // In percent too: what counts is whether it is 0.
-        let output = Frequency::from_centihertz(counts.into());
-        let shown = self.output(now, status, output);
-        status.motion = self.shaft.see(now, shown, Some(output));
-        self.was_lost = false;
-        match shown {
-            Output::Braking(_) => self.proof.descent.see(now, counts),
+        let output = counts.map(|counts| Frequency::from_centihertz(counts.into()));
+        let shown = output.map_or(Output::NotKnown, |output| self.output(now, status, output));
+        status.motion = self.watch.shaft.see(now, shown, output);
+        match (shown, counts) {
+            (Output::Braking(_), Some(counts)) => self.proof.descent.see(now, counts),
             _ => self.proof.descent = Descent::default(),
         }
         status.verdict = self.verdict(status);
@@ -152,34 +145,27 @@ impl<P: Port> Drive3g3ev<P> {
         if !off && output != Frequency::ZERO {
             return Output::Braking(output);
         }
-        let came_down = self.shaft.was_braked() && !self.proof.descent.is_cut(now) && !self.was_lost;
+        let came_down = self.watch.shaft.was_braked() && !self.proof.descent.is_cut(now);
         if came_down { Output::None } else { Output::Cut }
     }
 
     /// The verdict that a status carries, as far as is known without more exchanges.
     pub(crate) fn verdict(&self, status: &Status) -> Option<Verdict> {
-        let mut run = self.run;
-        run.judge(&self.evidence(status))
+        self.watch.run.verdict(&self.evidence(status))
     }
 
     /// The verdict of a status, which ends a run command that stands no more.
     pub(crate) fn judge(&mut self, status: &mut Status) {
         let evidence = self.evidence(status);
-        status.verdict = self.run.judge(&evidence);
+        status.verdict = self.watch.run.judge(&evidence);
     }
 
     fn evidence(&self, status: &Status) -> Evidence {
-        let Some(lease) = self.run.lease() else { return Evidence::default() };
-        let word = match self.proof.word {
-            None => RunWord::NotTold,
-            Some(held) if held.bits() == lease.word => RunWord::Stands,
-            Some(held) if held.contains(Command::RUN) => RunWord::Another,
-            Some(_) => RunWord::Gone,
-        };
+        let is_run = |word| Command::from_bits_retain(word).contains(Command::RUN);
         let state = state_word(status);
         let local = state.contains(DriveState::LOCAL_RUN).then_some(OTHER_COMMAND);
         Evidence {
-            word,
+            word: self.watch.run.word(is_run),
             command: Told::unless(local),
             output: Told::unless(withheld(status)),
             reference: self.reference_told(status, state),
@@ -204,25 +190,22 @@ impl<P: Port> Drive3g3ev<P> {
 
     /// Looks at what has its turn, behind a status. What cannot be read now, a later turn tells.
     pub(crate) async fn prove(&mut self) {
-        if self.run.lease().is_none() {
+        if self.watch.run.lease().is_none() {
             return;
         }
-        self.proof.statuses += 1;
+        let turn = self.watch.turns.pass(TURNS);
         if self.proof.urgent {
             self.proof.urgent = !self.look_at_orders().await;
-            return;
-        }
-        if self.proof.statuses < PAID_BY {
-            return;
-        }
-        self.proof.statuses = 0;
-        self.proof.turn = self.proof.turn.wrapping_add(1);
-        match self.proof.turn % 8 {
-            0 => self.look_at_settings(address::N39, &[0, 1]).await,
-            4 => self.look_at_settings(address::N02, &[2]).await,
-            _ => {
-                self.look_at_orders().await;
+            if turn.is_some() {
+                self.watch.turns.again();
             }
+            return;
+        }
+        match turn {
+            None => {}
+            Some(3) => self.look_at_settings(address::N39, &[Ground::Units, Ground::Watchdog]).await,
+            Some(7) => self.look_at_settings(address::N02, &[Ground::Inputs]).await,
+            Some(_) => drop(self.look_at_orders().await),
         }
     }
 
@@ -232,23 +215,18 @@ impl<P: Port> Drive3g3ev<P> {
         else {
             return false;
         };
-        let command = Command::from_bits_retain(command);
-        (self.command, self.proof.word) = (Some(command), Some(command));
+        self.holds(command);
         self.proof.reference = Some(reference);
         self.proof.agreed = self.proof.agreed.or(Some(reference));
         true
     }
 
-    async fn look_at_settings(&mut self, first: u16, which: &[usize]) {
-        let count = u16::try_from(which.len()).unwrap_or(1);
+    async fn look_at_settings(&mut self, first: u16, grounds: &[Ground]) {
+        let count = u16::try_from(grounds.len()).unwrap_or(1);
         let Ok(words) = self.registers.at(Class::Status).read_words(first, count).await else { return };
-        for (&index, word) in which.iter().zip(words) {
-            let known = self.proof.settings.get_mut(index).and_then(|known| known.replace(word));
-            if known.is_none_or(|known| known == word) {
-                continue;
-            }
-            self.proof.changed = Some([Ground::Units, Ground::Watchdog, Ground::Inputs][index]);
-            if index == 0 {
+        for ((register, &ground), word) in (first..).zip(grounds).zip(words) {
+            let changed = self.watch.finds(register, word, ground);
+            if changed && ground == Ground::Units {
                 // It acts at the next power-up (§2.1 note 3).
                 self.settings.unit_was_changed();
             }

@@ -1,13 +1,10 @@
 //! Reading the monitors.
 
-use drive_core::{
-    Class, Error, ExceptionMeaning, Exchange, Faults, Measurements, Port, Result, Setpoint, State, Status,
-    Voltage,
-};
+use drive_core::{Class, Faults, Measurements, Port, Result, State, Status, Voltage};
 
 use crate::{
     Drive3g3ev,
-    blocks::{Block, FAST, OUTPUT, TERMINALS, Words},
+    blocks::{FAST, OUTPUT, Run, TERMINALS, Words},
     command::is_run,
     faults::{present, warnings},
     registers::{
@@ -23,14 +20,18 @@ impl<P: Port> Drive3g3ev<P> {
         let unit = self.unit(class).await?;
         self.registers.begin_snapshot();
         let mut words = Words::default();
-        self.read_block(class, &FAST, &mut words).await?;
+        self.read_run(class, FAST, &mut words).await?;
+        if words.word(SIGNALS).is_none() {
+            // Without it nothing is known of the drive: its exception says so.
+            self.registers.at(class).read(SIGNALS).await?;
+        }
         let state = self.registers.at(class).read(STATE).await?;
-        words.extend(STATE.address(), &[state]);
+        words.extend(STATE.address(), [Some(state)]);
         let mut status = FastWords::of(words.clone()).status(unit, self.command);
         if status.state == State::Stopping && is_run(&status) {
             // So it is if the order that it was given last is still the one in force: another may have come since.
             let held = self.read_command(class).await?;
-            words.extend(held.address, &[held.value]);
+            words.extend(held.address, [Some(held.value)]);
             status = FastWords::of(words).status(unit, self.command);
         }
         status.at = self.registers.snapshot_time();
@@ -42,7 +43,7 @@ impl<P: Port> Drive3g3ev<P> {
     /// without reading it. What cannot be read now, a later status tells. False: there was no need.
     pub(crate) async fn keep_stop_ready(&mut self, status: &Status) -> bool {
         let shown = (is_run(status), status.direction, status.control);
-        let unproved = self.run.lease().is_some() && self.proof.word.is_none();
+        let unproved = self.watch.run.lease().is_some() && self.watch.run.held().is_none();
         let stale = self.command.is_none() || self.shown != Some(shown) || unproved;
         let was_read = status.raw(COMMAND.address()).is_some();
         if !stale || was_read {
@@ -57,55 +58,44 @@ impl<P: Port> Drive3g3ev<P> {
         let unit = self.unit(Class::Background).await?;
         self.registers.begin_snapshot();
         let mut words = Words::default();
-        self.read_block(Class::Background, &OUTPUT, &mut words).await?;
-        self.read_block(Class::Background, &TERMINALS, &mut words).await?;
-        let reference = unit.and_then(|unit| unit.frequency(words.word(REFERENCE_SEEN)));
+        self.read_run(Class::Background, OUTPUT, &mut words).await?;
+        self.read_run(Class::Background, TERMINALS, &mut words).await?;
+        let reference = unit.zip(words.word(REFERENCE_SEEN)).and_then(|(unit, word)| unit.setpoint(word));
         let volts = |word: u16| Voltage::from_decivolts(u32::from(word) * 10);
         Ok(Measurements {
             at: self.registers.snapshot_time(),
-            reference: reference.map(Setpoint::Frequency),
-            output_voltage: Some(volts(words.word(OUTPUT_VOLTAGE))),
-            dc_bus_voltage: Some(volts(words.word(DC_BUS))),
-            inputs: Some(words.word(INPUT_TERMINALS)),
-            outputs: Some(words.word(OUTPUT_CONTACTS)),
+            reference,
+            output_voltage: words.word(OUTPUT_VOLTAGE).map(volts),
+            dc_bus_voltage: words.word(DC_BUS).map(volts),
+            inputs: words.word(INPUT_TERMINALS),
+            outputs: words.word(OUTPUT_CONTACTS),
             raw: words.into_raw(),
             ..Measurements::default()
         })
     }
 
     pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
-        let mut calls = self.registers.at(Class::Background);
         let mut words = Words::default();
-        for (first, count) in [(SIGNALS.address(), 3), (STATE.address(), 1), (LINK_ERROR.address(), 1)] {
-            words.extend(first, &calls.read_words(first, count).await?);
+        for run in [(SIGNALS.address(), 3), (STATE.address(), 1), (LINK_ERROR.address(), 1)] {
+            self.read_run(Class::Background, run, &mut words).await?;
         }
+        let errors = match words.word(ERRORS) {
+            Some(errors) => errors,
+            // Without it no fault is known, and that there is none is not either: its exception says so.
+            None => self.registers.at(Class::Background).read(ERRORS).await?,
+        };
         Ok(Faults {
-            present: present(Errors::from_bits_retain(words.word(ERRORS))),
+            present: present(Errors::from_bits_retain(errors)),
             history: Vec::new(),
             warnings: warnings(&words.pairs()),
             reset_allowed: None,
         })
     }
 
-    /// Reads a block whole, or in its parts once the drive has refused to read the reserved registers along.
-    async fn read_block(&mut self, class: Class, block: &Block, words: &mut Words) -> Result<()> {
+    /// Reads a run of registers, as far as this drive has them.
+    async fn read_run(&mut self, class: Class, (first, count): Run, words: &mut Words) -> Result<()> {
         let mut calls = self.registers.at(class);
-        if !self.skips_reserved {
-            let (first, count) = block.whole;
-            match calls.read_words(first, count).await {
-                Ok(values) => {
-                    words.extend(first, &values);
-                    return Ok(());
-                }
-                Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, exchange, .. })
-                    if exchange == (Exchange { function: 0x03, register: Some(first) }) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        for (first, count) in block.parts {
-            words.extend(first, &calls.read_words(first, count).await?);
-        }
-        self.skips_reserved = true;
+        words.extend(first, self.absent.read(&mut calls, first, count).await?);
         Ok(())
     }
 }

@@ -30,7 +30,8 @@ impl<P: Port> Drive3g3ev<P> {
         if held.contains(input) {
             self.write_command(clear).await?;
         }
-        (self.command, self.proof.word) = (None, None);
+        self.command = None;
+        self.watch.run.sends(clear.bits());
         // Sent once; whatever becomes of it, the bit is cleared again.
         let pulse = self.registers.at(Class::Command).edge().write(COMMAND, (clear | input).bits()).await;
         match pulse {
@@ -54,9 +55,9 @@ impl<P: Port> Drive3g3ev<P> {
                 if pulse.is_err() && self.read_command(Class::Command).await?.value != clear.bits() {
                     self.write_command(clear).await?;
                 }
-                if self.run.lease().is_some() {
+                if self.watch.run.lease().is_some() {
                     self.read_command(Class::Command).await?;
-                    self.run.end();
+                    self.watch.run.end();
                 }
                 return Ok(Status { verdict: None, ..shown });
             }

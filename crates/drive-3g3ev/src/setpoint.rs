@@ -1,8 +1,8 @@
 //! The reference, 0002h.
 
 use drive_core::{
-    Class, Command as Order, Confirming, Error, ErrorKind, Frequency, Percent, Port, RawWord, Refusal,
-    Result, SETTLED_WITHIN, Setpoint, Status,
+    Class, Command as Order, Confirming, Error, ErrorKind, Port, RawWord, Refusal, Result, SETTLED_WITHIN,
+    Setpoint, Status,
 };
 use tokio::time::Instant;
 
@@ -15,55 +15,36 @@ use crate::{
 
 impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        let Setpoint::Frequency(frequency) = setpoint else {
+        if let Setpoint::Speed(_) = setpoint {
             return Err(Error::Unsupported {
                 what: "a setpoint in rpm",
                 reason: "the reference of a 3G3EV is a frequency or a share of one",
             });
-        };
+        }
         let order = Order::Setpoint(setpoint);
         self.check_reference(order).await?;
-        let word = self.frequency_word(frequency, order).await?;
+        let word = self.reference_word(setpoint, order).await?;
         self.write_reference(word, order).await
     }
 
-    /// Gives the drive a reference in percent, where n39 counts it so (2 or 3). 100 % is a frequency for which the
-    /// manual names no register.
-    ///
-    /// # Errors
-    /// As [`set_setpoint`](drive_core::Drive::set_setpoint); [`Error::Unsupported`] when n39 counts in hertz, and
-    /// [`Error::ValueNotAllowed`] for a share that is negative, between two counts or beyond a word.
-    pub async fn set_reference_share(&mut self, share: Percent) -> Result<()> {
-        let order = Order::Configure("reference in percent");
-        self.check_reference(order).await?;
-        let unit = self.reference_unit(order).await?;
-        if unit.share(0).is_none() {
-            return Err(Error::Unsupported {
-                what: "a reference in percent",
-                reason: "n39 counts the reference in hertz; 2 or 3 counts it in percent",
-            });
-        }
-        let word = unit.share_word(share).ok_or(Error::ValueNotAllowed {
-            slave: self.registers.slave(),
-            register: REFERENCE.address(),
-            code: REFERENCE.row().code,
-            value: share.hundredths(),
-        })?;
-        self.write_reference(word, order).await
-    }
-
-    async fn frequency_word(&mut self, frequency: Frequency, order: Order) -> Result<u16> {
-        let unit = self.reference_unit(order).await?;
-        let word = unit.frequency_word(frequency).ok_or(Error::Unsupported {
+    /// The word of a setpoint, in what n39 counts.
+    async fn reference_word(&mut self, setpoint: Setpoint, order: Order) -> Result<u16> {
+        const IN_PERCENT: Error = Error::Unsupported {
             what: "a setpoint in hertz",
             reason: "n39 counts the reference in percent of a frequency that the manual names no register for: \
-                     write 0 to n39, save it, and switch the drive off and on; then it takes hertz",
-        })?;
-        word.map_err(|problem| Error::Setpoint {
-            slave: self.registers.slave(),
-            setpoint: Setpoint::Frequency(frequency),
-            problem,
-        })
+                     give it in percent, or write 0 to n39, save it, and switch the drive off and on",
+        };
+        const IN_HERTZ: Error = Error::Unsupported {
+            what: "a setpoint in percent",
+            reason: "n39 counts the reference in hertz; 2 or 3 counts it in percent",
+        };
+        let unit = self.reference_unit(order).await?;
+        let word = match setpoint {
+            Setpoint::Frequency(frequency) => unit.frequency_word(frequency).ok_or(IN_PERCENT)?,
+            Setpoint::Share(share) => unit.share_word(share).ok_or(IN_HERTZ)?,
+            Setpoint::Speed(_) => return Err(IN_HERTZ),
+        };
+        word.map_err(|problem| Error::Setpoint { slave: self.registers.slave(), setpoint, problem })
     }
 
     /// Refuses a reference where bit 9 of 002Ch says that the panel or the terminals give it. n02 tells less: it acts at the

@@ -41,7 +41,12 @@ impl<P: Port> Drive3g3ev<P> {
         if self.settings.unit_changed {
             return Ok(None);
         }
-        Ok(FrequencyUnit::of(self.n39(class).await?))
+        if self.settings.n39.is_none() {
+            // A drive that does not have it counts nobody knows what.
+            let mut calls = self.registers.at(class);
+            self.settings.n39 = self.absent.word(&mut calls, N39.address()).await?;
+        }
+        Ok(self.settings.n39.and_then(FrequencyUnit::of))
     }
 
     /// The same without an exchange; `None` also where it was not read.
@@ -76,7 +81,7 @@ impl<P: Port> Drive3g3ev<P> {
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
         let mut calls = self.registers.at(Class::Background);
         let n40 = calls.read(N40).await?;
-        self.proof.settings[1] = Some(n40);
+        self.watch.knows(N40.address(), n40);
         match n40 {
             0 => Ok(Watchdog { timeout: Some(TIME_OVER), reaction: Some(Reaction::Trip) }),
             1 => Ok(Watchdog { timeout: None, reaction: Some(Reaction::Ignore) }),

@@ -13,20 +13,21 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FastWords {
     signals: Signals,
-    errors: Errors,
+    /// What is `None` this drive does not have.
+    errors: Option<Errors>,
     state: DriveState,
-    reference: u16,
-    output: u16,
-    current: u16,
+    reference: Option<u16>,
+    output: Option<u16>,
+    current: Option<u16>,
     raw: Vec<RawWord>,
 }
 
 impl FastWords {
     pub(crate) fn of(words: Words) -> Self {
         Self {
-            signals: Signals::from_bits_retain(words.word(SIGNALS)),
-            errors: Errors::from_bits_retain(words.word(ERRORS)),
-            state: DriveState::from_bits_retain(words.word(STATE)),
+            signals: Signals::from_bits_retain(words.word(SIGNALS).unwrap_or(0)),
+            errors: words.word(ERRORS).map(Errors::from_bits_retain),
+            state: DriveState::from_bits_retain(words.word(STATE).unwrap_or(0)),
             reference: words.word(REFERENCE_SEEN),
             output: words.word(OUTPUT_FREQUENCY),
             current: words.word(CURRENT),
@@ -44,12 +45,12 @@ impl FastWords {
         Status {
             state: self.drive_state(command),
             direction: Some(if reverse { Direction::Reverse } else { Direction::Forward }),
-            output_frequency: unit.and_then(|unit| unit.frequency(self.output)),
-            current: Some(Current::from_deciamperes(u32::from(self.current))),
-            reference: unit.and_then(|unit| unit.frequency(self.reference)),
+            output_frequency: unit.zip(self.output).and_then(|(unit, word)| unit.frequency(word)),
+            current: self.current.map(|word| Current::from_deciamperes(u32::from(word))),
+            reference: unit.zip(self.reference).and_then(|(unit, word)| unit.frequency(word)),
             at_reference: Some(self.state.contains(DriveState::AT_REFERENCE)),
             warning: Some(warning),
-            fault_code: (self.errors.bits() != 0).then(|| lowest_bit(self.errors)),
+            fault_code: self.errors.filter(|errors| errors.bits() != 0).map(lowest_bit),
             control: Some(self.control()),
             verdict: None,
             motion: Motion::NotKnown,
@@ -64,12 +65,15 @@ impl FastWords {
 
     fn drive_state(&self, command: Option<Command>) -> State {
         let fault = self.signals.contains(Signals::FAULT)
-            || self.errors.bits() != 0
+            || self.errors.is_some_and(|errors| errors.bits() != 0)
             || self.state.contains(DriveState::MAJOR_FAULT);
         let running = self.signals.contains(Signals::RUN) || self.state.contains(DriveState::RUN);
-        let turning = self.output != 0 && !self.state.contains(DriveState::OUTPUT_OFF);
+        let turning =
+            self.output.is_some_and(|output| output != 0) && !self.state.contains(DriveState::OUTPUT_OFF);
         // A run command without an output is none: something keeps it off.
-        let cut = self.state.contains(DriveState::OUTPUT_OFF) && self.reference != 0 && self.output == 0;
+        let cut = self.state.contains(DriveState::OUTPUT_OFF)
+            && self.reference != Some(0)
+            && self.output.is_none_or(|output| output == 0);
         let ready = self.signals.contains(Signals::READY)
             && self.state.contains(DriveState::READY)
             && !self.state.contains(DriveState::UNDERVOLTAGE);

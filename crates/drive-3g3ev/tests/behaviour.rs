@@ -6,17 +6,16 @@ use std::time::Duration;
 
 use drive_3g3ev::{ROWS, broadcast};
 use drive_core::{
-    Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Fault, Frequency, Percent, Reaction,
-    Refusal, Row, Setpoint, SetpointProblem, State, StopMode, Watchdog, registers::Storage,
+    Control, Direction, Drive, Error, ErrorKind, ExceptionMeaning, Fault, Frequency, Intent, Percent,
+    Reaction, Refusal, Row, Setpoint, SetpointProblem, State, StopMode, Watchdog, registers::Storage,
 };
 use drive_sim::{SimSlave, models::drive_3g3ev::Drive3g3ev as Model};
 use drive_testing::bench::{self, writes};
-use rig::{RESET, Rig, one};
+use rig::{Judged, RESET, Rig, one};
 use tokio_modbus::{Request, client::Client};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
 
-type Drive3g3ev = drive_3g3ev::Drive3g3ev<drive_bus::Slave>;
 /// What is wrong, how it comes about, the direction of the start, and the refusal.
 type Refused = (&'static str, fn(&SimSlave), Direction, Refusal);
 
@@ -24,7 +23,7 @@ fn row(code: &str) -> &'static Row {
     Row::find(ROWS, code).unwrap()
 }
 
-async fn running() -> (Drive3g3ev, SimSlave, Rig) {
+async fn running() -> (Judged, SimSlave, Rig) {
     let (mut drive, machine, rig) = one();
     drive.set_setpoint(FIFTY).await.unwrap();
     drive.start(Direction::Forward).await.unwrap();
@@ -166,16 +165,22 @@ async fn where_n39_counts_percent_hertz_are_refused_and_percents_are_taken() {
         set_up(&machine, &[(0x0127, n39)]);
         let error = drive.set_setpoint(FIFTY).await.unwrap_err();
         assert_eq!((error.kind(), writes(&machine)), (ErrorKind::Unsupported, 0));
-        drive.set_reference_share(Percent::from_percent(50)).await.unwrap();
+        drive.set_setpoint("50%".parse().unwrap()).await.unwrap();
         assert_eq!(machine.peek(2), Some(word));
+        let asked = drive.intent(2, word).await.unwrap();
+        assert_eq!(asked, Some(Intent::Setpoint(Percent::from_percent(50).into())));
         let status = drive.start(Direction::Forward).await.unwrap();
         assert_eq!((status.state, status.output_frequency), (State::Running, None));
-        assert_eq!(drive.measurements().await.unwrap().reference, None);
-        let error = drive.set_reference_share(Percent::from_percent(-1)).await.unwrap_err();
-        assert!(matches!(error, Error::ValueNotAllowed { value: -100, .. }), "{error}");
+        assert_eq!(drive.measurements().await.unwrap().reference, Some(Percent::from_percent(50).into()));
+        let error = drive.set_setpoint(Percent::from_percent(-1).into()).await.unwrap_err();
+        assert!(matches!(error, Error::Setpoint { problem: SetpointProblem::TooLarge, .. }), "{error}");
     }
+    let (mut drive, machine, _rig) = one();
+    set_up(&machine, &[(0x0127, 3)]);
+    let error = drive.set_setpoint(Percent::from_hundredths(4_555).into()).await.unwrap_err();
+    assert!(error.to_string().contains("steps of 0.1 %"), "{error}");
     let (mut drive, _machine, _rig) = one();
-    let error = drive.set_reference_share(Percent::from_percent(50)).await.unwrap_err();
+    let error = drive.set_setpoint(Percent::from_percent(50).into()).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Unsupported);
 }
 
@@ -310,7 +315,7 @@ async fn a_parameter_lives_in_ram_until_it_is_saved_once_for_each_change() {
 #[tokio::test(start_paused = true)]
 async fn the_eeprom_is_not_written_beyond_its_life() {
     let (_, machine, rig) = one();
-    let mut drive = rig.drive(1).with_saves(99_999);
+    let mut drive = rig.drive(1).with(|drive| drive.with_saves(99_999));
     drive.write_parameter(row("n20"), 50).await.unwrap();
     assert_eq!(drive.persist().await, Ok(100_000));
     drive.write_parameter(row("n20"), 51).await.unwrap();

@@ -11,7 +11,7 @@ use drive_testing::{
     bench,
     words::{Asked, Words},
 };
-use rig::{RESET, Rig, one, ready, running, with};
+use rig::{Judged, RESET, Rig, one, ready, running, with};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
 /// Bits of 002Ch.
@@ -38,7 +38,7 @@ fn running_with(more: &[(u16, u16)]) -> Words {
 }
 
 /// n02 as it is since the last power-up.
-fn powered_with_n02(n02: u16) -> (drive_3g3ev::Drive3g3ev<drive_bus::Slave>, SimSlave, Rig) {
+fn powered_with_n02(n02: u16) -> (Judged, SimSlave, Rig) {
     let (drive, machine, rig) = one();
     machine.poke(0x0102, n02);
     machine.power_cycle();

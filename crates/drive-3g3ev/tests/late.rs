@@ -106,7 +106,7 @@ impl Client for Gateway {
 fn behind_a_gateway(fates: impl IntoIterator<Item = Fate>) -> (Drive3g3ev<Gateway>, SimSlave, Rig) {
     let (drive, machine, rig) = one();
     let fates = Arc::new(Mutex::new(fates.into_iter().collect()));
-    let gateway = Gateway { line: drive.into_port(), fates, kept: None, due: None };
+    let gateway = Gateway { line: drive.into_drive().into_port(), fates, kept: None, due: None };
     let drive = Drive3g3ev::new(gateway, bench::address(1)).with_fault_reset_function(RESET);
     (drive, machine, rig)
 }

@@ -60,12 +60,12 @@ impl<P: Port> Atv21<P> {
         block: Option<([WriteSlot; 2], u16)>,
     ) -> Result<Status> {
         let command = Command::Start(direction);
-        self.check_own(command)?;
+        self.check_own(command).await?;
         let (status, held) = self.check_start(command).await?;
         let word = self.run_word(direction, held);
         self.take_command(command, status, held, word).await?;
-        self.run.give(Lease::new(direction, word.bits()));
-        self.proof.word = None;
+        self.watch.run.give(Lease::new(direction, word.bits()));
+        self.watch.run.sends(word.bits());
         let both = block.and_then(|(slots, reference)| command_and_reference(slots, word.bits(), reference));
         let mut calls = self.registers.at(Class::Command);
         let sent = match both {
@@ -73,17 +73,17 @@ impl<P: Port> Atv21<P> {
             None => calls.write(map::COMMAND_WORD, word.bits()).await,
         };
         match sent {
-            Ok(()) => self.run.was_written(),
+            Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out, and a block in doubt is read back.
             Err(error @ Error::Exception { .. }) => {
                 if self.command_word(Class::Command).await.map_err(Error::after_write)? != word {
-                    self.run.was_not_written();
+                    self.watch.run.was_not_written();
                     return Err(error);
                 }
             }
             Err(error) if both.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
             Err(error) if error.kind() == ErrorKind::NotSent => {
-                self.run.was_not_written();
+                self.watch.run.was_not_written();
                 return Err(error);
             }
             Err(error) => return Err(error),
@@ -160,7 +160,8 @@ impl<P: Port> Atv21<P> {
 
     /// Writes FA00, but for a stop; what may stand there then is remembered.
     pub(crate) async fn write_command_word(&mut self, word: CommandWord) -> Result<()> {
-        (self.held, self.proof.word) = (None, None);
+        self.held = None;
+        self.watch.run.sends(word.bits());
         self.registers.at(Class::Command).write(map::COMMAND_WORD, word.bits()).await?;
         self.held = Some(word);
         Ok(())
@@ -284,7 +285,7 @@ impl<P: Port> Atv21<P> {
                 because = force.flatten();
             }
             if !held.contains(CommandWord::RUN) {
-                self.run.end();
+                self.watch.run.end();
             }
             let comes_down = output == Some(Frequency::ZERO) || is_falling(first, output);
             if because.is_none() && (!runs || comes_down) {
@@ -293,7 +294,8 @@ impl<P: Port> Atv21<P> {
                 }
                 let taken_from = taken_from.filter(|_| source(&status) == CommandSource::Serial);
                 status.verdict = None;
-                return Ok(Stopped { status, mode, instead, taken_from });
+                let stopped = Stopped { instead, taken_from, ..Stopped::by(mode, status) };
+                return Ok(stopped.held_by(&self.watch.shaft));
             }
             first = first.or(output);
             let over = because.is_some() && held == word && Instant::now() >= settled;
@@ -320,7 +322,8 @@ impl<P: Port> Atv21<P> {
         {
             return sent.map(Ok);
         }
-        (self.held, self.proof.word) = (Some(word), None);
+        self.held = Some(word);
+        self.watch.run.sends(word.bits());
         Ok(sent)
     }
 
@@ -337,7 +340,7 @@ impl<P: Port> Atv21<P> {
     }
 
     /// The run command in this direction, with what its owner has chosen, or else as the drive holds it.
-    fn run_word(&self, direction: Direction, held: CommandWord) -> CommandWord {
+    pub(crate) fn run_word(&self, direction: Direction, held: CommandWord) -> CommandWord {
         let chosen = match self.selections {
             Some(selections) => selections | (held & CommandWord::PRIORITIES),
             None => held & CommandWord::KEPT,

@@ -225,8 +225,9 @@ impl<P: Port> Atv21<P> {
     /// FA00 as the drive holds it, remembered for the next stop.
     pub(crate) async fn command_word(&mut self, class: Class) -> Result<CommandWord> {
         let word = self.registers.at(class).read(map::COMMAND_WORD).await?;
+        self.watch.run.reads(word);
         let word = CommandWord::from_bits_retain(word);
-        (self.held, self.proof.word) = (Some(word), Some(word));
+        self.held = Some(word);
         Ok(word)
     }
 
@@ -242,7 +243,7 @@ impl<P: Port> Atv21<P> {
     /// reading before its word is written. What cannot be read now, a later status tells. False: there was no need.
     pub(crate) async fn keep_stop_ready(&mut self, status: &Status) -> bool {
         let shown = (status_word(status).intersection(CHOSEN_OR_ORDERED), source(status));
-        let unproved = self.run.lease().is_some() && self.proof.word.is_none();
+        let unproved = self.watch.run.lease().is_some() && self.watch.run.held().is_none();
         if self.held.is_some() && self.shown == Some(shown) && !unproved {
             return false;
         }
@@ -267,8 +268,7 @@ impl<P: Port> Atv21<P> {
         register: Register<impl Readable>,
     ) -> Result<Option<u16>> {
         let mut calls = self.registers.at(class);
-        let words = self.absent.read(&mut calls, register.address(), 1).await?;
-        Ok(words.first().copied().flatten())
+        self.absent.word(&mut calls, register.address()).await
     }
 }
 

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    Absent, BroadcastWrite, Class, Direction, Drive, Error, Faults, Ground, Identity, Intent, Lease,
-    Measurements, Port, Reaction, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
-    Withdrawn, Written,
+    Absent, BroadcastWrite, Class, Direction, Drive, Error, Faults, Identity, Intent, Lease, Measurements,
+    Port, Reaction, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn,
+    Written,
 };
 
 use crate::{Atv21, CommandWord, model, proof::Proof, registers};
@@ -14,34 +14,28 @@ use crate::{Atv21, CommandWord, model, proof::Proof, registers};
 #[async_trait]
 impl<P: Port> Drive for Atv21<P> {
     drive_core::told_by!(registers);
+    drive_core::watched_by!(watch);
 
-    fn lease(&self) -> Option<Lease> {
-        self.run.lease()
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        Some(self.run_word(direction, self.held.unwrap_or_default()).bits())
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.run.adopt(lease);
+        self.watch.adopt(lease);
         (self.shown, self.proof) = (None, Proof::of_unknown());
     }
 
     fn forget(&mut self) {
         self.forget_blocks();
         self.proof.forget();
+        self.watch.lose_sight();
         (self.held, self.shown, self.references) = (None, None, None);
-        (self.upper_limit, self.modes, self.other_drive) = (None, None, None);
-        (self.absent, self.was_lost) = (Absent::default(), true);
-    }
-
-    fn take_changed(&mut self) -> Option<Ground> {
-        self.proof.changed.take()
+        (self.upper_limit, self.modes, self.kind) = (None, None, None);
+        self.absent = Absent::default();
     }
 
     fn recognise(&self, identity: &Identity) -> Recognised {
         model::recognise(identity)
-    }
-
-    fn set_coast_time(&mut self, time: Option<Duration>) {
-        self.shaft.set_coast_time(time);
     }
 
     /// Reads the fast set: from the block of the drive, in one exchange, where it is known to hold FD01, FD00 and FE03;

@@ -40,8 +40,8 @@ mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, OwnRun, Port, Reaction, Refusal,
-    Registers, Result, Shaft, SlaveAddress, Status, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Reaction, Recognised, Refusal,
+    Registers, Result, SlaveAddress, Status, StopMode, Watch, WatchdogCapability, serial::CharacterFormat,
 };
 
 use crate::{blocks::WriteSlot, in_effect::ReadBlock, proof::Proof};
@@ -130,17 +130,13 @@ enum WriteBlock {
 #[derive(Debug)]
 pub struct Atv21<P> {
     registers: Registers<P>,
-    /// The run command of this side that stands, or may.
-    run: OwnRun,
+    watch: Watch,
     proof: Proof,
-    shaft: Shaft,
-    /// The line was lost since the shaft was last seen.
-    was_lost: bool,
     absent: Absent,
     /// CMOD and FMOD, where the drive has them; `None`: not read.
     modes: Option<[Option<u16>; 2]>,
-    /// What the drive has said it is, where that is no Altivar 21.
-    other_drive: Option<&'static str>,
+    /// Whether it has said that it is an Altivar 21; `None`: it was not asked.
+    kind: Option<Recognised>,
     authority: Authority,
     /// What its owner has chosen; `None`: what the drive holds is kept.
     selections: Option<CommandWord>,
@@ -165,13 +161,11 @@ impl<P: Port> Atv21<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            run: OwnRun::new(),
+            watch: Watch::every(proof::STATUSES_PER_TURN),
             proof: Proof::default(),
-            shaft: Shaft::new(),
-            was_lost: false,
             absent: Absent::default(),
             modes: None,
-            other_drive: None,
+            kind: None,
             authority: Authority::default(),
             selections: None,
             held: None,
@@ -222,11 +216,14 @@ impl<P: Port> Atv21<P> {
         self.registers.into_port()
     }
 
-    /// Refuses to write to a drive that has said that it is another one.
-    fn check_own(&self, command: Command) -> Result<()> {
-        match self.other_drive {
-            None => Ok(()),
-            Some(it_is) => Err(self.refused(command, Refusal::Settings(it_is))),
+    /// Refuses to write to a drive that says that it is another one, which it is asked once.
+    async fn check_own(&mut self, command: Command) -> Result<()> {
+        if self.kind.is_none() {
+            self.recognise_itself().await?;
+        }
+        match self.kind {
+            Some(Recognised::NotMine { it_is }) => Err(self.refused(command, Refusal::AnotherDrive(it_is))),
+            _ => Ok(()),
         }
     }
 

@@ -74,15 +74,10 @@ impl ModelEntry {
 
 /// Whether what says this of itself is an Altivar 21: by the reference of 43/14 (§7.9), else by FB05 and FB72.
 pub(crate) fn recognise(identity: &Identity) -> Recognised {
+    const STRANGER: Recognised =
+        Recognised::NotMine { it_is: "a drive whose identification (43/14) names no Altivar" };
     if let Some(model) = identity.model.as_deref().map(str::trim).filter(|model| !model.is_empty()) {
-        let is = |family: &&(&str, &str)| {
-            model.get(..family.0.len()).is_some_and(|own| own.eq_ignore_ascii_case(family.0))
-        };
-        return match RELATIVES.iter().find(is) {
-            Some((OWN, _)) => Recognised::Mine,
-            Some((_, it_is)) => Recognised::NotMine { it_is },
-            None => Recognised::NotMine { it_is: STRANGER },
-        };
+        return Recognised::by_reference(model, "ATV21").unwrap_or(STRANGER);
     }
     let code =
         |register: u16| identity.codes.iter().find(|word| word.address == register).map(|word| word.value);
@@ -92,21 +87,6 @@ pub(crate) fn recognise(identity: &Identity) -> Recognised {
         None => Recognised::CannotTell,
     }
 }
-
-const OWN: &str = "ATV21";
-/// How the references of 43/14 begin, and what is to be done about those of others. The longer of two comes first.
-const RELATIVES: &[(&str, &str)] = &[
-    (
-        "ATV212",
-        "it says that it is an Altivar 212: no family here fits, and nothing but a stop is written to it",
-    ),
-    (OWN, ""),
-    ("ATV312", "it says that it is an Altivar 312: set it up as one of the family atv312"),
-    ("ATV28", "it says that it is an Altivar 28: set it up as one of the family atv28"),
-    ("ATV58", "it says that it is an Altivar 58: set it up as one of the family atv58"),
-];
-const STRANGER: &str =
-    "its identification (43/14) names no Altivar 21: see what it is, for nothing but a stop is written to it";
 
 use Enclosure::{Ip54, Ip54ClassB, Standard};
 use VoltageClass::{V200, V400};

@@ -9,7 +9,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Evidence, Frequency, Ground, Output, Port, RawWord, Refusal, RunWord, Status, Told, Verdict,
+    Class, Evidence, Frequency, Ground, Output, Port, RawWord, Refusal, Status, Told, Verdict,
     registers::{Register, access::ReadWrite},
 };
 use tokio::time::Instant;
@@ -24,8 +24,9 @@ use crate::{
     words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
 };
 
-/// Exchanges of statuses that pay for one more.
-const PAID_BY: u16 = 10;
+/// Statuses that pay for one exchange more, a tenth of theirs at the most: of four exchanges each, and of two with the block.
+pub(crate) const STATUSES_PER_TURN: u16 = 3;
+const STATUSES_PER_TURN_WITH_BLOCK: u16 = 5;
 /// How far the output may be from the reference, in hundredths of a hertz: slip compensation, a jump frequency.
 const NEAR: u16 = 200;
 /// How long the output may come no nearer to the reference. The longest ramp, 3200 s to 80 Hz, does 0.25 Hz meanwhile.
@@ -72,24 +73,13 @@ const NOT_FOLLOWED: Refusal = Refusal::Overridden {
 /// What was last seen of what proves a run command.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proof {
-    /// FA00 as it was last read.
-    pub(crate) word: Option<CommandWord>,
     /// FE46.
     pub(crate) source: Option<ReferenceSource>,
     /// The reference that the run rests on: FA01 or FA13 as this side gave it or found it at the start.
     pub(crate) agreed: Option<Reference>,
     /// What stands for it now: FE02 for FA01, FA13 for itself.
     pub(crate) reference: Option<u16>,
-    /// [`SETTINGS`] as they were last read or written.
-    settings: [Option<u16>; SETTINGS.len()],
-    /// What was found otherwise, and not told yet.
-    pub(crate) changed: Option<Ground>,
-    /// Whether this value has armed the watchdog.
-    pub(crate) armed: bool,
     approach: Approach,
-    /// Exchanges of statuses since the last turn.
-    paid: u16,
-    turn: usize,
     /// How many of FE46 and FE02 are to be looked at whatever was paid.
     urgent: usize,
 }
@@ -102,8 +92,7 @@ impl Proof {
 
     /// After a lost line: what was seen before proves nothing any more. What the run rests on stays.
     pub(crate) fn forget(&mut self) {
-        (self.word, self.source, self.reference) = (None, None, None);
-        self.settings = [None; SETTINGS.len()];
+        (self.source, self.reference) = (None, None);
         (self.approach, self.urgent) = (Approach::default(), 2);
     }
 
@@ -111,15 +100,6 @@ impl Proof {
     pub(crate) fn agree(&mut self, reference: Reference, shown: u16) {
         (self.agreed, self.reference) = (Some(reference), Some(shown));
         (self.source, self.approach) = (Some(ReferenceSource::Serial), Approach::default());
-    }
-
-    /// A setting was read or written for its own sake: what is found later is held against it.
-    pub(crate) fn knows(&mut self, address: u16, word: u16) {
-        for (setting, known) in SETTINGS.iter().zip(&mut self.settings) {
-            if setting.address() == address {
-                *known = Some(word);
-            }
-        }
     }
 
     /// Nothing is known of the reference any more.
@@ -199,26 +179,19 @@ pub(crate) fn withheld(word: StatusWord) -> Option<Refusal> {
 impl<P: Port> Atv21<P> {
     /// What a reading of the fast set says of the shaft and of the run command.
     pub(crate) fn tell(&mut self, status: &mut Status) {
-        let shown = output(status_word(status), status.output_frequency, self.shaft.was_braked());
-        // What the drive did while the line was lost nobody knows: a motor that turned may coast.
-        let lost = std::mem::take(&mut self.was_lost) && matches!(shown, Output::None);
-        let shown = if lost { Output::Cut } else { shown };
-        status.motion = self.shaft.see(Instant::now(), shown, status.output_frequency);
+        let shaft = &mut self.watch.shaft;
+        let shown = output(status_word(status), status.output_frequency, shaft.was_braked());
+        status.motion = shaft.see(Instant::now(), shown, status.output_frequency);
         status.verdict = self.verdict(status);
     }
 
     /// What is known of the run command with this status.
     fn evidence(&self, status: &Status) -> Evidence {
-        let Some(lease) = self.run.lease() else { return Evidence::default() };
+        let Some(lease) = self.watch.run.lease() else { return Evidence::default() };
         let run = CommandWord::from_bits_retain(lease.word);
-        let word = match self.proof.word {
-            None => RunWord::NotTold,
-            Some(held) if held == run => RunWord::Stands,
-            Some(held) if held.contains(CommandWord::RUN) => RunWord::Another,
-            Some(_) => RunWord::Gone,
-        };
+        let is_run = |word| CommandWord::from_bits_retain(word).contains(CommandWord::RUN);
         Evidence {
-            word,
+            word: self.watch.run.word(is_run),
             command: Told::unless(commanded_by_other(status)),
             output: Told::unless(withheld(status_word(status))),
             reference: self.reference_told(run),
@@ -241,10 +214,11 @@ impl<P: Port> Atv21<P> {
 
     /// Looks at what has its turn, behind a status.
     pub(crate) async fn prove(&mut self, status: &mut Status) {
-        let exchanges = if matches!(self.read_block, ReadBlock::Shown(_)) { 2 } else { 4 };
-        if self.run.lease().is_some() || self.proof.armed {
+        if self.watch.is_kept() {
+            let by_block = matches!(self.read_block, ReadBlock::Shown(_));
+            let every = if by_block { STATUSES_PER_TURN_WITH_BLOCK } else { STATUSES_PER_TURN };
+            self.watch.turns.set_every(every);
             self.watch_approach(status);
-            self.proof.paid = self.proof.paid.saturating_add(exchanges);
             self.look_in_turn(status).await;
         }
     }
@@ -252,20 +226,19 @@ impl<P: Port> Atv21<P> {
     /// The verdict of a status, which ends a run command that stands no more.
     pub(crate) fn judge(&mut self, status: &mut Status) {
         let evidence = self.evidence(status);
-        status.verdict = self.run.judge(&evidence);
+        status.verdict = self.watch.run.judge(&evidence);
     }
 
     /// The verdict of a status that is read for a command.
     pub(crate) fn verdict(&self, status: &Status) -> Option<Verdict> {
-        let mut run = self.run;
-        run.judge(&self.evidence(status))
+        self.watch.run.verdict(&self.evidence(status))
     }
 
     fn watch_approach(&mut self, status: &Status) {
         let runs = status_word(status).contains(StatusWord::RUN | StatusWord::STANDBY_RUN);
         let by_bus = source(status) == CommandSource::Serial;
         // A motor that is turned round moves away from its reference first.
-        let directed = self.run.lease().is_some_and(|lease| status.direction == Some(lease.direction));
+        let directed = self.watch.run.lease().is_some_and(|lease| status.direction == Some(lease.direction));
         let output = status.raw(map::OUTPUT_FREQUENCY.address());
         let reference = self.proof.agreed.filter(|(register, _)| register.address() == FREQUENCY);
         match (output, reference) {
@@ -280,29 +253,33 @@ impl<P: Port> Atv21<P> {
 
     /// Reads what has its turn, if one is paid or it is urgent. What cannot be read now, a later turn tells.
     async fn look_in_turn(&mut self, status: &mut Status) {
-        let leased = self.run.lease().is_some();
+        let leased = self.watch.run.lease().is_some();
+        let things = if leased { 4 * SETTINGS.len() } else { SETTINGS.len() };
+        let turn = self.watch.turns.pass(things);
         if leased && self.proof.urgent > 0 {
             let seen = match self.proof.urgent {
                 2 => self.look_at_source(status).await,
                 _ => self.look_at_shown(status).await,
             };
             self.proof.urgent -= usize::from(seen);
-            return;
-        }
-        if self.proof.paid < PAID_BY {
-            return;
-        }
-        self.proof.paid = 0;
-        self.proof.turn = self.proof.turn.wrapping_add(1);
-        match self.proof.turn % 4 {
-            1 if leased => drop(self.look_at_source(status).await),
-            2 if leased => drop(self.look_at_shown(status).await),
-            3 if leased => {
-                if self.command_word(Class::Status).await.is_err() {
-                    self.proof.word = None;
-                }
+            if turn.is_some() {
+                self.watch.turns.again();
             }
-            _ => self.look_at_setting(self.proof.turn / 4 % SETTINGS.len(), status).await,
+            return;
+        }
+        match turn {
+            None => {}
+            Some(setting) if !leased => self.look_at_setting(setting, status).await,
+            Some(turn) => match turn % 4 {
+                0 => drop(self.look_at_source(status).await),
+                1 => drop(self.look_at_shown(status).await),
+                2 => {
+                    if self.command_word(Class::Status).await.is_err() {
+                        self.watch.run.unread();
+                    }
+                }
+                _ => self.look_at_setting(turn / 4, status).await,
+            },
         }
     }
 
@@ -347,14 +324,12 @@ impl<P: Port> Atv21<P> {
     async fn look_at_setting(&mut self, index: usize, status: &mut Status) {
         let Some(register) = SETTINGS.get(index).copied() else { return };
         let Some(word) = self.look(register.address(), register.row().code, status).await else { return };
-        let known = self.proof.settings.get_mut(index).and_then(|known| known.replace(word));
-        if known.is_some_and(|known| known != word) {
-            self.proof.changed = Some(match index {
-                0 | 1 => Ground::Watchdog,
-                2 => Ground::Limits,
-                _ => Ground::Inputs,
-            });
-        }
+        let ground = match index {
+            0 | 1 => Ground::Watchdog,
+            2 => Ground::Limits,
+            _ => Ground::Inputs,
+        };
+        self.watch.finds(register.address(), word, ground);
         match (index, &mut self.modes) {
             (2, _) => self.upper_limit = Some(Frequency::from_centihertz(word.into())),
             (3, Some([command, _])) => *command = Some(word),
@@ -366,8 +341,7 @@ impl<P: Port> Atv21<P> {
     /// One register beside the fast set; its word is kept among the status's.
     async fn look(&mut self, address: u16, code: &'static str, status: &mut Status) -> Option<u16> {
         let mut calls = self.registers.at(Class::Status);
-        let value = *self.absent.read(&mut calls, address, 1).await.ok()?.first()?;
-        let value = value?;
+        let value = self.absent.word(&mut calls, address).await.ok()??;
         status.raw.push(RawWord { address, code, value });
         Some(value)
     }

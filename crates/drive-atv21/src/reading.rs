@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power, RawWord,
-    Recognised, Result, Setpoint, Speed, State, Status,
+    Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, Power, RawWord, Result,
+    Setpoint, Speed, State, Status,
     registers::{Register, access::Read},
 };
 use tokio_modbus::prelude::ReadCode;
@@ -218,7 +218,7 @@ impl<P: Port> Atv21<P> {
     /// # Errors
     /// As every read.
     pub async fn model(&mut self) -> Result<Option<&'static ModelEntry>> {
-        let [code, class] = self.model_codes().await?;
+        let [code, class] = self.model_codes(Class::Background).await?;
         Ok(code.zip(class).and_then(|(code, class)| ModelEntry::lookup(code, class)))
     }
 
@@ -235,23 +235,37 @@ impl<P: Port> Atv21<P> {
     /// What 43/14 says, and FB05 and FB72 where the drive has them.
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
         let told = self.registers.at(Class::Background).identification(ReadCode::Basic).await;
-        let [code, class] = self.model_codes().await?;
-        let raw = |register: Register<Read>, value: Option<u16>| {
-            value.map(|value| RawWord { address: register.address(), code: register.row().code, value })
-        };
-        let codes: Vec<_> =
-            [raw(map::MODEL_CODE, code), raw(map::MODEL_CLASS, class)].into_iter().flatten().collect();
+        let codes = self.model_words(Class::Background).await?;
         let identity = match told {
             Ok(identity) => Identity { codes, ..identity },
             // Its codes tell what it is as well.
             Err(Error::Exception { .. }) if !codes.is_empty() => Identity { codes, ..Identity::default() },
             Err(error) => return Err(error),
         };
-        self.other_drive = match model::recognise(&identity) {
-            Recognised::NotMine { it_is } => Some(it_is),
-            _ => None,
-        };
+        self.kind = Some(model::recognise(&identity));
         Ok(identity)
+    }
+
+    /// Asks the drive what it is, by 43/14, and by FB05 and FB72 where that names no reference.
+    pub(crate) async fn recognise_itself(&mut self) -> Result<()> {
+        let mut identity = match self.registers.at(Class::Command).identification(ReadCode::Basic).await {
+            Err(Error::Exception { .. }) => Identity::default(),
+            told => told?,
+        };
+        if identity.model.is_none() {
+            identity.codes = self.model_words(Class::Command).await?;
+        }
+        self.kind = Some(model::recognise(&identity));
+        Ok(())
+    }
+
+    async fn model_words(&mut self, class: Class) -> Result<Vec<RawWord>> {
+        let raw = |register: Register<Read>, value: Option<u16>| {
+            value.map(|value| RawWord { address: register.address(), code: register.row().code, value })
+        };
+        let [code, model_class] = self.model_codes(class).await?;
+        let words = [raw(map::MODEL_CODE, code), raw(map::MODEL_CLASS, model_class)];
+        Ok(words.into_iter().flatten().collect())
     }
 
     /// The present fault in a form for a refusal: FC90, 0 for none.
@@ -276,9 +290,9 @@ impl<P: Port> Atv21<P> {
         Ok([calls.read(first).await?.into(), calls.read(second).await?.into()])
     }
 
-    async fn model_codes(&mut self) -> Result<[Option<u16>; 2]> {
-        let code = self.optional(Class::Background, map::MODEL_CODE).await?;
-        Ok([code, self.optional(Class::Background, map::MODEL_CLASS).await?])
+    async fn model_codes(&mut self, class: Class) -> Result<[Option<u16>; 2]> {
+        let code = self.optional(class, map::MODEL_CODE).await?;
+        Ok([code, self.optional(class, map::MODEL_CLASS).await?])
     }
 
     /// Reads the fast set from the block, where that is known to hold it; `None` where it is not. A drive that refuses

@@ -19,7 +19,7 @@ impl<P: Port> Atv21<P> {
         if status.state.is_moving() {
             return Err(self.refused(Command::Release, Refusal::MotorRunning));
         }
-        self.check_own(Command::Release)?;
+        self.check_own(Command::Release).await?;
         let terminals = self.terminals().await?;
         if terminals.command_mode == Some(BY_SERIAL_LINK) {
             let reason = Refusal::Settings("CMOD = 2 leaves the command with the bus: set CMOD to 0 or 1");
@@ -32,7 +32,7 @@ impl<P: Port> Atv21<P> {
         let held = self.command_word(Class::Command).await?;
         let chosen = if self.selections.is_some() { CommandWord::empty() } else { CommandWord::SELECTIONS };
         self.write_command_word(held & chosen & CommandWord::KEPT).await?;
-        self.run.end();
+        self.watch.run.end();
         let mut settling = Confirming::within(SETTLED_WITHIN);
         loop {
             let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
@@ -50,14 +50,14 @@ impl<P: Port> Atv21<P> {
     pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
         let status = self.read_status(Class::Command).await?;
         let held = self.command_word(Class::Command).await?;
-        let lease = self.run.lease();
+        let lease = self.watch.run.lease();
         let stands = held.contains(CommandWord::RUN);
         let ours =
             lease.is_some_and(|lease| lease.word == held.bits()) || commanded_by_other(&status).is_some();
         // One that was not seen to arrive may come late: what stands is written again, and read after it.
         let may_come = !stands && lease.is_some();
         if !(may_come || stands && ours) {
-            self.run.end();
+            self.watch.run.end();
             return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
         let word = held - CommandWord::RUN - CommandWord::EDGES;
@@ -67,7 +67,7 @@ impl<P: Port> Atv21<P> {
         if now.contains(CommandWord::RUN) {
             return Err(self.not_confirmed(Command::Withdraw, status, Some(OTHER_WORD)));
         }
-        self.run.end();
+        self.watch.run.end();
         Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
     }
 

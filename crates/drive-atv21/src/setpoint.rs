@@ -23,7 +23,7 @@ pub(crate) type Reference = (Register<ReadWrite>, u16);
 
 impl<P: Port> Atv21<P> {
     pub(crate) async fn write_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        self.check_own(Command::Setpoint(setpoint))?;
+        self.check_own(Command::Setpoint(setpoint)).await?;
         let reference @ (register, word) = self.reference(setpoint).await?;
         self.check_reference(Command::Setpoint(setpoint)).await?;
         self.clear_other_reference(register).await?;
@@ -73,6 +73,7 @@ impl<P: Port> Atv21<P> {
                     _ => Err(refuse(outside)),
                 }
             }
+            Setpoint::Share(_) => Err(Error::no_share()),
         }
     }
 
@@ -83,7 +84,7 @@ impl<P: Port> Atv21<P> {
         }
         let limit = match self.registers.at(Class::Command).read(map::UPPER_LIMIT).await {
             Ok(word) => {
-                self.proof.knows(map::UPPER_LIMIT.address(), word);
+                self.watch.knows(map::UPPER_LIMIT.address(), word);
                 Frequency::from_centihertz(word.into())
             }
             Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {

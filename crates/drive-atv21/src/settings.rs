@@ -158,7 +158,7 @@ impl<P: Port> Atv21<P> {
     }
 
     pub(crate) async fn write_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
-        self.check_own(Command::ArmWatchdog)?;
+        self.check_own(Command::ArmWatchdog).await?;
         let reaction_word = match reaction {
             Reaction::Ignore => None,
             Reaction::Freewheel => Some(0),
@@ -177,7 +177,7 @@ impl<P: Port> Atv21<P> {
             self.change_parameter(map::TIME_OUT_REACTION.row(), word, Command::ArmWatchdog).await?;
         }
         self.change_parameter(map::TIME_OUT.row(), seconds, Command::ArmWatchdog).await?;
-        self.proof.armed = seconds != 0;
+        self.watch.set_armed(seconds != 0);
         self.read_watchdog().await
     }
 
@@ -192,7 +192,7 @@ impl<P: Port> Atv21<P> {
             });
         }
         let command = Command::WriteParameter(row.address);
-        self.check_own(command)?;
+        self.check_own(command).await?;
         if DECIDE.iter().any(|register| register.address() == row.address) {
             self.check_value(row, word)?;
             let moves = self.read_status(Class::Command).await?.state.is_moving();
@@ -243,7 +243,7 @@ impl<P: Port> Atv21<P> {
         }
         let mut calls = self.registers.at(Class::Background);
         if calls.read_row(row).await.map_err(Error::after_write)? == word {
-            self.proof.knows(row.address, word);
+            self.watch.knows(row.address, word);
             return Ok(Written { changed: true, storage: row.storage });
         }
         sent?;
@@ -282,7 +282,7 @@ impl<P: Port> Atv21<P> {
 
     async fn read_background(&mut self, register: Register<ReadWrite>) -> Result<u16> {
         let word = self.registers.at(Class::Background).read(register).await?;
-        self.proof.knows(register.address(), word);
+        self.watch.knows(register.address(), word);
         Ok(word)
     }
 

@@ -39,7 +39,7 @@ impl<P: Port> Atv21<P> {
         if !is_tripped(&status) {
             return Ok(status);
         }
-        self.check_own(Command::ResetFaults)?;
+        self.check_own(Command::ResetFaults).await?;
         // The reset sets FA00 to 0, the priorities included: whoever gives a run command then starts the motor.
         let terminals = self.terminals().await?;
         if let Some(reason) = terminals.would_start() {
@@ -65,7 +65,7 @@ impl<P: Port> Atv21<P> {
         // the word by itself.
         let cleared = self.write_command_word(clear).await;
         if cleared.is_ok() {
-            self.run.end();
+            self.watch.run.end();
         }
         let mut confirming = Confirming::begin();
         let mut last = None;

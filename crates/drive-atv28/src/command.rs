@@ -2,14 +2,14 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Refusal, Result,
-    SlaveAddress, State, Status, StopMode, Verdict, Withdrawn,
+    BroadcastWrite, Class, Control, Direction, Effect, OwnRun, Port, Refusal, Result, SlaveAddress, State,
+    Status, StopMode, Verdict,
     drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
 
 use crate::{
     Atv28,
-    reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK, raw_command},
+    reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK, raw_command, read_block},
     registers::{CMD, ETA, IOLR, LFR, LFRD},
     words::{ControlWord, LogicIo, StatusWord},
 };
@@ -21,55 +21,56 @@ pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
 };
 
 impl<P: Port> Atv28<P> {
-    /// The stop of bit 12 beside every bit as it stands. A word whose answer was lost may still be on its way: the stop goes out
-    /// behind it.
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
-        let is_run = |held| ControlWord::from_bits_retain(held).is_run();
-        let held = self.read_control().await?;
-        let status = self.read_status(Class::Command).await?;
-        if !is_run(held) && (self.own.lease().is_none() || self.own.has_arrived()) {
-            self.own.end();
-            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
-        }
-        if let Some(reason) = FastWords::of_raw(&status.raw).state_words().refuses_withdrawal() {
-            return Err(Error::Unsupported { what: "withdrawal of the run command", reason });
-        }
-        self.write_control(Class::Command, held | ControlWord::STOP.bits(), Effect::Level).await?;
-        let held = self.read_control().await.map_err(Error::after_write)?;
-        let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
-        if !is_run(held) {
-            self.own.end();
-            return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
-        }
-        let (slave, command) = (self.registers.slave(), Command::Withdraw);
-        Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None })
-    }
-
     /// Reads the fast set, in two exchanges: seven words are the most that one carries.
     pub(crate) async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
         let mut calls = self.registers.at(class);
-        let first = calls.read_array(FIRST_BLOCK.0).await?;
-        let second = calls.read_array(SECOND_BLOCK.0).await?;
-        Ok(FastWords::of(first, second))
+        let first = read_block(&mut self.absent, &mut calls, FIRST_BLOCK).await?;
+        let second = read_block(&mut self.absent, &mut calls, SECOND_BLOCK).await?;
+        Ok(FastWords::of(first.into_iter().chain(second)))
     }
 
     /// The fast set as a status.
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
         self.registers.begin_snapshot();
         let words = self.fast_words(class).await?;
-        // A stop that was just written may not show yet.
-        let fresh = |command: ControlWord| class == Class::Command && command.is_stop();
-        let held = |&command: &ControlWord| fresh(command) || words.state_words().can_hold(command);
-        self.command = self.command.filter(held);
+        self.proof.holds_if(|word| {
+            let command = ControlWord::from_bits_retain(word);
+            // A stop that was just written may not show yet.
+            class == Class::Command && command.is_stop() || words.state_words().can_hold(command)
+        });
         self.control = Some(words.state_words().control());
-        self.motion = self.see_shaft(&words, self.registers.snapshot_time());
-        let status = self.status_of(&words);
-        Ok(Status { verdict: self.verdict(&words), ..status })
+        self.see_shaft(&words);
+        let verdict = self.evidence(&words).and_then(|evidence| self.proof.watch.run.verdict(&evidence));
+        Ok(Status { verdict, ..self.status_of(&words) })
+    }
+
+    /// The control word that the drive was last seen to hold.
+    pub(crate) fn command(&self) -> Option<ControlWord> {
+        self.proof.held().map(ControlWord::from_bits_retain)
+    }
+
+    /// A logic input that is closed: which of them gives a run command, and whether its level counts or its edge, no register
+    /// tells.
+    pub(crate) async fn closed_input(&mut self) -> Result<Option<Refusal>> {
+        const CLOSED: [Refusal; 6] = [
+            closed("a logic input that may give a run command (LI1 is closed)"),
+            closed("a logic input that may give a run command (LI2 is closed)"),
+            closed("a logic input that may give a run command (LI3 is closed)"),
+            closed("a logic input that may give a run command (LI4 is closed)"),
+            closed("a logic input that may give a run command (LI5 is closed)"),
+            closed("a logic input that may give a run command (LI6 is closed)"),
+        ];
+        const NOT_TOLD: Refusal =
+            Refusal::Settings("the drive has no IOLR (W478), so nothing tells which logic inputs are closed");
+        let iolr = self.absent.word(&mut self.registers.at(Class::Command), IOLR.address()).await?;
+        let Some(inputs) = iolr.map(|iolr| iolr & LogicIo::INPUTS.bits()) else { return Ok(Some(NOT_TOLD)) };
+        let lowest = usize::try_from(inputs.trailing_zeros()).ok();
+        Ok(lowest.and_then(|input| CLOSED.get(input)).copied())
     }
 
     pub(crate) fn status_of(&self, words: &FastWords) -> Status {
         let at = self.registers.snapshot_time();
-        Status { at, motion: self.motion, ..words.status(self.command) }
+        Status { at, motion: self.proof.motion, ..words.status(self.command()) }
     }
 }
 
@@ -82,7 +83,7 @@ impl<P: Port> Drivecom for Atv28<P> {
     }
 
     fn own_run(&mut self) -> &mut OwnRun {
-        &mut self.own
+        &mut self.proof.watch.run
     }
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
@@ -91,8 +92,7 @@ impl<P: Port> Drivecom for Atv28<P> {
 
     /// Remembers the word as the one that the drive holds; while the outcome is not known, none is.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
-        self.command = None;
-        self.last_written = Some(ControlWord::from_bits_retain(word));
+        self.proof.is_writing(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
@@ -100,7 +100,7 @@ impl<P: Port> Drivecom for Atv28<P> {
             (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
             (_, Effect::Level) => calls.write(CMD, word).await?,
         }
-        (self.command, self.command_is_read) = (self.last_written, false);
+        self.proof.was_written(word);
         Ok(())
     }
 
@@ -115,7 +115,9 @@ impl<P: Port> Drivecom for Atv28<P> {
         }
         // A sign that somebody else left would turn the direction round.
         let mut calls = self.registers.at(Class::Command);
-        let negative = calls.read(LFR).await?.cast_signed() < 0 || calls.read(LFRD).await?.cast_signed() < 0;
+        let references =
+            [calls.read(LFR).await?, self.absent.word(&mut calls, LFRD.address()).await?.unwrap_or(0)];
+        let negative = references.iter().any(|word| word.cast_signed() < 0);
         Ok(negative.then_some(Refusal::Settings(
             "a reference on the bus (LFr or LFRD) is negative: stop the motor, and give a setpoint in its unit first",
         )))
@@ -134,7 +136,7 @@ impl<P: Port> Drivecom for Atv28<P> {
             return Ok(RunShown::NotYet);
         }
         // The setpoint that the run command found is the one that it is to follow from now on.
-        self.given = in_force;
+        self.proof.given = in_force;
         status.verdict = Some(Verdict::InForce);
         Ok(shown)
     }
@@ -154,24 +156,20 @@ impl<P: Port> Drivecom for Atv28<P> {
             by: "whoever has command, for any word of the bus takes it from him,",
             remedy: "stop the motor by the bus first, which says whom it takes command from, or reset the fault at the drive",
         };
-        const CLOSED: [Refusal; 6] = [
-            closed("a logic input that may give a run command (LI1 is closed)"),
-            closed("a logic input that may give a run command (LI2 is closed)"),
-            closed("a logic input that may give a run command (LI3 is closed)"),
-            closed("a logic input that may give a run command (LI4 is closed)"),
-            closed("a logic input that may give a run command (LI5 is closed)"),
-            closed("a logic input that may give a run command (LI6 is closed)"),
-        ];
         if FastWords::of_raw(&status.raw).state_words().control() != Control::Bus {
             return Ok(Some(TAKES_COMMAND));
         }
-        let inputs = self.registers.at(Class::Command).read(IOLR).await? & LogicIo::INPUTS.bits();
-        let lowest = usize::try_from(inputs.trailing_zeros()).ok();
-        Ok(lowest.and_then(|input| CLOSED.get(input)).copied())
+        self.closed_input().await
     }
 
     async fn read_control(&mut self) -> Result<u16> {
         self.read_held(Class::Command).await.map(|(held, _)| held)
+    }
+
+    /// The stop of bit 12 beside every bit as it stands, in forced local mode and where the bus commands.
+    fn withdrawal(&self, held: u16, status: &Status) -> std::result::Result<u16, &'static str> {
+        let refused = FastWords::of_raw(&status.raw).state_words().refuses_withdrawal();
+        refused.map_or(Ok(held | ControlWord::STOP.bits()), Err)
     }
 
     fn last_control(&self) -> Option<Control> {

@@ -4,53 +4,34 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Fault, Faults, Ground, Identity, Intent, Lease, Measurements,
-    Percent, Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage, Withdrawn,
-    Written,
-    drivecom::{self, StatusWords},
-    registers::{Register, access::Readable},
+    Absent, BroadcastWrite, Class, Direction, Drive, Fault, Faults, Frequency, Identity, Intent, Lease,
+    Measurements, Percent, Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage,
+    Withdrawn, Written, drivecom,
 };
 
 use crate::{
     Atv28, FAULTS, WARNINGS, command,
-    proof::Doubt,
-    reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK},
-    registers::{DP1, DP2, DP3, DP4, ETA, INV, IOLR, OPR, OTR, RFRD, RTH},
-    setpoint::Limits,
+    reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK, read_block},
+    registers::{DP1, DP2, DP3, DP4, ETA, FRH, INV, IOLR, LFT, OPR, OTR, RFRD, RTH, THD, THR, ULN},
     words::{self, ControlWord, ExtendedStatus},
 };
 
 #[async_trait]
 impl<P: Port> Drive for Atv28<P> {
     drive_core::told_by!(registers);
+    drive_core::watched_by!(proof.watch);
 
-    fn lease(&self) -> Option<Lease> {
-        self.own.lease()
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        Some(ControlWord::run(direction).bits())
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.own.adopt(lease);
-        // What the drive holds is read with the next status.
-        self.command = None;
-    }
-
-    fn take_changed(&mut self) -> Option<Ground> {
-        (!self.changed.is_empty()).then(|| self.changed.remove(0))
-    }
-
-    fn set_coast_time(&mut self, time: Option<Duration>) {
-        self.shaft.set_coast_time(time);
+        self.proof.adopt(lease);
     }
 
     fn forget(&mut self) {
-        self.limits = Limits::default();
-        self.command = None;
-        self.control = None;
-        self.lfr = None;
-        self.doubt = Doubt::default();
-        if self.own.lease().is_none() {
-            self.given = None;
-        }
+        self.proof.forget();
+        (self.absent, self.speeds, self.control) = (Absent::default(), None, None);
     }
 
     /// Two exchanges, and a third one, for `CMD`, where the words alone do not tell whether a run command is in force: the
@@ -64,25 +45,27 @@ impl<P: Port> Drive for Atv28<P> {
     async fn measurements(&mut self) -> Result<Measurements> {
         self.registers.begin_snapshot();
         let mut calls = self.registers.at(Class::Background);
-        let block = calls.read_array(FIRST_BLOCK.0).await?;
-        let [frh, _, _, _, uln, thr, thd] = block;
-        let mut raw: Vec<_> = FastWords::first_block(&block);
-        let iolr = keep(&mut raw, IOLR, calls.read(IOLR).await?);
-        let otr = keep(&mut raw, OTR, calls.read(OTR).await?);
-        let opr = keep(&mut raw, OPR, calls.read(OPR).await?);
-        let rth = keep(&mut raw, RTH, calls.read(RTH).await?);
-        let rfrd = keep(&mut raw, RFRD, calls.read(RFRD).await?);
+        let words = FastWords::of(self.absent.read(&mut calls, FIRST_BLOCK.0, FIRST_BLOCK.1).await?);
+        let mut raw = words.raw();
+        for row in [IOLR.row(), OTR.row(), OPR.row(), RTH.row(), RFRD.row()] {
+            if let Some(value) = self.absent.word(&mut calls, row.address).await? {
+                raw.push(RawWord { address: row.address, code: row.code, value });
+            }
+        }
+        let word = |row: &Row| raw.iter().find(|word| word.address == row.address).map(|word| word.value);
+        let signed = |row| word(row).map(u16::cast_signed);
+        let iolr = word(IOLR.row());
         Ok(Measurements {
-            reference: Some(drive_core::Frequency::from_decihertz(frh).into()),
-            speed: Some(Speed::from_rpm(u32::from(rfrd.cast_signed().unsigned_abs()))),
-            line_voltage: Some(Voltage::from_decivolts(u32::from(uln))),
-            torque: Some(Percent::from_percent(otr.cast_signed())),
-            power_share: Some(Percent::from_percent(opr.cast_signed())),
-            drive_thermal: Some(percent(thd)),
-            motor_thermal: Some(percent(thr)),
-            running_time: Some(Duration::from_secs(u64::from(rth) * 3_600)),
-            inputs: Some(iolr & words::LogicIo::INPUTS.bits()),
-            outputs: Some(iolr & words::LogicIo::OUTPUTS.bits()),
+            reference: word(FRH.row()).map(|word| Frequency::from_decihertz(word).into()),
+            speed: signed(RFRD.row()).map(|rpm| Speed::from_rpm(u32::from(rpm.unsigned_abs()))),
+            line_voltage: word(ULN.row()).map(|word| Voltage::from_decivolts(u32::from(word))),
+            torque: signed(OTR.row()).map(Percent::from_percent),
+            power_share: signed(OPR.row()).map(Percent::from_percent),
+            drive_thermal: word(THD.row()).map(percent),
+            motor_thermal: word(THR.row()).map(percent),
+            running_time: word(RTH.row()).map(|hours| Duration::from_secs(u64::from(hours) * 3_600)),
+            inputs: iolr.map(|iolr| iolr & words::LogicIo::INPUTS.bits()),
+            outputs: iolr.map(|iolr| iolr & words::LogicIo::OUTPUTS.bits()),
             raw,
             at: self.registers.snapshot_time(),
             ..Measurements::default()
@@ -91,19 +74,19 @@ impl<P: Port> Drive for Atv28<P> {
 
     async fn faults(&mut self) -> Result<Faults> {
         let mut calls = self.registers.at(Class::Background);
-        let [lft, eta, eti, _] = calls.read_array(SECOND_BLOCK.0).await?;
+        let second = read_block(&mut self.absent, &mut calls, SECOND_BLOCK).await?;
+        let words = FastWords::of([None; FIRST_BLOCK.1 as usize].into_iter().chain(second));
         let mut history = Vec::new();
         for register in [DP1, DP2, DP3, DP4] {
-            let code = calls.read(register).await?;
-            if code != 0 {
-                history.push(Fault::lookup(FAULTS, code));
-            }
+            let code = self.absent.word(&mut calls, register.address()).await?;
+            history.extend(code.filter(|&code| code != 0).map(|code| Fault::lookup(FAULTS, code)));
         }
-        let state = StatusWords::new(eta, eti);
+        let state = words.state_words();
         let tripped = state.is_tripped();
-        let warnings = WARNINGS.iter().filter(|entry| eti >> entry.code & 1 == 1);
+        let warnings = WARNINGS.iter().filter(|entry| state.eti.bits() >> entry.code & 1 == 1);
+        let present = words.word(LFT).filter(|_| tripped);
         Ok(Faults {
-            present: tripped.then(|| Fault::lookup(FAULTS, lft)).into_iter().collect(),
+            present: present.map(|code| Fault::lookup(FAULTS, code)).into_iter().collect(),
             history,
             warnings: warnings.map(|entry| Fault { code: entry.code, entry: Some(entry) }).collect(),
             reset_allowed: tripped.then(|| state.eti.contains(ExtendedStatus::RESET_AUTHORISED)),
@@ -115,13 +98,13 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        drivecom::stop(self, mode).await
+        Ok(drivecom::stop(self, mode).await?.held_by(&self.proof.watch.shaft))
     }
 
     /// 100Fh, in forced local mode and where the bus commands: elsewhere a command would take the motor from whoever has it
     /// running.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
-        self.withdraw_run().await
+        drivecom::withdraw(self).await
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
@@ -134,8 +117,9 @@ impl<P: Port> Drive for Atv28<P> {
 
     /// The drive does not say what it is; its nominal current tells one rating from another.
     async fn identify(&mut self) -> Result<Identity> {
-        let value = self.registers.at(Class::Background).read(INV).await?;
-        let codes = vec![RawWord { address: INV.address(), code: INV.row().code, value }];
+        let inv = self.absent.word(&mut self.registers.at(Class::Background), INV.address()).await?;
+        let inv = inv.map(|value| RawWord { address: INV.address(), code: INV.row().code, value });
+        let codes = inv.into_iter().collect();
         Ok(Identity { codes, ..Identity::default() })
     }
 
@@ -162,10 +146,4 @@ impl<P: Port> Drive for Atv28<P> {
 
 fn percent(word: u16) -> Percent {
     Percent::from_hundredths(i32::from(word) * 100)
-}
-
-/// Keeps the raw word of a register and returns it.
-fn keep(raw: &mut Vec<RawWord>, register: Register<impl Readable>, value: u16) -> u16 {
-    raw.push(RawWord { address: register.address(), code: register.row().code, value });
-    value
 }

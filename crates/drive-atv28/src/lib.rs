@@ -15,12 +15,12 @@ mod setpoint;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Ground, Motion, OwnRun, Port, Registers, Row, SerialSettings,
-    Shaft, SlaveAddress, StopMode, Turns, serial::CharacterFormat,
+    Absent, Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress,
+    Speed, StopMode, drivecom::Proof, serial::CharacterFormat,
 };
 
+use crate::proof::Look;
 pub use crate::{faults::FAULTS, faults::WARNINGS, registers::ROWS};
-use crate::{proof::Doubt, setpoint::Limits, words::ControlWord};
 
 /// What an Altivar 28 can do.
 pub const CAPABILITIES: Capabilities = Capabilities {
@@ -54,26 +54,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv28<P> {
     registers: Registers<P>,
-    /// The run command of this side.
-    own: OwnRun,
-    shaft: Shaft,
-    /// What the shaft did at the last status.
-    motion: Motion,
-    turns: Turns,
-    doubt: Doubt,
-    /// What a contract rests on that was found otherwise and not told yet.
-    changed: Vec<Ground>,
-    /// The register and the word of the setpoint that is to be in force.
-    given: Option<(u16, u16)>,
-    /// `LFr` as it was read or written last.
-    lfr: Option<u16>,
-    limits: Limits,
-    /// The control word that the drive was last seen to hold; `None` when that is not known.
-    command: Option<ControlWord>,
-    /// Whether that was read, and not only written.
-    command_is_read: bool,
-    /// The control word that this side wrote last.
-    last_written: Option<ControlWord>,
+    /// The run command of this side and the shaft.
+    proof: Proof<Look>,
+    /// The registers that this drive lacks.
+    absent: Absent,
+    /// The limits of a setpoint in rpm.
+    speeds: Option<(Speed, Speed)>,
     /// Who commanded when it was last read.
     control: Option<Control>,
 }
@@ -89,18 +75,9 @@ impl<P: Port> Atv28<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            own: OwnRun::new(),
-            shaft: Shaft::new(),
-            motion: Motion::NotKnown,
-            turns: Turns::default(),
-            doubt: Doubt::default(),
-            changed: Vec::new(),
-            given: None,
-            lfr: None,
-            limits: Limits::default(),
-            command: None,
-            command_is_read: false,
-            last_written: None,
+            proof: Proof::default(),
+            absent: Absent::default(),
+            speeds: None,
             control: None,
         }
     }

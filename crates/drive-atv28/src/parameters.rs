@@ -1,11 +1,11 @@
 //! Parameters.
 
-use drive_core::{Class, Error, Port, Result, Row, Written, registers::refuse_commands};
+use drive_core::{Class, Command, Error, Port, Refusal, Result, Row, Written, registers::refuse_commands};
 
 use crate::{
     Atv28,
-    registers::{CMD, CMDD, CMI, LFR, LFRD},
-    setpoint::Limits,
+    registers::{CMD, CMDD, CMI, LCC, LFR, LFRD, TCC},
+    words::ControlWord,
 };
 
 impl<P: Port> Atv28<P> {
@@ -18,8 +18,27 @@ impl<P: Port> Atv28<P> {
                 reason: "its bits are not confirmed; on the Altivar 312 they recall factory settings and write the EEPROM",
             });
         }
+        if [TCC.address(), LCC.address()].contains(&row.address)
+            && let Some(reason) = self.refuses_move().await?
+        {
+            let command = Command::WriteParameter(row.address);
+            return Err(Error::Refused { slave: self.registers.slave(), command, reason });
+        }
         // HSP, LSP, nominal values: limits that were read once may change with it.
-        self.limits = Limits::default();
+        self.proof.doubt_limits();
+        self.speeds = None;
         self.registers.at(Class::Background).change_row(row, word).await
+    }
+
+    /// Why nothing is written now that changes who commands, or what the inputs do: somebody's run command might act by it.
+    async fn refuses_move(&mut self) -> Result<Option<Refusal>> {
+        const STANDS: Refusal = Refusal::Settings(
+            "CMD holds a run command, which may act when control moves: stop the motor first",
+        );
+        let (held, _) = self.read_held(Class::Background).await?;
+        if ControlWord::from_bits_retain(held).is_run() {
+            return Ok(Some(STANDS));
+        }
+        self.closed_input().await
     }
 }

@@ -1,6 +1,9 @@
 //! The words of the fast set, and what they say.
 
-use drive_core::{Current, Frequency, RawWord, Status, drivecom::StatusWords, registers::Register};
+use drive_core::{
+    Absent, Calls, Current, Frequency, Port, RawWord, Result, Status, drivecom::StatusWords,
+    registers::Register,
+};
 
 use crate::{
     registers::{CMD, ETA, ETI, ETI2, FRH, LCR, LFT, RFR, THD, THR, ULN, W452},
@@ -8,12 +11,12 @@ use crate::{
 };
 
 /// The first block: W450 to W456, the seven words that the manual's own sample reads.
-pub(crate) const FIRST_BLOCK: (u16, usize) = (FRH.address(), 7);
+pub(crate) const FIRST_BLOCK: (u16, u16) = (FRH.address(), 7);
 /// The second block: W457 to W460.
-pub(crate) const SECOND_BLOCK: (u16, usize) = (LFT.address(), 4);
+pub(crate) const SECOND_BLOCK: (u16, u16) = (LFT.address(), 4);
 
 /// The mnemonics of the two blocks in their order.
-const CODES: [&str; FIRST_BLOCK.1 + SECOND_BLOCK.1] = [
+const CODES: [&str; (FIRST_BLOCK.1 + SECOND_BLOCK.1) as usize] = [
     FRH.row().code,
     RFR.row().code,
     W452.row().code,
@@ -27,39 +30,37 @@ const CODES: [&str; FIRST_BLOCK.1 + SECOND_BLOCK.1] = [
     ETI2.row().code,
 ];
 
-/// W450 to W460 as they were read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What no status is without: these are read, also where the drive was found not to have one.
+const NEEDED: [u16; 3] = [FRH.address(), ETA.address(), ETI.address()];
+
+/// W450 to W460 as they were read; `None`: not in this drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FastWords {
-    words: [u16; CODES.len()],
+    words: [Option<u16>; CODES.len()],
 }
 
 impl FastWords {
     /// From the two blocks.
-    pub(crate) fn of(first: [u16; FIRST_BLOCK.1], second: [u16; SECOND_BLOCK.1]) -> Self {
-        let mut words = [0; CODES.len()];
-        for (word, read) in words.iter_mut().zip(first.into_iter().chain(second)) {
-            *word = read;
-        }
-        Self { words }
+    pub(crate) fn of(words: impl IntoIterator<Item = Option<u16>>) -> Self {
+        let mut fast = Self::default();
+        fast.words.iter_mut().zip(words).for_each(|(word, read)| *word = read);
+        fast
     }
 
     /// From the raw words of a status that [`status`](Self::status) made.
     pub(crate) fn of_raw(raw: &[RawWord]) -> Self {
-        let mut words = [0; CODES.len()];
-        for (word, read) in words.iter_mut().zip(raw) {
-            *word = read.value;
-        }
-        Self { words }
+        let word = |address| raw.iter().find(|word| word.address == address).map(|word| word.value);
+        Self::of((FIRST_BLOCK.0..).take(CODES.len()).map(word))
     }
 
-    pub(crate) fn word<A: drive_core::registers::access::Kind>(&self, register: Register<A>) -> u16 {
+    pub(crate) fn word<A: drive_core::registers::access::Kind>(&self, register: Register<A>) -> Option<u16> {
         let index = register.address().checked_sub(FIRST_BLOCK.0).map(usize::from);
-        index.and_then(|index| self.words.get(index)).copied().unwrap_or(0)
+        index.and_then(|index| self.words.get(index)).copied().flatten()
     }
 
     /// `ETA` and `ETI`.
     pub(crate) fn state_words(&self) -> StatusWords {
-        StatusWords::new(self.word(ETA), self.word(ETI))
+        StatusWords::new(self.word(ETA).unwrap_or(0), self.word(ETI).unwrap_or(0))
     }
 
     /// The status. `command` is the control word that this drive was last seen to hold, if any: see
@@ -67,34 +68,45 @@ impl FastWords {
     pub(crate) fn status(&self, command: Option<ControlWord>) -> Status {
         let state = self.state_words();
         Status {
-            output_frequency: Some(self.output()),
+            output_frequency: self.output(),
             reference: Some(self.reference()),
-            current: Some(Current::from_deciamperes(u32::from(self.word(LCR)))),
-            fault_code: state.is_tripped().then(|| self.word(LFT)),
+            current: self.word(LCR).map(|word| Current::from_deciamperes(u32::from(word))),
+            fault_code: self.word(LFT).filter(|_| state.is_tripped()),
             raw: self.raw(),
             ..state.status(command)
         }
     }
 
     /// The output frequency.
-    pub(crate) fn output(&self) -> Frequency {
-        Frequency::from_decihertz(self.word(RFR).cast_signed().unsigned_abs())
+    pub(crate) fn output(&self) -> Option<Frequency> {
+        self.word(RFR).map(|word| Frequency::from_decihertz(word.cast_signed().unsigned_abs()))
     }
 
     /// The reference before the ramp.
     pub(crate) fn reference(&self) -> Frequency {
-        Frequency::from_decihertz(self.word(FRH))
+        Frequency::from_decihertz(self.word(FRH).unwrap_or(0))
     }
 
+    /// The words that the drive has.
     pub(crate) fn raw(&self) -> Vec<RawWord> {
-        Self::first_block(&self.words)
+        let words = (FIRST_BLOCK.0..).zip(CODES).zip(self.words);
+        words.filter_map(|((address, code), value)| Some(RawWord { address, code, value: value? })).collect()
     }
+}
 
-    /// The raw form of words that begin at W450.
-    pub(crate) fn first_block(words: &[u16]) -> Vec<RawWord> {
-        let words = (FIRST_BLOCK.0..).zip(CODES).zip(words);
-        words.map(|((address, code), &value)| RawWord { address, code, value }).collect()
+/// A block of the fast set. Without a word that no status is without it is refused as the drive refuses it.
+pub(crate) async fn read_block<P: Port>(
+    absent: &mut Absent,
+    calls: &mut Calls<'_, P>,
+    (first, count): (u16, u16),
+) -> Result<Vec<Option<u16>>> {
+    let words = absent.read(calls, first, count).await?;
+    if let Some(needed) =
+        NEEDED.into_iter().find(|&word| (first..first + count).contains(&word) && absent.has(word))
+    {
+        calls.read_word(needed).await?;
     }
+    Ok(words)
 }
 
 /// The raw form of the control word, for statuses that were confirmed by it.

@@ -1,14 +1,9 @@
 //! Setpoints: `LFr` in hertz, `LFRD` in rpm, both as magnitudes. The direction is the run command's.
 
-use std::time::Duration;
-
 use drive_core::{
-    Class, Command, Confirming, Control, Error, Frequency, Ground, Port, Result, Setpoint, SetpointProblem,
-    Speed,
-    drivecom::{self, ChartState, Drivecom, follows_frequency, follows_speed},
+    Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
+    drivecom::{self, ChartState, Drivecom, Limits, follows_frequency, follows_speed},
 };
-
-use tokio::time::Instant;
 
 use crate::{
     Atv28,
@@ -18,15 +13,9 @@ use crate::{
     words::ControlWord,
 };
 
-/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the terminal may
-/// change them.
-const LIMITS_HOLD: Duration = Duration::from_secs(10);
-
-/// The drive's own limits, read when the first setpoint needs them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Limits {
-    pub(crate) frequency: Option<((Frequency, Frequency), Instant)>,
-    speed: Option<(Speed, Speed)>,
+/// What a word of `LFr` asks for, in size.
+pub(crate) const fn count(lfr: u16) -> Frequency {
+    Frequency::from_decihertz(lfr.cast_signed().unsigned_abs())
 }
 
 impl<P: Port> Atv28<P> {
@@ -38,16 +27,14 @@ impl<P: Port> Atv28<P> {
                 0 => (LFR, 0),
                 word => (LFRD, word),
             },
+            Setpoint::Share(_) => return Err(Error::no_share()),
         };
         let word =
             if self.is_negative().await? { word.cast_signed().wrapping_neg().cast_unsigned() } else { word };
         self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
-        self.given = Some((register.address(), word));
-        if register.address() == LFR.address() {
-            self.lfr = Some(word);
-        }
-        let word = word.cast_signed().unsigned_abs();
-        let frequency = (register.address() == LFR.address()).then(|| Frequency::from_decihertz(word));
+        let is_lfr = register.address() == LFR.address();
+        self.proof.gives(register.address(), word, is_lfr);
+        let frequency = is_lfr.then(|| count(word));
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
     }
 
@@ -80,7 +67,10 @@ impl<P: Port> Atv28<P> {
                 _ if refusal.is_some() => false,
                 _ if !self.runs_by_bus(&words) && self.holds_setpoint().await? => return Ok(()),
                 _ if !self.runs_by_bus(&words) => false,
-                Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
+                Some(asked) => {
+                    let limits = self.frequency_limits().await?.unwrap_or((asked, asked));
+                    follows_frequency(words.reference(), asked, limits)
+                }
                 None => self.follows_speed().await?.1,
             };
             if follows {
@@ -96,7 +86,7 @@ impl<P: Port> Atv28<P> {
 
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
-        let Some((register, word)) = self.given else { return Ok(false) };
+        let Some((register, word)) = self.proof.given else { return Ok(false) };
         let held = self.registers.at(Class::Command).read_words(register, 1).await?;
         Ok(held.first() == Some(&word))
     }
@@ -105,8 +95,8 @@ impl<P: Port> Atv28<P> {
     /// speed was given, `FRHD` is `LFRD`.
     pub(crate) async fn follows(&mut self, words: &FastWords) -> Result<Option<(u16, u16)>> {
         let (_, lfr) = self.read_held(Class::Command).await?;
-        let limits = self.frequency_limits().await?;
-        let asked = Frequency::from_decihertz(lfr.cast_signed().unsigned_abs());
+        let asked = count(lfr);
+        let limits = self.frequency_limits().await?.unwrap_or((asked, asked));
         if follows_frequency(words.reference(), asked, limits) {
             return Ok(Some((LFR.address(), lfr)));
         }
@@ -115,15 +105,21 @@ impl<P: Port> Atv28<P> {
     }
 
     async fn follows_speed(&mut self) -> Result<(u16, bool)> {
-        // LFRD, FRHD.
-        let [lfrd, frhd] = self.registers.at(Class::Command).read_array(LFRD.address()).await?;
+        let (lfrd, frhd) = self.read_speeds(Class::Command).await?;
         Ok((lfrd, follows_speed(frhd, lfrd)))
+    }
+
+    /// `LFRD` and `FRHD`: a drive without them follows no speed.
+    pub(crate) async fn read_speeds(&mut self, class: Class) -> Result<(u16, u16)> {
+        let words = self.absent.read(&mut self.registers.at(class), LFRD.address(), 2).await?;
+        let word = |index: usize| words.get(index).copied().flatten().unwrap_or(0);
+        Ok((word(0), word(1)))
     }
 
     /// Whether a run command of the bus is in force.
     fn runs_by_bus(&self, words: &FastWords) -> bool {
         let words = words.state_words();
-        let runs = self.command.map_or(words.is_turning(), ControlWord::is_run);
+        let runs = self.command().map_or(words.is_turning(), ControlWord::is_run);
         runs && words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus
     }
 
@@ -134,11 +130,12 @@ impl<P: Port> Atv28<P> {
         }
         let word = frequency.exact_decihertz();
         let word = word.ok_or_else(|| self.setpoint(setpoint, SetpointProblem::TooLarge))?;
-        let (low, high) = self.frequency_limits().await?;
-        if frequency < low || frequency > high {
-            return Err(self.setpoint(setpoint, SetpointProblem::OutsideFrequencyLimits { low, high }));
+        match self.frequency_limits().await? {
+            Some((low, high)) if !(low..=high).contains(&frequency) => {
+                Err(self.setpoint(setpoint, SetpointProblem::OutsideFrequencyLimits { low, high }))
+            }
+            _ => Ok(word),
         }
-        Ok(word)
     }
 
     async fn speed_word(&mut self, speed: Speed) -> Result<u16> {
@@ -147,34 +144,36 @@ impl<P: Port> Atv28<P> {
         drivecom::speed_word(speed, limits).map_err(|problem| self.setpoint(setpoint, problem))
     }
 
-    /// HSP and LSP, which follow each other, where they were not read lately.
-    async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
-        match self.limits.frequency {
-            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(limits),
-            _ => self.read_frequency_limits(Class::Command).await,
+    /// HSP and LSP, which follow each other, where they were not read lately; `None`: the drive has none.
+    async fn frequency_limits(&mut self) -> Result<Option<Limits>> {
+        match self.proof.fresh_limits() {
+            Some(limits) => Ok(limits),
+            None => self.read_frequency_limits(Class::Command).await,
         }
     }
 
-    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<(Frequency, Frequency)> {
-        let words: [u16; 2] = self.registers.at(class).read_array(HSP.address()).await?;
-        let [high, low] = words.map(Frequency::from_decihertz);
-        let limits = (low, high);
-        let before = self.limits.frequency.replace((limits, Instant::now()));
-        if before.is_some_and(|(before, _)| before != limits) {
+    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<Option<Limits>> {
+        let words = self.absent.read(&mut self.registers.at(class), HSP.address(), 2).await?;
+        let limits = match *words.as_slice() {
+            [Some(high), Some(low)] => {
+                Some((Frequency::from_decihertz(low), Frequency::from_decihertz(high)))
+            }
+            _ => None,
+        };
+        if self.proof.take_limits(limits) {
             // The same limits in rpm.
-            self.limits.speed = None;
-            self.changed(Ground::Limits);
+            self.speeds = None;
         }
         Ok(limits)
     }
 
     /// SMIL and SMAL, the same limits in rpm.
     async fn speed_limits(&mut self) -> Result<(Speed, Speed)> {
-        if let Some(limits) = self.limits.speed {
+        if let Some(limits) = self.speeds {
             return Ok(limits);
         }
         let limits = drivecom::speed_limits(&mut self.registers.at(Class::Command), SMIL_LOW).await?;
-        self.limits.speed = Some(limits);
+        self.speeds = Some(limits);
         Ok(limits)
     }
 

@@ -294,7 +294,7 @@ async fn what_commands_the_drive_is_no_parameter() {
 #[tokio::test(start_paused = true)]
 async fn a_configuration_register_is_refused_by_a_drive_that_runs() {
     let (mut drive, _machine, _line) = running().await;
-    let error = drive.write_parameter(row("tCC"), 1).await.unwrap_err();
+    let error = drive.write_parameter(row("tFr"), 700).await.unwrap_err();
     assert!(matches!(error, Error::Exception { code: 4, meaning: ExceptionMeaning::Failed, .. }), "{error}");
 }
 

@@ -4,7 +4,7 @@
 use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result,
-    SlaveAddress, State, Status, StopMode, Stopped, Verdict, Withdrawn,
+    SlaveAddress, State, Status, StopMode, Stopped, Verdict,
     drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
     registers::{Register, access::ReadWrite},
 };
@@ -33,48 +33,6 @@ impl<P: Port> Atv312<P> {
         stopped
     }
 
-    /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel. Where operation
-    /// is not enabled, as after a trip, no bit acts on the motor.
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
-        let unsupported = |reason| Err(Error::Unsupported { what: "withdrawal of the run command", reason });
-        self.read_settings(Class::Command).await?;
-        let held = self.read_controls(Class::Command).await?.command;
-        let status = self.fast_status(Class::Command).await?;
-        let settings = &self.known.settings;
-        if !settings.meaning(held).is_run() {
-            // One whose answer was lost may still be on its way: the word goes out behind it.
-            if self.own.lease().is_none() || self.own.has_arrived() {
-                self.own.end();
-                return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
-            }
-        }
-        let words = FastWords::in_status(&status).state_words();
-        let enabled = words.chart() == Some(ChartState::OperationEnabled);
-        if settings.others().contains(ControlWord::STOP) && enabled {
-            return unsupported(
-                "a function is assigned to bit 12 of CMD, and no other bit ends a run command alone",
-            );
-        }
-        let manages_channels = settings.level() != Some(AccessLevel::L3);
-        if let Some(reason) = words.refuses_withdrawal().filter(|_| manages_channels) {
-            return unsupported(reason);
-        }
-        let word = match settings.others().contains(ControlWord::STOP) {
-            true => settings.kept(held),
-            false => held | ControlWord::STOP.bits(),
-        };
-        self.held = None;
-        self.last_written = Some(word);
-        self.registers.at(Class::Command).write(CMD, word).await?;
-        let held = self.read_controls(Class::Command).await.map_err(Error::after_write)?.command;
-        let status = self.fast_status(Class::Command).await.map_err(Error::after_write)?;
-        if self.known.settings.meaning(held).is_run() {
-            return Err(self.not_confirmed(Command::Withdraw, status, None));
-        }
-        self.own.end();
-        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
-    }
-
     /// Reads the fast words in a class, without making a status of them.
     pub(crate) async fn fast_words(&mut self, class: Class) -> Result<FastWords> {
         self.registers.at(class).read_array(FIRST).await.map(FastWords::of)
@@ -84,23 +42,26 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn fast_status(&mut self, class: Class) -> Result<Status> {
         self.registers.begin_snapshot();
         let words = self.fast_words(class).await?;
-        // A stop that was just written may not show yet.
         let settings = &self.known.settings;
-        let held = |&held: &u16| {
+        self.proof.holds_if(|held| {
             let command = settings.meaning(held);
+            // A stop that was just written may not show yet.
             class == Class::Command && command.is_stop() || words.state_words().can_hold(command)
-        };
-        self.held = self.held.filter(held);
+        });
         self.control = Some(words.state_words().control());
-        self.motion = self.see_shaft(&words, self.registers.snapshot_time());
-        let status = self.status_of(&words);
-        Ok(Status { verdict: self.verdict(&words), ..status })
+        self.see_shaft(&words);
+        let verdict = self.evidence(&words).and_then(|evidence| self.proof.watch.run.verdict(&evidence));
+        Ok(Status { verdict, ..self.status_of(&words) })
+    }
+
+    /// The control word that the drive was last seen to hold, as it would be at level L1.
+    pub(crate) fn command(&self) -> Option<ControlWord> {
+        self.proof.held().map(|held| self.known.settings.meaning(held))
     }
 
     pub(crate) fn status_of(&self, words: &FastWords) -> Status {
-        let command = self.held.map(|held| self.known.settings.meaning(held));
         let at = self.registers.snapshot_time();
-        Status { at, motion: self.motion, ..words.status(self.known.resolution, command) }
+        Status { at, motion: self.proof.motion, ..words.status(self.known.resolution, self.command()) }
     }
 
     pub(crate) fn refused(&self, command: Command, reason: Refusal) -> Error {
@@ -112,9 +73,8 @@ impl<P: Port> Atv312<P> {
         Error::NotConfirmed { slave, command, status, because }
     }
 
-    /// Remembers what the drive holds, as it has just confirmed.
+    /// Remembers the high bits that the drive holds, as it has just confirmed.
     pub(crate) fn hold(&mut self, word: u16) {
-        (self.held, self.held_is_read) = (Some(word), false);
         self.high_bits = word & self.known.settings.assignable();
     }
 
@@ -204,7 +164,7 @@ impl<P: Port> Drivecom for Atv312<P> {
     }
 
     fn own_run(&mut self) -> &mut OwnRun {
-        &mut self.own
+        &mut self.proof.watch.run
     }
 
     fn as_written(&self, word: u16) -> u16 {
@@ -223,9 +183,7 @@ impl<P: Port> Drivecom for Atv312<P> {
     /// The bits that have another function in this drive stay as it holds them, and the channels with the bus.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         let word = self.as_written(word);
-        // Not known while the outcome is not known.
-        self.held = None;
-        self.last_written = Some(word);
+        self.proof.is_writing(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
@@ -233,6 +191,7 @@ impl<P: Port> Drivecom for Atv312<P> {
             (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
             (_, Effect::Level) => calls.write(CMD, word).await?,
         }
+        self.proof.was_written(word);
         self.hold(word);
         Ok(())
     }
@@ -291,7 +250,7 @@ impl<P: Port> Drivecom for Atv312<P> {
             return Ok(RunShown::NotYet);
         }
         // The setpoint that the run command found is the one that it is to follow from now on.
-        self.given = Some(in_force);
+        self.proof.given = Some(in_force);
         status.verdict = Some(Verdict::InForce);
         Ok(shown)
     }
@@ -332,6 +291,34 @@ impl<P: Port> Drivecom for Atv312<P> {
 
     async fn read_control(&mut self) -> Result<u16> {
         self.read_controls(Class::Command).await.map(|controls| controls.command)
+    }
+
+    fn is_run(&self, held: u16) -> bool {
+        self.known.settings.meaning(held).is_run()
+    }
+
+    /// The stop of bit 12 beside every bit as it stands: it ends a run command, and neither voltage nor channel. Where operation
+    /// is not enabled, as after a trip, no bit acts on the motor.
+    fn withdrawal(&self, held: u16, status: &Status) -> std::result::Result<u16, &'static str> {
+        let settings = &self.known.settings;
+        let words = FastWords::in_status(status).state_words();
+        let enabled = words.chart() == Some(ChartState::OperationEnabled);
+        let taken = settings.others().contains(ControlWord::STOP);
+        if taken && enabled {
+            return Err("a function is assigned to bit 12 of CMD, and no other bit ends a run command alone");
+        }
+        let manages_channels = settings.level() != Some(AccessLevel::L3);
+        match words.refuses_withdrawal().filter(|_| manages_channels) {
+            Some(reason) => Err(reason),
+            None if taken => Ok(settings.kept(held)),
+            None => Ok(held | ControlWord::STOP.bits()),
+        }
+    }
+
+    /// Without the bits that lead the channels to the bus.
+    async fn write_withdrawal(&mut self, word: u16) -> Result<()> {
+        self.proof.is_writing(word);
+        self.registers.at(Class::Command).write(CMD, word).await
     }
 
     fn last_control(&self) -> Option<Control> {

@@ -61,15 +61,18 @@ impl<P: Port> Atv312<P> {
     /// The status, `LFt`, the alarms and the four past faults: four requests.
     pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
         let words = self.fast_words(Class::Background).await?;
+        let absent = &mut self.known.absent;
         let mut calls = self.registers.at(Class::Background);
-        let last = calls.read(LFT).await?;
-        let past: [u16; 4] = calls.read_array(DP1.address()).await?;
-        let lrs1 = ExtendedStatus1::from_bits_retain(calls.read(LRS1).await?);
+        let last = absent.word(&mut calls, LFT.address()).await?;
+        let past = absent.read(&mut calls, DP1.address(), 4).await?;
+        let lrs1 = absent.word(&mut calls, LRS1.address()).await?;
+        let lrs1 = ExtendedStatus1::from_bits_retain(lrs1.unwrap_or(0));
         // LFt keeps the last fault after it is gone: only the state says that it is present.
         let state = words.state_words();
         let tripped = state.is_tripped();
-        let present = tripped.then(|| Fault::lookup(FAULTS, last)).into_iter().collect();
-        let history = past.into_iter().filter(|&code| code != 0).map(|code| Fault::lookup(FAULTS, code));
+        let present = last.filter(|_| tripped).map(|code| Fault::lookup(FAULTS, code)).into_iter().collect();
+        let past = past.into_iter().flatten().filter(|&code| code != 0);
+        let history = past.map(|code| Fault::lookup(FAULTS, code));
         Ok(Faults {
             present,
             history: history.collect(),
@@ -148,27 +151,12 @@ impl<P: Port> Atv312<P> {
 /// What function 43/14 or `TSP` say of the family: the reference begins with it (BBV52816 p. 14), `TSP` is 128 (p. 26). An
 /// Altivar 31, which has all but three of these registers at the same addresses, is not told from it.
 pub(crate) fn recognised(identity: &Identity) -> Recognised {
-    const OTHERS: &[(&str, &str)] = &[
-        ("ATV212", "an Altivar 212, which no family here fits"),
-        ("ATV21", "an Altivar 21: the family atv21 fits"),
-        ("ATV28", "an Altivar 28: the family atv28 fits"),
-        ("ATV58", "an Altivar 58: the family atv58 fits"),
-        ("ATV61", "an Altivar 61, which no family here fits"),
-        ("ATV71", "an Altivar 71, which no family here fits"),
-        ("ATV32", "an Altivar 32, which no family here fits"),
-        ("ATV12", "an Altivar 12, which no family here fits"),
-        ("ATV", "another Altivar, which no family here fits"),
-    ];
     let model = identity.model.as_deref().unwrap_or_default();
     let tsp = identity.codes.iter().find(|word| word.address == TSP.address()).map(|word| word.value);
-    if model.starts_with("ATV312") {
-        return Recognised::Mine;
-    }
-    if model.starts_with("ATV31") {
-        return Recognised::CannotTell;
-    }
-    if let Some(&(_, it_is)) = OTHERS.iter().find(|(prefix, _)| model.starts_with(prefix)) {
-        return Recognised::NotMine { it_is };
+    match Recognised::by_reference(model, "ATV312") {
+        Some(Recognised::NotMine { .. }) if model.starts_with("ATV31") => return Recognised::CannotTell,
+        Some(told) => return told,
+        None => {}
     }
     match tsp {
         Some(128) => Recognised::Mine,

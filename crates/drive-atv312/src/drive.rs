@@ -4,15 +4,14 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Faults, Ground, Identity, Intent, Lease, Measurements, Port,
-    Reaction, Recognised, Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn,
-    Written, drivecom,
+    BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Lease, Measurements, Port, Reaction,
+    Recognised, Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
+    drivecom,
 };
 
 use crate::{
     Atv312, command,
     diagnosis::recognised,
-    proof::Doubt,
     registers::{ATR, ETA},
     settings::Known,
     words::ControlWord,
@@ -21,37 +20,23 @@ use crate::{
 #[async_trait]
 impl<P: Port> Drive for Atv312<P> {
     drive_core::told_by!(registers);
+    drive_core::watched_by!(proof.watch);
 
-    fn lease(&self) -> Option<Lease> {
-        self.own.lease()
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        Some(drivecom::Drivecom::as_written(self, ControlWord::run(direction).bits()))
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.own.adopt(lease);
-        // What the drive holds is read with the next status.
-        self.held = None;
-    }
-
-    fn take_changed(&mut self) -> Option<Ground> {
-        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+        self.proof.adopt(lease);
     }
 
     fn recognise(&self, identity: &Identity) -> Recognised {
         recognised(identity)
     }
 
-    fn set_coast_time(&mut self, time: Option<Duration>) {
-        self.shaft.set_coast_time(time);
-    }
-
     fn forget(&mut self) {
-        self.known = Known::default();
-        self.held = None;
-        self.control = None;
-        self.doubt = Doubt::default();
-        if self.own.lease().is_none() {
-            self.given = None;
-        }
+        self.proof.forget();
+        (self.known, self.control) = (Known::default(), None);
     }
 
     /// W3201 to W3206 in one exchange. Where these words alone do not tell the frequency or whether a run command is in
@@ -80,12 +65,13 @@ impl<P: Port> Drive for Atv312<P> {
     /// `LAC` or `dCI` allow it. What does not act is replaced by what `Stt` says, and else by the fast stop. A drive whose
     /// settings were not read yet is stopped by the quick stop. At L3 the bits that have another function stay as they are.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        self.stop_motor(mode).await
+        Ok(self.stop_motor(mode).await?.held_by(&self.proof.watch.shaft))
     }
 
     /// 100Fh with the bits above it as the drive holds them, where bit 12 has its usual meaning.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
-        self.withdraw_run().await
+        self.read_settings(Class::Command).await?;
+        drivecom::withdraw(self).await
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {

@@ -18,8 +18,8 @@ mod settings;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Ground, Motion, OwnRun, Port, Registers, Row, Shaft,
-    SlaveAddress, StopMode, Turns,
+    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SlaveAddress, StopMode,
+    drivecom::Proof,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
@@ -29,7 +29,7 @@ pub use crate::{
     registers::ROWS,
 };
 use crate::{
-    proof::{Doubt, Grounds},
+    proof::{Facts, Look},
     settings::Known,
 };
 
@@ -65,28 +65,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv312<P> {
     registers: Registers<P>,
-    /// The run command of this side.
-    own: OwnRun,
-    shaft: Shaft,
-    /// What the shaft did at the last status.
-    motion: Motion,
-    turns: Turns,
-    doubt: Doubt,
-    /// What the contract rests on, and whether there is one: the watchdog was armed.
-    grounds: Grounds,
-    armed: bool,
-    /// What of it was found otherwise and not told yet.
-    changed: Vec<Ground>,
-    /// The register and the word of the setpoint that is to be in force.
-    given: Option<(u16, u16)>,
+    /// The run command of this side and the shaft.
+    proof: Proof<Look>,
+    /// What was found of the reference behind the present words.
+    facts: Facts,
     known: Known,
-    /// The control word that the drive was last seen to hold; `None` when that is not known.
-    held: Option<u16>,
-    /// Whether that was read, and not only written.
-    held_is_read: bool,
-    /// The control word that this side wrote last.
-    last_written: Option<u16>,
-    /// Its bits 11 to 15 as they were last known: one of them may say who commands.
+    /// The bits 11 to 15 of the control word as they were last known: one of them may say who commands.
     high_bits: u16,
     /// Who commanded when it was last read.
     control: Option<Control>,
@@ -110,19 +94,9 @@ impl<P: Port> Atv312<P> {
     pub fn new(port: P, slave: SlaveAddress) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, exception_meaning),
-            own: OwnRun::new(),
-            shaft: Shaft::new(),
-            motion: Motion::NotKnown,
-            turns: Turns::default(),
-            doubt: Doubt::default(),
-            grounds: Grounds::default(),
-            armed: false,
-            changed: Vec::new(),
-            given: None,
+            proof: Proof::default(),
+            facts: Facts::default(),
             known: Known::default(),
-            held: None,
-            held_is_read: false,
-            last_written: None,
             high_bits: 0,
             control: None,
             set_up_before: Vec::new(),

@@ -11,7 +11,6 @@ use drive_core::{
 
 use crate::{
     Atv312,
-    proof::Grounds,
     registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address},
     settings::Known,
     words::{ControlWord, ExtendedControl, ExtendedStatus},
@@ -109,7 +108,8 @@ impl<P: Port> Atv312<P> {
         };
         if may_have_changed {
             self.known = Known::default();
-            self.held = None;
+            self.proof.holds_if(|_| false);
+            self.proof.doubt_limits();
             self.unsaved |= matches!(row.storage, Storage::RamUntilSaved | Storage::Unknown);
         }
         outcome
@@ -200,7 +200,10 @@ impl<P: Port> Atv312<P> {
         let sll = calls.read(SLL).await?;
         let unwatched =
             ExtendedControl::from_bits_retain(calls.read(CMI).await?).contains(ExtendedControl::NO_TIMEOUT);
-        self.grounds = Grounds { time_out: Some(timeout), reaction: Some(sll), unwatched: Some(unwatched) };
+        let nto = if unwatched { ExtendedControl::NO_TIMEOUT.bits() } else { 0 };
+        for (register, word) in [(TTO.address(), timeout), (SLL.address(), sll), (CMI.address(), nto)] {
+            self.proof.watch.knows(register, word);
+        }
         let reaction = reaction(sll);
         let off = unwatched || reaction == Reaction::Ignore;
         Ok(Watchdog { timeout: (!off).then(|| STEP * u32::from(timeout)), reaction: Some(reaction) })
@@ -219,7 +222,7 @@ impl<P: Port> Atv312<P> {
         };
         let tto = self.time_out_counts(timeout)?;
         let current = self.read_watchdog().await?;
-        self.armed = reaction != Reaction::Ignore;
+        self.proof.watch.set_armed(reaction != Reaction::Ignore);
         let wanted =
             Watchdog { timeout: (reaction != Reaction::Ignore).then_some(timeout), reaction: Some(reaction) };
         if current == wanted {

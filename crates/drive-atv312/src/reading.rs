@@ -12,7 +12,7 @@ use drive_core::{
 
 use crate::{
     registers::{CMD, ETA, ETI, FRH, LCR, OTR, RFR},
-    words::{ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
+    words::{ControlWord, ExtendedControl, ExtendedStatus},
 };
 
 /// The first word of the block.
@@ -101,16 +101,6 @@ impl FastWords {
     /// The output frequency.
     pub(crate) fn output(&self, resolution: Resolution) -> Frequency {
         resolution.frequency(self.word(RFR))
-    }
-
-    /// What of these words is another question when it is another: not the alarm, and not how far a ramp is.
-    pub(crate) fn question(&self) -> (u16, u16, u16) {
-        let passing = ExtendedStatus::TRANSIENT
-            | ExtendedStatus::MOTOR_THERMAL_ALARM
-            | ExtendedStatus::BRAKING_ALARM
-            | ExtendedStatus::CURRENT_LIMIT;
-        let StatusWords { eta, eti } = self.state_words();
-        ((eta - StatusWord::ALARM).bits(), (eti - passing).bits(), self.word(FRH))
     }
 
     /// Why a setting cannot be changed now.

@@ -37,7 +37,7 @@ impl<P: Port> Atv312<P> {
     /// drive's own words tell it.
     pub(crate) async fn other_reference(&mut self) -> Result<Option<Refusal>> {
         self.read_settings(Class::Command).await?;
-        let held = self.held.unwrap_or(0);
+        let held = self.proof.held().unwrap_or(0);
         let mut calls = self.registers.at(Class::Command);
         let settings = &self.known.settings;
         let mut facts = Facts::default();

@@ -35,16 +35,15 @@ impl<P: Port> Atv312<P> {
                 0 => (LFR, 0),
                 word => (LFRD, word),
             },
+            Setpoint::Share(_) => return Err(Error::no_share()),
         };
         let word = if self.is_negative(&words, &controls).await? { negative(word) } else { word };
         // Both are images of the one reference of the bus, so a later setpoint of either kind takes the place of one
         // that still waits.
         self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
-        self.given = Some((register.address(), word));
-        if register.address() == LFR.address() {
-            self.known.lfr = Some(word);
-        }
-        let frequency = (register.address() == LFR.address()).then(|| resolution.frequency(word));
+        let is_lfr = register.address() == LFR.address();
+        self.proof.gives(register.address(), word, is_lfr);
+        let frequency = is_lfr.then(|| resolution.frequency(word));
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
     }
 
@@ -82,7 +81,7 @@ impl<P: Port> Atv312<P> {
 
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
-        let Some((register, word)) = self.given else { return Ok(false) };
+        let Some((register, word)) = self.proof.given else { return Ok(false) };
         let held = self.registers.at(Class::Command).read_words(register, 1).await?;
         Ok(held.first() == Some(&word))
     }
@@ -122,8 +121,7 @@ impl<P: Port> Atv312<P> {
     /// Whether a run command of the bus is in force.
     fn runs_by_bus(&self, words: &FastWords) -> bool {
         let words = words.state_words();
-        let held = self.held.map(|held| self.known.settings.meaning(held));
-        let runs = held.map_or(words.is_turning(), ControlWord::is_run);
+        let runs = self.command().map_or(words.is_turning(), ControlWord::is_run);
         runs && words.chart() == Some(ChartState::OperationEnabled) && words.control() == Control::Bus
     }
 

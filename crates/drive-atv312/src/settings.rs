@@ -2,15 +2,12 @@
 //! [`forget`](drive_core::Drive::forget): what the control word's bits do, where command and reference come from, what
 //! replaces a reference, the limits.
 
-use std::time::Duration;
-
 use drive_core::{
     Absent, Class, Error, ErrorKind, Frequency, Ground, Port, Recognised, Refusal, Result, SelfRestart,
     Speed, StopMode,
-    drivecom::{self, StopWord},
+    drivecom::{self, Limits, StopWord},
     registers::{Register, access::Kind},
 };
-use tokio::time::Instant;
 
 use crate::{
     Atv312,
@@ -43,10 +40,6 @@ const LI1: u16 = 129;
 pub(crate) const CD13: u16 = CD11 + 2;
 /// Cd14.
 pub(crate) const CD14: u16 = CD11 + 3;
-
-/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
-/// change them.
-const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
 /// A block of consecutive settings, and when it counts.
 type Block = (u16, u16, When);
@@ -105,10 +98,6 @@ const FUNCTIONS: [u16; 10] = [
 pub(crate) struct Known {
     pub(crate) resolution: Option<Resolution>,
     pub(crate) settings: Settings,
-    /// `LSP` and `HSP`, and when they were read.
-    pub(crate) frequencies: Option<((Frequency, Frequency), Instant)>,
-    /// `LFr` as it was read or written last.
-    pub(crate) lfr: Option<u16>,
     /// Whether it is an Altivar 312, once it was asked.
     pub(crate) kind: Option<Recognised>,
     /// The registers that this drive lacks.
@@ -513,7 +502,7 @@ impl<P: Port> Atv312<P> {
             let known = self.known.settings.words.iter_mut().find(|(at, _)| *at == address);
             if let Some((_, known)) = known.filter(|(_, known)| *known != word) {
                 *known = word;
-                self.changed(Ground::Inputs);
+                self.proof.watch.changes(Ground::Inputs);
             }
         }
         Ok(())
@@ -526,22 +515,20 @@ impl<P: Port> Atv312<P> {
     }
 
     /// `LSP` to `HSP`, both within `tFr`: the three follow each other, one exchange where they were not read lately.
-    pub(crate) async fn frequency_limits(&mut self) -> Result<(Frequency, Frequency)> {
-        match self.known.frequencies {
-            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(limits),
-            _ => self.read_frequency_limits(Class::Command).await,
+    pub(crate) async fn frequency_limits(&mut self) -> Result<Limits> {
+        match self.proof.fresh_limits().flatten() {
+            Some(limits) => Ok(limits),
+            None => self.read_frequency_limits(Class::Command).await,
         }
     }
 
-    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<(Frequency, Frequency)> {
+    pub(crate) async fn read_frequency_limits(&mut self, class: Class) -> Result<Limits> {
         let words: [u16; 3] = self.registers.at(class).read_array(TFR.address()).await?;
         let [tfr, hsp, lsp] = words.map(Frequency::from_decihertz);
         let limits = (lsp, hsp.min(tfr));
-        let before = self.known.frequencies.replace((limits, Instant::now()));
-        if before.is_some_and(|(before, _)| before != limits) {
+        if self.proof.take_limits(Some(limits)) {
             // The same limits in rpm.
             self.known.speeds = None;
-            self.changed(Ground::Limits);
         }
         Ok(limits)
     }
@@ -560,9 +547,8 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn read_controls(&mut self, class: Class) -> Result<Controls> {
         let [command, reference, _, cmi] = self.registers.at(class).read_array(CMD.address()).await?;
         self.hold(command);
-        self.held_is_read = true;
+        self.proof.was_read(command, reference);
         let controls = Controls { command, reference, cmi: ExtendedControl::from_bits_retain(cmi) };
-        self.known.lfr = Some(reference);
         self.take_extended(controls.cmi);
         Ok(controls)
     }

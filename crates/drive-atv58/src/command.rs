@@ -2,8 +2,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Command, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result,
-    SlaveAddress, Status, StopMode, Verdict, Withdrawn,
+    Class, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result, SlaveAddress, Status,
+    StopMode, Verdict,
     drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
 
@@ -18,6 +18,8 @@ pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
     by: "another reference (the mapped reference is not that of W401)",
     remedy: "see which input gives it, or correct the map of the words",
 };
+
+const NO_WITHDRAWAL: &str = "the manual names no word that ends it and nothing else";
 
 impl<P: Port> Atv58<P> {
     pub(crate) const fn run_word(&self, direction: Direction) -> Result<u16> {
@@ -45,10 +47,11 @@ impl<P: Port> Atv58<P> {
         let reference = map.reference.filter(|word| class == Class::Command || span(word));
         let fast = ordinary.into_iter().chain([reference]);
         let addresses: Vec<u16> = fast.flatten().collect();
+        let mut words = self.produced(class, &addresses, map.status).await?;
         let mut calls = self.registers.at(class);
-        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
         if words.is_tripped(&map) {
-            words.append(&mut calls, map.input_words, W483.address(), 1).await?;
+            let fault = Words::read(&mut self.absent, &mut calls, map.input_words, &[W483.address()]).await?;
+            words.join(fault);
         }
         // Whether a drive leaves "operation enabled" at once or at the end of its ramp is not known; the control word
         // that it holds tells the stop from the run.
@@ -56,42 +59,8 @@ impl<P: Port> Atv58<P> {
             words.append(&mut calls, false, CMD.address(), 1).await?;
         }
         let status = Status { at: self.registers.snapshot_time(), ..words.status(&map) };
-        Ok(Status { motion: self.see_shaft(&status), ..status })
-    }
-
-    /// A drive that has left "operation enabled", such as a tripped one, has its run command taken back by "disable voltage",
-    /// which moves nothing there. For one that has not, the manual names no word that ends it and nothing else.
-    pub(crate) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
-        let unsupported = Err(Error::Unsupported {
-            what: "withdrawal of the run command",
-            reason: "the manual names no word that ends it and nothing else",
-        });
-        let is_run = |held: u16| held & drivecom::ENABLE_OPERATION == drivecom::ENABLE_OPERATION;
-        let status = self.read_status(Class::Command).await?;
-        let chart = status.raw(self.map.status).and_then(ChartState::of);
-        let (held, _) = self.read_held(Class::Command).await?;
-        if !is_run(held) && (self.own.lease().is_none() || self.own.has_arrived()) {
-            self.own.end();
-            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
-        }
-        let turns = status.output_frequency.is_none_or(|output| output != Frequency::ZERO);
-        match chart {
-            Some(ChartState::Fault) => {}
-            None | Some(ChartState::OperationEnabled | ChartState::FaultReactionActive) => {
-                return unsupported;
-            }
-            Some(_) if turns => return unsupported,
-            Some(_) => {}
-        }
-        self.write_control(Class::Command, drivecom::DISABLE_VOLTAGE, Effect::Level).await?;
-        let (held, _) = self.read_held(Class::Command).await.map_err(Error::after_write)?;
-        let status = self.read_status(Class::Command).await.map_err(Error::after_write)?;
-        if is_run(held) {
-            let (slave, command) = (self.registers.slave(), Command::Withdraw);
-            return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None });
-        }
-        self.own.end();
-        Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
+        self.see_shaft(&status);
+        Ok(Status { motion: self.proof.motion, ..status })
     }
 
     /// The control word of a stop; `None` where there is none.
@@ -118,17 +87,18 @@ impl<P: Port> Drivecom for Atv58<P> {
     }
 
     fn own_run(&mut self) -> &mut OwnRun {
-        &mut self.own
+        &mut self.proof.watch.run
     }
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let status = self.fast_status(class).await?;
-        Ok(Status { verdict: self.verdict(&status), ..status })
+        let verdict = self.evidence(&status).and_then(|evidence| self.proof.watch.run.verdict(&evidence));
+        Ok(Status { verdict, ..status })
     }
 
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         self.stops_by_ramp = Some(word) == self.map.ramp_stop;
-        self.last_written = Some(word);
+        self.proof.is_writing(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
             // What a stop has done is read as a command.
@@ -136,9 +106,7 @@ impl<P: Port> Drivecom for Atv58<P> {
             (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
             (_, Effect::Level) => calls.write(CMD, word).await?,
         }
-        // Only what was read tells that another word has taken its place.
-        let run = word & drivecom::ENABLE_OPERATION == drivecom::ENABLE_OPERATION;
-        self.seen.held = self.seen.held.filter(|_| run).map(|(_, reference)| (word, reference));
+        self.proof.was_written(word);
         Ok(())
     }
 
@@ -174,7 +142,7 @@ impl<P: Port> Drivecom for Atv58<P> {
         };
         if shown != RunShown::NotYet {
             // The setpoint that the run command found is the one that it is to follow from now on.
-            self.given = Some(reference);
+            self.proof.given = Some((W401.address(), reference));
             status.verdict = Some(Verdict::InForce);
         }
         Ok(shown)
@@ -189,6 +157,18 @@ impl<P: Port> Drivecom for Atv58<P> {
 
     async fn read_control(&mut self) -> Result<u16> {
         self.read_held(Class::Command).await.map(|(held, _)| held)
+    }
+
+    /// "Disable voltage" for a drive that has left "operation enabled", such as a tripped one: it moves nothing there. For one that
+    /// has not, the manual names no word that ends a run command and nothing else.
+    fn withdrawal(&self, _: u16, status: &Status) -> std::result::Result<u16, &'static str> {
+        let turns = status.output_frequency.is_none_or(|output| output != Frequency::ZERO);
+        match status.raw(self.map.status).and_then(ChartState::of) {
+            Some(ChartState::Fault) => Ok(drivecom::DISABLE_VOLTAGE),
+            None | Some(ChartState::OperationEnabled | ChartState::FaultReactionActive) => Err(NO_WITHDRAWAL),
+            Some(_) if turns => Err(NO_WITHDRAWAL),
+            Some(_) => Ok(drivecom::DISABLE_VOLTAGE),
+        }
     }
 
     /// The card gives no word of the terminals: while local control is forced, or might be, one of their inputs may start the

@@ -1,10 +1,8 @@
 //! The [`Drive`] of this family.
 
-use std::time::Duration;
-
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Ground, Identity, Intent, Lease,
+    Absent, BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease,
     Measurements, Port, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
     WatchdogCapability, Withdrawn, Written, drivecom, registers::refuse_commands,
 };
@@ -12,51 +10,34 @@ use tokio_modbus::prelude::ReadCode;
 
 use crate::{
     Atv58,
-    proof::Seen,
     reading::Words,
-    registers::{CMD, W401, W402, W463},
+    registers::{CMD, W401, W402, W463, W483},
     watchdog,
+    words::FaultRegister,
 };
 
 #[async_trait]
 impl<P: Port> Drive for Atv58<P> {
     drive_core::told_by!(registers);
+    drive_core::watched_by!(proof.watch);
 
-    fn lease(&self) -> Option<Lease> {
-        self.own.lease()
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        self.run_word(direction).ok()
     }
 
     fn adopt(&mut self, lease: Lease) {
-        self.own.adopt(lease);
-        // What the drive holds is read with the next status.
-        self.seen = Seen::default();
-    }
-
-    fn take_changed(&mut self) -> Option<Ground> {
-        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+        self.proof.adopt(lease);
     }
 
     /// What the card says of itself over UNI-TELWAY begins with the family's name.
     fn recognise(&self, identity: &Identity) -> Recognised {
-        match identity.model.as_deref() {
-            Some(model) if model.starts_with("ATV58") => Recognised::Mine,
-            Some(model) if model.starts_with("ATV") => {
-                Recognised::NotMine { it_is: "another Altivar than an Altivar 58" }
-            }
-            _ => Recognised::CannotTell,
-        }
-    }
-
-    fn set_coast_time(&mut self, time: Option<Duration>) {
-        self.shaft.set_coast_time(time);
+        let told = identity.model.as_deref().and_then(|model| Recognised::by_reference(model, "ATV58"));
+        told.unwrap_or(Recognised::CannotTell)
     }
 
     fn forget(&mut self) {
-        self.limits = None;
-        self.seen = Seen::default();
-        if self.own.lease().is_none() {
-            self.given = None;
-        }
+        self.proof.forget();
+        (self.absent, self.idle) = (Absent::default(), 0);
     }
 
     /// One exchange with the default map, and a second one for W483 when the drive has tripped. Of several fault bits
@@ -71,20 +52,24 @@ impl<P: Port> Drive for Atv58<P> {
         self.registers.begin_snapshot();
         let mapped = [map.reference, map.line_voltage, map.motor_thermal, map.drive_thermal];
         let addresses: Vec<u16> = mapped.into_iter().flatten().collect();
-        let mut calls = self.registers.at(Class::Background);
-        let mut words = Words::read(&mut calls, map.input_words, &addresses).await?;
-        words.append(&mut calls, map.input_words, W463.address(), 4).await?;
+        let sample: Vec<u16> = (W463.address()..).take(4).collect();
+        let (absent, mut calls) = (&mut self.absent, self.registers.at(Class::Background));
+        let mut words = Words::read(absent, &mut calls, map.input_words, &addresses).await?;
+        words.join(Words::read(absent, &mut calls, map.input_words, &sample).await?);
         Ok(Measurements { at: self.registers.snapshot_time(), ..words.measurements(&map) })
     }
 
     /// The bits of W483 while the drive is tripped, each as its number: their meanings are not public. The family has
     /// no history and names no alarm.
     async fn faults(&mut self) -> Result<Faults> {
-        let words = self.produced(Class::Background, self.map.status).await?;
+        let words = self.produced(Class::Background, &[], self.map.status).await?;
         if !words.is_tripped(&self.map) {
             return Ok(Faults::default());
         }
-        let register = self.fault_register().await?;
+        let input = self.map.input_words;
+        let mut calls = self.registers.at(Class::Background);
+        let words = Words::read(&mut self.absent, &mut calls, input, &[W483.address()]).await?;
+        let register = FaultRegister(words.at(Some(W483.address())).unwrap_or(0));
         let present = register.bits().map(|code| Fault { code, entry: None }).collect();
         Ok(Faults { present, ..Faults::default() })
     }
@@ -103,7 +88,7 @@ impl<P: Port> Drive for Atv58<P> {
     /// 0000h to a drive that has left "operation enabled", such as a tripped one. For one that has not the manual names no word
     /// that ends a run command and nothing else.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
-        self.withdraw_run().await
+        drivecom::withdraw(self).await
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
@@ -116,7 +101,7 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn keep_alive(&mut self) -> Result<()> {
-        self.produced(Class::KeepAlive, self.map.status).await.map(drop)
+        self.produced(Class::KeepAlive, &[], self.map.status).await.map(drop)
     }
 
     /// What the card says of itself on a UNI-TELWAY line: its rating and the version of its software (request 0Fh,
@@ -163,7 +148,7 @@ impl<P: Port> Drive for Atv58<P> {
             });
         }
         // The limits that were read once may change with it.
-        self.limits = None;
+        self.proof.doubt_limits();
         self.registers.at(Class::Background).change_row(row, word).await
     }
 

@@ -15,14 +15,12 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, Class, ExceptionMeaning, Frequency, Ground, OwnRun, Port, Registers, Result, Row,
-    SerialSettings, Shaft, SlaveAddress, StopMode, Turns, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Class, ExceptionMeaning, Port, Registers, Result, Row, SerialSettings,
+    SlaveAddress, StopMode, WatchdogCapability, drivecom::Proof, serial::CharacterFormat,
 };
 
-use tokio::time::Instant;
-
 pub use crate::{diagnostics::Counters, registers::ROWS, settings::Atv58Map};
-use crate::{proof::Seen, reading::Words, registers::W483, words::FaultRegister};
+use crate::{proof::Look, reading::Words, registers::W483, words::FaultRegister};
 
 /// The card's message watch over RTU and UNI-TELWAY, fixed as far as its manual says (VVDED397054 p. 24/48).
 pub const MESSAGE_WATCH: Duration = Duration::from_secs(10);
@@ -80,20 +78,13 @@ pub const CAPABILITIES: Capabilities = Capabilities {
 #[derive(Debug)]
 pub struct Atv58<P> {
     registers: Registers<P>,
-    /// The run command of this side.
-    own: OwnRun,
-    shaft: Shaft,
-    turns: Turns,
-    seen: Seen,
-    /// What a contract rests on that was found otherwise and not told yet.
-    changed: Vec<Ground>,
-    /// The word of the setpoint that is to be in force.
-    given: Option<u16>,
-    /// The control word that this side wrote last.
-    last_written: Option<u16>,
+    /// The run command of this side and the shaft.
+    proof: Proof<Look>,
+    /// How many statuses behind each other show no output although operation is enabled.
+    idle: u8,
+    /// The registers that this drive lacks.
+    absent: Absent,
     map: Atv58Map,
-    /// Low and high speed, and when they were read.
-    limits: Option<((Frequency, Frequency), Instant)>,
     /// Whether the ramp stop was the last word that was written.
     stops_by_ramp: bool,
 }
@@ -115,15 +106,10 @@ impl<P: Port> Atv58<P> {
     pub fn with_map(port: P, slave: SlaveAddress, map: Atv58Map) -> Self {
         Self {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
-            own: OwnRun::new(),
-            shaft: Shaft::new(),
-            turns: Turns::default(),
-            seen: Seen::default(),
-            changed: Vec::new(),
-            given: None,
-            last_written: None,
+            proof: Proof::default(),
+            idle: 0,
+            absent: Absent::default(),
             map,
-            limits: None,
             stops_by_ramp: false,
         }
     }
@@ -153,13 +139,19 @@ impl<P: Port> Atv58<P> {
     /// # Errors
     /// [`Error::Port`](drive_core::Error::Port) and [`Error::Exception`](drive_core::Error::Exception).
     pub async fn fault_register(&mut self) -> Result<FaultRegister> {
-        let words = self.produced(Class::Background, W483.address()).await?;
+        let words = self.produced(Class::Background, &[], W483.address()).await?;
         Ok(FaultRegister(words.at(Some(W483.address())).unwrap_or_default()))
     }
 
-    /// Reads a word that the drive alone writes.
-    async fn produced(&mut self, class: Class, address: u16) -> Result<Words> {
-        Words::read(&mut self.registers.at(class), self.map.input_words, &[address]).await
+    /// Reads words that the drive alone writes: those that it has, and one without which nothing is told.
+    async fn produced(&mut self, class: Class, addresses: &[u16], needed: u16) -> Result<Words> {
+        let input = self.map.input_words;
+        let mut calls = self.registers.at(class);
+        let mut words = Words::read(&mut self.absent, &mut calls, input, addresses).await?;
+        if words.at(Some(needed)).is_none() {
+            words.append(&mut calls, input, needed, 1).await?;
+        }
+        Ok(words)
     }
 }
 

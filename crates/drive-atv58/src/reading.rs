@@ -1,7 +1,7 @@
 //! Reading the mapped words, and what they say.
 
 use drive_core::{
-    Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
+    Absent, Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
     Setpoint, State, Status, Voltage, drivecom::ChartState,
 };
 
@@ -19,9 +19,10 @@ pub(crate) struct Words {
 }
 
 impl Words {
-    /// Reads these words: in one request from the lowest to the highest where the limit of words allows it, else one by
-    /// one. `input`: by function 04.
+    /// Reads those of these words that the drive has: in one request from the lowest to the highest where the limit of words
+    /// allows it, else one by one. `input`: by function 04.
     pub(crate) async fn read<P: Port>(
+        absent: &mut Absent,
         calls: &mut Calls<'_, P>,
         input: bool,
         addresses: &[u16],
@@ -30,17 +31,24 @@ impl Words {
         let (Some(&first), Some(&last)) = (addresses.iter().min(), addresses.iter().max()) else {
             return Ok(words);
         };
-        if last - first < CAPABILITIES.read_words {
-            words.append(calls, input, first, last - first + 1).await?;
+        let blocks = if last - first < CAPABILITIES.read_words {
+            vec![(first, last)]
         } else {
-            for &address in addresses {
-                words.append(calls, input, address, 1).await?;
+            addresses.iter().map(|&address| (address, address)).collect()
+        };
+        for (first, last) in blocks {
+            let mut at = first;
+            while let Some((from, count)) = absent.next(at, last + 1) {
+                if let Some(values) = absent.told(from, count, request(calls, input, from, count).await)? {
+                    words.extend(from, values);
+                    at = from + count;
+                }
             }
         }
         Ok(words)
     }
 
-    /// Reads `count` more words from `first` on.
+    /// Reads `count` more words from `first` on, which the drive has.
     pub(crate) async fn append<P: Port>(
         &mut self,
         calls: &mut Calls<'_, P>,
@@ -48,14 +56,17 @@ impl Words {
         first: u16,
         count: u16,
     ) -> Result<()> {
-        let values = if input {
-            read_input_words(calls, first, count).await?
-        } else {
-            calls.read_words(first, count).await?
-        };
+        self.extend(first, request(calls, input, first, count).await?);
+        Ok(())
+    }
+
+    pub(crate) fn join(&mut self, more: Self) {
+        self.words.extend(more.words);
+    }
+
+    fn extend(&mut self, first: u16, values: Vec<u16>) {
         let words = (first..=u16::MAX).zip(values);
         self.words.extend(words.map(|(address, value)| RawWord { address, code: code(address), value }));
-        Ok(())
     }
 
     pub(crate) fn at(&self, address: Option<u16>) -> Option<u16> {
@@ -139,6 +150,10 @@ impl Words {
             None => State::Running,
         }
     }
+}
+
+async fn request<P: Port>(calls: &mut Calls<'_, P>, input: bool, first: u16, count: u16) -> Result<Vec<u16>> {
+    if input { read_input_words(calls, first, count).await } else { calls.read_words(first, count).await }
 }
 
 fn code(address: u16) -> &'static str {

@@ -1,26 +1,17 @@
 //! Setpoints: `W401`, in counts of the map.
 
-use std::time::Duration;
-
 use drive_core::{
-    Class, Command, Confirming, Error, Frequency, Ground, Port, Refusal, Result, Setpoint, SetpointProblem,
-    Status,
-    drivecom::{ChartState, Drivecom, ENABLE_OPERATION, follows_frequency},
+    Class, Command, Confirming, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem, Status,
+    drivecom::{ChartState, Drivecom, ENABLE_OPERATION, Limits, follows_frequency},
 };
 
-use tokio::time::Instant;
-
 use crate::{Atv58, command::OTHER_REFERENCE, reading::Words, registers::W401};
-
-/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the terminal may
-/// change them.
-const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
 impl<P: Port> Atv58<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         let Setpoint::Frequency(frequency) = setpoint else {
             return Err(Error::Unsupported {
-                what: "a setpoint in rpm",
+                what: "a setpoint in rpm or percent",
                 reason: "the manual names a frequency reference only",
             });
         };
@@ -42,8 +33,7 @@ impl<P: Port> Atv58<P> {
         }
         let mut calls = self.registers.at(Class::Command).replacing(W401.address());
         calls.write(W401, count.cast_unsigned()).await?;
-        self.given = Some(count.cast_unsigned());
-        self.seen.held = self.seen.held.map(|(held, _)| (held, count.cast_unsigned()));
+        self.proof.gives(W401.address(), count.cast_unsigned(), true);
         self.see_setpoint(setpoint).await.map_err(Error::after_write)
     }
 
@@ -85,7 +75,7 @@ impl<P: Port> Atv58<P> {
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
         let held = self.registers.at(Class::Command).read(W401).await?;
-        Ok(Some(held) == self.given)
+        Ok(Some((W401.address(), held)) == self.proof.given)
     }
 
     /// Whether the drive follows the reference of the bus, as far as the map names the word that tells.
@@ -113,22 +103,25 @@ impl<P: Port> Atv58<P> {
         status.raw(self.map.reference?).map(Frequency::from_decihertz)
     }
 
-    async fn speed_limits(&mut self) -> Result<Option<(Frequency, Frequency)>> {
-        match self.limits {
-            Some((limits, at)) if at.elapsed() < LIMITS_HOLD => Ok(Some(limits)),
-            _ => self.read_limits(Class::Command).await,
+    async fn speed_limits(&mut self) -> Result<Option<Limits>> {
+        match self.proof.fresh_limits() {
+            Some(limits) => Ok(limits),
+            None => self.read_limits(Class::Command).await,
         }
     }
 
-    pub(crate) async fn read_limits(&mut self, class: Class) -> Result<Option<(Frequency, Frequency)>> {
-        let Some((low, high)) = self.map.speed_limits else { return Ok(None) };
-        let words = Words::read(&mut self.registers.at(class), false, &[low, high]).await?;
-        let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
-        let Some(limits) = frequency(low).zip(frequency(high)) else { return Ok(None) };
-        let before = self.limits.replace((limits, Instant::now()));
-        if before.is_some_and(|(before, _)| before != limits) {
-            self.changed(Ground::Limits);
-        }
-        Ok(Some(limits))
+    /// The limits, where the map names them and the drive has them.
+    pub(crate) async fn read_limits(&mut self, class: Class) -> Result<Option<Limits>> {
+        let limits = match self.map.speed_limits {
+            None => None,
+            Some((low, high)) => {
+                let calls = &mut self.registers.at(class);
+                let words = Words::read(&mut self.absent, calls, false, &[low, high]).await?;
+                let frequency = |address| words.at(Some(address)).map(Frequency::from_decihertz);
+                frequency(low).zip(frequency(high))
+            }
+        };
+        self.proof.take_limits(limits);
+        Ok(limits)
     }
 }

@@ -6,6 +6,7 @@
 mod awake;
 mod cpu;
 mod dead;
+mod doors;
 mod far_end;
 mod faults;
 mod growth;
@@ -20,6 +21,7 @@ mod rig;
 mod simulator;
 mod spinning;
 mod stop;
+mod strangers;
 mod usage;
 mod utilisation;
 mod virtual_line;
@@ -47,9 +49,13 @@ enum Section {
     Growth,
     /// Wrong values accepted as right, over every fault of the simulator.
     Faults,
+    /// A gateway with a dead drive behind it, connections that replay or go mute, a process that stands still.
+    Strangers,
+    /// The wait of a stop at each door of the daemon while somebody attacks another; wants `drived` built beside this program.
+    Doors,
 }
 
-const EVERYTHING: [Section; 7] = [
+const EVERYTHING: [Section; 8] = [
     Section::Utilisation,
     Section::Stop,
     Section::Dead,
@@ -57,6 +63,7 @@ const EVERYTHING: [Section; 7] = [
     Section::Lines,
     Section::Growth,
     Section::Faults,
+    Section::Strangers,
 ];
 
 /// Measures a line of simulated drives.
@@ -138,7 +145,9 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
         Section::Cpu => cpu::measure(report, time),
         Section::Lines => lines::measure(report, time, arguments.lines),
         Section::Growth => growth::measure(report, time, arguments.most_lines, arguments.plot.as_deref()),
+        Section::Doors => doors::measure(report),
         Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
+        Section::Strangers => strangers::measure(report),
     }
 }
 

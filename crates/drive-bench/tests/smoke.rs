@@ -81,3 +81,14 @@ fn our_line_is_measured_beside_the_masters_of_others() {
     assert_eq!(row(&rows, "this line: silences shorter")["value"], 0.0);
     assert!(row(&rows, "this line by the best of the others")["value"].as_f64().is_some());
 }
+
+#[test]
+fn behind_strangers_nothing_is_wrong_and_the_living_are_read() {
+    let rows = rows("strangers");
+    assert_eq!(row(&rows, "200 reconnects")["value"], 0.0);
+    assert_eq!(row(&rows, "100 stalls")["value"], 0.0);
+    for goal in ["this line: values of the living", "a stop confirmed within", "a connection that goes mute"]
+    {
+        assert_eq!(row(&rows, goal)["met"], true, "{rows:?}");
+    }
+}

@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, time::Duration};
 use drive_core::serial::SerialSettings;
 
 pub use crate::exchange::echo::Echo;
-use crate::{pdu::MAX_PDU, protocol::Protocol};
+use crate::{gateway::Gateway, pdu::MAX_PDU, protocol::Protocol};
 
 /// Where a line goes. Ways whose feature is not compiled in do not exist.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,34 +51,6 @@ impl Endpoint {
             Self::Tcp(_) => true,
             _ => false,
         }
-    }
-}
-
-/// What is known of a gateway: a box, or a program, between a network and the drives' own line. It goes on with a question
-/// after its master has given up, and most serve one question at a time, so that a drive that does not answer holds up all
-/// others, and a stop. The line finds out what is not set, and asks no more than one such question at a time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Gateway {
-    /// How many requests it serves at once. `None`: the line finds out.
-    pub at_once: Option<usize>,
-    /// How long it waits for a drive that does not answer, all its attempts together: 3 s for three attempts of one second.
-    /// `None`: [`ASSUMED_WAIT`](Self::ASSUMED_WAIT), until the line has seen it. Zero: there is no gateway, each drive has
-    /// its own connection.
-    pub wait: Option<Duration>,
-}
-
-impl Gateway {
-    /// How long a gateway is taken to wait of which nothing is known: three attempts of a second, as many come.
-    pub const ASSUMED_WAIT: Duration = Duration::from_secs(3);
-
-    /// There is none: what answers is the drive itself.
-    pub const NONE: Self = Self { at_once: None, wait: Some(Duration::ZERO) };
-
-    /// What it adds to the wait of a stop: one question in vain, and one more where it is not known how many it serves at
-    /// once.
-    #[must_use]
-    pub fn stop_waits(&self) -> Duration {
-        self.wait.unwrap_or(Self::ASSUMED_WAIT) * if self.at_once.is_some() { 1 } else { 2 }
     }
 }
 

@@ -69,8 +69,10 @@ pub mod answer;
 pub mod capture;
 pub mod config;
 pub mod content;
+pub mod evidence;
 #[doc(hidden)]
 pub mod exchange;
+mod gateway;
 mod line;
 pub mod listen;
 #[doc(hidden)]
@@ -95,7 +97,8 @@ pub mod unite;
 
 #[cfg(feature = "serial")]
 pub use config::Rs485;
-pub use config::{Echo, Endpoint, Gateway, LineConfig, SlaveSettings};
+pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
+pub use gateway::{Gateway, GatewayError};
 pub use line::Line;
 pub use protocol::Protocol;
 pub use slave::Slave;

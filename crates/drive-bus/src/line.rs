@@ -11,6 +11,7 @@ use tokio::{
 use crate::{
     capture::{self, Dissector, Writing},
     config::{LineConfig, SlaveSettings},
+    evidence::{Fact, Finding},
     master::Master,
     pdu::MAX_PDU,
     record::Exchange,
@@ -115,6 +116,18 @@ impl Line {
     #[must_use]
     pub fn stats(&self) -> Stats {
         self.handle.shared.master().stats(Instant::now())
+    }
+
+    /// What the line has heard last that is no plain answer, the oldest first: kept always, and bounded.
+    #[must_use]
+    pub fn evidence(&self) -> Vec<Fact> {
+        self.handle.shared.master().evidence()
+    }
+
+    /// What is wrong with the line by what it has heard lately; nothing for a line that loses or damages one question in a hundred.
+    #[must_use]
+    pub fn findings(&self) -> Vec<Finding> {
+        self.handle.shared.master().findings(Instant::now())
     }
 
     /// Keeps the last `count` exchanges from now on, each with its bytes: some 200 bytes an exchange. A line keeps none unless

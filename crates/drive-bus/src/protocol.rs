@@ -1,6 +1,7 @@
 //! Which protocol a line speaks, and everything that follows from that.
 
 mod text;
+pub(crate) mod time;
 
 use std::time::Duration;
 

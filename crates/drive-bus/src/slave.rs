@@ -20,8 +20,9 @@ use crate::{
 /// its own [`Terms`].
 ///
 /// # Cancellation
-/// A call does nothing until it is polled, and is in the schedule after its first poll. It may be dropped at any time. What has not been sent never is; what is on the wire finishes there and its answer
-/// is discarded. The next call is not affected.
+/// A call does nothing until it is polled, and is in the schedule after its first poll. It may be dropped at any time. What has
+/// not been sent never is; what is on the wire finishes there and its answer is discarded. **The write of a stop is sent all the
+/// same**, and again as if its caller waited. The next call is not affected.
 ///
 /// # Errors
 /// A slave's exception is the inner error of a call. Everything else is a [`PortError`] inside
@@ -50,6 +51,13 @@ impl Slave {
     #[must_use]
     pub fn retracted(&self) -> Option<Instant> {
         self.handle.shared.master().retracted(self.address)
+    }
+
+    /// When the last exchange began that it has answered, also by an exception and whoever has asked: not before then has it
+    /// heard a frame of this line, so its watchdog runs from there. `None`: it has answered nothing yet.
+    #[must_use]
+    pub fn answered_at(&self) -> Option<Instant> {
+        self.handle.shared.master().answered_at(self.address)
     }
 
     /// This slave under other terms.

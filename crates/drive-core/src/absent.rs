@@ -36,31 +36,55 @@ impl Absent {
         count: u16,
     ) -> Result<Vec<Option<u16>>> {
         let mut words = vec![None; usize::from(count)];
-        let mut at = 0;
-        while at < count {
-            let row = self.row(first, at, count);
-            if row == 0 {
-                at += 1;
-                continue;
-            }
-            match calls.read_words(first + at, row).await {
-                Ok(read) => {
-                    for (word, read) in words.iter_mut().skip(usize::from(at)).zip(read) {
-                        *word = Some(read);
-                    }
-                    at += row;
-                }
-                Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
-                    if row == 1 {
-                        self.missing.insert(first + at);
-                    } else {
-                        self.singly.extend(first + at..first + at + row);
-                    }
-                }
-                Err(error) => return Err(error),
+        let (mut at, known) = (first, self.missing.len());
+        while let Some((from, row)) = self.next(at, first + count) {
+            let read = calls.read_words(from, row).await;
+            if let Some(read) = self.told(from, row, read)? {
+                let behind = words.iter_mut().skip(usize::from(from - first));
+                behind.zip(read).for_each(|(word, read)| *word = Some(read));
+                at = from + row;
             }
         }
+        if self.missing.len() > known {
+            // Those between the missing ones are read in rows from now on, unless such a row is refused as well.
+            self.singly.retain(|register| !(first..first + count).contains(register));
+        }
         Ok(words)
+    }
+
+    /// The next request for the registers from `at` up to `end`: its first one and how many; `None`: no other is there. For who
+    /// reads by a function of his own, with [`told`](Self::told).
+    #[must_use]
+    pub fn next(&self, at: u16, end: u16) -> Option<(u16, u16)> {
+        let from = (at..end).find(|&register| !self.has(register))?;
+        Some((from, self.row(from, 0, end - from)))
+    }
+
+    /// What such a request was answered; `None`: one of them is missing, and [`next`](Self::next) tells how to go on.
+    ///
+    /// # Errors
+    /// The answer's, except that of a register that the drive does not have.
+    pub fn told(&mut self, first: u16, count: u16, answer: Result<Vec<u16>>) -> Result<Option<Vec<u16>>> {
+        match answer {
+            Ok(words) => Ok(Some(words)),
+            Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
+                if count == 1 {
+                    self.missing.insert(first);
+                } else {
+                    self.singly.extend(first..first + count);
+                }
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Reads one register. `None`: not in this drive.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read).
+    pub async fn word<P: Port>(&mut self, calls: &mut Calls<'_, P>, register: u16) -> Result<Option<u16>> {
+        Ok(self.read(calls, register, 1).await?.first().copied().flatten())
     }
 
     /// How many words from `at` on are asked for together; 0: the drive does not have this one.

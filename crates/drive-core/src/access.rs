@@ -11,6 +11,7 @@ use crate::{
     confirm::Confirming,
     error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
     identity::Identity,
+    kept_readings::KeptReadings,
     port::{Class, Effect, Port, PortError, Terms},
     registers::{
         Register, Row, Written,
@@ -78,6 +79,8 @@ pub struct Registers<P> {
     oldest: Option<Instant>,
     /// How long calls may wait.
     pub lifetimes: Lifetimes,
+    /// What long jobs have read that were cut.
+    pub kept: KeptReadings,
 }
 
 impl<P: Port> Registers<P> {
@@ -94,7 +97,8 @@ impl<P: Port> Registers<P> {
         if elsewhere.is_none() {
             port.set_slave(Slave(slave.number()));
         }
-        Self { port, slave, capabilities, meaning, elsewhere, oldest: None, lifetimes: Lifetimes::default() }
+        let (lifetimes, kept) = (Lifetimes::default(), KeptReadings::default());
+        Self { port, slave, capabilities, meaning, elsewhere, oldest: None, lifetimes, kept }
     }
 
     /// The slave.
@@ -127,6 +131,11 @@ impl<P: Port> Registers<P> {
         self.oldest
     }
 
+    /// What was read is a part of the picture.
+    fn see(&mut self, at: Instant) {
+        self.oldest = Some(self.oldest.map_or(at, |oldest| oldest.min(at)));
+    }
+
     /// The port.
     #[must_use]
     pub const fn port(&self) -> &P {
@@ -141,7 +150,7 @@ impl<P: Port> Registers<P> {
 }
 
 /// The methods of [`Drive`](crate::Drive) that need nothing but the [`Registers`] of a family, in the field of this name:
-/// `slave`, `capabilities` and `lifetimes_mut`.
+/// `slave`, `capabilities`, `lifetimes_mut` and `kept_mut`.
 ///
 /// ```ignore
 /// #[async_trait]
@@ -164,6 +173,10 @@ macro_rules! told_by {
         fn lifetimes_mut(&mut self) -> &mut $crate::Lifetimes {
             &mut self.$registers.lifetimes
         }
+
+        fn kept_mut(&mut self) -> Option<&mut $crate::KeptReadings> {
+            Some(&mut self.$registers.kept)
+        }
     };
 }
 
@@ -174,7 +187,7 @@ macro_rules! told_by {
 ///
 /// # Cancellation
 /// Dropping a future of these leaves the line whole: what is on the wire finishes there and its answer is discarded.
-/// Whether a dropped write was carried out is unknown.
+/// Whether a dropped write was carried out is unknown; that of a stop is sent all the same where the port has a schedule.
 #[derive(Debug)]
 pub struct Calls<'a, P> {
     registers: &'a mut Registers<P>,
@@ -214,6 +227,11 @@ impl<P: Port> Calls<'_, P> {
     pub async fn read_words(&mut self, first: u16, count: u16) -> Result<Vec<u16>> {
         self.check_words(usize::from(count), self.registers.capabilities.read_words)?;
         let exchange = Self::reading(first);
+        let is_kept = self.terms.class == Class::Background;
+        if is_kept && let Some((words, at)) = self.registers.kept.of(Instant::now(), first, count) {
+            self.registers.see(at);
+            return Ok(words);
+        }
         let terms = self.terms.sparing(self.registers.capabilities.spare_words(first, count));
         let response =
             self.request_under(terms, Request::ReadHoldingRegisters(first, count), exchange).await?;
@@ -222,6 +240,10 @@ impl<P: Port> Calls<'_, P> {
         };
         if words.len() != usize::from(count) {
             return Err(self.answer(exchange, "the answer holds another number of words"));
+        }
+        if is_kept {
+            let at = self.registers.port.asked_at().unwrap_or_else(Instant::now);
+            self.registers.kept.keep(first, &words, at);
         }
         Ok(words)
     }
@@ -410,7 +432,7 @@ impl<P: Port> Calls<'_, P> {
         self.registers.port.set_terms(terms);
         let outcome = self.registers.port.call(request).await;
         if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.asked_at()) {
-            self.registers.oldest = Some(self.registers.oldest.map_or(at, |oldest| oldest.min(at)));
+            self.registers.see(at);
         }
         match outcome {
             Ok(Ok(response)) => Ok(response),

@@ -50,6 +50,8 @@ pub struct Capabilities {
     pub stop_modes: &'static [StopMode],
     /// Whether it takes a setpoint in rpm besides one in hertz.
     pub speed_setpoint: bool,
+    /// Takes a setpoint in percent, where it is set up to count so.
+    pub share_setpoint: bool,
     /// The smallest step of a frequency setpoint as the manual prints it.
     pub frequency_step: &'static str,
     /// How a fault is reset over the bus.
@@ -116,6 +118,7 @@ impl Capabilities {
             factory: SerialSettings::MODBUS_DEFAULT,
             stop_modes: &[StopMode::Ramp],
             speed_setpoint: false,
+            share_setpoint: false,
             frequency_step: "0.1 Hz",
             fault_reset: "as its manual says",
             watchdog: None,

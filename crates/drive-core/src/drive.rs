@@ -11,6 +11,7 @@ use crate::{
     faults::Faults,
     identity::Identity,
     intent::Intent,
+    kept_readings::KeptReadings,
     lease::{Ground, Lease, Recognised, Withdrawn},
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
@@ -61,8 +62,8 @@ pub struct BroadcastWrite {
 /// command is on its way when its method returns.
 ///
 /// Dropping the future of any method leaves the line whole and the drive as the last exchange left it; what is unsent is
-/// withdrawn by the port. A dropped command may have been carried out, in part; read the status, and stop a drive
-/// whose start was dropped.
+/// withdrawn by the port, but for the write of a stop, which is sent all the same where the port has a schedule. A dropped
+/// command may have been carried out, in part; read the status, and stop a drive whose start was dropped.
 ///
 /// # Errors
 /// Every method that talks to the drive returns [`Error::Port`] when no valid answer came and [`Error::Exception`]
@@ -78,6 +79,11 @@ pub trait Drive: Send {
     /// How long its calls may wait on the line until they are sent.
     fn lifetimes_mut(&mut self) -> &mut Lifetimes;
 
+    /// What long jobs of class Background have read that were cut, for whoever begins them again; `None` where nothing is kept.
+    fn kept_mut(&mut self) -> Option<&mut KeptReadings> {
+        None
+    }
+
     /// Forgets everything that was read once (units, limits, block configuration) and is true only as long as the
     /// drive is the same and was not switched off. Call it after a reconnect.
     fn forget(&mut self);
@@ -89,6 +95,13 @@ pub trait Drive: Send {
     /// Takes a run command for this side's that an earlier run of the program has given, where the drive holds that very
     /// word. The next [`status`](Self::status) says whether it is in force; one that does not stand ends then. Nothing is sent.
     fn adopt(&mut self, lease: Lease);
+
+    /// The run command by which a start in this direction would be given now, as far as what was read tells: for whoever keeps a
+    /// record of it before it is given. `None` where the family does not know it beforehand. Nothing is sent.
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        let _ = direction;
+        None
+    }
 
     /// What a contract rests on that a status has found otherwise than it was when it was last read or set; told once.
     /// Nothing is sent.
@@ -106,6 +119,14 @@ pub trait Drive: Send {
     /// How long the motor coasts at the most when its output is cut, as its owner says; `None`: nobody knows, and a motor that
     /// was cut [may coast](crate::Motion::Coasting) until it is driven again. Nothing is sent.
     fn set_coast_time(&mut self, time: Option<Duration>) {
+        let _ = time;
+    }
+
+    /// How long direct current takes to bring the motor to rest, as its owner says: for so long it is
+    /// [held](Stopped::injects_for) by a stop by [`StopMode::DcInjection`], at most for
+    /// [`INJECTION_AT_MOST`](crate::INJECTION_AT_MOST). `None`: nobody knows, and [`INJECTION_TIME`](crate::INJECTION_TIME) counts.
+    /// No drive of these families has a time of its own for an injection by the bus. Nothing is sent.
+    fn set_injection_time(&mut self, time: Option<Duration>) {
         let _ = time;
     }
 
@@ -144,7 +165,8 @@ pub trait Drive: Send {
     /// never read gets a word that stops it and leaves command where it was last known to be.
     ///
     /// Some drives inject direct current for as long as they are told to: end a stop by [`StopMode::DcInjection`] with
-    /// one by [`StopMode::Ramp`] once the output has come to zero, or the motor is heated at rest.
+    /// one by [`StopMode::Ramp`] once its [time](Stopped::injects_for) is over, or the motor is heated at rest. One that is ended
+    /// earlier leaves a motor that [may coast](crate::Motion::Coasting).
     ///
     /// # Errors
     /// [`Error::NotConfirmed`] when the stop does not show, with what keeps the motor turning where the drive tells it:

@@ -471,6 +471,12 @@ pub enum ErrorKind {
 }
 
 impl Error {
+    /// A setpoint in percent, of a family that does not count so.
+    #[must_use]
+    pub const fn no_share() -> Self {
+        Self::Unsupported { what: "a setpoint in percent", reason: "the drive takes a frequency" }
+    }
+
     /// The same failure, of an exchange that was to show what an earlier write has done. Whether it was not sent, not
     /// answered or refused says nothing of that write: its outcome is unknown.
     #[must_use]

@@ -177,3 +177,40 @@ pub enum Recognised {
     /// Nothing in this family's drives tells.
     CannotTell,
 }
+
+/// How the references of the Altivars begin, and what each is. The longer of two comes first.
+const REFERENCES: &[(&str, &str)] = &[
+    ("ATV212", "an Altivar 212, which no family here fits"),
+    ("ATV21", "an Altivar 21: the family atv21 fits"),
+    ("ATV28", "an Altivar 28: the family atv28 fits"),
+    ("ATV312", "an Altivar 312: the family atv312 fits"),
+    ("ATV31", "an Altivar 31, which no family here fits"),
+    ("ATV32", "an Altivar 32, which no family here fits"),
+    ("ATV58", "an Altivar 58: the family atv58 fits"),
+    ("ATV61", "an Altivar 61, which no family here fits"),
+    ("ATV71", "an Altivar 71, which no family here fits"),
+    ("ATV12", "an Altivar 12, which no family here fits"),
+    ("ATV", "another Altivar, which no family here fits"),
+];
+
+impl Recognised {
+    /// What a Schneider reference says, such as function 43/14 tells, to the family whose own references begin with `own`;
+    /// `None`: it is none of an Altivar.
+    ///
+    /// ```
+    /// use drive_core::Recognised;
+    ///
+    /// assert_eq!(Recognised::by_reference("ATV312HU15N4", "ATV312"), Some(Recognised::Mine));
+    /// let told = Recognised::by_reference("ATV312HU15N4", "ATV21");
+    /// assert!(matches!(told, Some(Recognised::NotMine { it_is }) if it_is.contains("the family atv312 fits")));
+    /// assert_eq!(Recognised::by_reference("3G3EV", "ATV21"), None);
+    /// ```
+    #[must_use]
+    pub fn by_reference(reference: &str, own: &str) -> Option<Self> {
+        let begins = |prefix: &str| {
+            reference.trim().get(..prefix.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(prefix))
+        };
+        let &(prefix, it_is) = REFERENCES.iter().find(|(prefix, _)| begins(prefix))?;
+        Some(if prefix == own { Self::Mine } else { Self::NotMine { it_is } })
+    }
+}

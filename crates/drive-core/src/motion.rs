@@ -73,6 +73,10 @@ pub enum Output {
 /// its full height (`IdC`, BBV51701 p. 40). No manual says when the shaft stands.
 pub const INJECTION_TIME: Duration = Duration::from_secs(5);
 
+/// How long direct current is held at the most: longer heats a motor that stands. An Altivar 312 takes no longer time for it
+/// either (`tdC`, BBV51701 p. 41).
+pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
+
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Past {
@@ -98,8 +102,10 @@ pub struct Shaft {
     injected_since: Option<Instant>,
     /// How long the motor coasts at the most, where its owner says so.
     coast_time: Option<Duration>,
-    /// How long an injection takes to bring it to rest.
+    /// How long an injection takes to bring it to rest, where its owner says so.
     injection_time: Option<Duration>,
+    /// The line was lost since it was last seen.
+    was_lost: bool,
 }
 
 impl Default for Shaft {
@@ -112,8 +118,8 @@ impl Shaft {
     /// A shaft that was never seen to turn.
     #[must_use]
     pub const fn new() -> Self {
-        let injection_time = Some(INJECTION_TIME);
-        Self { past: Past::Unseen, injected_since: None, coast_time: None, injection_time }
+        let (coast_time, injection_time) = (None, None);
+        Self { past: Past::Unseen, injected_since: None, coast_time, injection_time, was_lost: false }
     }
 
     /// How long it coasts at the most, as its owner says; `None`: nobody knows.
@@ -121,9 +127,22 @@ impl Shaft {
         self.coast_time = time;
     }
 
-    /// How long an injection takes to bring it to rest; `None`: nobody knows.
+    /// How long an injection takes to bring it to rest, as its owner says; `None`: nobody knows, and
+    /// [`INJECTION_TIME`] counts.
     pub const fn set_injection_time(&mut self, time: Option<Duration>) {
         self.injection_time = time;
+    }
+
+    /// How long direct current is to be held until the motor stands: as its owner says, else [`INJECTION_TIME`]; never longer
+    /// than [`INJECTION_AT_MOST`].
+    #[must_use]
+    pub fn injection_time(&self) -> Duration {
+        self.injection_time.unwrap_or(INJECTION_TIME).min(INJECTION_AT_MOST)
+    }
+
+    /// The line was lost: what the drive does meanwhile nobody sees, and a motor that turned may have been cut.
+    pub const fn lose_sight(&mut self) {
+        self.was_lost = true;
     }
 
     /// Whether the last status showed it being brought down.
@@ -135,6 +154,8 @@ impl Shaft {
     /// What a status shows at `at`, with the output frequency that the drive tells.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
+        let was_lost = std::mem::take(&mut self.was_lost);
+        let shown = if was_lost && shown == Output::None { Output::Cut } else { shown };
         if shown != Output::NotKnown && shown != Output::Injection {
             self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
         }
@@ -169,7 +190,7 @@ impl Shaft {
     }
 
     fn is_injected_for_long(&self, at: Instant, since: Instant) -> bool {
-        self.injection_time.is_some_and(|time| at.saturating_duration_since(since) >= time)
+        at.saturating_duration_since(since) >= self.injection_time()
     }
 
     /// What was injected for long enough stands; else it coasts on.
@@ -227,6 +248,31 @@ mod tests {
         let (mut shaft, now) = (Shaft::new(), Instant::now());
         assert_eq!(shaft.see(now, Output::Braking(Frequency::from_hertz(3)), None), Motion::Braking);
         assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_came_down_when_the_line_was_lost_may_have_been_cut_meanwhile() {
+        let (mut shaft, now) = (Shaft::new(), Instant::now());
+        shaft.see(now, Output::Braking(Frequency::from_hertz(30)), None);
+        shaft.lose_sight();
+        assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
+        // One that stood is not set in motion by a lost line.
+        let mut resting = Shaft::new();
+        resting.see(now, Output::None, Some(Frequency::ZERO));
+        resting.lose_sight();
+        assert_eq!(resting.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    #[test]
+    fn direct_current_is_held_as_its_owner_says_and_never_for_longer_than_a_motor_at_rest_bears() {
+        let held = |time| {
+            let mut shaft = Shaft::new();
+            shaft.set_injection_time(time);
+            shaft.injection_time()
+        };
+        assert_eq!(held(None), INJECTION_TIME);
+        assert_eq!(held(Some(Duration::from_secs(2))), Duration::from_secs(2));
+        assert_eq!(held(Some(Duration::from_secs(600))), INJECTION_AT_MOST);
     }
 
     #[tokio::test(start_paused = true)]

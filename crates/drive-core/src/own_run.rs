@@ -54,6 +54,15 @@ pub struct Evidence {
     pub reference: Told,
 }
 
+impl Evidence {
+    /// Whether every part is there.
+    #[must_use]
+    pub fn is_proven(&self) -> bool {
+        let parts = [self.command, self.output, self.reference];
+        self.word == RunWord::Stands && parts.iter().all(|told| *told == Told::Yes)
+    }
+}
+
 /// The run command of this side, from before it is written until the drive's own words showed that it stands no more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OwnRun {
@@ -62,13 +71,17 @@ pub struct OwnRun {
     before: Option<Lease>,
     /// Whether the drive has said that it took it. While it has not, that it does not stand says nothing: it may be on its way.
     arrived: bool,
+    /// The command word that this side wrote last, whatever became of it.
+    sent: Option<u16>,
+    /// The command word as the drive was read to hold it since.
+    held: Option<u16>,
 }
 
 impl OwnRun {
     /// None was given.
     #[must_use]
     pub const fn new() -> Self {
-        Self { lease: None, before: None, arrived: false }
+        Self { lease: None, before: None, arrived: false, sent: None, held: None }
     }
 
     /// The run command that stands, or may.
@@ -81,6 +94,38 @@ impl OwnRun {
     #[must_use]
     pub const fn has_arrived(&self) -> bool {
         self.arrived
+    }
+
+    /// A command word is about to be written, a run command or another: nobody knows what stands then until it is read.
+    pub const fn sends(&mut self, word: u16) {
+        (self.sent, self.held) = (Some(word), None);
+    }
+
+    /// The drive was read to hold this command word.
+    pub const fn reads(&mut self, word: u16) {
+        self.held = Some(word);
+    }
+
+    /// What was read proves nothing any more: the line was lost, or the drive may be another one.
+    pub const fn unread(&mut self) {
+        self.held = None;
+    }
+
+    /// The command word that the drive was read to hold since one was written.
+    #[must_use]
+    pub const fn held(&self) -> Option<u16> {
+        self.held
+    }
+
+    /// What that says of the run command, in a drive of which these words are run commands.
+    #[must_use]
+    pub fn word(&self, is_run: impl Fn(u16) -> bool) -> RunWord {
+        match (self.held, self.lease) {
+            (Some(held), Some(lease)) if held == lease.word => RunWord::Stands,
+            (Some(held), _) if is_run(held) => RunWord::Another,
+            (Some(_), _) => RunWord::Gone,
+            (None, _) => RunWord::NotTold,
+        }
     }
 
     /// A run command is about to be written.
@@ -105,14 +150,25 @@ impl OwnRun {
     /// One of an earlier run of the program. The next evidence of its word ends it where it does not stand.
     pub const fn adopt(&mut self, lease: Lease) {
         (self.lease, self.before, self.arrived) = (Some(lease), None, true);
+        (self.sent, self.held) = (None, None);
     }
 
     /// The drive was seen to hold another word of this side in its place: a stop, a withdrawal, a reset.
     pub const fn end(&mut self) {
-        *self = Self::new();
+        (self.lease, self.before, self.arrived) = (None, None, false);
     }
 
-    /// The verdict on the run command, if one stands. A word that took its place ends it; the verdict says so once.
+    /// What [`judge`](Self::judge) would say, for a status that a command has read: it ends nothing. While a word of this side
+    /// is on its way, what stands says nothing.
+    #[must_use]
+    pub fn verdict(&self, evidence: &Evidence) -> Option<Verdict> {
+        let word = if evidence.word == RunWord::Gone { RunWord::NotTold } else { evidence.word };
+        let mut own = *self;
+        own.judge(&Evidence { word, ..*evidence })
+    }
+
+    /// The verdict on the run command, if one stands. A word that took its place ends it; the verdict says so once, unless it is
+    /// this side's own, of a stop that did not show at once.
     pub fn judge(&mut self, evidence: &Evidence) -> Option<Verdict> {
         const GONE: Refusal = Refusal::Overridden {
             by: "another word, or a power cycle, that took the place of the run command,",
@@ -127,6 +183,10 @@ impl OwnRun {
             remedy: "stop it, and start again",
         };
         self.lease?;
+        if evidence.word == RunWord::Gone && self.held.is_some() && self.held == self.sent {
+            self.end();
+            return None;
+        }
         self.arrived |= evidence.word == RunWord::Stands;
         let gone = match evidence.word {
             RunWord::Stands | RunWord::NotTold => None,
@@ -149,8 +209,7 @@ impl OwnRun {
             Told::No(because) => Some(Verdict::lacks(lack, because)),
             Told::Yes | Told::NotTold => None,
         });
-        let proven = evidence.word == RunWord::Stands && parts.iter().all(|&(_, told)| told == Told::Yes);
-        Some(lacking.unwrap_or(if proven { Verdict::InForce } else { Verdict::NotKnown }))
+        Some(lacking.unwrap_or(if evidence.is_proven() { Verdict::InForce } else { Verdict::NotKnown }))
     }
 }
 
@@ -211,6 +270,34 @@ mod tests {
             lost.judge(&evidence);
             assert_eq!(lost.lease(), None);
         }
+    }
+
+    #[test]
+    fn what_stands_is_known_from_when_it_was_read_until_another_word_is_written() {
+        let is_run = |word| word & 0x000F == 0x000F;
+        let mut own = given();
+        own.sends(RUN.word);
+        assert_eq!(own.word(is_run), RunWord::NotTold, "a confirmed write is no reading");
+        for (held, told) in [(0x000F, RunWord::Stands), (0x080F, RunWord::Another), (0x0006, RunWord::Gone)] {
+            own.reads(held);
+            assert_eq!((own.word(is_run), own.held()), (told, Some(held)));
+        }
+        own.unread();
+        assert_eq!(own.word(is_run), RunWord::NotTold);
+    }
+
+    #[test]
+    fn a_stop_of_this_side_that_shows_late_ends_it_and_is_nobody_elses_word() {
+        let gone = Evidence { word: RunWord::Gone, ..IN_FORCE };
+        let mut own = given();
+        own.sends(0x0007);
+        assert_eq!(own.verdict(&gone), Some(Verdict::NotKnown), "it is on its way");
+        own.reads(0x0007);
+        assert_eq!((own.judge(&gone), own.lease()), (None, None));
+        let mut own = given();
+        own.sends(0x0007);
+        own.reads(0x0006);
+        assert!(own.judge(&gone).is_some(), "that one is somebody else's");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::units::{Frequency, Speed, UnitError};
+use crate::units::{Frequency, Percent, Speed, UnitError};
 
 /// Direction of rotation, as the drive names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -31,6 +31,9 @@ pub enum Setpoint {
     /// Motor speed, for drives that take one.
     #[cfg_attr(feature = "serde", serde(rename = "speed_rpm"))]
     Speed(Speed),
+    /// A share of the drive's own full scale, for drives that count so.
+    #[cfg_attr(feature = "serde", serde(rename = "share_percent"))]
+    Share(Percent),
 }
 
 impl From<Frequency> for Setpoint {
@@ -45,17 +48,24 @@ impl From<Speed> for Setpoint {
     }
 }
 
+impl From<Percent> for Setpoint {
+    fn from(share: Percent) -> Self {
+        Self::Share(share)
+    }
+}
+
 impl fmt::Display for Setpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Frequency(frequency) => frequency.fmt(f),
             Self::Speed(speed) => speed.fmt(f),
+            Self::Share(share) => share.fmt(f),
         }
     }
 }
 
-/// Reads a frequency with at most two decimals, such as `30 Hz` or `30.5Hz`, or a whole speed, such as `900 rpm`. A number
-/// without a unit is none.
+/// Reads a frequency with at most two decimals, such as `30 Hz` or `30.5Hz`, a whole speed, such as `900 rpm`, or a share with
+/// at most two decimals, such as `50%`. A number without a unit is none.
 ///
 /// ```
 /// use drive_core::{Frequency, Setpoint};
@@ -68,9 +78,12 @@ impl FromStr for Setpoint {
 
     fn from_str(text: &str) -> Result<Self, UnitError> {
         let frequency = text.parse().map(Self::Frequency);
+        let share = || text.parse().ok().filter(|share: &Percent| share.hundredths() >= 0).map(Self::Share);
         let setpoint = frequency.or_else(|_: UnitError| text.parse().map(Self::Speed));
-        setpoint.map_err(|_: UnitError| {
-            UnitError("a frequency with at most two decimals such as 47.5 Hz, or a speed such as 1450 rpm")
+        setpoint.or_else(|_: UnitError| {
+            share().ok_or(UnitError(
+                "a frequency with at most two decimals such as 47.5 Hz, or a speed such as 1450 rpm, or a share such as 50 %",
+            ))
         })
     }
 }
@@ -176,10 +189,24 @@ mod tests {
             ("0.01 hz", hertz(1)),
             ("900 rpm", Ok(Speed::from_rpm(900).into())),
             ("1450RPM", Ok(Speed::from_rpm(1_450).into())),
+            ("50%", Ok(Percent::from_percent(50).into())),
+            ("12.25 %", Ok(Percent::from_hundredths(1_225).into())),
         ] {
             assert_eq!(text.parse::<Setpoint>(), setpoint, "{text}");
         }
-        for text in ["", "30", "fast", "-5 Hz", "1.234 Hz", "1,5 Hz", "99999999999 Hz", "rpm", "14.5 rpm"] {
+        for text in [
+            "",
+            "30",
+            "fast",
+            "-5 Hz",
+            "1.234 Hz",
+            "1,5 Hz",
+            "99999999999 Hz",
+            "rpm",
+            "14.5 rpm",
+            "-5 %",
+            "%",
+        ] {
             let error = text.parse::<Setpoint>().expect_err(text);
             assert!(error.to_string().contains("such as 47.5 Hz, or a speed such as 1450 rpm"));
         }

@@ -211,27 +211,18 @@ impl Status {
         }
     }
 
-    /// Whether the motor stands: at rest, or held there by direct current. A reading of [`motion`](Self::motion); of a drive
-    /// that tells none, of its state and its output: a quick stop drives the motor until its output is told to be zero.
+    /// Whether the motor stands, as far as is known: at rest, or held there by direct current. A reading of
+    /// [`motion`](Self::motion), and of nothing else.
     #[must_use]
-    pub fn is_standstill(&self) -> bool {
-        let output = self.output_frequency;
-        match (self.motion, self.state) {
-            (Motion::AtRest | Motion::Held, _) => true,
-            (Motion::Driven | Motion::Braking | Motion::Coasting, _) => false,
-            (Motion::NotKnown, State::NotReady | State::Disabled | State::Ready | State::Fault) => {
-                output.is_none_or(|output| output == Frequency::ZERO)
-            }
-            (Motion::NotKnown, State::QuickStop) => output == Some(Frequency::ZERO),
-            (Motion::NotKnown, _) => false,
-        }
+    pub const fn is_standstill(&self) -> bool {
+        matches!(self.motion, Motion::AtRest | Motion::Held)
     }
 
     /// Whether the drive gives the motor no torque, and none is to be expected: it [stands](Self::is_standstill), or its output was
     /// cut and [the shaft may coast](Motion::Coasting).
     #[must_use]
-    pub fn is_undriven(&self) -> bool {
-        self.is_standstill() || self.motion == Motion::Coasting
+    pub const fn is_undriven(&self) -> bool {
+        matches!(self.motion, Motion::AtRest | Motion::Held | Motion::Coasting)
     }
 }
 
@@ -408,26 +399,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tripped_drive_that_still_shows_an_output_is_not_at_standstill() {
-        let mut status = Status {
-            state: State::Fault,
-            output_frequency: Some(Frequency::from_hertz(3)),
-            ..Status::default()
-        };
-        assert!(!status.is_standstill());
-        status.output_frequency = Some(Frequency::ZERO);
-        assert!(status.is_standstill());
-    }
-
-    #[test]
-    fn a_quick_stop_is_no_standstill_until_the_output_is_told_to_be_zero() {
-        let of = |output_frequency| Status { state: State::QuickStop, output_frequency, ..Status::default() };
-        assert!(!of(None).is_standstill());
-        assert!(!of(Some(Frequency::from_hertz(3))).is_standstill());
-        assert!(of(Some(Frequency::ZERO)).is_standstill());
-    }
-
-    #[test]
     fn a_motor_that_may_coast_or_is_braked_without_an_output_is_not_at_standstill() {
         let of = |state, motion| {
             let output_frequency = Some(Frequency::ZERO);
@@ -440,8 +411,13 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_state_is_never_taken_for_standstill() {
-        assert!(!Status::default().is_standstill());
+    fn no_state_and_no_output_is_taken_for_standstill() {
+        for state in
+            [State::Ready, State::Fault, State::Disabled, State::NotReady, State::QuickStop, State::Unknown]
+        {
+            let status = Status { state, output_frequency: Some(Frequency::ZERO), ..Status::default() };
+            assert!(!status.is_standstill() && !status.is_undriven(), "{state}");
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! What became of a stop: [`Stopped`].
 
-use std::fmt;
+use std::{fmt, time::Duration};
 
 use crate::{
+    motion::Shaft,
     setpoint::StopMode,
     status::{Control, Status},
 };
@@ -24,13 +25,32 @@ pub struct Stopped {
     /// nothing was taken.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub taken_from: Option<Control>,
+    /// How long direct current is to be held until the motor stands, where it is injected; then a stop by ramp ends it. See
+    /// [`Drive::set_injection_time`](crate::Drive::set_injection_time).
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "injection_ms",
+            skip_serializing_if = "Option::is_none",
+            serialize_with = "crate::serialize::milliseconds"
+        )
+    )]
+    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
+    pub injects_for: Option<Duration>,
 }
 
 impl Stopped {
     /// A stop in the mode that was asked for.
     #[must_use]
     pub const fn by(mode: StopMode, status: Status) -> Self {
-        Self { status, mode, instead: None, taken_from: None }
+        Self { status, mode, instead: None, taken_from: None, injects_for: None }
+    }
+
+    /// The same, with how long direct current is to be held where that is the mode.
+    #[must_use]
+    pub fn held_by(self, shaft: &Shaft) -> Self {
+        let injects = self.mode == StopMode::DcInjection;
+        Self { injects_for: injects.then(|| shaft.injection_time()), ..self }
     }
 }
 

@@ -4,18 +4,36 @@
 /// on a line of many drives that is less than 5 % of a sweep.
 pub const STATUSES_PER_TURN: u16 = 20;
 
-/// Whose turn it is. Each of `n` things is read within `n` times [`STATUSES_PER_TURN`] statuses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// Whose turn it is. Each of `n` things is read within `n` times so many statuses as there are from turn to turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turns {
+    every: u16,
     statuses: u16,
     next: usize,
 }
 
+impl Default for Turns {
+    fn default() -> Self {
+        Self::every(STATUSES_PER_TURN)
+    }
+}
+
 impl Turns {
+    /// A turn behind every so many statuses: fewer for a family whose status takes several exchanges anyway.
+    #[must_use]
+    pub const fn every(statuses: u16) -> Self {
+        Self { every: statuses, statuses: 0, next: 0 }
+    }
+
+    /// From now on a turn behind every so many statuses.
+    pub const fn set_every(&mut self, statuses: u16) {
+        self.every = statuses;
+    }
+
     /// Counts a status. The number of the thing whose turn has come, of so many `things`.
     pub const fn pass(&mut self, things: usize) -> Option<usize> {
-        self.statuses += 1;
-        if self.statuses < STATUSES_PER_TURN || things == 0 {
+        self.statuses = self.statuses.saturating_add(1);
+        if self.statuses < self.every || things == 0 {
             return None;
         }
         self.statuses = 0;
@@ -26,7 +44,7 @@ impl Turns {
 
     /// The thing whose turn had come was not read: it comes again with the next status.
     pub const fn again(&mut self) {
-        self.statuses = STATUSES_PER_TURN - 1;
+        self.statuses = self.every.saturating_sub(1);
         self.next = self.next.saturating_sub(1);
     }
 }
@@ -45,6 +63,15 @@ mod tests {
             }
         }
         assert_eq!(read, [1; 3]);
+    }
+
+    #[test]
+    fn a_family_whose_status_takes_several_exchanges_has_its_turns_more_often() {
+        let mut turns = Turns::every(3);
+        let told: Vec<_> = (0..9).map(|_| turns.pass(2)).collect();
+        assert_eq!(told, [None, None, Some(0), None, None, Some(1), None, None, Some(0)]);
+        turns.set_every(1);
+        assert_eq!((turns.pass(2), turns.pass(2)), (Some(1), Some(0)));
     }
 
     #[test]

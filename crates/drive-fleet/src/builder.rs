@@ -8,7 +8,8 @@ use std::{
 
 use drive_bus::{Line, Slave, SlaveSettings};
 use drive_core::{
-    Capabilities, Drive, LineMismatch, SlaveAddress, SlaveAddressError, StopMode, WatchdogCapability,
+    Capabilities, Drive, INJECTION_AT_MOST, LineMismatch, SlaveAddress, SlaveAddressError, StopMode,
+    WatchdogCapability,
 };
 use tokio::{
     sync::{broadcast, mpsc, watch},
@@ -20,7 +21,8 @@ use crate::{
     fleet::{Fleet, LineEntry, Members},
     handle::Entry,
     plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
-    settings::{DriveSettings, Times, WatchdogContract},
+    runs::{Keeper, RunKept},
+    settings::{DriveSettings, WatchdogContract},
     supervisor::Supervisor,
     task::{Desk, Task},
 };
@@ -140,12 +142,19 @@ pub struct FleetBuilder {
     /// The first thing that cannot be.
     problem: Option<FleetError>,
     refuses_plans: bool,
+    runs: Option<mpsc::UnboundedSender<RunKept>>,
 }
 
 impl Fleet {
     /// Begins a fleet.
     pub const fn builder() -> FleetBuilder {
-        FleetBuilder { lines: Vec::new(), members: Vec::new(), problem: None, refuses_plans: true }
+        FleetBuilder {
+            lines: Vec::new(),
+            members: Vec::new(),
+            problem: None,
+            refuses_plans: true,
+            runs: None,
+        }
     }
 }
 
@@ -256,6 +265,13 @@ impl FleetBuilder {
         Ok(Member { line, settings, drive: opened })
     }
 
+    /// Tells here what is to be kept of the run commands of this side: what becomes
+    /// [`run_before`](DriveSettings::run_before) in the next run of the program. A start waits until its record is kept.
+    pub fn keep_runs(mut self, runs: mpsc::UnboundedSender<RunKept>) -> Self {
+        self.runs = Some(runs);
+        self
+    }
+
     /// Starts also if a line cannot keep its periods or feed its watchdogs: for a tool that commands a drive for a moment,
     /// whatever its line is like.
     pub const fn whatever_the_plan(mut self) -> Self {
@@ -268,9 +284,9 @@ impl FleetBuilder {
     ///
     /// # Errors
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
-    pub fn start(self) -> Result<Fleet, FleetError> {
+    pub fn start(mut self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(EVENTS);
-        let events = Teller::new(events);
+        let events = Teller::new(events, self.runs.take());
         let members = self.enlist(&Members::default(), &events)?;
         Ok(Fleet::new(members, events, first))
     }
@@ -369,22 +385,17 @@ pub fn check_settings(
             );
         }
     }
-    let Times { lifetime, effect, reference, standstill, stop_alarm } = settings.times;
-    for (setting, name, time) in [
-        ("periods", "slow", periods.slow),
-        ("periods", "max_age", periods.max_age),
-        ("times", "lifetime", lifetime),
-        ("times", "effect", effect),
-        ("times", "reference", reference),
-        ("times", "standstill", standstill),
-        ("times", "stop_alarm", stop_alarm),
-    ] {
-        if time > LONGEST {
+    for (setting, times) in [("periods", periods.named()), ("times", settings.times.named())] {
+        if let Some((name, time)) = times.into_iter().find(|(_, time)| *time > LONGEST) {
             return problem(setting, format!("{name} is {time:?}: expected a year at the most"));
         }
     }
-    if lifetime.is_zero() {
+    if settings.times.lifetime.is_zero() {
         return problem("times", "lifetime is zero: no command would ever be sent".to_owned());
+    }
+    if let Some(time) = settings.injection.filter(|time| time.is_zero() || *time > INJECTION_AT_MOST) {
+        let reason = format!("expected more than nothing and {INJECTION_AT_MOST:?} at the most");
+        return problem("injection", format!("an injection of {time:?}: {reason}"));
     }
     if let Err(reason) = settings.limits.check() {
         return problem("limits", reason);
@@ -440,6 +451,8 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     let (urgent, urgent_box) = mpsc::unbounded_channel();
     let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
+    let keeper = Keeper::new(Arc::clone(&name), events.runs.clone(), settings.run_before.clone());
+    let answers = line.line.slave(slave.number());
     let settings = Arc::new(settings);
     let desk = Desk {
         supervisor,
@@ -451,7 +464,9 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         settings: Some(Arc::clone(&settings)),
     };
     let turns = Arc::clone(&line.turns);
-    tokio::spawn(Task { drive, desk, messages: message_box, urgent: urgent_box, turns }.run());
+    tokio::spawn(
+        Task { drive, desk, messages: message_box, urgent: urgent_box, turns, keeper, answers }.run(),
+    );
     Arc::new(Entry {
         name,
         line,
@@ -471,7 +486,10 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{settings::Periods, testing::CAPABILITIES};
+    use crate::{
+        settings::{Periods, Times},
+        testing::CAPABILITIES,
+    };
 
     #[test]
     fn times_that_no_clock_can_hold_and_a_lifetime_of_nothing_are_refused() {

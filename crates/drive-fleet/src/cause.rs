@@ -55,12 +55,18 @@ pub enum Policy {
     OnFault,
     /// [`OnControlTaken`](crate::OnControlTaken): the run command is withdrawn when somebody else takes control.
     ControlTaken,
+    /// The run command is withdrawn because the motor follows another reference.
+    ReferenceTaken,
+    /// The run command is withdrawn because something cuts, brakes or holds the output.
+    OutputBlocked,
     /// The run command of a drive that has tripped is withdrawn.
     Tripped,
     /// A start that is not confirmed is taken back.
     StartNotConfirmed,
     /// A start whose ticket was dropped before its outcome was heard is taken back.
     StartWithdrawn,
+    /// A stop goes on, because the value that confirmed it was withdrawn.
+    ValueWithdrawn,
     /// [`OnExit`](crate::OnExit), because the fleet shuts down.
     Exit,
     /// [`OnExit`](crate::OnExit), because the drive leaves the fleet: it was removed, or became another.
@@ -75,9 +81,12 @@ drive_core::named! { Policy {
     OnLoss => "on loss",
     OnFault => "on fault",
     ControlTaken => "control taken",
+    ReferenceTaken => "reference taken",
+    OutputBlocked => "output blocked",
     Tripped => "tripped",
     StartNotConfirmed => "start not confirmed",
     StartWithdrawn => "start withdrawn",
+    ValueWithdrawn => "value withdrawn",
     Exit => "exit",
     Removal => "removal",
     Watchdog => "watchdog",

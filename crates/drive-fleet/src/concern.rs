@@ -95,6 +95,9 @@ table! {
     /// Another drive than before answers at its address.
     IdentityChanged: "identity_changed", "another drive than before answers at its address", Alarm, false,
         "see which drive it is, then accept its identity";
+    /// It is none of the family that it is configured as.
+    OtherFamily: "other_family", "a drive of another family answers at its address", Alarm, false,
+        "set it up as what it is: until then it is only read, and stopped when that is asked for";
     /// Its communication watchdog cannot be brought to what the contract says.
     WatchdogBroken: "watchdog_broken", "its watchdog is not as the contract says", Alarm, false,
         "set it at the drive, or change the contract";
@@ -110,6 +113,9 @@ table! {
     /// Settings of the drive start its motor again by themselves, and nobody has accepted that.
     RestartsItself: "restarts_itself", "its own settings start the motor again by themselves", Warning, false,
         "switch them off at the drive, or accept them by name";
+    /// Its EEPROM is written more often than it lasts.
+    EepromWorn: "eeprom_worn", "its EEPROM is written more often than it lasts", Warning, false,
+        "see who writes its parameters, and why its watchdog does not stay as it is set";
     /// A measured value is above its limit.
     LimitExceeded: "limit_exceeded", "above its limit", Warning, false,
         "look at load, fan and filters";
@@ -246,6 +252,10 @@ impl Snapshot {
                 }
                 _ => return None,
             },
+            ConcernKind::OtherFamily => match &self.identity {
+                IdentityCheck::OtherFamily { it_is, .. } => (None, Some(it_is.to_string())),
+                _ => return None,
+            },
             ConcernKind::WatchdogBroken => match &self.watchdog {
                 WatchdogCheck::Broken(why) => (None, Some(why.clone())),
                 _ => return None,
@@ -265,6 +275,10 @@ impl Snapshot {
                     self.self_restarts.as_ref().filter(|by| !by.is_empty() && !self.restarts_accepted)?;
                 let codes: Vec<&str> = by.iter().map(|restart| restart.code).collect();
                 (None, Some(codes.join(", ")))
+            }
+            ConcernKind::EepromWorn => {
+                let times = self.eeprom_worn?;
+                (None, Some(format!("{times} times today")))
             }
             ConcernKind::LimitExceeded => {
                 let limits: Vec<String> = self.exceeded.iter().map(ToString::to_string).collect();

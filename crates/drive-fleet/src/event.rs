@@ -1,20 +1,26 @@
 //! What happens to the drives of a fleet, as it happens.
 
 use std::{
+    borrow::Cow,
     fmt,
     sync::{Arc, Mutex, PoisonError},
     time::{Duration, SystemTime},
 };
 
 use drive_core::{
-    Command, Control, Current, Error, Ground, Identity, Motion, Percent, Refusal, SelfRestart, Setpoint,
-    State, Status, StopMode, Watchdog,
+    Command, Control, Current, Error, Ground, Identity, Lease, Motion, Percent, Refusal, SelfRestart,
+    Setpoint, State, Status, StopMode, Watchdog,
 };
-use tokio::{sync::broadcast, time::Instant};
+use tokio::{
+    sync::{broadcast, mpsc},
+    time::Instant,
+};
 
 use crate::{
     cause::{Cause, ChangedWord},
+    eeprom::{EEPROM_WRITES_A_DAY, EepromLedger, EepromUse},
     outcome::{Outcome, Tenths},
+    runs::RunKept,
     settings::WatchdogBefore,
     snapshot::Trip,
 };
@@ -69,11 +75,16 @@ pub(crate) struct Happened {
 pub(crate) struct Teller {
     events: broadcast::Sender<Event>,
     last: Arc<Mutex<u64>>,
+    /// Where it is told what is to be kept of run commands.
+    pub(crate) runs: Option<mpsc::UnboundedSender<RunKept>>,
 }
 
 impl Teller {
-    pub(crate) fn new(events: broadcast::Sender<Event>) -> Self {
-        Self { events, last: Arc::default() }
+    pub(crate) fn new(
+        events: broadcast::Sender<Event>,
+        runs: Option<mpsc::UnboundedSender<RunKept>>,
+    ) -> Self {
+        Self { events, last: Arc::default(), runs }
     }
 
     pub(crate) fn subscribe(&self) -> broadcast::Receiver<Event> {
@@ -156,6 +167,14 @@ pub enum EventKind {
         /// What it says now.
         found: Arc<Identity>,
     },
+    /// **Alarm**: it says that it is none of the family that it is configured as. It is read, and stopped when that is asked for;
+    /// nothing else is written to it.
+    OtherFamily {
+        /// What it is, and which family fits.
+        it_is: Cow<'static, str>,
+        /// What it says.
+        found: Arc<Identity>,
+    },
     /// Its communication watchdog is as the contract says; whether it had to be written for that.
     WatchdogVerified {
         /// As it is.
@@ -177,6 +196,14 @@ pub enum EventKind {
         timeout: Duration,
         /// Why it was not put back.
         why: &'static str,
+    },
+    /// Its EEPROM was written, or may have been: **an alarm** where that is more often than it lasts
+    /// ([`EEPROM_WRITES_A_DAY`]).
+    EepromWritten {
+        /// By what.
+        by: EepromUse,
+        /// What is known of its writes now.
+        ledger: EepromLedger,
     },
     /// A command ended.
     Command {
@@ -226,6 +253,12 @@ pub enum EventKind {
     CommandOverridden(Refusal),
     /// What a contract with the drive rests on has changed without this side: it is looked at anew.
     ContractChanged(Ground),
+    /// A second, different answer came to the question that its last status has answered: what that showed counts for nothing.
+    ValueWithdrawn,
+    /// The run command of an earlier run of this program stands in the drive: it is ours again.
+    RunAdopted(Lease),
+    /// There is a record of a run command of an earlier run of this program, and it is not ours: why.
+    RunNotAdopted(String),
     /// Other settings hold from now on: these.
     Reconfigured(Vec<&'static str>),
     /// What was done to it when the fleet shut down.
@@ -256,11 +289,13 @@ impl EventKind {
             Self::RestartsItself { .. } => "restarts itself",
             Self::Identified(_) => "identified",
             Self::IdentityChanged { .. } => "identity changed",
+            Self::OtherFamily { .. } => "other family",
             Self::WatchdogVerified { .. } => "watchdog verified",
             Self::WatchdogBroken(_) => "watchdog broken",
             Self::WatchdogNotInForce(_) => "watchdog not in force",
             Self::WatchdogRestored(_) => "watchdog put back",
             Self::WatchdogStays { .. } => "watchdog stays armed",
+            Self::EepromWritten { .. } => "eeprom written",
             Self::Command { .. } => "command",
             Self::StopModeReplaced { .. } => "stop mode replaced",
             Self::StopTookCommand(_) => "stop took command",
@@ -270,6 +305,9 @@ impl EventKind {
             Self::ReferenceTaken(_) => "reference taken",
             Self::CommandOverridden(_) => "command overridden",
             Self::ContractChanged(_) => "contract changed",
+            Self::ValueWithdrawn => "value withdrawn",
+            Self::RunAdopted(_) => "run adopted",
+            Self::RunNotAdopted(_) => "run not adopted",
             Self::Reconfigured(_) => "reconfigured",
             Self::Exit(_) => "exit",
             Self::Removed(_) => "removed",
@@ -281,6 +319,7 @@ impl EventKind {
     pub const fn is_alarm(&self) -> bool {
         match self {
             Self::Exit(action) | Self::Removed(action) => action.is_alarm(),
+            Self::EepromWritten { ledger, .. } => ledger.today >= EEPROM_WRITES_A_DAY,
             other => other.is_always_alarm(),
         }
     }
@@ -291,6 +330,7 @@ impl EventKind {
             Self::Lost { .. }
                 | Self::Tripped(_)
                 | Self::IdentityChanged { .. }
+                | Self::OtherFamily { .. }
                 | Self::WatchdogBroken(_)
                 | Self::WatchdogNotInForce(_)
                 | Self::StopUnconfirmed { .. }
@@ -328,6 +368,15 @@ impl fmt::Display for EventKind {
             Self::IdentityChanged { remembered, found } => {
                 write!(f, ": {} instead of {}", found, remembered)
             }
+            Self::OtherFamily { it_is, .. } => write!(f, ": {it_is}"),
+            Self::RunAdopted(lease) => {
+                write!(
+                    f,
+                    ": the run command {} of an earlier run of this program stands, it is ours again",
+                    lease.direction
+                )
+            }
+            Self::RunNotAdopted(why) => write!(f, ": whatever turns the motor is not ours: {why}"),
             Self::WatchdogVerified { watchdog, written, .. } => {
                 let how = if *written { "written and read back" } else { "found so" };
                 match watchdog.timeout {
@@ -345,6 +394,7 @@ impl fmt::Display for EventKind {
             Self::WatchdogStays { timeout, why } => {
                 write!(f, ", it acts {timeout:?} after the last message: {why}")
             }
+            Self::EepromWritten { by, ledger } => write!(f, " by {by}: {ledger}"),
             Self::Command { command, setpoint: Some(setpoint), commander, outcome } => {
                 write!(f, ": {command} at {setpoint} by {commander}: {outcome}")
             }
@@ -375,6 +425,7 @@ impl fmt::Display for EventKind {
                 write!(f, ": {because}")
             }
             Self::ContractChanged(ground) => write!(f, ": {ground}"),
+            Self::ValueWithdrawn => f.write_str(": another answer came to the same question"),
             Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed { .. } => Ok(()),
         }
     }

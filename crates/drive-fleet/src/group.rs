@@ -131,6 +131,9 @@ pub enum GroupFailure {
     },
 }
 
+/// What became of the start of a group: of each drive how it started, or why the group did not.
+pub type GroupStarted = Result<Vec<(Arc<str>, Outcome)>, GroupFailure>;
+
 impl fmt::Display for GroupFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -267,9 +270,9 @@ impl Group {
     /// is stopped meanwhile, by whomever, is not started any more even if its turn comes when that stop is long
     /// confirmed.
     ///
-    /// [`GroupFailure`] names who was not ready, or did not start. Dropping the ticket before its outcome was heard takes the
+    /// Each drive's outcome says which setpoint its start uses. [`GroupFailure`] names who was not ready, or did not start. Dropping the ticket before its outcome was heard takes the
     /// whole start back: see [`GroupTicket`].
-    pub fn start(&self, start: GroupStart) -> GroupTicket<Result<(), GroupFailure>> {
+    pub fn start(&self, start: GroupStart) -> GroupTicket<GroupStarted> {
         let gone = self.members.iter().map(|member| (Arc::clone(member.name()), Refused::ShutDown));
         let gone = Err(GroupFailure::NotReady(gone.collect()));
         let group = self.in_one_act();
@@ -278,11 +281,7 @@ impl Group {
         })
     }
 
-    async fn started(
-        &self,
-        start: GroupStart,
-        told: &Told<Result<(), GroupFailure>>,
-    ) -> Result<(), GroupFailure> {
+    async fn started(&self, start: GroupStart, told: &Told<GroupStarted>) -> GroupStarted {
         let GroupStart { direction, setpoint, spacing, until } = start;
         let asked = join_all(self.members.iter().map(|member| member.ask(setpoint))).await;
         let (mut leaves, mut unready) = (Vec::new(), Vec::new());
@@ -302,13 +301,13 @@ impl Group {
         }
         let setpoint = setpoint.filter(|_| !together);
         let order = Order::Start { direction, setpoint, until: Until::InForce };
-        self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
+        let started = self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
         if until == Until::AtReference {
-            told.in_force(Ok(()));
+            told.in_force(Ok(started.clone()));
             let reached = self.members.iter().map(|member| reach(member.clone(), start.setpoint));
             self.keep_or_stop(join_all(reached).await).await?;
         }
-        Ok(())
+        Ok(started)
     }
 
     /// Gives every drive of the group a setpoint, on each line one drive after the other as in [`start`](Self::start).
@@ -333,7 +332,7 @@ impl Group {
         leaves: &[(&DriveHandle, Leave)],
         order: Order,
         spacing: Duration,
-        told: &Told<Result<(), GroupFailure>>,
+        told: &Told<GroupStarted>,
     ) -> Vec<(Arc<str>, Outcome)> {
         let failed = &AtomicBool::new(false);
         let commands = leaves.iter().zip(0_u32..).map(|(&(member, leave), number)| async move {
@@ -365,10 +364,11 @@ impl Group {
         ended
     }
 
-    async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> Result<(), GroupFailure> {
-        let outcomes: Vec<_> = outcomes.into_iter().filter(|(_, outcome)| !outcome.is_confirmed()).collect();
+    async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> GroupStarted {
+        let (confirmed, outcomes): (Vec<_>, Vec<_>) =
+            outcomes.into_iter().partition(|(_, outcome)| outcome.is_confirmed());
         if outcomes.is_empty() {
-            return Ok(());
+            return Ok(confirmed);
         }
         // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
         // perhaps by its freewheel, is not slowed down by this.
@@ -394,8 +394,10 @@ async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Ou
             let (now, snapshot) = (Instant::now(), member.snapshot());
             let last = snapshot.status.as_ref().map(|status| status.seen(now));
             match snapshot.fresh_status(now) {
-                Some(_) => Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None }),
-                None => Outcome::OutcomeUnknown(Unknown { error: snapshot.error.clone(), last }),
+                Some(_) => {
+                    Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None, stop: None })
+                }
+                None => Outcome::OutcomeUnknown(Unknown { error: snapshot.error.clone(), last, stop: None }),
             }
         }
     };

@@ -47,6 +47,7 @@
 mod builder;
 mod cause;
 mod concern;
+mod eeprom;
 mod event;
 mod fleet;
 mod group;
@@ -56,7 +57,9 @@ mod limits;
 mod membership;
 mod outcome;
 mod plan;
+mod runs;
 mod settings;
+mod shows;
 mod snapshot;
 mod supervisor;
 mod task;
@@ -69,18 +72,23 @@ pub mod view;
 pub use builder::{FleetBuilder, FleetError, SettingProblem, check_settings};
 pub use cause::{Act, Cause, ChangedWord, Policy};
 pub use concern::{Concern, ConcernKind, Severity};
+pub use eeprom::{EEPROM_WRITES_A_DAY, EepromLedger, EepromUse, InVain};
 pub use event::{Event, EventKind, ExitAction, Limit};
 pub use fleet::{Events, Fleet, Received};
-pub use group::{Group, GroupFailure, GroupStart, NoSuchDrive, StopReport};
+pub use group::{Group, GroupFailure, GroupStart, GroupStarted, NoSuchDrive, StopReport};
 pub use group_ticket::{GroupStop, GroupTicket};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
-pub use outcome::{Became, LastSeen, Order, Outcome, Refused, Unconfirmed, Unknown, Until};
+pub use outcome::{
+    Became, LastSeen, Order, Outcome, Refused, Started, StopModes, Unconfirmed, Unknown, Until,
+};
 pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
+pub use runs::RunKept;
 pub use settings::{
     Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
-    OnLoss, Periods, Times, WatchdogBefore, WatchdogContract,
+    OnLoss, Periods, RunRecord, Times, WatchdogBefore, WatchdogContract,
 };
+pub use shows::Shows;
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,
 };

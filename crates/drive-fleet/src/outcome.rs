@@ -1,8 +1,8 @@
 //! What is asked of a drive of a fleet, and what became of it.
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Direction, Error, Refusal, Setpoint, Status};
+use drive_core::{Command, Direction, Error, Frequency, Refusal, Setpoint, Status, StopMode};
 
 use crate::limits::LimitProblem;
 
@@ -61,6 +61,14 @@ impl Order {
         }
     }
 
+    /// How it ends when this status has shown that it is in force.
+    pub(crate) fn done(&self, status: Option<&Status>) -> Outcome {
+        match *self {
+            Self::Start { direction, .. } => Outcome::Started(Started::shown(direction, status)),
+            _ => Outcome::Confirmed,
+        }
+    }
+
     /// How events and logs name it.
     #[must_use]
     pub const fn command(&self) -> Command {
@@ -100,6 +108,10 @@ pub enum Became {
 pub enum Outcome {
     /// The drive's own words show it.
     Confirmed,
+    /// The drive's own words show it of a start: which way, and the setpoint that it uses.
+    Started(Started),
+    /// The drive's own words show it of a stop: how it was asked for, and how the drive has stopped.
+    Stopped(StopModes),
     /// It was sent and the drive's own words do not show it. A run command may still take effect later, so that a start
     /// is taken back by a ramp stop, which is repeated until it is confirmed.
     NotConfirmed(Unconfirmed),
@@ -116,7 +128,27 @@ impl Outcome {
     /// Whether the drive's own words show it.
     #[must_use]
     pub const fn is_confirmed(&self) -> bool {
-        matches!(self, Self::Confirmed)
+        matches!(self, Self::Confirmed | Self::Started(_) | Self::Stopped(_))
+    }
+
+    /// Of a start that is in force: which way, and the setpoint that it uses.
+    #[must_use]
+    pub const fn started(&self) -> Option<Started> {
+        match self {
+            Self::Started(started) => Some(*started),
+            _ => None,
+        }
+    }
+
+    /// Of a stop that was sent: how it was asked for, and how the drive stops.
+    #[must_use]
+    pub const fn stop(&self) -> Option<StopModes> {
+        match self {
+            Self::Stopped(stop) => Some(*stop),
+            Self::NotConfirmed(Unconfirmed::TimeOver { stop, .. }) => *stop,
+            Self::OutcomeUnknown(Unknown { stop, .. }) => *stop,
+            _ => None,
+        }
     }
 
     /// What it comes to.
@@ -125,7 +157,7 @@ impl Outcome {
         match self {
             Self::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
             | Self::Refused(Refused::Superseded | Refused::Stopped) => Became::Superseded,
-            Self::Confirmed => Became::Confirmed,
+            Self::Confirmed | Self::Started(_) | Self::Stopped(_) => Became::Confirmed,
             Self::NotConfirmed(_) => Became::NotConfirmed,
             Self::Expired => Became::Expired,
             Self::OutcomeUnknown(_) => Became::Unknown,
@@ -151,7 +183,11 @@ impl Outcome {
     #[must_use]
     pub const fn reason(&self) -> Option<&'static str> {
         match self {
-            Self::Confirmed | Self::Expired | Self::OutcomeUnknown(_) => None,
+            Self::Confirmed
+            | Self::Started(_)
+            | Self::Stopped(_)
+            | Self::Expired
+            | Self::OutcomeUnknown(_) => None,
             Self::NotConfirmed(why) => Some(why.word()),
             Self::Refused(why) => Some(why.word()),
         }
@@ -161,7 +197,7 @@ impl Outcome {
     #[must_use]
     pub const fn kind(&self) -> &'static str {
         match self {
-            Self::Confirmed => "confirmed",
+            Self::Confirmed | Self::Started(_) | Self::Stopped(_) => "confirmed",
             Self::NotConfirmed(_) => "not confirmed",
             Self::Expired => "expired",
             Self::OutcomeUnknown(_) => "outcome unknown",
@@ -174,10 +210,77 @@ impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.kind())?;
         match self {
-            Self::Confirmed | Self::Expired => Ok(()),
+            Self::Started(started) => write!(f, ": {started}"),
+            Self::Stopped(stop) if stop.is_replaced() => write!(f, ": {stop}"),
+            Self::Confirmed | Self::Stopped(_) | Self::Expired => Ok(()),
             Self::NotConfirmed(why) => write!(f, ": {why}"),
             Self::OutcomeUnknown(unknown) => write!(f, ": {unknown}"),
             Self::Refused(why) => write!(f, ": {why}"),
+        }
+    }
+}
+
+/// How a drive was started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub struct Started {
+    /// Which way.
+    pub direction: Direction,
+    /// The setpoint that it uses, as the drive told it with the start; `None` where its words do not hold it.
+    #[cfg_attr(feature = "serde", serde(rename = "reference_hz", skip_serializing_if = "Option::is_none"))]
+    pub reference: Option<Frequency>,
+}
+
+impl Started {
+    /// As the status shows it that has confirmed the start.
+    pub(crate) fn shown(direction: Direction, status: Option<&Status>) -> Self {
+        Self { direction, reference: status.and_then(|status| status.reference) }
+    }
+}
+
+impl fmt::Display for Started {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "started {}", self.direction)?;
+        match self.reference {
+            None => Ok(()),
+            Some(Frequency::ZERO) => {
+                write!(f, " at {}: its setpoint is zero", Frequency::ZERO)
+            }
+            Some(reference) => write!(f, " at {reference}"),
+        }
+    }
+}
+
+/// How a stop was asked for, and how the drive stops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct StopModes {
+    /// The mode that was asked for.
+    pub asked: StopMode,
+    /// The mode by which the drive stops; `None` while it has shown none.
+    pub used: Option<StopMode>,
+    /// Why it is another, where the drive or its driver tells.
+    pub why: Option<&'static str>,
+}
+
+impl StopModes {
+    /// Whether the drive stops by another mode than was asked for.
+    #[must_use]
+    pub fn is_replaced(&self) -> bool {
+        self.used.is_some_and(|used| used != self.asked)
+    }
+}
+
+impl fmt::Display for StopModes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { asked, used, why } = self;
+        match used {
+            None => write!(f, "asked for a {asked} stop, and the drive has shown none"),
+            Some(used) if used == asked => write!(f, "{asked} stop"),
+            Some(used) => {
+                write!(f, "asked for a {asked} stop, the drive did a {used} stop")?;
+                why.map_or(Ok(()), |why| write!(f, " because {why}"))
+            }
         }
     }
 }
@@ -214,6 +317,8 @@ pub struct Unknown {
     pub error: Option<Error>,
     /// What the drive said last, which is older than the command.
     pub last: Option<LastSeen>,
+    /// Of a stop: how it was asked for, and how the drive stops.
+    pub stop: Option<StopModes>,
 }
 
 impl fmt::Display for Unknown {
@@ -225,7 +330,16 @@ impl fmt::Display for Unknown {
         match &self.last {
             Some(last) => write!(f, "; the drive was last seen {last}"),
             None => f.write_str("; the drive has never been seen"),
-        }
+        }?;
+        replaced(f, self.stop)
+    }
+}
+
+/// The part of a sentence that tells of another mode than was asked for.
+fn replaced(f: &mut fmt::Formatter<'_>, stop: Option<StopModes>) -> fmt::Result {
+    match stop.filter(StopModes::is_replaced) {
+        Some(stop) => write!(f, "; {stop}"),
+        None => Ok(()),
     }
 }
 
@@ -240,6 +354,8 @@ pub enum Unconfirmed {
         last: Option<LastSeen>,
         /// What keeps the command from being in force, where the drive tells it.
         because: Option<Refusal>,
+        /// Of a stop: how it was asked for, and how the drive stops.
+        stop: Option<StopModes>,
     },
     /// The drive's words deny it.
     Denied(Error),
@@ -276,13 +392,14 @@ impl Unconfirmed {
 impl fmt::Display for Unconfirmed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TimeOver { after, last, because } => {
+            Self::TimeOver { after, last, because, stop } => {
                 let after = Tenths(*after);
                 match last {
                     Some(last) => write!(f, "after {after} the drive says {last}")?,
                     None => write!(f, "the drive has said nothing for {after}")?,
                 }
-                because.map_or(Ok(()), |because| write!(f, "; {because}"))
+                because.map_or(Ok(()), |because| write!(f, "; {because}"))?;
+                replaced(f, *stop)
             }
             Self::Denied(Error::NotConfirmed { status, because, .. }) => {
                 write!(f, "the drive says {status}")?;
@@ -314,6 +431,8 @@ pub enum Refused {
     Because(Refusal),
     /// It says that it is another drive than before; accept that first.
     IdentityChanged,
+    /// It says that it is of another family than it is configured as: what it is, and which family fits.
+    OtherFamily(Cow<'static, str>),
     /// What it is could not be checked in time since it was connected.
     IdentityUnchecked,
     /// Its communication watchdog is not as the contract says.
@@ -346,7 +465,7 @@ impl Refused {
             Self::NotConnected => "offline",
             Self::Stale => "stale",
             Self::Because(reason) => reason.word(),
-            Self::IdentityChanged | Self::IdentityUnchecked => "identity",
+            Self::IdentityChanged | Self::IdentityUnchecked | Self::OtherFamily(_) => "identity",
             Self::WatchdogUnverified => "watchdog",
             Self::StopPending => "stop_pending",
             Self::Stopped => "stop",
@@ -384,6 +503,7 @@ impl fmt::Display for Refused {
             Self::IdentityChanged => {
                 f.write_str("it is another drive than before: accept its identity first")
             }
+            Self::OtherFamily(it_is) => write!(f, "it is none of the family that it is set up as: {it_is}"),
             Self::IdentityUnchecked => f.write_str("it has not been possible to check which drive it is"),
             Self::WatchdogUnverified => f.write_str("its communication watchdog is not verified"),
             Self::StopPending => f.write_str("a stop of it is not confirmed yet"),

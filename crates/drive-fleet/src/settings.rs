@@ -2,136 +2,125 @@
 
 use std::time::Duration;
 
-use drive_core::{Current, Identity, Lack, Percent, Reaction, StopMode, Watchdog};
+use drive_core::{Current, Identity, Lack, Lease, Percent, Reaction, StopMode, Watchdog};
 
-use crate::limits::FrequencyLimits;
+use crate::{eeprom::EepromLedger, limits::FrequencyLimits};
 
-/// Settings of one drive.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub struct DriveSettings {
-    /// Its name, unique in the fleet.
-    pub name: String,
-    /// Whether anything is ever written to it. `false`: it is only read, and every command is refused, stops included
-    /// (rule 11).
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub control: bool,
-    /// Who may command it. Anybody may stop it.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub commanders: Commanders,
-    /// How often it is asked.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub periods: Periods,
-    /// How long its commands may take.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub times: Times,
-    /// Which setpoints it may be given.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub limits: FrequencyLimits,
-    /// Measured values that are worth an event.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub alarms: Alarms,
-    /// Its communication watchdog; `None`: the fleet leaves it alone.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub watchdog: Option<WatchdogContract>,
-    /// What happens to it when the fleet shuts down.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_exit: OnExit,
-    /// What happens at the shut-down to a motor that turns and that the fleet has not started.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_exit_adopted: OnExitAdopted,
-    /// What happens at the shut-down to the watchdog that the fleet has armed.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_exit_watchdog: OnExitWatchdog,
-    /// What happens to it when it is lost.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_loss: OnLoss,
-    /// What happens to it after a trip.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_fault: OnFault,
-    /// What happens to it when somebody else takes control of it while it runs by our command.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub on_control_taken: OnControlTaken,
-    /// The settings of the drive by which it may start again by itself, by their mnemonics, such as `Atr`. A start of a
-    /// drive that has another such setting active is refused.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub accept_self_restart: Vec<String>,
-    /// What a run command of this side may lack for a while and then act again by itself, such as `output` where a guard cuts the
-    /// output and gives it back. Anything else that keeps it from acting has it withdrawn.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub accept_resume: Vec<Lack>,
-    /// How long the motor coasts at the most when its output is cut, as its owner knows; `None`: nobody knows, and a motor that
-    /// was cut may coast until it is driven again.
-    #[cfg_attr(
-        feature = "serde",
-        serde(
-            rename = "coast_ms",
-            default,
-            skip_serializing_if = "Option::is_none",
-            with = "drive_core::serialize::maybe_ms"
-        )
-    )]
-    #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
-    pub coast: Option<Duration>,
-    /// What it said it was, from an earlier run; `None`: what it says first is remembered.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub identity: Option<Identity>,
-    /// What an earlier run found of its communication watchdog, armed it over, and did not live to put back.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub watchdog_before: Option<WatchdogBefore>,
+/// Declares the settings of a drive, each once: what it is, its type, and what serde has to know beside that. What nobody has
+/// set is the default of its type. What is known from an earlier run is no setting.
+macro_rules! settings {
+    (
+        $(#[$of_all:meta])*
+        pub struct $name:ident { $($(#[$of_one:meta])* pub $setting:ident: $type:ty,)* }
+        from an earlier run { $($(#[$of_kept:meta])* pub $kept:ident: $type_kept:ty,)* }
+    ) => {
+        $(#[$of_all])*
+        #[derive(Debug, Clone, PartialEq, Eq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+        #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+        pub struct $name {
+            /// Its name, unique in the fleet.
+            pub name: String,
+            $($(#[$of_one])* #[cfg_attr(feature = "serde", serde(default))] pub $setting: $type,)*
+            $($(#[$of_kept])* #[cfg_attr(feature = "serde", serde(skip))] pub $kept: $type_kept,)*
+        }
+
+        impl $name {
+            /// Settings of a drive that is only read.
+            #[must_use]
+            pub fn watched(name: impl Into<String>) -> Self {
+                Self {
+                    name: name.into(),
+                    $($setting: <$type>::default(),)*
+                    $($kept: <$type_kept>::default(),)*
+                }
+            }
+
+            /// The names of the settings that others have otherwise.
+            pub(crate) fn differ(&self, other: &Self) -> Vec<&'static str> {
+                let pairs = [$((stringify!($setting), self.$setting != other.$setting)),*];
+                pairs.into_iter().filter_map(|(name, differs)| differs.then_some(name)).collect()
+            }
+        }
+    };
+}
+
+settings! {
+    /// Settings of one drive.
+    pub struct DriveSettings {
+        /// Whether anything is ever written to it. `false`: it is only read, and every command is refused, stops included
+        /// (rule 11).
+        pub control: bool,
+        /// Who may command it. Anybody may stop it.
+        pub commanders: Commanders,
+        /// How often it is asked.
+        pub periods: Periods,
+        /// How long its commands may take.
+        pub times: Times,
+        /// Which setpoints it may be given.
+        pub limits: FrequencyLimits,
+        /// Measured values that are worth an event.
+        pub alarms: Alarms,
+        /// Its communication watchdog; `None`: the fleet leaves it alone.
+        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+        pub watchdog: Option<WatchdogContract>,
+        /// What happens to it when the fleet shuts down.
+        pub on_exit: OnExit,
+        /// What happens at the shut-down to a motor that turns and that the fleet has not started.
+        pub on_exit_adopted: OnExitAdopted,
+        /// What happens at the shut-down to the watchdog that the fleet has armed.
+        pub on_exit_watchdog: OnExitWatchdog,
+        /// What happens to it when it is lost.
+        pub on_loss: OnLoss,
+        /// What happens to it after a trip.
+        pub on_fault: OnFault,
+        /// What happens to it when somebody else takes control of it while it runs by our command.
+        pub on_control_taken: OnControlTaken,
+        /// The settings of the drive by which it may start again by itself, by their mnemonics, such as `Atr`. A start of a
+        /// drive that has another such setting active is refused.
+        pub accept_self_restart: Vec<String>,
+        /// What a run command of this side may lack for a while and then act again by itself, such as `output` where a guard
+        /// cuts the output and gives it back. Anything else that keeps it from acting has it withdrawn.
+        pub accept_resume: Vec<Lack>,
+        /// How long the motor coasts at the most when its output is cut, as its owner knows; `None`: nobody knows, and a motor
+        /// that was cut may coast until it is driven again.
+        #[cfg_attr(
+            feature = "serde",
+            serde(
+                rename = "coast_ms",
+                skip_serializing_if = "Option::is_none",
+                with = "drive_core::serialize::maybe_ms"
+            )
+        )]
+        #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
+        pub coast: Option<Duration>,
+        /// How long direct current takes to bring the motor to rest, as its owner knows, up to
+        /// [`INJECTION_AT_MOST`](drive_core::INJECTION_AT_MOST); `None`: nobody knows, and
+        /// [`INJECTION_TIME`](drive_core::INJECTION_TIME) counts.
+        #[cfg_attr(
+            feature = "serde",
+            serde(
+                rename = "injection_ms",
+                skip_serializing_if = "Option::is_none",
+                with = "drive_core::serialize::maybe_ms"
+            )
+        )]
+        #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
+        pub injection: Option<Duration>,
+    }
+    from an earlier run {
+        /// What it said it was; `None`: what it says first is remembered.
+        pub identity: Option<Identity>,
+        /// What was found of its communication watchdog before it was armed, where nobody lived to put that back.
+        pub watchdog_before: Option<WatchdogBefore>,
+        /// The run command that may still stand in the drive.
+        pub run_before: Option<RunRecord>,
+        /// What earlier runs have written to its EEPROM.
+        pub eeprom_before: Option<EepromLedger>,
+    }
 }
 
 impl DriveSettings {
-    /// The names of the settings that others have otherwise.
-    pub(crate) fn differ(&self, other: &Self) -> Vec<&'static str> {
-        let pairs = [
-            ("control", self.control != other.control),
-            ("commanders", self.commanders != other.commanders),
-            ("periods", self.periods != other.periods),
-            ("times", self.times != other.times),
-            ("limits", self.limits != other.limits),
-            ("alarms", self.alarms != other.alarms),
-            ("watchdog", self.watchdog != other.watchdog),
-            ("on_exit", self.on_exit != other.on_exit),
-            ("on_exit_adopted", self.on_exit_adopted != other.on_exit_adopted),
-            ("on_exit_watchdog", self.on_exit_watchdog != other.on_exit_watchdog),
-            ("on_loss", self.on_loss != other.on_loss),
-            ("on_fault", self.on_fault != other.on_fault),
-            ("accept_resume", self.accept_resume != other.accept_resume),
-            ("coast", self.coast != other.coast),
-            ("on_control_taken", self.on_control_taken != other.on_control_taken),
-            ("accept_self_restart", self.accept_self_restart != other.accept_self_restart),
-        ];
-        pairs.into_iter().filter_map(|(name, differs)| differs.then_some(name)).collect()
-    }
-
-    /// Settings of a drive that is only read.
-    #[must_use]
-    pub fn watched(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            control: false,
-            commanders: Commanders::Anyone,
-            periods: Periods::default(),
-            times: Times::default(),
-            limits: FrequencyLimits::default(),
-            alarms: Alarms::default(),
-            watchdog: None,
-            on_exit: OnExit::default(),
-            on_exit_adopted: OnExitAdopted::default(),
-            on_exit_watchdog: OnExitWatchdog::default(),
-            on_loss: OnLoss::default(),
-            on_fault: OnFault::default(),
-            on_control_taken: OnControlTaken::default(),
-            accept_self_restart: Vec::new(),
-            accept_resume: Vec::new(),
-            coast: None,
-            identity: None,
-            watchdog_before: None,
-        }
-    }
-
     /// Settings of a drive that is also commanded.
     #[must_use]
     pub fn controlled(name: impl Into<String>) -> Self {
@@ -163,99 +152,73 @@ impl Commanders {
     }
 }
 
-/// How often a drive is asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(default, deny_unknown_fields)
-)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub struct Periods {
-    /// The fast set while it runs or has to confirm something.
-    #[cfg_attr(feature = "serde", serde(rename = "running_ms", with = "drive_core::serialize::duration_ms"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub running: Duration,
-    /// The fast set while it stands.
-    #[cfg_attr(feature = "serde", serde(rename = "rest_ms", with = "drive_core::serialize::duration_ms"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub rest: Duration,
-    /// The slow set; zero: never.
-    #[cfg_attr(feature = "serde", serde(rename = "slow_ms", with = "drive_core::serialize::duration_ms"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub slow: Duration,
-    /// The oldest status that still counts as fresh. A drive without a valid status for longer is lost.
-    #[cfg_attr(feature = "serde", serde(rename = "max_age_ms", with = "drive_core::serialize::duration_ms"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub max_age: Duration,
+/// Declares times, each once: what it is, its name in JSON, and its default in milliseconds.
+macro_rules! times {
+    ($(#[$of_all:meta])* pub struct $name:ident { $($(#[$of_one:meta])* pub $time:ident as $json:literal: $default:literal,)* }) => {
+        $(#[$of_all])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[cfg_attr(
+            feature = "serde",
+            derive(serde::Serialize, serde::Deserialize),
+            serde(default, deny_unknown_fields)
+        )]
+        #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+        pub struct $name {
+            $(
+                $(#[$of_one])*
+                #[doc = concat!("\n\nUnless it is said otherwise: ", $default, " ms.")]
+                #[cfg_attr(
+                    feature = "serde",
+                    serde(rename = $json, with = "drive_core::serialize::duration_ms")
+                )]
+                #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
+                pub $time: Duration,
+            )*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($time: Duration::from_millis($default)),* }
+            }
+        }
+
+        impl $name {
+            /// Each with its name.
+            pub(crate) fn named(&self) -> Vec<(&'static str, Duration)> {
+                vec![$((stringify!($time), self.$time)),*]
+            }
+        }
+    };
 }
 
-impl Default for Periods {
-    /// 0.5 s running, 1 s at rest, 10 s for the slow set, stale after 3 s.
-    fn default() -> Self {
-        Self {
-            running: Duration::from_millis(500),
-            rest: Duration::from_secs(1),
-            slow: Duration::from_secs(10),
-            max_age: Duration::from_secs(3),
-        }
+times! {
+    /// How often a drive is asked.
+    pub struct Periods {
+        /// The fast set while it runs or has to confirm something.
+        pub running as "running_ms": 500,
+        /// The fast set while it stands.
+        pub rest as "rest_ms": 1_000,
+        /// The slow set; zero: never.
+        pub slow as "slow_ms": 10_000,
+        /// The oldest status that still counts as fresh. A drive without a valid status for longer is lost.
+        pub max_age as "max_age_ms": 3_000,
     }
 }
 
-/// How long the commands of a drive may take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(default, deny_unknown_fields)
-)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub struct Times {
-    /// From the call until it is sent; what is not sent by then never is (rule 2).
-    #[cfg_attr(
-        feature = "serde",
-        serde(rename = "lifetime_ms", with = "drive_core::serialize::duration_ms")
-    )]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub lifetime: Duration,
-    /// From sending until the drive's words show that it took effect: run command in force, fault gone, and where an
-    /// answer was lost the time to find out.
-    #[cfg_attr(feature = "serde", serde(rename = "effect_ms", with = "drive_core::serialize::duration_ms"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub effect: Duration,
-    /// From then until the reference is reached.
-    #[cfg_attr(
-        feature = "serde",
-        serde(rename = "reference_ms", with = "drive_core::serialize::duration_ms")
-    )]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub reference: Duration,
-    /// From a stop until standstill.
-    #[cfg_attr(
-        feature = "serde",
-        serde(rename = "standstill_ms", with = "drive_core::serialize::duration_ms")
-    )]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub standstill: Duration,
-    /// How long a stop may go without a confirmation before it raises an alarm.
-    #[cfg_attr(
-        feature = "serde",
-        serde(rename = "stop_alarm_ms", with = "drive_core::serialize::duration_ms")
-    )]
-    #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
-    pub stop_alarm: Duration,
-}
-
-impl Default for Times {
-    /// 1 s until sent, 5 s until in effect (an Altivar 21 is deaf for 2 s after a reset), 60 s to reach the reference and to stand still, an alarm after 2 s.
-    fn default() -> Self {
-        Self {
-            lifetime: Duration::from_secs(1),
-            effect: Duration::from_secs(5),
-            reference: Duration::from_secs(60),
-            standstill: Duration::from_secs(60),
-            stop_alarm: Duration::from_secs(2),
-        }
+times! {
+    /// How long the commands of a drive may take.
+    pub struct Times {
+        /// From the call until it is sent; what is not sent by then never is (rule 2).
+        pub lifetime as "lifetime_ms": 1_000,
+        /// From sending until the drive's words show that it took effect: run command in force, fault gone, and where an
+        /// answer was lost the time to find out. An Altivar 21 is deaf for 2 s after a reset.
+        pub effect as "effect_ms": 5_000,
+        /// From then until the reference is reached.
+        pub reference as "reference_ms": 60_000,
+        /// From a stop until standstill.
+        pub standstill as "standstill_ms": 60_000,
+        /// How long a stop may go without a confirmation before it raises an alarm.
+        pub stop_alarm as "stop_alarm_ms": 2_000,
     }
 }
 
@@ -313,6 +276,21 @@ pub struct WatchdogBefore {
     pub set: Watchdog,
     /// What was found, and is to be put back.
     pub found: Watchdog,
+}
+
+/// A run command of this side, for whoever keeps it beyond the life of the program ([`RunKept`](crate::RunKept)) and gives it to
+/// the next as [`run_before`](DriveSettings::run_before): a program that was killed has stopped nothing.
+///
+/// It is ours again only where the drive says that it is the same one and its own words show that this very run command stands.
+/// Else somebody else has started the motor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct RunRecord {
+    /// Which drive it was, as [`Identity`] is displayed; `None` where it does not say.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub identity: Option<String>,
+    /// The run command.
+    pub lease: Lease,
 }
 
 /// What happens to a drive when the fleet shuts down (rule 8).

@@ -1,6 +1,7 @@
 //! What a fleet knows of a drive: [`Snapshot`], with the time of each value and a verdict on its age.
 
 use std::{
+    borrow::Cow,
     collections::VecDeque,
     sync::Arc,
     time::{Duration, SystemTime},
@@ -131,6 +132,15 @@ pub enum IdentityCheck {
         #[cfg_attr(feature = "serde", serde(flatten))]
         found: Arc<Identity>,
     },
+    /// It is none of the family that it is configured as. It is read, and stopped when that is asked for; nothing else is
+    /// written to it.
+    OtherFamily {
+        /// What it is, and which family fits.
+        it_is: Cow<'static, str>,
+        /// What it says.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        found: Arc<Identity>,
+    },
 }
 
 /// What is known of the drive's communication watchdog.
@@ -252,6 +262,8 @@ pub struct Snapshot {
     pub error: Option<Error>,
     /// The fast set.
     pub status: Option<Timed<Status>>,
+    /// Whether a second, different answer has withdrawn the fast set: it counts for nothing any more.
+    pub retracted: bool,
     /// The slow set.
     pub measurements: Option<Timed<Measurements>>,
     /// The setpoint that this fleet gave it last and it confirmed, as long as nothing else is known.
@@ -270,6 +282,8 @@ pub struct Snapshot {
     pub run_command_stands: Option<Error>,
     /// The measured values that are above their limits.
     pub exceeded: Vec<Limit>,
+    /// How often its EEPROM was written today, where that is more often than it lasts.
+    pub eeprom_worn: Option<u32>,
     /// A stop that is not confirmed yet.
     pub stop: Option<PendingStop>,
     /// The run command of this side that stands in the drive, or may: the motor may turn, now or later, because of it.
@@ -300,7 +314,10 @@ impl Snapshot {
     /// The verdict on the status at `now`.
     #[must_use]
     pub fn freshness(&self, now: Instant) -> Freshness {
-        self.judge(self.status.as_ref().map(|status| status.age(now)), self.max_age)
+        match self.judge(self.status.as_ref().map(|status| status.age(now)), self.max_age) {
+            Freshness::Fresh if self.retracted => Freshness::Stale,
+            judged => judged,
+        }
     }
 
     /// The verdict on the measurements at `now`.

@@ -7,7 +7,8 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Drive, Setpoint, StopMode};
+use drive_bus::Slave;
+use drive_core::{Drive, Error, Lease, Lifetimes, Setpoint, StopMode};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -17,7 +18,8 @@ use crate::{
     cause::{Act, Policy},
     event::{ExitAction, Teller},
     outcome::{Order, Refused},
-    settings::DriveSettings,
+    runs::Keeper,
+    settings::{DriveSettings, RunRecord},
     snapshot::Snapshot,
     supervisor::{Asker, CallId, Job, Leave, Output, Question, Reply, Step, Supervisor, Told, Turn},
     ticket::Report,
@@ -74,12 +76,15 @@ pub(crate) struct Task {
     pub(crate) urgent: mpsc::UnboundedReceiver<Urgent>,
     /// The turn that the drives of a line take one after the other.
     pub(crate) turns: Arc<Semaphore>,
+    pub(crate) keeper: Keeper,
+    /// What its line says of its answers.
+    pub(crate) answers: Slave,
 }
 
 impl Task {
     /// Runs until the fleet has shut down, or nobody holds it any more.
     pub(crate) async fn run(self) {
-        let Self { mut drive, mut desk, mut messages, mut urgent, turns } = self;
+        let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
         let mut open = true;
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
@@ -89,18 +94,35 @@ impl Task {
                 let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
                 drive.accept_self_restart(&accepted);
                 drive.set_coast_time(settings.coast);
+                drive.set_injection_time(settings.injection);
+            }
+            if let Some(lease) = desk.supervisor.take_adoption() {
+                drive.adopt(lease);
             }
             // Also what a call that was dropped has left.
-            desk.supervisor.handle_lease(drive.lease());
+            let lease = drive.lease();
+            desk.supervisor.handle_lease(lease);
+            if lease.is_some() || !desk.supervisor.is_adopting() {
+                keeper.follow(lease, || desk.supervisor.says_what_it_is());
+            }
             if let Some(ground) = drive.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
+            }
+            if let Some(at) = answers.retracted() {
+                desk.supervisor.handle_retracted(Instant::now(), at);
+            }
+            if let Some(at) = answers.answered_at() {
+                desk.supervisor.handle_heard(at);
             }
             let step = desk.supervisor.next(Instant::now());
             desk.publish();
             let (call, until) = match step {
                 Step::Finished => break,
                 Step::Wait(until) => (None, Some(until)),
-                Step::Do { job, lifetime, until, .. } => (Some(carry_out(&mut *drive, job, lifetime)), until),
+                Step::Do { job, lifetime, until, .. } => {
+                    let identity = desk.supervisor.says_what_it_is();
+                    (Some(carry_out(&mut *drive, &mut keeper, job, lifetime, identity)), until)
+                }
             };
             let on_turn = matches!(step, Step::Do { on_turn: true, .. });
             match desk.supervisor.turn() {
@@ -137,7 +159,9 @@ impl Task {
                             continue;
                         }
                     },
-                    reply = &mut call => {
+                    (reply, lease) = &mut call => {
+                        // What it says is judged by what stands now.
+                        desk.supervisor.handle_lease(lease);
                         desk.supervisor.handle_reply(Instant::now(), reply);
                         break;
                     }
@@ -151,7 +175,16 @@ impl Task {
                         }
                         true
                     }
-                    () = &mut timer => true,
+                    () = &mut timer => {
+                        if let Some(at) = answers.answered_at() {
+                            desk.supervisor.handle_heard(at);
+                        }
+                        if let Some(at) = desk.supervisor.goes_on(Instant::now()).filter(|_| talking) {
+                            timer.set(passing(Some(at)));
+                            continue;
+                        }
+                        true
+                    }
                     // A call may take long on a line with dead drives; who waits for a stop hears in time that it does.
                     () = passing(alarm_at) => {
                         desk.supervisor.handle_stop_alarm(Instant::now());
@@ -280,9 +313,9 @@ impl Desk {
                         let _ = asker.send(told);
                     }
                 }
-                Output::InForce(id) => {
+                Output::InForce(id, outcome) => {
                     if let Some(caller) = self.callers.get(&id) {
-                        caller.send_modify(|progress| progress.in_force = true);
+                        caller.send_modify(|progress| progress.in_force = Some(outcome));
                     }
                 }
                 Output::Answer(id, outcome) => {
@@ -298,15 +331,60 @@ impl Desk {
     }
 }
 
-async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
-    let lifetimes = drive.lifetimes_mut();
-    match job {
-        Job::Status { .. } => lifetimes.status = lifetime,
-        Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
-            lifetimes.command = lifetime;
-        }
-        _ => {}
+/// What a call gave, and the run command of this side as it stands behind it.
+async fn carry_out(
+    drive: &mut dyn Drive,
+    keeper: &mut Keeper,
+    job: Job,
+    lifetime: Option<Duration>,
+    identity: Option<String>,
+) -> (Reply, Option<Lease>) {
+    let mut lifetime = lifetime;
+    if let Job::Start(direction) = job
+        && let Some(word) = drive.run_word_for(direction)
+    {
+        let began = Instant::now();
+        keeper.before(RunRecord { identity, lease: Lease::new(direction, word) }).await;
+        lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
     }
+    let reply = call(drive, job, lifetime).await;
+    (reply, drive.lease())
+}
+
+/// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in
+/// the class of commands, too, and waits for as long as it takes.
+fn lifetimes(job: Job, lifetime: Option<Duration>) -> Lifetimes {
+    let usual = Lifetimes::default();
+    match job {
+        Job::Status { .. } => Lifetimes { status: lifetime, ..usual },
+        Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+            Lifetimes { command: lifetime, ..usual }
+        }
+        Job::Stop(_) | Job::Withdraw => Lifetimes { command: None, ..usual },
+        _ => usual,
+    }
+}
+
+/// A call that goes on where it was cut, if it is such a one.
+async fn call(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
+    if let Some(kept) = drive.kept_mut() {
+        match (job.keeps(), job) {
+            (Some(number), _) => kept.begin(number),
+            (None, Job::Status { anew: true }) => kept.forget(),
+            (None, _) => kept.pause(),
+        }
+    }
+    let reply = asked(drive, job, lifetime).await;
+    // What found no answer goes on as well.
+    let ended = reply.error().is_none_or(|error| !matches!(error, Error::Port { .. }));
+    if let (Some(kept), Some(number), true) = (drive.kept_mut(), job.keeps(), ended) {
+        kept.end(number);
+    }
+    reply
+}
+
+async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
+    *drive.lifetimes_mut() = lifetimes(job, lifetime);
     match job {
         Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
         Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
@@ -324,7 +402,13 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
             }
             Reply::Status(drive.status().await)
         }
-        Job::Identify => Reply::Identity(drive.identify().await),
+        Job::Identify => {
+            let identity = drive.identify().await;
+            Reply::Identity(identity.map(|identity| {
+                let recognised = drive.recognise(&identity);
+                (identity, recognised)
+            }))
+        }
         Job::Watchdog => Reply::Watchdog(drive.watchdog().await),
         Job::SelfRestarts => Reply::SelfRestarts(drive.self_restarts().await),
         Job::Faults => Reply::Faults(drive.faults().await),
@@ -334,5 +418,23 @@ async fn carry_out(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) 
         Job::Ask(Question::Write(row, word)) => {
             Reply::Told(drive.write_parameter(row, word).await.map(Told::Written))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::Direction;
+
+    use super::*;
+
+    #[test]
+    fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
+        let short = Some(Duration::from_millis(54));
+        assert_eq!(lifetimes(Job::Start(Direction::Forward), short).command, short);
+        for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
+            assert_eq!(lifetimes(stop, None).command, None, "{stop:?}");
+        }
+        assert_eq!(lifetimes(Job::Status { anew: false }, short).status, short);
+        assert_eq!(lifetimes(Job::KeepAlive, None), Lifetimes::default());
     }
 }

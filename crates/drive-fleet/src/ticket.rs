@@ -18,8 +18,8 @@ use crate::{
 /// How far a command has come.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Progress {
-    /// The drive has shown that it is in force.
-    pub(crate) in_force: bool,
+    /// The drive has shown that it is in force, and how.
+    pub(crate) in_force: Option<Outcome>,
     pub(crate) finished: Option<Outcome>,
 }
 
@@ -31,13 +31,13 @@ pub(crate) type Hearer = watch::Receiver<Progress>;
 
 /// A command that has ended before it began.
 pub(crate) fn refused(refused: Refused) -> Hearer {
-    watch::Sender::new(Progress { in_force: false, finished: Some(Outcome::Refused(refused)) }).subscribe()
+    watch::Sender::new(Progress { in_force: None, finished: Some(Outcome::Refused(refused)) }).subscribe()
 }
 
 /// What became of a command, when it is known; with `early` also that it is in force.
 async fn outcome(hearer: &Hearer, early: bool) -> Outcome {
     let known = |progress: &Progress| {
-        let in_force = (early && progress.in_force).then_some(Outcome::Confirmed);
+        let in_force = progress.in_force.clone().filter(|_| early);
         in_force.or_else(|| progress.finished.clone())
     };
     let mut hearer = hearer.clone();

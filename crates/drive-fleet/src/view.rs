@@ -19,8 +19,8 @@ use std::{
 };
 
 use drive_core::{
-    Command, Control, Error, ErrorKind, Fault, Ground, Identity, Measurements, Motion, Refusal, SelfRestart,
-    Setpoint, State, Status, StopMode, Watchdog,
+    Command, Control, Error, ErrorKind, Fault, Ground, Identity, Lease, Measurements, Motion, Refusal,
+    SelfRestart, Setpoint, State, Status, StopMode, Watchdog,
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use tokio::time::Instant;
@@ -28,9 +28,11 @@ use tokio::time::Instant;
 use crate::{
     cause::{Cause, ChangedWord},
     concern::{Concern, ConcernKind, Severity},
+    eeprom::{EepromLedger, EepromUse},
     event::{Event, EventKind, ExitAction, Limit},
-    outcome::{Became, LastSeen, Outcome, Refused, Unconfirmed},
+    outcome::{Became, LastSeen, Outcome, Refused, Started, StopModes, Unconfirmed},
     settings::WatchdogBefore,
+    shows::Shows,
     snapshot::{Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Trip, WatchdogCheck},
 };
 
@@ -40,6 +42,9 @@ use crate::{
 pub struct SnapshotView {
     /// Its name.
     pub name: Arc<str>,
+    /// What it does, in the one word with which its row begins.
+    #[serde(default)]
+    pub shows: Shows,
     /// Whether it answers.
     pub link: Link,
     /// What went wrong last since its last status.
@@ -87,12 +92,19 @@ impl SnapshotView {
         self.concerns.first()
     }
 
+    /// Its place among all by what troubles it: 0 is the worst, and who troubles nobody comes last.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.concern().map_or(usize::MAX, |concern| concern.rank)
+    }
+
     /// What is known of it at `now`.
     #[must_use]
     pub fn of(snapshot: &Snapshot, now: Instant) -> Self {
         let restarts = snapshot.self_restarts.as_ref();
         Self {
             name: Arc::clone(&snapshot.name),
+            shows: snapshot.shows(),
             link: snapshot.link,
             error: snapshot.error.as_ref().map(ToString::to_string),
             status: Judged {
@@ -149,6 +161,14 @@ pub struct Judged<T> {
     /// The value.
     #[serde(flatten)]
     pub value: Option<T>,
+}
+
+impl<T> Judged<T> {
+    /// Whether the value is so now.
+    #[must_use]
+    pub const fn is_good(&self) -> bool {
+        matches!(self.quality, Freshness::Fresh)
+    }
 }
 
 /// Something that troubles a drive.
@@ -328,6 +348,10 @@ pub enum Happened {
         remembered: Identity,
         found: Identity,
     },
+    OtherFamily {
+        it_is: String,
+        found: Identity,
+    },
     WatchdogVerified {
         watchdog: Watchdog,
         written: bool,
@@ -346,6 +370,10 @@ pub enum Happened {
     WatchdogStaysArmed {
         timeout_ms: u64,
         why: String,
+    },
+    EepromWritten {
+        by: EepromUse,
+        ledger: EepromLedger,
     },
     Command {
         command: CommandedView,
@@ -390,6 +418,18 @@ pub enum Happened {
         /// What.
         ground: Ground,
     },
+    /// Another answer came to the question that the last status has answered.
+    ValueWithdrawn,
+    /// A run command of an earlier run of the program stands, and is ours again.
+    RunAdopted {
+        /// The run command.
+        lease: Lease,
+    },
+    /// It is not ours.
+    RunNotAdopted {
+        /// Why.
+        why: String,
+    },
     Reconfigured {
         settings: Vec<String>,
     },
@@ -429,6 +469,9 @@ impl From<&EventKind> for Happened {
                 remembered: Identity::clone(remembered),
                 found: Identity::clone(found),
             },
+            EventKind::OtherFamily { it_is, found } => {
+                Self::OtherFamily { it_is: it_is.to_string(), found: Identity::clone(found) }
+            }
             EventKind::WatchdogVerified { watchdog, written, before } => Self::WatchdogVerified {
                 watchdog: *watchdog,
                 written: *written,
@@ -462,6 +505,12 @@ impl From<&EventKind> for Happened {
             EventKind::ReferenceTaken(because) => Self::ReferenceTaken { because: because.into() },
             EventKind::CommandOverridden(because) => Self::CommandOverridden { because: because.into() },
             EventKind::ContractChanged(ground) => Self::ContractChanged { ground: *ground },
+            EventKind::EepromWritten { by, ledger } => {
+                Self::EepromWritten { by: *by, ledger: EepromLedger::clone(ledger) }
+            }
+            EventKind::ValueWithdrawn => Self::ValueWithdrawn,
+            EventKind::RunAdopted(lease) => Self::RunAdopted { lease: *lease },
+            EventKind::RunNotAdopted(why) => Self::RunNotAdopted { why: why.clone() },
             EventKind::Reconfigured(settings) => {
                 Self::Reconfigured { settings: settings.iter().map(|name| (*name).to_owned()).collect() }
             }
@@ -497,12 +546,18 @@ pub struct OutcomeView {
     /// Why, in one word.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Why, in a sentence.
+    /// Why, in a sentence; of a start that is in force, at what.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
     /// What went wrong, where something did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorView>,
+    /// Of a start that is in force: which way, and the setpoint that it uses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub started: Option<Started>,
+    /// Of a stop: how it was asked for, and how the drive stops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop: Option<StopModesView>,
     /// What the drive said last, where that matters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last: Option<Box<SeenView>>,
@@ -511,7 +566,9 @@ pub struct OutcomeView {
 impl From<&Outcome> for OutcomeView {
     fn from(outcome: &Outcome) -> Self {
         let (text, error, last) = match outcome {
-            Outcome::Confirmed | Outcome::Expired => (None, None, None),
+            Outcome::Started(started) => (Some(started.to_string()), None, None),
+            Outcome::Stopped(stop) if stop.is_replaced() => (Some(stop.to_string()), None, None),
+            Outcome::Confirmed | Outcome::Stopped(_) | Outcome::Expired => (None, None, None),
             Outcome::NotConfirmed(why) => {
                 let (error, last) = match why {
                     Unconfirmed::Denied(error) => (Some(error), None),
@@ -536,8 +593,30 @@ impl From<&Outcome> for OutcomeView {
             reason: outcome.reason().map(str::to_owned),
             text,
             error: error.map(ErrorView::from),
+            started: outcome.started(),
+            stop: outcome.stop().map(StopModesView::from),
             last: last.map(|last| Box::new(SeenView::from(last))),
         }
+    }
+}
+
+/// How a stop was asked for, and how the drive stops.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub struct StopModesView {
+    /// The mode that was asked for.
+    pub asked: StopMode,
+    /// The mode by which the drive stops; absent while it has shown none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub used: Option<StopMode>,
+    /// Why it is another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+impl From<StopModes> for StopModesView {
+    fn from(stop: StopModes) -> Self {
+        Self { asked: stop.asked, used: stop.used, why: stop.why.map(str::to_owned) }
     }
 }
 

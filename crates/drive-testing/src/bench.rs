@@ -82,8 +82,16 @@ pub fn writes(machine: &SimSlave) -> u64 {
 /// # Panics
 /// When the slave does not take it.
 pub async fn write(line: &Line, register: u16, value: u16) {
-    let answer = line.slave(1).call(Request::WriteSingleRegister(register, value)).await;
-    answer.expect("it answers").expect("it takes the value");
+    assert!(write_to(line, 1, register, value).await, "it takes the value");
+}
+
+/// Somebody else on the line writes a register of this slave; whether it took the value.
+///
+/// # Panics
+/// When the slave does not answer.
+pub async fn write_to(line: &Line, slave: u8, register: u16, value: u16) -> bool {
+    let answer = line.slave(slave).call(Request::WriteSingleRegister(register, value)).await;
+    answer.expect("it answers").is_ok()
 }
 
 /// A write to everybody.

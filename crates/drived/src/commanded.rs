@@ -7,7 +7,7 @@ use drive_core::{Error, ErrorKind, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
     DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
-    Refused, Times, Unknown,
+    Refused, Started, Times, Unknown,
 };
 use tokio::time::{Instant, interval_at, timeout};
 
@@ -95,7 +95,7 @@ impl Commanded {
     pub(crate) async fn start(
         &mut self,
         command: impl AsyncFn(DriveHandle) -> Outcome,
-    ) -> Result<Status, Failure> {
+    ) -> Result<(Started, Status), Failure> {
         self.connected().await?;
         let outcome = tokio::select! {
             biased;
@@ -103,7 +103,7 @@ impl Commanded {
             () = self.ending.asked() => None,
         };
         let why = match outcome {
-            Some(Outcome::Confirmed) => return Ok(self.status()),
+            Some(Outcome::Started(started)) => return Ok((started, self.status())),
             Some(outcome @ (Outcome::Refused(_) | Outcome::Expired)) => return Err(self.failure(&outcome)),
             Some(outcome) => format!("the start is {outcome}"),
             None => "asked to end before the start was confirmed".to_owned(),
@@ -164,7 +164,7 @@ impl Commanded {
         };
         self.tell_what_it_took().await;
         match outcome {
-            Outcome::Confirmed => Ok(self.status()),
+            outcome if outcome.is_confirmed() => Ok(self.status()),
             outcome @ Outcome::NotConfirmed(_) if taken => {
                 Err(Failure::Drive(format!("{name} has taken the stop and does not stand: {outcome}")))
             }
@@ -218,7 +218,7 @@ impl Commanded {
         let (name, config) = (self.name, &self.config);
         Failure::Drive(match outcome {
             Outcome::Refused(Refused::Drive(error)) => one_drive::words(name, config, error),
-            Outcome::OutcomeUnknown(Unknown { error: Some(error), last }) => {
+            Outcome::OutcomeUnknown(Unknown { error: Some(error), last, .. }) => {
                 format!("{}{}", one_drive::words(name, config, error), seen(last.as_ref()))
             }
             outcome => format!("{name}: {outcome}"),

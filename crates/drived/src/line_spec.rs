@@ -1,6 +1,8 @@
 //! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
 //! and the settings that the drives on it share.
 
+mod far_end;
+
 use std::{fmt, str::FromStr, time::Duration};
 
 use drive_bus::{
@@ -13,11 +15,15 @@ use drive_core::{
 };
 use drive_families::Options;
 
+use self::far_end::FarEndError;
+pub(crate) use self::far_end::{FarEndSpec, proposal};
 use crate::drive_spec::DriveName;
 
 /// What a line is, for the help of `--line`.
 pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; \
-     PROTOCOL is rtu, ascii or unitelway, such as unitelway,header=simplified,link-timeout=200ms";
+     PROTOCOL is rtu, ascii or unitelway, such as unitelway,header=simplified,link-timeout=200ms; behind each may stand gateway=none, \
+     or gateway=3x1s for a gateway that asks a dead drive three times for a second, and far-end-paces=no for an adapter or a program \
+     that is faster than the line's speed";
 
 /// The same for a port that is only listened to.
 pub(crate) const TO_LISTEN_TO: &str = "A port to listen to: PATH[,BAUD[,FORMAT[,PROTOCOL]]] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]";
@@ -27,6 +33,7 @@ pub(crate) const TO_LISTEN_TO: &str = "A port to listen to: PATH[,BAUD[,FORMAT[,
 pub(crate) struct LineSpec {
     target: Target,
     serial: SerialSpec,
+    far_end: FarEndSpec,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,7 +65,8 @@ impl LineSpec {
     /// The serial port whatever is said of its speed and format, and whether something is; `None` over TCP.
     pub(crate) fn port(&self) -> Option<(LineConfig, bool)> {
         let Target::Serial(path) = &self.target else { return None };
-        Some((LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT), self.serial.baud.is_some()))
+        let config = LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT);
+        Some((self.far_end.on(config).ok()?, self.serial.baud.is_some()))
     }
 
     /// The configuration of this line for these drives, checked against what each family can be set to.
@@ -73,7 +81,12 @@ impl LineSpec {
             }
             Target::ModbusTcp(address) => LineConfig::modbus_tcp(address.as_str()),
         };
-        Ok(with_turnarounds(config, drives))
+        Ok(with_turnarounds(self.far_end.on(config)?, drives))
+    }
+
+    /// The same line, with what a file says of its far end.
+    pub(crate) fn with_far_end(&self, said: FarEndSpec) -> Self {
+        Self { far_end: said.or(self.far_end), ..self.clone() }
     }
 }
 
@@ -116,13 +129,14 @@ pub(crate) fn port(config: &LineConfig) -> String {
 /// A line as `--line` takes it.
 pub(crate) fn written(config: &LineConfig) -> String {
     let (baud, format) = (config.serial.baud(), config.serial.format());
-    match (&config.endpoint, config.protocol) {
+    let port = match (&config.endpoint, config.protocol) {
         (Endpoint::Serial(path), Protocol::Rtu) => format!("{},{baud},{format}", path.display()),
         (Endpoint::Serial(path), protocol) => format!("{},{baud},{format},{protocol}", path.display()),
         (Endpoint::Tcp(address), Protocol::Tcp) => format!("tcp://{address}"),
         (Endpoint::Tcp(address), _) => format!("rtu+tcp://{address},{baud},{format}"),
         _ => format!("{baud},{format}"),
-    }
+    };
+    port + &FarEndSpec::of(config).written()
 }
 
 /// The silence that the line's protocol needs before each request, and how it is called; `None` where it needs none.
@@ -230,6 +244,8 @@ pub(crate) enum LineSpecError {
     TcpProtocol,
     #[error("Modbus TCP has no speed and no format: expected tcp://HOST:PORT")]
     TcpSettings,
+    #[error(transparent)]
+    FarEnd(#[from] FarEndError),
     #[error("say which speed and format the line has, such as 19200,8E1")]
     NoDrive,
     #[error("{0}: say which speed and format the line has, such as 19200,8E1")]
@@ -242,21 +258,20 @@ impl FromStr for LineSpec {
     type Err = LineSpecError;
 
     fn from_str(text: &str) -> Result<Self, LineSpecError> {
+        let (text, far_end) = FarEndSpec::take(text)?;
         if let Some(address) = text.strip_prefix("tcp://") {
             let (address, settings) = split_settings(address);
-            return match settings {
-                Some(_) => Err(LineSpecError::TcpSettings),
-                None => Ok(Self {
-                    target: Target::ModbusTcp(host_and_port(address)?),
-                    serial: SerialSpec::default(),
-                }),
-            };
+            if settings.is_some() {
+                return Err(LineSpecError::TcpSettings);
+            }
+            let target = Target::ModbusTcp(host_and_port(address)?);
+            return Ok(Self { target, serial: SerialSpec::default(), far_end });
         }
         let (target, settings) = if let Some(rest) = text.strip_prefix("rtu+tcp://") {
             let (address, settings) = split_settings(rest);
             (Target::RtuOverTcp(host_and_port(address)?), settings)
         } else {
-            let (path, settings) = split_settings(text);
+            let (path, settings) = split_settings(&text);
             if path.is_empty() || path.contains("://") {
                 return Err(LineSpecError::Form);
             }
@@ -266,7 +281,7 @@ impl FromStr for LineSpec {
         if matches!(target, Target::RtuOverTcp(_)) && serial.protocol != Protocol::Rtu {
             return Err(LineSpecError::TcpProtocol);
         }
-        Ok(Self { target, serial })
+        Ok(Self { target, serial, far_end })
     }
 }
 
@@ -362,9 +377,24 @@ mod tests {
             "COM3,19200,8O1,unitelway,header=simplified,link-timeout=200ms",
             "rtu+tcp://plant:4001,9600,8N1",
             "tcp://plant:502",
+            "tcp://plant:502,gateway=none",
+            "tcp://plant:502,gateway=3s/4",
+            "rtu+tcp://plant:4001,9600,8N1,gateway=unknown,far-end-paces=yes",
+            "COM3,9600,8N1,far-end-paces=no",
+            "COM3,19200,8O1,unitelway,header=simplified,link-timeout=200ms,far-end-paces=no",
         ] {
             assert_eq!(written(&config(line, &["atv58@1"]).unwrap()), line);
         }
+    }
+
+    #[test]
+    fn what_is_said_of_the_far_end_stands_anywhere_behind_the_port() {
+        let line = config("/dev/ttyUSB0,far-end-paces=no", &["atv312@1"]).unwrap();
+        assert_eq!((line.far_end_paces, line.serial.to_string().as_str()), (Some(false), "19200 8E1"));
+        let none = config("tcp://plant:502,gateway=none", &["atv312@1"]).unwrap();
+        assert_eq!(none.far_end(), None);
+        let error = config("tcp://plant:502,far-end-paces=no", &["atv312@1"]).unwrap_err().to_string();
+        assert!(error.contains("Modbus TCP has no speed"), "{error}");
     }
 
     #[test]
@@ -407,6 +437,9 @@ mod tests {
             ("tcp://:502", "is not HOST:PORT"),
             ("tcp://plant:99999", "is not HOST:PORT"),
             ("tcp://plant:502,9600", "Modbus TCP has no speed"),
+            ("tcp://plant:502,gateway=often", "\"often\": expected none, unknown, or how long"),
+            ("tcp://plant:502,gateway=none,gateway=1s", "gateway is said twice"),
+            ("COM3,9600,8N1,far-end-paces=maybe", "expected yes or no"),
         ] {
             let error = line.parse::<LineSpec>().unwrap_err().to_string();
             assert!(error.contains(reason), "{line}: {error}");

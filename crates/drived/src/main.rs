@@ -2,6 +2,8 @@
 
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+mod agreement;
 mod api;
 #[allow(dead_code, reason = "a Sparkplug node stands on the rest of it")]
 mod broker;
@@ -12,12 +14,12 @@ mod commands;
 mod config;
 mod desk;
 mod doors;
-mod drive_cells;
 mod drive_options;
 mod drive_spec;
 mod duration;
 mod explain;
 mod failure;
+mod findings;
 mod gateway;
 mod journal;
 mod json;
@@ -31,11 +33,13 @@ mod output;
 mod page;
 mod plant;
 mod registers;
+mod row;
 mod run;
 mod screen;
 mod signals;
 mod simulated;
 mod sparkplug;
+mod values;
 
 use std::process::ExitCode;
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_bus::{Endpoint, Line, LineConfig, OpenError};
 use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError, Status};
 use drive_families::Options;
-use drive_fleet::Order;
+use drive_fleet::{Order, Started};
 use serde_json::json;
 use tokio::time::timeout;
 
@@ -118,6 +118,21 @@ impl OneDriveArgs {
         let body =
             json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
         self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")))
+    }
+
+    /// The same for a start, with the setpoint that it uses.
+    pub(crate) fn say_started(
+        &self,
+        one: &Commanded,
+        started: Started,
+        status: &Status,
+    ) -> Result<(), Failure> {
+        let name = one.name;
+        let body = json!({
+            "drive": name.to_string(), "action": "start", "outcome": "confirmed", "text": started.to_string(), "started": started,
+            "status": status,
+        });
+        self.daemon.say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

@@ -125,6 +125,8 @@ fn a_poll_of_a_drive_that_never_answered_ends_with_1_however_short_it_is() {
     assert_eq!(poll.code, Some(1), "{poll:?}");
     assert!(poll.err.contains("no status from atv312@1"), "{poll:?}");
     let mut poll = Running::start(&["poll", "--line", &rtu, "--drive", "atv312@1"]);
+    // Its first words: a signal within the moment in which it begins to hear signals can be lost.
+    poll.wait_for("atv312@1");
     poll.ask_to_end();
     assert_ne!(poll.end().0, Some(0));
 }

@@ -55,6 +55,52 @@ fn a_stop_that_cannot_reach_the_daemon_says_so_loudly_and_is_sent_again() {
 }
 
 #[test]
+fn a_stop_that_a_network_swallows_is_said_to_be_unknown_and_sent_again() {
+    look_at_the_demo("hung");
+}
+
+#[test]
+fn what_a_proxy_answers_is_not_known_and_the_command_is_found_by_its_id() {
+    look_at_the_demo("proxy");
+}
+
+#[test]
+fn the_document_alone_stops_the_motors() {
+    look_at_the_demo("bare");
+}
+
+#[test]
+fn each_of_six_pages_of_one_browser_can_stop() {
+    look_at_the_demo("tabs");
+}
+
+#[test]
+fn a_phone_can_stop_while_a_question_or_the_login_stands_open() {
+    look_at_three_pumps("questions");
+}
+
+#[test]
+fn a_long_name_of_a_group_pushes_nothing_off_a_phone() {
+    look_at_three_pumps("long_group");
+}
+
+#[test]
+fn a_stop_of_a_dead_line_is_told_as_not_confirmed_of_every_drive() {
+    look_at_three_pumps("dead");
+}
+
+#[test]
+fn a_trend_is_the_daemons_record_by_the_daemons_clock() {
+    look_at_three_pumps("clocks");
+}
+
+#[test]
+fn no_view_breaks_a_rule_of_axe() {
+    look_at_three_pumps("axe");
+    look_at_three_pumps("axe_dark");
+}
+
+#[test]
 fn two_hundred_drives_are_listed_and_searched() {
     let Some(python) = python() else { return };
     let lines: Vec<_> = (0..8).map(|line| Sim::serve(&format!("page-{line}"), &["atv312@1-25"])).collect();
@@ -77,7 +123,7 @@ fn look_at_three_pumps(scene: &str) {
     let Some(python) = python() else { return };
     let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-3"]);
     let text = format!(
-        "[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n",
+        "[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
         pumps.link()
     );
     let config = File::new(&format!("page-{scene}"), &text);
@@ -115,7 +161,7 @@ fn look(python: &Path, scene: &str, arguments: &[&str], mut drives: Option<&mut 
 /// A Python with Playwright beside a Chromium, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.
 fn python() -> Option<PathBuf> {
     let python = PathBuf::from(env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into()));
-    let there = runs(Command::new(&python).args(["-c", "import playwright"]))
+    let there = runs(Command::new(&python).args(["-c", "import playwright, axe_playwright_python"]))
         && runs(Command::new("/usr/bin/chromium").arg("--version"));
     assert!(
         there || env::var_os("CI").is_none(),

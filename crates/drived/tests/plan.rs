@@ -334,3 +334,25 @@ fn more_stations_than_a_family_allows_on_a_segment_are_refused() {
     let wide = run(&["plan", "--line", "/dev/nowhere,19200,8E1", "--drive", "atv312@1-32", "--period", "5s"]);
     wide.assert_refused(2, "which allows 31 stations");
 }
+
+#[test]
+fn of_a_stop_over_modbus_tcp_the_plan_says_what_is_a_gateways_and_asks_for_it() {
+    let planned = |line: &str| {
+        let ended = run(&["plan", "--line", line, "--drive", "atv312@1"]);
+        let out = ended.assert_done().to_owned();
+        (row(&out, "a stop is on the wire")[0].clone(), out)
+    };
+    let (alone, out) = planned("tcp://drive:502,gateway=none");
+    assert!(!out.contains("gateway's"), "{out}");
+    // The longest answer that is waited for, and nothing of a line that is not there.
+    assert!(alone.ends_with(" ms"), "{alone}");
+    let (assumed, out) = planned("tcp://drive:502");
+    assert!(
+        out.contains(&format!("Say gateway=none where each drive answers for itself: then it is {alone}")),
+        "{out}"
+    );
+    let (three, out) = planned("tcp://drive:502,gateway=3x1s");
+    assert!(out.contains("3.00 s of a stop's wait are the gateway's, which waits 3s"), "{out}");
+    let seconds = |text: &str| text.trim_end_matches(" s").parse::<f64>().expect("seconds");
+    assert!((seconds(&assumed) - seconds(&three) - 3.0).abs() < 0.011, "{assumed} and {three}");
+}

@@ -61,7 +61,9 @@ fn a_configuration_is_checked_without_a_port() {
         "{out}"
     );
     assert!(
-        out.contains("atv312@1-10 (pump 1 … pump 10)\n    status            every 500ms running"),
+        out.contains(
+            "atv312@1-10 (pump 1 … pump 10)\n    commands          by anyone\n    status            every 500ms running"
+        ),
         "{out}"
     );
     assert!(out.contains("at the exit       stopped if it was started here (ramp stop)"), "{out}");

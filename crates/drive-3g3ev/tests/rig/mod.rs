@@ -11,6 +11,9 @@ use drive_sim::{SimLine, SimSlave, Wiring, models::drive_3g3ev::Drive3g3ev as Mo
 use drive_testing::{bench, words::Words};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
+/// A drive, each of whose words is held against its machine.
+pub(crate) type Judged = drive_testing::truth::Judged<Drive3g3ev<Slave>>;
+
 /// A number for "fault reset" in n06 to n08. The manual prints none, so the tests take one that nobody else would.
 pub(crate) const RESET: u16 = 77;
 
@@ -53,8 +56,10 @@ impl Rig {
         Self { line: Line::over(ours, config), sim, machines, frames }
     }
 
-    pub(crate) fn drive(&self, number: u8) -> Drive3g3ev<Slave> {
-        Drive3g3ev::new(self.line.slave(number), bench::address(number)).with_fault_reset_function(RESET)
+    pub(crate) fn drive(&self, number: u8) -> Judged {
+        let drive = Drive3g3ev::new(self.line.slave(number), bench::address(number));
+        let machine = self.machines[usize::from(number) - 1].clone();
+        Judged::new(drive.with_fault_reset_function(RESET), machine)
     }
 }
 
@@ -77,7 +82,7 @@ async fn relay(mut master: DuplexStream, mut slaves: DuplexStream, frames: Frame
 }
 
 /// One drive at address 1, and the machine beside it.
-pub(crate) fn one() -> (Drive3g3ev<Slave>, SimSlave, Rig) {
+pub(crate) fn one() -> (Judged, SimSlave, Rig) {
     let rig = Rig::new([Model::new().with_fault_reset_function(RESET)]);
     let machine = rig.machines[0].clone();
     machine.poke(0x0107, RESET);

@@ -82,7 +82,7 @@ async fn a_stop_leaves_motor_ramp_and_priorities_as_the_drive_holds_them() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_does_not_give_the_motor_to_terminals_that_would_run_it_faster() {
     let (rig, drive) = Rig::factory();
-    let mut drive = drive.with_authority(Authority::Settings);
+    let mut drive = drive.with(|drive| drive.with_authority(Authority::Settings));
     // Another master runs it at 10 Hz by the priorities, and F is closed.
     for (register, word) in [(0xFA01, 1_000), (0xFA00, 0xC400), (0xFE35, 1_023), (0xFD06, 1)] {
         rig.machine.poke(register, word);
@@ -98,7 +98,7 @@ async fn a_stop_does_not_give_the_motor_to_terminals_that_would_run_it_faster() 
 async fn a_stop_takes_the_command_from_terminals_that_run_the_motor_and_says_so() {
     for authority in [Authority::Priority, Authority::Settings] {
         let (rig, drive) = Rig::factory();
-        let mut drive = drive.with_authority(authority);
+        let mut drive = drive.with(|drive| drive.with_authority(authority));
         run_by_terminals(&rig).await;
         drive.status().await.unwrap();
         let stopped = drive.stop(StopMode::Ramp).await.unwrap();
@@ -159,8 +159,7 @@ async fn where_input_r_switches_the_reference_to_via_nothing_is_confirmed_and_no
     {
         rig.machine.poke(register, word);
     }
-    let mut drive_by_settings =
-        Atv21::new(rig.line.slave(1), bench::address(1)).with_authority(Authority::Settings);
+    let mut drive_by_settings = rig.another().with(|drive| drive.with_authority(Authority::Settings));
     assert!(instead(drive_by_settings.set_setpoint(Frequency::from_hertz(10).into()).await).contains("VIA"));
     assert!(instead(drive_by_settings.start(Direction::Forward).await).contains("VIA"));
     assert!(instead(drive.start(Direction::Forward).await).contains("VIA"));
@@ -237,7 +236,7 @@ async fn after_a_preset_run_and_one_stop_a_setpoint_is_taken() {
     drive.start(Direction::Forward).await.unwrap();
     rig.until(|seen| seen.output_frequency == 1_000).await;
     rig.at_rest(&mut drive).await;
-    let mut other = Atv21::new(rig.line.slave(1), bench::address(1));
+    let mut other = rig.another();
     other.set_setpoint(HALF_SPEED.into()).await.unwrap();
     assert_eq!(rig.machine.peek(0xFA00), Some(0xC000));
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use drive_atv21::{Atv21, CAPABILITIES, ROWS};
-use drive_bus::Slave;
 use drive_core::{
     Direction, Drive, Error, ErrorKind, Frequency, Ground, Lack, Lease, Motion, Reaction, Recognised,
     Refusal, Result, Row, State, StopMode, Verdict, Withdrawn,
@@ -11,7 +10,7 @@ use drive_core::{
 use drive_sim::{Panel, SimSlave, models::atv21::Atv21 as Model};
 use drive_testing::{bench, words::Words};
 
-use crate::support::{HALF_SPEED, Rig, SECOND, refusal};
+use crate::support::{HALF_SPEED, Judged, Rig, SECOND, refusal};
 
 /// A motor that runs at 25 Hz by the bus: FA00, FA01, FD00, FD01, FE02, FE45, FE46, UL.
 const RUNNING: [(u16, u16); 8] = [
@@ -32,12 +31,12 @@ fn lacks(verdict: Option<Verdict>) -> Option<(Lack, String)> {
     }
 }
 
-async fn verdict(drive: &mut Atv21<Slave>) -> Option<Verdict> {
+async fn verdict(drive: &mut Judged) -> Option<Verdict> {
     drive.status().await.unwrap().verdict
 }
 
 /// Asks until a status says that the run command is not in force, so many times at the most.
-async fn lost(drive: &mut Atv21<Slave>, statuses: usize) -> (Lack, String) {
+async fn lost(drive: &mut Judged, statuses: usize) -> (Lack, String) {
     for _ in 0..statuses {
         if let Some(told) = lacks(verdict(drive).await) {
             return told;
@@ -58,7 +57,7 @@ fn refusing(exception: u8) -> Atv21<Words> {
     Atv21::new(words, bench::address(1))
 }
 
-async fn running() -> (Rig, Atv21<Slave>) {
+async fn running() -> (Rig, Judged) {
     let (rig, mut drive) = Rig::factory();
     rig.at_speed(&mut drive).await;
     assert_eq!(verdict(&mut drive).await, Some(Verdict::InForce));
@@ -273,7 +272,7 @@ async fn a_trip_that_is_first_seen_at_a_reconnect_is_withdrawn_on_the_wire() {
 async fn a_run_command_is_adopted_only_where_that_very_word_stands() {
     let (rig, drive) = running().await;
     let lease = drive.lease().unwrap();
-    let mut other = Atv21::new(rig.line.slave(1), bench::address(1));
+    let mut other = rig.another();
     other.adopt(lease);
     let mut last = None;
     for _ in 0..4 {
@@ -408,9 +407,12 @@ async fn what_43_14_names_is_what_the_drive_is_and_the_codes_tell_where_it_names
         drive.recognise(&identity)
     };
     assert_eq!(named("ATV21HD11N4"), Recognised::Mine);
-    for (model, family) in
-        [("ATV312HU15N4", "atv312"), ("ATV212HU15N4", "Altivar 212"), ("ATV71HU15N4", "43/14")]
-    {
+    for (model, family) in [
+        ("ATV312HU15N4", "atv312"),
+        ("ATV212HU15N4", "Altivar 212"),
+        ("ATV71HU15N4", "Altivar 71"),
+        ("X", "43/14"),
+    ] {
         let Recognised::NotMine { it_is } = named(model) else { panic!("{model}") };
         assert!(it_is.contains(family), "{it_is}");
     }
@@ -421,6 +423,85 @@ async fn what_43_14_names_is_what_the_drive_is_and_the_codes_tell_where_it_names
     assert_eq!(drive.recognise(&unnamed), Recognised::CannotTell);
     let codes: BTreeSet<u16> = identity.codes.iter().map(|word| word.address).collect();
     assert_eq!(codes, BTreeSet::from([0xFB05, 0xFB72]));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stranger_is_asked_once_what_it_is_read_stopped_and_not_written_to() {
+    let (rig, mut drive) = Rig::new(Model::new().identified_as("ATV71HU15N4"));
+    fn another<T: std::fmt::Debug>(result: Result<T>) {
+        let Err(Error::Refused { reason: Refusal::AnotherDrive(it_is), .. }) = result else {
+            panic!("{result:?}")
+        };
+        assert!(it_is.contains("Altivar 71"), "{it_is}");
+    }
+    another(drive.start(Direction::Forward).await);
+    another(drive.set_setpoint(HALF_SPEED.into()).await);
+    another(drive.arm_watchdog(2 * SECOND, Reaction::Ramp).await);
+    another(drive.write_parameter(Row::find(ROWS, "ACC").unwrap(), 100).await);
+    rig.machine.trip(14);
+    another(drive.reset_faults().await);
+    assert_eq!((bench::writes(&rig.machine), rig.machine.requests(0x2B)), (0, 1));
+    drive.status().await.unwrap();
+    drive.stop(StopMode::Ramp).await.unwrap();
+    assert_eq!(bench::writes(&rig.machine), 1, "a stop is written to any drive");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_ours_that_shows_late_is_nobody_elses_word() {
+    let (rig, mut drive) = running().await;
+    rig.machine.mute();
+    assert!(drive.stop(StopMode::Ramp).await.is_err());
+    assert!(drive.lease().is_some(), "nobody has seen it");
+    rig.machine.unmute();
+    // The drive has taken it all the same.
+    rig.machine.poke(0xFA00, 0xC000);
+    drive.forget();
+    let status = loop {
+        if let Ok(status) = drive.status().await {
+            break status;
+        }
+        tokio::time::sleep(SECOND / 10).await;
+    };
+    assert_eq!((lacks(status.verdict), drive.lease()), (None, None));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_after_a_power_cut_or_a_reset_names_the_setpoint_of_zero_that_it_uses() {
+    // §8.2 p. 28: FA00 and FA01 go back to 0 when the supply is cut, and at the reset of a trip.
+    for by_reset in [false, true] {
+        let (rig, mut drive) = Rig::new(Model::new().restarting_in(std::time::Duration::ZERO));
+        rig.at_speed(&mut drive).await;
+        if by_reset {
+            rig.machine.trip(14);
+            drive.reset_faults().await.unwrap();
+        } else {
+            rig.power_cycle().await;
+            drive.forget();
+        }
+        assert_eq!((rig.machine.peek(0xFA01), rig.machine.observe().running), (Some(0), false));
+        drive.status().await.unwrap();
+        let status = drive.start(Direction::Forward).await.unwrap();
+        assert_eq!(status.reference, Some(Frequency::ZERO), "by a reset: {by_reset}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn direct_current_is_held_for_the_time_of_its_owner_or_the_printed_one_and_then_the_motor_stands() {
+    for (owner, held) in [(None, 5), (Some(2), 2), (Some(600), 30)] {
+        let (rig, mut drive) = running().await;
+        drive.set_injection_time(owner.map(|seconds| seconds * SECOND));
+        let stopped = drive.stop(StopMode::DcInjection).await.unwrap();
+        assert_eq!((stopped.mode, stopped.injects_for), (StopMode::DcInjection, Some(held * SECOND)));
+        let begun = tokio::time::Instant::now();
+        while drive.status().await.unwrap().motion != Motion::Held {
+            assert!(begun.elapsed() < (held + 1) * SECOND, "{held} s");
+            tokio::time::sleep(SECOND / 10).await;
+        }
+        assert!(begun.elapsed() + SECOND / 5 >= held * SECOND, "{:?} of {held} s", begun.elapsed());
+        assert_eq!(rig.machine.observe().shaft_frequency, 0);
+        assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().injects_for, None);
+        assert_eq!(drive.status().await.unwrap().motion, Motion::AtRest);
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -108,7 +108,7 @@ async fn a_start_is_refused_while_somebody_else_has_the_drive() {
     rig.machine.poke(0xFD06, 0);
     rig.until(|seen| !seen.running).await;
     // Without the priorities a drive that listens to its terminals is not ours.
-    let mut drive = drive.with_authority(Authority::Settings);
+    let mut drive = drive.with(|drive| drive.with_authority(Authority::Settings));
     assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Terminals));
     assert_eq!(rig.machine.requests(6), 0);
     rig.machine.poke(0x0003, 2);
@@ -180,7 +180,7 @@ async fn a_preset_speed_that_overrides_the_setpoint_is_noticed() {
 #[tokio::test(start_paused = true)]
 async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_allows_it() {
     let (rig, drive) = Rig::with_blocks().await;
-    let mut drive = drive.with_write_block();
+    let mut drive = drive.with(Atv21::with_write_block);
     let set_up = rig.machine.requests(6);
     let status = drive.start_at(Direction::Reverse, HALF_SPEED).await.unwrap();
     assert_eq!(state(&status), (State::Running, Some(Direction::Reverse)));
@@ -192,7 +192,7 @@ async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_a
     rig.until(|seen| seen.output_frequency == -2_500).await;
 
     let (rig, drive) = Rig::factory();
-    let mut drive = drive.with_write_block();
+    let mut drive = drive.with(Atv21::with_write_block);
     drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
     assert_eq!((rig.machine.requests(0x10), rig.machine.requests(6)), (0, 3));
     rig.until(|seen| seen.output_frequency == 2_500).await;
@@ -202,12 +202,12 @@ async fn start_at_writes_command_and_reference_in_one_exchange_where_the_block_a
 async fn start_at_never_writes_the_block_unless_its_owner_says_that_it_is_in_effect() {
     // What is configured would put the reference into FA00; nobody has reset the drive since.
     let (rig, drive) = Rig::with_blocks().await;
-    let mut drive = drive.with_write_block();
+    let mut drive = drive.with(Atv21::with_write_block);
     for (register, choice) in [("F870", 3), ("F871", 1)] {
         drive.write_parameter(Row::find(ROWS, register).unwrap(), choice).await.unwrap();
     }
     drive.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
-    let mut other = Atv21::new(rig.line.slave(1), bench::address(1));
+    let mut other = rig.another();
     other.start_at(Direction::Forward, HALF_SPEED).await.unwrap();
     assert_eq!(rig.machine.requests(0x10), 0);
     assert_eq!((rig.machine.peek(0xFA00), rig.machine.peek(0xFA01)), (Some(0xC400), Some(2_500)));

@@ -11,6 +11,9 @@ use drive_testing::bench;
 pub(crate) const SECOND: Duration = Duration::from_secs(1);
 pub(crate) const HALF_SPEED: Frequency = Frequency::from_hertz(25);
 
+/// A drive, each of whose words is held against its machine.
+pub(crate) type Judged = drive_testing::truth::Judged<Atv21<Slave>>;
+
 /// A simulated drive, and the line to it.
 pub(crate) struct Rig {
     pub(crate) machine: SimSlave,
@@ -18,19 +21,25 @@ pub(crate) struct Rig {
 }
 
 impl Rig {
-    pub(crate) fn new(model: Model) -> (Self, Atv21<Slave>) {
+    pub(crate) fn new(model: Model) -> (Self, Judged) {
         let (drive, machine, line) = bench::on_a_line(&CAPABILITIES, model, Atv21::new);
         // The time-out would trip a drive that a test leaves alone.
         machine.poke(0x0803, 0);
+        let drive = Judged::new(drive, machine.clone());
         (Self { machine, line }, drive)
     }
 
-    pub(crate) fn factory() -> (Self, Atv21<Slave>) {
+    /// Another driver of the same machine.
+    pub(crate) fn another(&self) -> Judged {
+        Judged::new(Atv21::new(self.line.slave(1), bench::address(1)), self.machine.clone())
+    }
+
+    pub(crate) fn factory() -> (Self, Judged) {
         Self::new(Model::new())
     }
 
     /// With the standard blocks in effect.
-    pub(crate) async fn with_blocks() -> (Self, Atv21<Slave>) {
+    pub(crate) async fn with_blocks() -> (Self, Judged) {
         let (rig, mut drive) = Self::factory();
         let _ = drive.set_up_blocks(Blocks::STANDARD).await.unwrap();
         rig.power_cycle().await;
@@ -39,7 +48,7 @@ impl Rig {
     }
 
     /// With the standard blocks in effect, and the motor at speed: the block has shown what it holds.
-    pub(crate) async fn with_blocks_shown() -> (Self, Atv21<Slave>) {
+    pub(crate) async fn with_blocks_shown() -> (Self, Judged) {
         let (rig, mut drive) = Self::with_blocks().await;
         rig.at_speed(&mut drive).await;
         drive.measurements().await.unwrap();
@@ -47,7 +56,7 @@ impl Rig {
         (rig, drive)
     }
 
-    pub(crate) async fn at_rest(&self, drive: &mut Atv21<Slave>) {
+    pub(crate) async fn at_rest(&self, drive: &mut Judged) {
         drive.stop(StopMode::Ramp).await.unwrap();
         self.until(|seen| !seen.running).await;
     }
@@ -57,7 +66,7 @@ impl Rig {
         tokio::time::sleep(2 * SECOND).await;
     }
 
-    pub(crate) async fn at_speed(&self, drive: &mut Atv21<Slave>) {
+    pub(crate) async fn at_speed(&self, drive: &mut Judged) {
         drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
         drive.start(Direction::Forward).await.unwrap();
         self.until(|seen| seen.output_frequency == 2_500).await;

@@ -3,7 +3,9 @@
 
 use drive_atv21::{Atv21, Authority, CAPABILITIES};
 use drive_bus::Line;
-use drive_core::{Class, Direction, Drive, Error, ExceptionMeaning, Frequency, Percent, Registers, State};
+use drive_core::{
+    Class, Direction, Drive, Error, ExceptionMeaning, Frequency, Percent, Recognised, Registers, State,
+};
 use drive_sim::{Exception, Model, SimLine, SimSlave, Wiring, models};
 use drive_testing::{
     bench,
@@ -11,6 +13,11 @@ use drive_testing::{
 };
 use tokio::io::DuplexStream;
 
+/// §7.9, without CRC.
+const IDENTIFIED: Printed<'_> = (
+    "01 2B 0E 01 00",
+    "01 2B 0E 01 01 00 00 03  00 0D 54656C656D6563616E69717565  01 0C 41545632314830373 54D3358  02 04 30323031",
+);
 /// §7.4.
 const ONE_WORD: Printed<'_> = ("01 03 FD 00 00 01 | B5 A6", "01 03 02 17 70 | B6 50");
 const TWO_WORDS: Printed<'_> = ("01 03 FD 00 00 02 | F5 A7", "01 83 03 | 01 31");
@@ -253,7 +260,7 @@ async fn a_setpoint_of_60_hertz_is_the_write_of_7_6_and_one_of_80_that_of_8_5() 
         script
     };
     let script = [
-        vec![("01 03 0012 0001", "01 03 02 1F40")],
+        vec![IDENTIFIED, ("01 03 0012 0001", "01 03 02 1F40")],
         set(true, SIXTY_HERTZ, "01 03 02 1770"),
         set(false, EIGHTY_HERTZ, "01 03 02 1F40"),
         vec![NO_REGISTER],
@@ -291,18 +298,23 @@ async fn the_block_is_written_and_refused_as_in_7_8() {
 #[tokio::test(start_paused = true)]
 async fn identification_is_asked_and_read_as_in_7_9() {
     let (line, other_end) = scripted(&[
-        (
-            "01 2B 0E 01 00",
-            "01 2B 0E 01 01 00 00 03  00 0D 54656C656D6563616E69717565  01 0C 41545632314830373 54D3358  02 04 30323031",
-        ),
+        IDENTIFIED,
         ("01 03 FB05 0001", "01 03 02 0004"),
         ("01 03 FB72 0001", "01 03 02 0000"),
+        // A drive without FB05 and FB72 is the one that 43/14 names all the same.
+        IDENTIFIED,
+        ("01 03 FB05 0001", "01 83 02"),
+        ("01 03 FB72 0001", "01 83 02"),
     ]);
-    let identity = Atv21::new(line.slave(1), bench::address(1)).identify().await.unwrap();
+    let mut drive = Atv21::new(line.slave(1), bench::address(1));
+    let identity = drive.identify().await.unwrap();
     assert_eq!(identity.vendor.as_deref(), Some("Telemecanique"));
     assert_eq!(identity.model.as_deref(), Some("ATV21H075M3X"));
     assert_eq!(identity.version.as_deref(), Some("0201"));
     assert_eq!(identity.codes.iter().map(|code| code.value).collect::<Vec<_>>(), [4, 0]);
+    let named = drive.identify().await.unwrap();
+    assert_eq!((&named.model, named.codes.len()), (&identity.model, 0));
+    assert_eq!(drive.recognise(&named), Recognised::Mine);
     other_end.is_done().await;
 }
 
@@ -320,6 +332,7 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
         let running =
             format!("01 03 02 {:04X}", if direction == Direction::Forward { 0x6400 } else { 0x6600 });
         let mut script: Vec<(&str, &str)> = vec![
+            IDENTIFIED,
             ("01 03 FD01 0001", "01 03 02 4000"),
             ("01 03 FE45 0001", &source),
             ("01 03 FA00 0001", "01 03 02 0000"),

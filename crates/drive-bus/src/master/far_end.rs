@@ -14,7 +14,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use crate::{
-    config::Gateway,
+    gateway::Gateway,
     shape::Shape,
     stats::{FarEndStats, WaitIs},
 };

@@ -8,7 +8,9 @@ use tokio::time::Instant;
 use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
     answer, config,
+    evidence::Ended,
     exchange::{Answer, Failure, NOBODY_ANSWERED},
+    protocol::Protocol,
     record::Ending,
     schedule::Entry,
     shape,
@@ -31,6 +33,15 @@ impl<C> Master<C> {
         let result = self.believe(now, &flight, result);
         let (result, nobody) = self.gateway_says(now, &flight, result);
         self.record.ended(now, slave, flight.started, Ending::of(&result));
+        let expected = answer::likely_len(&flight.request);
+        let ended = match &result {
+            Ok(Ok(_)) => Ended::Answered(expected),
+            Ok(Err(code)) => Ended::Exception(u8::from(*code)),
+            Err(Failure::Nobody) => Ended::Exception(NOBODY_ANSWERED),
+            Err(Failure::Doubted(_) | Failure::Refused(_)) => Ended::Unclear,
+            Err(_) => Ended::InVain,
+        };
+        self.evidence.ended(now, slave, self.config.protocol == Protocol::Rtu, ended, expected);
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
@@ -160,6 +171,7 @@ impl<C> Master<C> {
         let given_up = self.far_end.answered(now, flight.behind, at_once);
         self.nobody_answered(now, given_up);
         let station = self.station(flight.slave);
+        station.answered_at = Some(flight.asked_at);
         // What has waited behind what was owed says nothing of its slave.
         if let Some(sent) = flight.sent.filter(|_| at_once) {
             let elapsed = || now.saturating_duration_since(sent.end).saturating_sub(characters);
@@ -335,9 +347,13 @@ impl<C> Master<C> {
             && self
                 .schedule
                 .any(|other| other.slave == entry.slave && other.terms.replaces == entry.terms.replaces);
+        // The gateway has not given it up yet, and asks as often as it does. One that answers as a rule is late, and soon heard.
+        let was_heard = self.stations.get(&entry.slave).is_some_and(|station| station.timeout.is_learned());
+        let is_asked_still =
+            !entry.work.is_write && !was_heard && self.far_end.gate(true).is_some_and(|gate| gate > now);
         entry.work.attempts < self.config.retries
             && entry.expires().is_none_or(|expires| now < expires)
-            && !(offline || edge || stopped || replaced || self.closing)
+            && !(offline || edge || stopped || replaced || is_asked_still || self.closing)
     }
 
     /// The time of a request that nobody answers is over.

@@ -29,6 +29,7 @@ use tokio_modbus::Request;
 use crate::{
     answer,
     config::{self, LineConfig, SlaveSettings},
+    evidence::{Evidence, Fact, Finding, Known, What},
     exchange::{self, Answer, Failure, Frame, Machine, Step, Stray},
     pdu,
     record::{Ending, Exchange, Record},
@@ -102,6 +103,7 @@ pub struct Master<C> {
     opened_at: Option<Instant>,
     stats: Stats,
     record: Record,
+    evidence: Evidence,
 }
 
 /// What is asked, and by whom.
@@ -218,6 +220,7 @@ impl<C> Master<C> {
             opened_at: None,
             stats: Stats::default(),
             record: Record::default(),
+            evidence: Evidence::default(),
             config,
         };
         master.set_far_end_paces(master.config.endpoint.is_serial());
@@ -376,8 +379,12 @@ impl<C> Master<C> {
         self.schedule.first_stop(first).map(|_| sent.usually_by)
     }
 
-    /// The caller of a request is gone.
+    /// The caller of a request is gone: what is unsent never is, but the write of a stop is sent, and sent again, all the same.
     pub fn withdraw(&mut self, ticket: Ticket) {
+        let is_stop = |entry: &Entry<Asked<C>>| entry.terms.class == Class::Stop && entry.work.is_write;
+        if self.schedule.any(|entry| entry.ticket == ticket && is_stop(entry)) {
+            return;
+        }
         if let Some(entry) = self.schedule.withdraw(ticket) {
             self.station(entry.slave).stats.outcomes.withdrawn += 1;
             return;
@@ -385,7 +392,7 @@ impl<C> Master<C> {
         let aside = self.aside.values_mut().map(|aside| &mut aside.flight);
         for flight in self.flight.iter_mut().chain(aside) {
             if let Purpose::Call(call) = &mut flight.purpose {
-                call.take_if(|entry| entry.ticket == ticket);
+                call.take_if(|entry| entry.ticket == ticket && !is_stop(entry));
             }
         }
     }
@@ -399,6 +406,7 @@ impl<C> Master<C> {
         if self.flight.is_some() {
             self.record.heard(bytes);
         }
+        self.evidence.heard(now, self.flight.is_some(), bytes);
         let step = self.exchange.handle_bytes(now, bytes);
         self.act(now, step);
     }
@@ -493,9 +501,13 @@ impl<C> Master<C> {
                     let station = self.station(slave);
                     station.stats.early += 1;
                     let heard = station.doubt.heard(now, frame, false);
+                    self.evidence.stray(now, slave, What::Early);
                     self.note_heard(now, slave, heard);
                 }
                 Stray::Frame { slave, function, frame, is_request, number, nobody } => {
+                    if number == Some(0) && self.exchange.number() != Some(0) {
+                        self.evidence.stray(now, slave, What::NumberZero);
+                    }
                     let given_up = self.far_end.heard(now, slave, number, frame.shape, nobody);
                     let was_owed = given_up.is_some();
                     if was_owed && !nobody && number.is_some() && self.stations.contains_key(&slave) {
@@ -521,12 +533,26 @@ impl<C> Master<C> {
         let asked = self.flight.as_ref().filter(|flight| flight.slave == slave);
         let asked = asked.map(|flight| flight.request.function_code().value());
         let confuses = self.exchange.confuses_late_answers();
+        let with_next = asked.is_some();
         let Some(station) = self.stations.get_mut(&slave) else {
             self.stats.foreign += 1;
+            let what = if is_request { What::OthersRequest } else { What::OthersAnswer };
+            self.evidence.stray(now, slave, what);
             return;
         };
         let heard = if confuses { station.doubt.heard(now, frame, is_request) } else { Heard::default() };
         let late = heard.was_owed;
+        self.evidence.stray(
+            now,
+            slave,
+            match &heard {
+                _ if is_request => What::OthersRequest,
+                _ if was_owed || late => What::Late { with_next },
+                heard if heard.withdraws.is_some() => What::Contradicted,
+                heard if heard.again_after.is_some() => What::Doubled,
+                _ => What::OthersAnswer,
+            },
+        );
         if was_owed && !late {
             station.stats.late += 1;
             return;
@@ -561,6 +587,11 @@ impl<C> Master<C> {
     /// When the last value of a slave was asked for that another answer has withdrawn.
     pub(crate) fn retracted(&self, slave: u8) -> Option<Instant> {
         self.stations.get(&slave)?.retracted
+    }
+
+    /// When the last question began that a slave has answered.
+    pub(crate) fn answered_at(&self, slave: u8) -> Option<Instant> {
+        self.stations.get(&slave)?.answered_at
     }
 
     /// The next call that has ended.
@@ -604,6 +635,18 @@ impl<C> Master<C> {
             })
             .collect();
         stats
+    }
+
+    /// What was heard last that is no plain answer, the oldest first.
+    #[must_use]
+    pub fn evidence(&self) -> Vec<Fact> {
+        self.evidence.facts()
+    }
+
+    /// What is wrong with the line at `now`, by its evidence.
+    #[must_use]
+    pub fn findings(&self, now: Instant) -> Vec<Finding> {
+        self.evidence.findings(Known { now, is_unitelway: self.config.protocol.name() == "unitelway" })
     }
 
     /// Keeps the last exchanges from now on.

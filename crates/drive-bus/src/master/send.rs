@@ -27,11 +27,14 @@ const NEVER_QUIET: Duration = Duration::from_secs(1);
 impl<C> Master<C> {
     /// What is to be written now, if anything. [`handle_sent`](Self::handle_sent) **must** follow when it is.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Bytes> {
-        let bytes = match self.to_send.take() {
+        let going_on = self.to_send.take();
+        let goes_on = going_on.is_some();
+        let bytes = match going_on {
             Some(bytes) => bytes,
             None => self.next_exchange(now)?,
         };
         self.record.sent(&bytes);
+        self.evidence.sent(now, goes_on, &bytes);
         self.sending = Some(Sending { since: now, characters: bytes.len() });
         Some(bytes)
     }

@@ -33,6 +33,8 @@ pub(super) struct Station {
     pub(super) doubt: Doubt,
     /// When the last of its values was asked for that was withdrawn.
     pub(super) retracted: Option<Instant>,
+    /// When the last question began that it has answered.
+    pub(super) answered_at: Option<Instant>,
     failures: u32,
     /// It was heard when its time was over.
     slow: bool,
@@ -51,6 +53,7 @@ impl Station {
             ready_at: None,
             doubt: Doubt::default(),
             retracted: None,
+            answered_at: None,
             failures: 0,
             slow: false,
             last_read: None,

@@ -163,8 +163,12 @@ impl Rig {
 
     pub(crate) fn withdraw(&mut self, call: u64) {
         self.collect(&mut Vec::new());
-        if let Some(asked) = self.asked.remove(&call) {
-            self.master.withdraw(asked.ticket);
+        let Some(asked) = self.asked.get(&call) else { return };
+        let is_kept = asked.class == Class::Stop && is_write(&asked.request);
+        self.master.withdraw(asked.ticket);
+        // The write of a stop is sent although nobody waits for it, and ends as if somebody did.
+        if !is_kept {
+            self.asked.remove(&call);
         }
     }
 

@@ -5,11 +5,12 @@ use async_trait::async_trait;
 use super::{
     chart::{ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET},
     climb::{Climb, Next},
+    words::ControlWord,
 };
 use crate::{
     confirm::Confirming,
     error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
-    lease::Lease,
+    lease::{Lease, Withdrawn},
     own_run::OwnRun,
     port::{Class, Effect},
     setpoint::{Command, Direction, StopMode},
@@ -105,6 +106,19 @@ pub trait Drivecom: Send {
 
     /// The control word that the drive holds, read as a command.
     async fn read_control(&mut self) -> Result<u16>;
+
+    /// Whether a control word that the drive holds is a run command.
+    fn is_run(&self, held: u16) -> bool {
+        ControlWord::from_bits_retain(held).is_run()
+    }
+
+    /// The word that ends the run command which the drive holds, and nothing else; or why there is none.
+    fn withdrawal(&self, held: u16, status: &Status) -> Result<u16, &'static str>;
+
+    /// Writes it: the word as it stands.
+    async fn write_withdrawal(&mut self, word: u16) -> Result<()> {
+        self.write_control(Class::Command, word, Effect::Level).await
+    }
 
     /// Who commanded the drive when it was last read, where it tells that.
     fn last_control(&self) -> Option<Control> {
@@ -318,6 +332,32 @@ fn stopped(StopWord { mode, instead, .. }: StopWord, status: Status) -> Stopped 
     }
 }
 
+/// Ends the run command of this side, and nothing else. A word whose answer was lost may still be on its way: the withdrawal goes
+/// out behind it.
+///
+/// # Errors
+/// [`Error::Unsupported`] where no word does only that; [`Error::NotConfirmed`] when the run command still stands.
+pub async fn withdraw<D: Drivecom>(drive: &mut D) -> Result<Withdrawn> {
+    let held = drive.read_control().await?;
+    let status = drive.read_status(Class::Command).await?;
+    let may_come = drive.own_run().lease().is_some() && !drive.own_run().has_arrived();
+    if !drive.is_run(held) && !may_come {
+        drive.own_run().end();
+        return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
+    }
+    let unsupported = |reason| Error::Unsupported { what: "withdrawal of the run command", reason };
+    let word = drive.withdrawal(held, &status).map_err(unsupported)?;
+    drive.write_withdrawal(word).await?;
+    let held = drive.read_control().await.map_err(Error::after_write)?;
+    let status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
+    if drive.is_run(held) {
+        let (slave, command) = (drive.address(), Command::Withdraw);
+        return Err(Error::NotConfirmed { slave, command, status: Box::new(status), because: None });
+    }
+    drive.own_run().end();
+    Ok(Withdrawn::Ended(Status { verdict: None, ..status }))
+}
+
 /// One rising edge of the fault reset, cleared at once. A drive without a fault is left alone. Both words disable the
 /// voltage, so nothing of this side starts by a reset; and so none is sent to a drive that may still drive its motor.
 ///
@@ -515,6 +555,10 @@ mod tests {
 
         async fn read_control(&mut self) -> Result<u16> {
             Ok(self.written.last().copied().unwrap_or(0))
+        }
+
+        fn withdrawal(&self, _: u16, _: &Status) -> Result<u16, &'static str> {
+            Ok(SWITCH_ON)
         }
 
         fn stop_word(&self, mode: StopMode) -> StopWord {

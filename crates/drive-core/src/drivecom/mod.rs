@@ -10,11 +10,13 @@ mod chart;
 mod climb;
 mod ladder;
 mod limits;
+mod proof;
 mod words;
 
 pub use chart::{
     ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, QUICK_STOP, SHUTDOWN, SWITCH_ON,
 };
-pub use ladder::{Drivecom, RunShown, StopWord, reset_fault, start, stop};
+pub use ladder::{Drivecom, RunShown, StopWord, reset_fault, start, stop, withdraw};
 pub use limits::{follows_frequency, follows_speed, speed_limits, speed_word};
+pub use proof::{Followed, Limits, Proof, Question};
 pub use words::{ControlWord, ExtendedStatus, StatusWord, StatusWords};

@@ -7,6 +7,7 @@ use bitflags::bitflags;
 use super::{
     chart::{ChartState, ENABLE_OPERATION},
     ladder::RunShown,
+    proof::Question,
 };
 use crate::{
     error::Refusal,
@@ -287,6 +288,26 @@ impl StatusWords {
         }
     }
 
+    /// Whether only the control word that the drive holds tells what it does: a motor that slows down to stop looks like one that
+    /// slows down to a lower setpoint, and one that stands at a setpoint of zero, or after `tLS`, like a stopped one. `held` is
+    /// the word as far as it is known.
+    #[must_use]
+    pub fn needs_command(self, held: Option<ControlWord>) -> bool {
+        let by_bus = self.chart() == Some(ChartState::OperationEnabled) && self.control() == Control::Bus;
+        let slows_down = !self.is_turning() || self.eti.contains(ExtendedStatus::DECELERATING);
+        by_bus && held.is_none_or(|command| command.is_run() && slows_down)
+    }
+
+    /// What of these words and of `FrH` is another question when it is another: not the alarm, and not how far a ramp is.
+    #[must_use]
+    pub fn question(self, frh: u16) -> Question {
+        let passing = ExtendedStatus::TRANSIENT
+            | ExtendedStatus::MOTOR_THERMAL_ALARM
+            | ExtendedStatus::BRAKING_ALARM
+            | ExtendedStatus::CURRENT_LIMIT;
+        ((self.eta - StatusWord::ALARM).bits(), (self.eti - passing).bits(), frh)
+    }
+
     /// What these words say of the fast set; frequency, current, fault code and raw words are the family's to add.
     #[must_use]
     pub fn status(self, command: Option<ControlWord>) -> Status {
@@ -311,7 +332,8 @@ impl StatusWords {
     }
 
     /// What these words show of the output. `command` is the control word that the drive was last seen to hold; `ramps`: the
-    /// normal stop is known to bring the motor down; `braked`: the status before showed it being brought down.
+    /// normal stop is known to bring the motor down; `braked`: the status before showed it being brought down; `reacted`: by the
+    /// reaction to a fault.
     #[must_use]
     pub fn output(
         self,
@@ -319,6 +341,7 @@ impl StatusWords {
         frequency: Option<Frequency>,
         ramps: bool,
         braked: bool,
+        reacted: bool,
     ) -> Output {
         let at = frequency.unwrap_or(Frequency::from_centihertz(1));
         // Zero is no output also where the words say that the motor is driven: as in a quick stop that has ended.
@@ -338,7 +361,9 @@ impl StatusWords {
             // A ramp has ended, or a run command stands and asks for nothing.
             ChartState::OperationEnabled if ramps || braked => Output::None,
             ChartState::QuickStopActive => Output::None,
-            ChartState::SwitchedOn | ChartState::Fault if braked => Output::None,
+            ChartState::SwitchedOn if braked => Output::None,
+            // A trip cuts off a motor that was coming down for another reason.
+            ChartState::Fault if braked && reacted => Output::None,
             _ => Output::Cut,
         }
     }

@@ -125,6 +125,7 @@ fn what_is_asked_reads_back_as_it_was_told() {
     for (setpoint, told) in [
         (Setpoint::from(Frequency::from_centihertz(3_005)), json!({"frequency_hz": 30.05})),
         (Speed::from_rpm(900).into(), json!({"speed_rpm": 900})),
+        (Percent::from_hundredths(4_550).into(), json!({"share_percent": 45.5})),
     ] {
         is(setpoint, told.clone());
         assert_eq!(from_value::<Setpoint>(told).unwrap(), setpoint);

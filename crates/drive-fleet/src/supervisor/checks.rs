@@ -1,14 +1,17 @@
 //! What is checked at each connect: which drive it is, its communication watchdog, and whether it starts again by itself.
 
-use std::{sync::Arc, time::Duration};
+use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use drive_core::{
-    Error, ErrorKind, ExceptionMeaning, Ground, Identity, Result, SelfRestart, Watchdog, WatchdogCapability,
+    Error, ErrorKind, ExceptionMeaning, Ground, Identity, Recognised, Result, SelfRestart, Watchdog,
+    WatchdogCapability,
 };
 use tokio::time::Instant;
 
 use crate::{
+    eeprom::InVain,
     event::EventKind,
+    outcome::Refused,
     settings::{DriveSettings, WatchdogBefore, WatchdogContract},
     snapshot::{IdentityCheck, WatchdogCheck},
     supervisor::Job,
@@ -46,6 +49,10 @@ pub(crate) struct Checks {
     written: bool,
     /// The contract was written, once, and the drive has kept something else: it is not written again, for that may wear its EEPROM.
     in_vain: bool,
+    /// What an earlier run has written in vain.
+    in_vain_before: Option<InVain>,
+    /// Its EEPROM has been written too often: nothing is written to it by the fleet itself.
+    held_back: bool,
     /// How often the drive has refused the write at standstill.
     refusals: u8,
     /// What an earlier run found, and did not live to put back.
@@ -79,6 +86,8 @@ impl Checks {
             found: None,
             written: false,
             in_vain: false,
+            in_vain_before: settings.eeprom_before.as_ref().and_then(|ledger| ledger.in_vain.clone()),
+            held_back: false,
             refusals: 0,
             inherited: settings.watchdog_before.clone(),
             told: false,
@@ -149,10 +158,12 @@ impl Checks {
         }
     }
 
-    /// The drive received a frame and answered.
-    pub(crate) const fn heard(&mut self, now: Instant) {
-        self.heard = Some(now);
-        self.feed_again = None;
+    /// The drive received a frame at this time, and answered it.
+    pub(crate) fn heard(&mut self, at: Instant) {
+        if self.heard.is_none_or(|before| before < at) {
+            self.heard = Some(at);
+            self.feed_again = None;
+        }
     }
 
     /// When the watchdog wants a frame of its own.
@@ -264,16 +275,72 @@ impl Checks {
         due.then_some(Job::Watchdog)
     }
 
-    /// The job that sets the watchdog up.
-    pub(crate) fn arm(&self) -> Option<Job> {
-        self.contract.map(|contract| Job::ArmWatchdog(contract.timeout, contract.reaction))
+    /// Whether nothing is to be written by the fleet itself.
+    pub(crate) const fn hold_back(&mut self, held_back: bool) {
+        self.held_back = held_back;
     }
 
-    pub(crate) fn handle_identity(&mut self, now: Instant, result: Result<Identity>) -> Option<EventKind> {
+    /// What was written, and reads back otherwise.
+    pub(crate) fn in_vain(&self) -> Option<InVain> {
+        let contract = self.contract.filter(|_| self.in_vain)?;
+        Some(InVain { identity: self.says(), contract })
+    }
+
+    /// What the drive says of itself, where it does.
+    pub(crate) fn says(&self) -> Option<String> {
+        match &self.identity {
+            IdentityCheck::Same(identity) => Some(identity.to_string()),
+            _ => None,
+        }
+    }
+
+    /// It is known which drive it is: what was tried on it in vain is not tried again.
+    fn known(&mut self) {
+        let tried = self.in_vain_before.as_ref();
+        self.in_vain |=
+            tried.is_some_and(|tried| Some(tried.contract) == self.contract && tried.identity == self.says());
+    }
+
+    /// The job that sets the watchdog up.
+    pub(crate) fn arm(&self) -> Option<Job> {
+        self.contract
+            .filter(|_| !self.held_back)
+            .map(|contract| Job::ArmWatchdog(contract.timeout, contract.reaction))
+    }
+
+    /// Why nothing is written to what answers, where it is not known to be the drive that is meant.
+    pub(crate) fn stranger(&self) -> Option<Refused> {
+        match &self.identity {
+            IdentityCheck::Same(_) | IdentityCheck::CannotSay => None,
+            IdentityCheck::Unchecked => Some(Refused::IdentityUnchecked),
+            IdentityCheck::Changed { .. } => Some(Refused::IdentityChanged),
+            IdentityCheck::OtherFamily { it_is, .. } => Some(Refused::OtherFamily(it_is.clone())),
+        }
+    }
+
+    /// Whether what answers is known to be another drive than the one that is meant, or one of another family.
+    pub(crate) const fn is_another(&self) -> bool {
+        matches!(self.identity, IdentityCheck::Changed { .. } | IdentityCheck::OtherFamily { .. })
+    }
+
+    pub(crate) fn handle_identity(
+        &mut self,
+        now: Instant,
+        result: Result<(Identity, Recognised)>,
+    ) -> Option<EventKind> {
         let found = match result {
-            Ok(identity) => Arc::new(identity),
+            Ok((identity, Recognised::NotMine { it_is })) => {
+                (self.found, self.written, self.inherited) = (None, false, None);
+                let found = Arc::new(identity);
+                let it_is = Cow::Borrowed(it_is);
+                self.identity =
+                    IdentityCheck::OtherFamily { it_is: it_is.clone(), found: Arc::clone(&found) };
+                return Some(EventKind::OtherFamily { it_is, found });
+            }
+            Ok((identity, _)) => Arc::new(identity),
             Err(error) if cannot_say(&error) => {
                 self.identity = IdentityCheck::CannotSay;
+                self.known();
                 return None;
             }
             Err(_) => {
@@ -293,6 +360,7 @@ impl Checks {
             _ => {
                 self.remembered = Some(Arc::clone(&found));
                 self.identity = IdentityCheck::Same(Arc::clone(&found));
+                self.known();
                 Some(EventKind::Identified(found))
             }
         }
@@ -379,7 +447,10 @@ impl Checks {
                 self.watchdog_at = Some(now + AGAIN);
                 None
             }
-            Err(error) => self.broken(now, error.to_string()),
+            Err(error) => {
+                self.in_vain |= written && error.kind() == ErrorKind::NotConfirmed;
+                self.broken(now, error.to_string())
+            }
         }
     }
 

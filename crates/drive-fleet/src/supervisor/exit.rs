@@ -49,7 +49,7 @@ impl Supervisor {
         }
         self.exits_by = why;
         self.refuse_queue();
-        let started = self.lease.is_some() || self.is_starting();
+        let started = (self.lease.is_some() || self.is_starting()) && !self.checks.is_another();
         // Rule 1 ends with its confirmation, whatever the policy.
         let stopping = self.stopping.is_some();
         let turns = self.turns();

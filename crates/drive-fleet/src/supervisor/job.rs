@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Direction, Error, Faults, Identity, Measurements, Reaction, Result, SelfRestart, Setpoint, Status,
-    StopMode, Stopped, Watchdog, Withdrawn,
+    Direction, Error, Faults, Identity, Measurements, Reaction, Recognised, Result, SelfRestart, Setpoint,
+    Status, StopMode, Stopped, Watchdog, Withdrawn,
 };
 use tokio::time::Instant;
 
@@ -68,6 +68,16 @@ pub(crate) enum Job {
 }
 
 impl Job {
+    /// The number of a long reading that goes on where it was cut.
+    pub(crate) const fn keeps(self) -> Option<u8> {
+        match self {
+            Self::Measurements => Some(1),
+            Self::Faults | Self::Ask(Question::Faults) => Some(2),
+            Self::SelfRestarts => Some(3),
+            _ => None,
+        }
+    }
+
     /// Whether it only reads, and gives way to an order.
     pub(crate) const fn is_poll(self) -> bool {
         matches!(
@@ -95,7 +105,7 @@ pub(crate) enum Reply {
     Saved(Result<u32>),
     KeptAlive(Result<()>),
     Status(Result<Status>),
-    Identity(Result<Identity>),
+    Identity(Result<(Identity, Recognised)>),
     Watchdog(Result<Watchdog>),
     SelfRestarts(Result<Vec<SelfRestart>>),
     Faults(Result<Faults>),

@@ -5,6 +5,7 @@
 //! [`next`](Supervisor::next) says what to do now, [`poll_output`](Supervisor::poll_output) what to tell whom,
 //! [`snapshot`](Supervisor::snapshot) what is known.
 
+mod adoption;
 pub(crate) mod checks;
 mod exit;
 mod job;
@@ -13,6 +14,7 @@ mod orders;
 mod pace;
 mod permission;
 mod questions;
+mod retraction;
 mod stopping;
 #[cfg(test)]
 mod tests;
@@ -32,11 +34,13 @@ use drive_core::{
 use tokio::time::Instant;
 
 use self::{
+    adoption::Adoption,
     checks::Checks,
     exit::Exit,
     orders::{Active, Queued},
     pace::Pace,
     questions::Questions,
+    retraction::Retraction,
     stopping::Stopping,
     withdraw::Withdrawal,
 };
@@ -48,6 +52,7 @@ pub(crate) use self::{
 use crate::{
     cause::{Act, Cause, ChangedWord, Policy},
     concern::{self, ConcernKind},
+    eeprom::{EepromUse, Ledger},
     event::{EventKind, ExitAction, Happened, Limit},
     limits::Given,
     outcome::{Outcome, Refused, Unknown},
@@ -103,7 +108,7 @@ pub(crate) enum Output {
     /// To everybody.
     Event(Happened),
     /// To one caller: the drive shows that it is in force what he has asked for.
-    InForce(CallId),
+    InForce(CallId, Outcome),
     /// To one caller.
     Answer(CallId, Outcome),
     /// To one who asked a question.
@@ -122,6 +127,8 @@ pub(crate) struct Supervisor {
     link: Link,
     status: Option<Timed<Status>>,
     measurements: Option<Timed<Measurements>>,
+    /// What was withdrawn of them.
+    retraction: Retraction,
     /// The setpoint that the drive confirmed last.
     given: Option<Given>,
     checks: Checks,
@@ -140,6 +147,10 @@ pub(crate) struct Supervisor {
     started_by: Option<CallId>,
     /// The run command of this side that stands in the drive, or may, as the family keeps it.
     lease: Option<Lease>,
+    /// What was written to its EEPROM.
+    ledger: Ledger,
+    /// What becomes of a run command of before.
+    adoption: Adoption,
     /// What the last status said of it that was told.
     suspended: Option<(Lack, Refusal)>,
     /// Somebody else has command, and the settings leave the run command as it is until it is in force again.
@@ -185,6 +196,7 @@ impl Supervisor {
             link: Link::Connecting,
             status: None,
             measurements: None,
+            retraction: Retraction::new(now),
             given: None,
             checks: Checks::new(&settings, watchdog),
             pace: Pace::new(now, settings.periods),
@@ -198,6 +210,8 @@ impl Supervisor {
             exits_by: Policy::Exit,
             started_by: None,
             lease: None,
+            ledger: Ledger::new(now, settings.eeprom_before.clone()),
+            adoption: Adoption::of(&settings),
             suspended: None,
             reported: false,
             exceeded: BTreeMap::new(),
@@ -350,6 +364,7 @@ impl Supervisor {
         if self.link != Link::Lost && now >= self.lost_at() {
             self.lose(now);
         }
+        self.checks.hold_back(self.watchdog_wears && self.ledger.is_worn(now).is_some());
         self.check_stop_times(now);
         self.check_order_times(now);
         self.advance_exit(now);
@@ -363,9 +378,6 @@ impl Supervisor {
     pub(crate) fn handle_reply(&mut self, now: Instant, reply: Reply) {
         let job = self.in_flight.take();
         self.changed = true;
-        if reply.error().is_none_or(|error| error.kind() == ErrorKind::Exception) {
-            self.checks.heard(now);
-        }
         if let Some(error) = reply.error() {
             self.last_error = Some(error.clone());
             self.counters.failures += 1;
@@ -381,16 +393,31 @@ impl Supervisor {
                 if let Some(event) = self.checks.handle_identity(now, result) {
                     self.emit_by(event, Cause::Found);
                 }
+                if self.checks.is_another() {
+                    // Whatever turns its motor is not ours.
+                    self.withdrawal = None;
+                    self.end_writes();
+                }
+                self.adopt_run(now);
             }
             Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {
+                let wears = self.watchdog_wears && may_have_written(&result);
                 self.handle_restored(result);
+                if wears {
+                    self.note_eeprom(now, EepromUse::Restore, Cause::policy(self.exits_by));
+                }
             }
             Reply::Watchdog(result) => {
                 let armed = matches!(job, Some(Job::ArmWatchdog(..)));
+                let wears = self.watchdog_wears && armed && may_have_written(&result);
                 let control = self.settings.control;
                 if let Some(event) = self.checks.handle_watchdog(now, armed, control, result) {
                     let cause = if armed { Cause::policy(Policy::Watchdog) } else { Cause::Found };
                     self.emit_by(event, cause);
+                }
+                if wears {
+                    self.ledger.kept.in_vain = self.checks.in_vain();
+                    self.note_eeprom(now, EepromUse::Watchdog, Cause::policy(Policy::Watchdog));
                 }
                 self.tell_watchdog();
             }
@@ -399,19 +426,35 @@ impl Supervisor {
                     self.emit_by(event, Cause::Found);
                 }
             }
-            Reply::Told(told) => self.handle_told(told),
+            Reply::Told(told) => self.handle_told(now, told),
             Reply::Withdrawn(result) => self.handle_withdrawn(now, result),
             Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
             Reply::Stopped(result) => self.handle_stopped(now, result),
             Reply::Setpoint(result) => self.handle_setpoint_reply(now, result),
             Reply::Ordered(result) => self.handle_order_reply(now, result.map(Some)),
             Reply::Saved(result) => {
+                if may_have_written(&result) {
+                    let cause = self.active.as_ref().map_or(Cause::Drive, Active::cause);
+                    self.note_eeprom(now, EepromUse::Save, cause);
+                }
                 if let Ok(saves) = result {
                     self.counters.saves = u64::from(saves);
                 }
                 self.handle_order_reply(now, result.map(|_| None));
             }
         }
+    }
+
+    /// The drive has heard a frame, and answered it. No reply of a job tells that: some take no exchange at all.
+    pub(crate) fn handle_heard(&mut self, at: Instant) {
+        self.checks.heard(at);
+    }
+
+    /// Until when the job in flight goes on although its time is over: the frames of a status feed the drive as well, so it is
+    /// not cut for a keep-alive while they are answered.
+    pub(crate) fn goes_on(&self, now: Instant) -> Option<Instant> {
+        let status = matches!(self.in_flight, Some(Job::Status { .. }));
+        self.checks.feed_at().filter(|at| status && *at > now)
     }
 
     /// When a stop under way becomes an alarm or is over for those who wait for it, whatever is in flight.
@@ -469,6 +512,7 @@ impl Supervisor {
             link: self.link,
             error: self.last_error.clone(),
             status: self.status.clone(),
+            retracted: self.retraction.is_open,
             measurements: self.measurements.clone(),
             setpoint: self.given.map(|given| given.setpoint),
             identity: self.checks.identity().clone(),
@@ -477,6 +521,7 @@ impl Supervisor {
             restarts_accepted: self.checks.restarts_accepted(),
             control_taken: self.control_taken,
             run_command_stands: self.withdrawal.as_ref().and_then(Withdrawal::stands).cloned(),
+            eeprom_worn: self.ledger.is_worn(now),
             exceeded: self.exceeded.values().copied().collect(),
             since: self.since.clone(),
             stop: self.stopping.as_ref().map(Stopping::pending),
@@ -525,6 +570,13 @@ impl Supervisor {
         self.acted = cause.map(|cause| (job, cause));
     }
 
+    /// Its EEPROM was written, or may have been.
+    fn note_eeprom(&mut self, now: Instant, by: EepromUse, cause: Cause) {
+        self.ledger.write(now);
+        let ledger = self.ledger.kept.clone();
+        self.emit_by(EventKind::EepromWritten { by, ledger }, cause);
+    }
+
     /// Whether the drive's words show that the motor is not driven.
     fn stands(&self) -> bool {
         self.link == Link::Connected && self.status.as_ref().is_some_and(|status| status.value.is_undriven())
@@ -544,8 +596,16 @@ impl Supervisor {
     /// What is known of something whose outcome is not.
     fn unknown(&self, now: Instant, error: Option<Error>) -> Outcome {
         let last = self.status.as_ref().map(|status| status.seen(now));
-        Outcome::OutcomeUnknown(Unknown { error, last })
+        Outcome::OutcomeUnknown(Unknown { error, last, stop: None })
     }
+}
+
+/// Whether a write may have been carried out.
+fn may_have_written<T>(result: &Result<T, Error>) -> bool {
+    result
+        .as_ref()
+        .err()
+        .is_none_or(|error| matches!(error.kind(), ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed))
 }
 
 /// Whether an error says that the drive cannot be reached at all now.

@@ -72,6 +72,7 @@ impl Supervisor {
         self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
         self.last_error = None;
+        self.retraction.status(now);
         self.changed = true;
         if was != Link::Connected {
             self.link = Link::Connected;
@@ -166,13 +167,15 @@ impl Supervisor {
             (_, Some(is)) => {
                 // Whoever has control now may give another reference.
                 self.given = None;
-                let given = self.acted.as_ref().filter(|(job, _)| *job == Job::Release);
+                // The reset of an Altivar 21 zeroes its command word (Modbus §6.4): so it gives command back, too.
+                let given =
+                    self.acted.as_ref().filter(|(job, _)| matches!(job, Job::Release | Job::ResetFaults));
                 match given.map(|(_, cause)| cause.clone()) {
                     _ if found => self.emit_shown(EventKind::ControlElsewhere(is), Cause::Found),
                     // It was given, not taken.
-                    Some(release) => {
+                    Some(act) => {
                         self.acted = None;
-                        self.emit_shown(EventKind::ControlElsewhere(is), release);
+                        self.emit_shown(EventKind::ControlElsewhere(is), act);
                     }
                     None => {
                         self.control_taken = Some(is);
@@ -266,6 +269,7 @@ impl Supervisor {
                 .zip(alarms.motor_thermal)
                 .map(|(measured, limit)| (Limit::MotorThermal { measured, limit }, measured > limit))
         });
+        self.retraction.measurements(now);
         self.measurements = Some(Timed::<Measurements>::new(measurements, now));
         self.changed = true;
     }

@@ -51,10 +51,11 @@ impl Pace {
         if busy { self.periods.running } else { self.periods.rest }
     }
 
-    /// From now until the tick after the one that is due: how long a poll that starts now is of use.
+    /// From now until the tick after the one that is due, and at least a period: how long a poll that starts now is of use.
+    /// On a full line that which is late is as good as the next, and dropping it would only make that late, too.
     pub(crate) fn until_next(&self, now: Instant, busy: bool) -> Duration {
         let period = self.period(busy);
-        (self.status_due + period).saturating_duration_since(now).max(period / 4)
+        (self.status_due + period).saturating_duration_since(now).max(period)
     }
 
     /// The status that was due has ended; whether before the next tick.

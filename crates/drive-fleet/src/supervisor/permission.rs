@@ -7,7 +7,7 @@ use super::{Asker, Job, Supervisor, orders::Active};
 use crate::{
     limits::LimitProblem,
     outcome::{Order, Refused, Until},
-    snapshot::{IdentityCheck, Link, WatchdogCheck},
+    snapshot::{Link, WatchdogCheck},
 };
 
 /// How many orders of one drive may wait.
@@ -157,17 +157,17 @@ impl Supervisor {
             return Err(Refused::NotConnected.into());
         }
         let max_age = self.settings.periods.max_age;
-        if self.status.as_ref().is_none_or(|status| status.age(now) > max_age) {
+        if self.retraction.is_open || self.status.as_ref().is_none_or(|status| status.age(now) > max_age) {
             return Err(Blocked::Meanwhile(Refused::Stale));
         }
-        match self.checks.identity() {
-            IdentityCheck::Same(_) | IdentityCheck::CannotSay => Ok(()),
-            IdentityCheck::Changed { .. } if order == Order::AcceptIdentity => Ok(()),
-            IdentityCheck::Changed { .. } => Err(Refused::IdentityChanged.into()),
-            IdentityCheck::Unchecked => Err(match self.checks.identity_job(now) {
-                Some(job) => Blocked::Until(job, Refused::IdentityUnchecked),
-                None => Blocked::Meanwhile(Refused::IdentityUnchecked),
+        match self.checks.stranger() {
+            None => Ok(()),
+            Some(Refused::IdentityChanged) if order == Order::AcceptIdentity => Ok(()),
+            Some(unchecked @ Refused::IdentityUnchecked) => Err(match self.checks.identity_job(now) {
+                Some(job) => Blocked::Until(job, unchecked),
+                None => Blocked::Meanwhile(unchecked),
             }),
+            Some(stranger) => Err(stranger.into()),
         }
     }
 

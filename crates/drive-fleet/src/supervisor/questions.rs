@@ -2,10 +2,16 @@
 
 use std::{collections::VecDeque, mem};
 
-use drive_core::{Faults, Result, Row, Written};
+use drive_core::{Faults, Result, Row, Written, registers::Storage};
+use tokio::time::Instant;
 
-use super::{CallId, Job, Output, Supervisor, permission::QUEUE};
-use crate::{outcome::Refused, snapshot::Link};
+use super::{CallId, Job, Output, Supervisor, may_have_written, permission::QUEUE};
+use crate::{
+    cause::{Act, Cause},
+    eeprom::EepromUse,
+    outcome::Refused,
+    snapshot::Link,
+};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,14 +33,14 @@ pub(crate) enum Told {
 }
 
 /// The questions that wait, the first perhaps in flight.
-pub(super) type Questions = VecDeque<(CallId, Question)>;
+pub(super) type Questions = VecDeque<(CallId, Question, Act)>;
 
 impl Supervisor {
     /// Somebody asks. One that is dropped for something more urgent is asked again: a write looks first at what is there.
     pub(crate) fn handle_question(&mut self, id: CallId, name: &str, question: Question) {
         match self.refuse_question(name, question) {
             Some(refused) => self.outputs.push_back(Output::Told(id, Err(refused))),
-            None => self.questions.push_back((id, question)),
+            None => self.questions.push_back((id, question, Act::of(name))),
         }
     }
 
@@ -45,6 +51,9 @@ impl Supervisor {
             }
             if !self.settings.commanders.allow(name) {
                 return Some(Refused::Commander(name.to_owned()));
+            }
+            if let Some(stranger) = self.checks.stranger() {
+                return Some(stranger);
             }
         }
         if self.is_exiting() {
@@ -59,22 +68,41 @@ impl Supervisor {
     /// Askers do not wait any more. What is in flight is finished.
     pub(crate) fn forget_questions(&mut self, gone: impl Fn(CallId) -> bool) {
         let mut in_flight = matches!(self.in_flight, Some(Job::Ask(_)));
-        self.questions.retain(|(id, _)| std::mem::take(&mut in_flight) || !gone(*id));
+        self.questions.retain(|(id, ..)| std::mem::take(&mut in_flight) || !gone(*id));
     }
 
     pub(super) fn question_job(&self) -> Option<Job> {
-        self.questions.front().map(|(_, question)| Job::Ask(*question))
+        self.questions.front().map(|(_, question, _)| Job::Ask(*question))
     }
 
-    pub(super) fn handle_told(&mut self, told: Result<Told>) {
-        if let Some((id, _)) = self.questions.pop_front() {
+    pub(super) fn handle_told(&mut self, now: Instant, told: Result<Told>) {
+        if let Some((id, question, act)) = self.questions.pop_front() {
+            let is_written = match &told {
+                Ok(Told::Written(written)) => written.changed,
+                told => may_have_written(told),
+            };
+            if matches!(question, Question::Write(row, _) if row.storage == Storage::Eeprom) && is_written {
+                self.note_eeprom(now, EepromUse::Parameter, Cause::Command(act));
+            }
             self.outputs.push_back(Output::Told(id, told.map_err(Refused::from)));
+        }
+    }
+
+    /// What was found to be another drive than is meant is not written.
+    pub(super) fn end_writes(&mut self) {
+        let Some(stranger) = self.checks.stranger() else { return };
+        let is_write = |asked: &(CallId, Question, Act)| matches!(asked.1, Question::Write(..));
+        let (writes, rest): (Questions, Questions) =
+            mem::take(&mut self.questions).into_iter().partition(is_write);
+        self.questions = rest;
+        for (id, ..) in writes {
+            self.outputs.push_back(Output::Told(id, Err(stranger.clone())));
         }
     }
 
     /// Nobody can be asked any more.
     pub(super) fn end_questions(&mut self, refused: &Refused) {
-        for (id, _) in mem::take(&mut self.questions) {
+        for (id, ..) in mem::take(&mut self.questions) {
             self.outputs.push_back(Output::Told(id, Err(refused.clone())));
         }
     }

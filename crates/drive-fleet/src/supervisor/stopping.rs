@@ -2,22 +2,22 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Frequency, Motion, Result, Setpoint, Status, StopMode, Stopped};
+use drive_core::{
+    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Result, Setpoint, Status, StopMode,
+    Stopped,
+};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Output, Supervisor};
 use crate::{
     cause::Cause,
     event::EventKind,
-    outcome::{Outcome, Refused, Unconfirmed},
+    outcome::{Outcome, Refused, StopModes, Unconfirmed, Unknown},
     snapshot::{Link, PendingStop},
 };
 
 /// The shortest and the longest pause between two attempts of a stop.
 pub(super) const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
-
-/// How long direct current is held at the most: longer heats a motor that stands.
-const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 
 /// By how much the output has to come down to count as coming down.
 const PROGRESS: Frequency = Frequency::from_centihertz(50);
@@ -32,6 +32,8 @@ pub(super) struct Stopping {
     mode: StopMode,
     /// The mode by which the drive says that it stops; that which is sent until it has said so.
     used: StopMode,
+    /// By which the drive has said that it stops, and why by another than was asked for.
+    shown: Option<(StopMode, Option<&'static str>)>,
     since: Instant,
     /// Attempts that have ended.
     attempts: u32,
@@ -62,6 +64,13 @@ struct Waiter {
 }
 
 impl Stopping {
+    /// How a stop was asked for, and how the drive stops.
+    fn modes(&self, asked: StopMode) -> StopModes {
+        let used = self.shown.map(|(used, _)| used);
+        let why = self.shown.and_then(|(_, why)| why).filter(|_| used != Some(asked));
+        StopModes { asked, used, why }
+    }
+
     pub(super) const fn pending(&self) -> PendingStop {
         PendingStop {
             mode: self.used,
@@ -162,13 +171,14 @@ impl Supervisor {
                 }
                 let in_force = waiter.asker.id().filter(|_| stopping.taken);
                 stopping.waiters.push(waiter);
-                self.outputs.extend(in_force.map(Output::InForce));
+                self.outputs.extend(in_force.map(|id| Output::InForce(id, Outcome::Confirmed)));
                 stopping.asker = asker;
             }
             None => {
                 self.stopping = Some(Stopping {
                     mode,
                     used: mode,
+                    shown: None,
                     since: now,
                     attempts: 0,
                     begun: 0,
@@ -208,10 +218,14 @@ impl Supervisor {
         stopping.begun = stopping.begun.saturating_sub(u32::from(!sent));
         let cause = stopping.asker.cause();
         let status = match result {
-            Ok(Stopped { status, mode: used, instead: why, taken_from }) => {
+            Ok(Stopped { status, mode: used, instead: why, taken_from, .. }) => {
                 let asked = stopping.mode;
                 let told = std::mem::replace(&mut stopping.used, used);
                 stopping.next_try = None;
+                // The ramp that ends an injection is no other mode.
+                if stopping.injects_since.is_none() || used != StopMode::Ramp {
+                    stopping.shown = Some((used, why));
+                }
                 if used == StopMode::DcInjection {
                     stopping.injects_since.get_or_insert(now);
                 }
@@ -223,7 +237,8 @@ impl Supervisor {
                     stopping.alarm_at = Some(now + standstill);
                     for waiter in &mut stopping.waiters {
                         waiter.until = now + standstill;
-                        self.outputs.extend(waiter.asker.id().map(Output::InForce));
+                        let in_force = |id| Output::InForce(id, Outcome::Confirmed);
+                        self.outputs.extend(waiter.asker.id().map(in_force));
                     }
                 }
                 if let Some(other) = taken_from {
@@ -282,9 +297,15 @@ impl Supervisor {
 
     fn stop_confirmed(&mut self, motion: Motion) {
         let Some(stopping) = self.stopping.take() else { return };
+        if let Some(status) = &self.status {
+            self.retraction.confirmed(status.at, stopping.mode);
+        }
         self.given = None;
-        for waiter in stopping.waiters {
-            self.conclude(waiter.asker, Command::Stop(waiter.asked), None, Outcome::Confirmed);
+        let modes = |asked| stopping.modes(asked);
+        let waiters: Vec<_> =
+            stopping.waiters.iter().map(|waiter| (waiter.asker.clone(), modes(waiter.asked))).collect();
+        for (asker, modes) in waiters {
+            self.conclude(asker, Command::Stop(modes.asked), None, Outcome::Stopped(modes));
         }
         self.emit_shown(EventKind::StopConfirmed { mode: stopping.used, motion }, stopping.asker.cause());
     }
@@ -300,18 +321,22 @@ impl Supervisor {
         }
         let (since, attempts) = (now.saturating_duration_since(stopping.since), stopping.begun);
         let cause = stopping.asker.cause();
-        let outcome = self.unconfirmed_stop(now);
+        let asked = stopping.mode;
+        let over: Vec<_> = over.into_iter().map(|waiter| (waiter.asker, waiter.asked)).collect();
         if alarm {
-            self.emit_by(EventKind::StopUnconfirmed { since, attempts, outcome: outcome.clone() }, cause);
+            let outcome = self.unconfirmed_stop(now, asked);
+            self.emit_by(EventKind::StopUnconfirmed { since, attempts, outcome }, cause);
         }
-        for waiter in over {
-            self.conclude(waiter.asker, Command::Stop(waiter.asked), None, outcome.clone());
+        for (asker, asked) in over {
+            let outcome = self.unconfirmed_stop(now, asked);
+            self.conclude(asker, Command::Stop(asked), None, outcome);
         }
     }
 
     /// What is known of a stop that is not confirmed: only a status that is fresh, and younger than it, says anything of it.
-    fn unconfirmed_stop(&self, now: Instant) -> Outcome {
+    fn unconfirmed_stop(&self, now: Instant, asked: StopMode) -> Outcome {
         let Some(stopping) = &self.stopping else { return Outcome::Confirmed };
+        let stop = Some(stopping.modes(asked));
         let error = stopping.error.clone().or_else(|| self.last_error.clone());
         let max_age = self.settings.periods.max_age;
         let said = self.status.as_ref().filter(|status| {
@@ -325,9 +350,12 @@ impl Supervisor {
                     Some(Error::NotConfirmed { because, .. }) => *because,
                     _ => None,
                 };
-                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because })
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because, stop })
             }
-            _ => self.unknown(now, error),
+            _ => {
+                let last = self.status.as_ref().map(|status| status.seen(now));
+                Outcome::OutcomeUnknown(Unknown { error, last, stop })
+            }
         }
     }
 

@@ -48,16 +48,17 @@ impl Supervisor {
         active.setpoint_given = true;
         match active.order {
             Order::Setpoint { until: Until::InForce, .. } => self.end_order(Outcome::Confirmed),
-            Order::Setpoint { .. } => self.await_reference(now),
+            Order::Setpoint { .. } => self.await_reference(now, Outcome::Confirmed),
             _ => active.phase = Phase::Prepare,
         }
     }
 
-    fn await_reference(&mut self, now: Instant) {
+    /// It is in force, as told, and on its way to the reference.
+    fn await_reference(&mut self, now: Instant, in_force: Outcome) {
         let until = now + self.settings.times.reference;
         self.set_phase(Phase::Awaiting { since: now, until });
         let asker = self.active.as_ref().and_then(|active| active.asker.id());
-        self.outputs.extend(asker.map(Output::InForce));
+        self.outputs.extend(asker.map(|id| Output::InForce(id, in_force)));
         self.pace.quicken(now);
     }
 
@@ -79,9 +80,10 @@ impl Supervisor {
         };
         match result {
             Ok(status) => {
+                let done = order.done(status.as_ref());
                 match order {
-                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
-                    _ => self.end_order(Outcome::Confirmed),
+                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now, done),
+                    _ => self.end_order(done),
                 }
                 if let Some(status) = status {
                     self.accept_status(now, status);
@@ -90,11 +92,13 @@ impl Supervisor {
             Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
                 self.end_order(Outcome::Refused(error.into()));
             }
-            Err(error) if job == Job::Persist => self.end_order(match error.kind() {
-                ErrorKind::Exception => Outcome::Refused(Refused::Drive(error)),
-                ErrorKind::NotConfirmed => Outcome::NotConfirmed(Unconfirmed::Denied(error)),
+            Err(error) if job == Job::Persist => self.end_order(match denied(&error) {
+                Some(outcome) => outcome,
+                None if error.kind() == ErrorKind::NotConfirmed => {
+                    Outcome::NotConfirmed(Unconfirmed::Denied(error))
+                }
                 // A save is an edge and cannot be read back.
-                _ => self.unknown(now, Some(error)),
+                None => self.unknown(now, Some(error)),
             }),
             Err(error) => {
                 let status = match &error {
@@ -133,18 +137,24 @@ impl Supervisor {
             Phase::Awaiting { since, .. } => {
                 let after = now.saturating_duration_since(*since);
                 if has_reached(given, &status) {
-                    self.end_order(Outcome::Confirmed);
+                    let done = active.order.done(Some(&status));
+                    self.end_order(done);
                 } else if let Some(because) = status.verdict.and_then(|verdict| verdict.because()) {
                     let last = self.status.as_ref().map(|status| status.seen(now));
                     let because = Some(because);
-                    self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because }));
+                    self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver {
+                        after,
+                        last,
+                        because,
+                        stop: None,
+                    }));
                 }
             }
             Phase::Verifying { job: Job::Start(_), error, until, seen, .. } => {
                 *seen = true;
                 let after = self.settings.times.effect.saturating_sub(until.saturating_duration_since(now));
                 let denied = denied(error);
-                self.judge_lost_start(now, status.verdict, after, denied);
+                self.judge_lost_start(now, &status, after, denied);
             }
             Phase::Verifying { job, error, seen, .. } => {
                 *seen = true;
@@ -158,24 +168,26 @@ impl Supervisor {
     }
 
     /// What the family says of a start whose answer was lost, so long after it.
-    fn judge_lost_start(
-        &mut self,
-        now: Instant,
-        verdict: Option<Verdict>,
-        after: Duration,
-        denied: Option<Outcome>,
-    ) {
+    fn judge_lost_start(&mut self, now: Instant, status: &Status, after: Duration, denied: Option<Outcome>) {
         let Some(active) = &self.active else { return };
-        match verdict {
-            Some(Verdict::InForce) => match active.order {
-                Order::Start { until: Until::AtReference, .. } => self.await_reference(now),
-                _ => self.end_order(Outcome::Confirmed),
-            },
+        match status.verdict {
+            Some(Verdict::InForce) => {
+                let done = active.order.done(Some(status));
+                match active.order {
+                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now, done),
+                    _ => self.end_order(done),
+                }
+            }
             // A drive may take a while to show a word that it holds.
             Some(Verdict::NotInForce { because, .. }) if after >= SETTLED_WITHIN => {
                 let last = self.status.as_ref().map(|status| status.seen(now));
                 let because = Some(because);
-                self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because }));
+                self.end_order(Outcome::NotConfirmed(Unconfirmed::TimeOver {
+                    after,
+                    last,
+                    because,
+                    stop: None,
+                }));
                 self.withdraw_start(now);
             }
             _ => {
@@ -226,7 +238,7 @@ impl Supervisor {
             Phase::Awaiting { since, until } if *until <= now => {
                 let after = now.saturating_duration_since(*since);
                 let last = self.status.as_ref().map(|status| status.seen(now));
-                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None })
+                Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None, stop: None })
             }
             _ => return,
         };

@@ -12,11 +12,17 @@ use crate::{
     event::EventKind,
     outcome::Outcome,
     settings::OnControlTaken,
+    snapshot::Link,
 };
 
-/// Who withdraws and stops here, as events name it.
-const TAKEN: Asker = Asker::Policy(Policy::ControlTaken);
-const TRIPPED: Asker = Asker::Policy(Policy::Tripped);
+/// Who withdraws and stops here, as events name it: by what the run command lacks.
+const fn by(lacks: Lack) -> Policy {
+    match lacks {
+        Lack::Output => Policy::OutputBlocked,
+        Lack::Reference => Policy::ReferenceTaken,
+        _ => Policy::ControlTaken,
+    }
+}
 
 /// A run command that is to be withdrawn.
 #[derive(Debug)]
@@ -48,8 +54,11 @@ impl Withdrawal {
 impl Supervisor {
     /// What a new status says of the run command of this side.
     pub(super) fn judge_run(&mut self, now: Instant) {
-        let Some(status) = self.status.as_ref() else { return };
-        match status.value.verdict {
+        let Some(verdict) = self.status.as_ref().map(|status| status.value.verdict) else { return };
+        if self.judge_adoption(verdict) {
+            return;
+        }
+        match verdict {
             Some(Verdict::NotInForce { lacks, because }) => self.run_suspended(now, lacks, because),
             Some(Verdict::InForce) => {
                 (self.suspended, self.reported) = (None, false);
@@ -86,10 +95,10 @@ impl Supervisor {
         match (tripped, lacks) {
             // Where its own restart is accepted the command stands for that.
             (true, _) if !self.settings.accept_self_restart.is_empty() => {}
-            (true, _) => self.withdraw(now, TRIPPED),
+            (true, _) => self.withdraw(now, Policy::Tripped),
             (false, _) if self.reported => {}
             (false, lack) if self.settings.accept_resume.contains(&lack) => {}
-            (false, _) => self.withdraw(now, TAKEN),
+            (false, lack) => self.withdraw(now, by(lack)),
         }
     }
 
@@ -98,8 +107,10 @@ impl Supervisor {
         self.stopping.is_some() || self.is_being_started()
     }
 
-    fn withdraw(&mut self, now: Instant, asker: Asker) {
-        if self.settings.control && !self.ends_by_itself() && self.withdrawal.is_none() {
+    fn withdraw(&mut self, now: Instant, policy: Policy) {
+        let is_another = self.checks.is_another();
+        if self.settings.control && !is_another && !self.ends_by_itself() && self.withdrawal.is_none() {
+            let asker = Asker::Policy(policy);
             let alarm_at = Some(now + self.settings.times.stop_alarm);
             self.withdrawal =
                 Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at, stands: None });
@@ -108,7 +119,12 @@ impl Supervisor {
 
     pub(super) fn withdraw_job(&self, now: Instant) -> Option<Job> {
         let due = self.withdrawal.as_ref()?.next_try? <= now;
-        due.then_some(Job::Withdraw)
+        if !due {
+            return None;
+        }
+        // Nothing is written to a drive of which nobody knows which it is, as long as it has not been asked.
+        let asks = self.checks.identity_job(now).filter(|_| self.link == Link::Connected);
+        Some(asks.unwrap_or(Job::Withdraw))
     }
 
     pub(super) fn handle_withdrawn(&mut self, now: Instant, result: Result<Withdrawn>) {

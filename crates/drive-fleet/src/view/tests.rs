@@ -17,7 +17,7 @@ use tokio::time::{Instant, advance};
 use crate::{
     Act, Alarms, Band, Cause, ChangedWord, Commanders, Counters, DriveSettings, Event, EventKind, ExitAction,
     FrequencyLimits, IdentityCheck, LastSeen, Limit, LimitProblem, Link, OnExit, OnFault, OnLoss, Outcome,
-    PendingStop, Periods, Policy, Refused, Snapshot, StopReport, Timed, Trip, Unconfirmed, Unknown,
+    PendingStop, Periods, Policy, Refused, Snapshot, Started, StopReport, Timed, Trip, Unconfirmed, Unknown,
     WatchdogBefore, WatchdogCheck, WatchdogContract,
     view::{EventView, Happened, SnapshotView},
 };
@@ -42,6 +42,7 @@ fn nothing_known() -> Snapshot {
         link: Link::Connecting,
         error: None,
         status: None,
+        retracted: false,
         measurements: None,
         setpoint: None,
         identity: IdentityCheck::Unchecked,
@@ -50,6 +51,7 @@ fn nothing_known() -> Snapshot {
         restarts_accepted: true,
         control_taken: None,
         run_command_stands: None,
+        eeprom_worn: None,
         exceeded: Vec::new(),
         since: Vec::new(),
         stop: None,
@@ -68,9 +70,9 @@ fn a_drive_that_was_never_seen_has_no_value() {
     is(
         nothing_known(),
         json!({
-            "name": "pump 1", "link": "connecting", "status": {"quality": "missing"},
+            "name": "pump 1", "shows": "connecting", "link": "connecting", "status": {"quality": "missing"},
             "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"},
-            "concerns": [{"kind": "never_seen", "rank": 15, "severity": "note", "wakes": false, "text": "not seen yet",
+            "concerns": [{"kind": "never_seen", "rank": crate::ConcernKind::NeverSeen.rank(), "severity": "note", "wakes": false, "text": "not seen yet",
                 "remedy": "wait, or look at its supply, its address and its cable"}],
             "watchdog": {"check": "no_contract"}, "start_refused": "the drive does not answer",
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}
@@ -107,7 +109,7 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
     is(
         &snapshot,
         json!({
-            "name": "pump 1", "link": "connected",
+            "name": "pump 1", "shows": "stop_pending", "link": "connected",
             "status": {"quality": "good", "age_ms": 120, "state": "running", "motion": "driven",
                 "output_frequency_hz": 30.0, "raw": []},
             "measurements": {"quality": "good", "age_ms": 10_120, "before_trip": false, "torque_percent": 40.0, "raw": []},
@@ -180,7 +182,7 @@ fn what_could_be_checked_of_identity_and_watchdog_is_told_in_words() {
 fn an_outcome_is_one_of_six_words_with_its_reason() {
     let slave = SlaveAddress::try_from(7).unwrap();
     let because = Some(Refusal::NotInControl(Control::Panel));
-    let over = Unconfirmed::TimeOver { after: Duration::from_secs(2), last: None, because };
+    let over = Unconfirmed::TimeOver { after: Duration::from_secs(2), last: None, because, stop: None };
     let asked = Frequency::from_hertz(31);
     let band = Band { low: Frequency::from_hertz(30), high: Frequency::from_hertz(32) };
     let setpoint = Speed::from_rpm(900).into();
@@ -190,7 +192,7 @@ fn an_outcome_is_one_of_six_words_with_its_reason() {
     for (outcome, word, reason) in [
         (Outcome::Confirmed, "confirmed", None),
         (Outcome::Expired, "expired", None),
-        (Outcome::OutcomeUnknown(Unknown { error: None, last: None }), "unknown", None),
+        (Outcome::OutcomeUnknown(Unknown { error: None, last: None, stop: None }), "unknown", None),
         (Outcome::NotConfirmed(over), "not_confirmed", Some("not_remote")),
         (Outcome::NotConfirmed(Unconfirmed::Denied(denied)), "not_confirmed", Some("denied")),
         (Outcome::NotConfirmed(Unconfirmed::Lost), "not_confirmed", Some("offline")),
@@ -214,6 +216,13 @@ fn an_outcome_is_one_of_six_words_with_its_reason() {
         assert_eq!((&told["outcome"], told.get("reason")), (&json!(word), reason.map(Value::from).as_ref()));
         assert_eq!(told.get("text").is_some(), !matches!(word, "confirmed" | "expired"), "{told}");
     }
+    is(
+        Outcome::Started(Started { direction: Direction::Forward, reference: Some(Frequency::ZERO) }),
+        json!({
+            "outcome": "confirmed", "started": {"direction": "forward", "reference_hz": 0.0},
+            "text": "started forward at 0.00 Hz: its setpoint is zero"
+        }),
+    );
     is(
         Outcome::Refused(Refused::ReadOnly),
         json!({"outcome": "refused", "reason": "read_only", "text": "the drive is only read: its settings say control = false"}),
@@ -263,9 +272,13 @@ fn every_kind() -> Vec<EventKind> {
     let watchdog = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
     let before = WatchdogBefore { identity: "one".to_owned(), set: watchdog, found: watchdog };
     let seen = LastSeen { status: status(State::Running).value, age: Duration::from_millis(120) };
-    let over =
-        Unconfirmed::TimeOver { after: Duration::from_secs(2), last: Some(seen.clone()), because: None };
-    let unknown = Outcome::OutcomeUnknown(Unknown { error: Some(error()), last: Some(seen) });
+    let over = Unconfirmed::TimeOver {
+        after: Duration::from_secs(2),
+        last: Some(seen.clone()),
+        because: None,
+        stop: None,
+    };
+    let unknown = Outcome::OutcomeUnknown(Unknown { error: Some(error()), last: Some(seen), stop: None });
     let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
     let trip = Box::new(Trip {
         at: Instant::now(),

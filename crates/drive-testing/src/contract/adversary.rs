@@ -15,6 +15,7 @@ use super::Contract;
 use crate::{
     recorder::{Habit, Recorder, Witness},
     rig::Rig,
+    truth::TOLERANCE,
 };
 
 /// What is asked of every drive here.
@@ -23,8 +24,6 @@ const SETPOINT: Frequency = Frequency::from_hertz(20);
 const OTHER: Frequency = Frequency::from_hertz(25);
 /// Longer than every ramp from there, and than a family waits for a confirmation.
 const SETTLED: Duration = Duration::from_secs(12);
-/// What is seen of a motor that stands, in hundredths of a hertz.
-const TOLERANCE: i32 = 20;
 
 /// What a family does that its contract forbids.
 #[derive(Debug, Clone, PartialEq, Eq)]

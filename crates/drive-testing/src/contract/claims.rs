@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Direction, Error, ErrorKind, Frequency, Reaction, Speed, State, StopMode};
+use drive_core::{Direction, Error, ErrorKind, Frequency, Percent, Reaction, Speed, State, StopMode};
 
 use super::Contract;
 use crate::rig::Rig;
@@ -28,6 +28,9 @@ impl Contract {
         rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("every family takes hertz");
         let by_speed = rig.drive.set_setpoint(Speed::from_rpm(900).into()).await;
         assert_eq!(is_unsupported(by_speed), !claims.speed_setpoint, "{name}: a setpoint in rpm");
+        // Whoever takes one takes it where it is set up to count so.
+        let by_share = rig.drive.set_setpoint(Percent::from_percent(50).into()).await;
+        assert!(is_unsupported(by_share) || claims.share_setpoint, "{name}: a setpoint in percent");
         let says = claims.identification.is_some() && !self.identifies_elsewhere;
         assert_eq!(is_unsupported(rig.drive.identify().await), !says, "{name}");
         assert_eq!(is_unsupported(rig.drive.persist().await), claims.persist.is_none(), "{name}: saving");

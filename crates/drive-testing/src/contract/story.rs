@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Command, Direction, Error, ErrorKind, Frequency, Motion, Reaction, Refusal, State, StopMode,
+    Command, Direction, Error, ErrorKind, Frequency, Motion, Reaction, Refusal, State, Status, StopMode,
 };
 
 use super::{Contract, claims::reset};
@@ -71,11 +71,7 @@ async fn it_stops_by_each_mode_that_it_claims_and_by_another_for_the_rest(rig: &
         assert_ne!(stopped.status.state, State::Running, "{mode}");
         if stopped.mode == StopMode::DcInjection {
             // Some drives inject for as long as they are told to.
-            rig.until("the motor is held", |status| match status.motion {
-                Motion::NotKnown => status.output_frequency == Some(Frequency::ZERO),
-                _ => status.is_standstill(),
-            })
-            .await;
+            rig.until("the motor is held", Status::is_standstill).await;
             rig.drive.stop(StopMode::Ramp).await.expect("it ends the injection");
         }
         // Of a motor whose output was cut nobody knows when it stands.

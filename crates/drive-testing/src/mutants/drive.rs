@@ -5,8 +5,9 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Frequency, Ground, Identity, Intent,
-    Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Result, Row, SelfRestart, Setpoint,
-    SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability, Withdrawn, Written,
+    KeptReadings, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Result, Row, SelfRestart,
+    Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability, Withdrawn,
+    Written,
 };
 
 use super::{Mutant, port::Tap};
@@ -72,6 +73,10 @@ impl Drive for Faulty {
         self.drive.lifetimes_mut()
     }
 
+    fn kept_mut(&mut self) -> Option<&mut KeptReadings> {
+        self.drive.kept_mut()
+    }
+
     fn forget(&mut self) {
         if self.is(Mutant::ForgetForgetsNothing) {
             return;
@@ -84,6 +89,10 @@ impl Drive for Faulty {
         self.drive.lease().filter(|_| !self.ended)
     }
 
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        self.drive.run_word_for(direction)
+    }
+
     fn adopt(&mut self, lease: Lease) {
         self.drive.adopt(lease);
     }
@@ -94,6 +103,10 @@ impl Drive for Faulty {
 
     fn set_coast_time(&mut self, time: Option<Duration>) {
         self.drive.set_coast_time(time);
+    }
+
+    fn set_injection_time(&mut self, time: Option<Duration>) {
+        self.drive.set_injection_time(time);
     }
 
     fn recognise(&self, identity: &Identity) -> Recognised {

@@ -37,6 +37,8 @@ pub struct Silence {
     pub source: &'static str,
     /// What it does not say.
     pub question: &'static str,
+    /// What the driver of this house does there, where it is written down.
+    pub driver: Option<&'static str>,
 }
 
 /// An answer with its source, or the question that stays open.
@@ -298,12 +300,15 @@ macro_rules! rules {
 
 /// Silences of one family.
 macro_rules! silences {
-    ($family:ident $all:ident $($name:ident $source:literal $question:literal;)*) => {
+    (@driver) => { None };
+    (@driver $driver:literal) => { Some($driver) };
+    ($family:ident $all:ident $($name:ident $source:literal $question:literal $(=> $driver:literal)?;)*) => {
         $(pub(super) static $name: Silence = Silence {
             family: Family::$family,
             name: stringify!($name),
             source: $source,
             question: $question,
+            driver: silences!(@driver $($driver)?),
         };)*
         pub(super) static $all: &[&Silence] = &[$(&$name),*];
     };

@@ -195,6 +195,15 @@ mod tests {
     }
 
     #[test]
+    fn where_a_manual_is_silent_it_is_written_down_what_the_driver_does() {
+        for family in [Family::Atv21, Family::Omron3g3ev] {
+            for silence in family.manual().silences() {
+                assert!(silence.driver.is_some(), "{family:?}: {}", silence.name);
+            }
+        }
+    }
+
+    #[test]
     fn names_of_a_family_are_its_own() {
         for family in Family::ALL {
             let mut names: Vec<_> = family.manual().rules().iter().map(|rule| rule.name).collect();

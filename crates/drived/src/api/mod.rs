@@ -3,6 +3,7 @@
 mod ask;
 mod capture;
 mod command;
+mod compress;
 pub(crate) mod demo;
 mod document;
 mod health;
@@ -20,6 +21,7 @@ use axum::{
     body::Bytes,
     extract::DefaultBodyLimit,
     http::header::{CACHE_CONTROL, CONTENT_TYPE},
+    middleware::from_fn,
     response::{IntoResponse as _, Response},
     routing::{any, get},
 };
@@ -76,5 +78,6 @@ fn of(mut routes: Vec<Route>, plant: Plant) -> Router {
         .route("/api/{*rest}", any(|| async { Problem::not_found("there is nothing at this address") }))
         .method_not_allowed_fallback(async || Problem::method_not_allowed())
         .layer(DefaultBodyLimit::max(LARGEST_BODY))
+        .layer(from_fn(compress::over_a_slow_network))
         .with_state(plant)
 }

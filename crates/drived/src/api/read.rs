@@ -2,11 +2,11 @@
 
 use axum::{
     Json,
-    extract::State,
+    extract::{Query, State, rejection::QueryRejection},
     http::{HeaderValue, header::CACHE_CONTROL},
     response::{IntoResponse, Response},
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     ask::{Named, Viewer},
@@ -38,12 +38,19 @@ pub(super) async fn settings(
     plant.settings(&name).map(|settings| fresh(&settings)).ok_or_else(|| no_drive(&name))
 }
 
+#[derive(Deserialize)]
+pub(super) struct SinceTime {
+    since_unix_ms: Option<u64>,
+}
+
 pub(super) async fn history(
     State(plant): State<Plant>,
     _: Viewer,
     Named(name): Named,
+    since: Result<Query<SinceTime>, QueryRejection>,
 ) -> Result<Response, Problem> {
-    plant.history(&name).map(|history| fresh(&history)).ok_or_else(|| no_drive(&name))
+    let Query(SinceTime { since_unix_ms }) = since?;
+    plant.history(&name, since_unix_ms).map(|history| fresh(&history)).ok_or_else(|| no_drive(&name))
 }
 
 pub(super) async fn lines(State(plant): State<Plant>, _: Viewer) -> Response {

@@ -14,7 +14,7 @@ use super::{
     read, reload, stream,
 };
 use crate::doors::{
-    LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, SessionView, TOKENS, TokensView,
+    LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, Rotation, SessionView, TOKENS, TokensView,
 };
 use crate::plant::{
     Plant,
@@ -72,6 +72,11 @@ const DRY_RUN: Parameter =
     Parameter { name: "dry_run", about: "only say what would change", kind: "boolean" };
 const SINCE: Parameter =
     Parameter { name: "since", about: "the revision that the reader has", kind: "integer" };
+const SINCE_TIME: Parameter = Parameter {
+    name: "since_unix_ms",
+    about: "the time of the last sample that the reader has: what came later is told",
+    kind: "integer",
+};
 
 impl Route {
     fn new<H, T>(method: Method, path: &'static str, handler: H, about: &'static str) -> Self
@@ -193,8 +198,18 @@ pub(super) fn door_routes() -> Vec<Route> {
     );
     new.body = Some(SchemaGenerator::subschema_for::<NewToken>);
     let removed = "/api/v1/tokens/{name}";
+    let mut other = on_socket(
+        Route::elsewhere(
+            Method::PUT,
+            removed,
+            "Replaces a token by another of its name, over the control socket",
+        )
+        .answers::<MadeToken>(200, "the other one, told this once"),
+    );
+    other.body = Some(SchemaGenerator::subschema_for::<Rotation>);
     vec![
         login,
+        other,
         post(LOGOUT, "Ends the session of the cookie"),
         on_socket(
             Route::elsewhere(Method::GET, TOKENS, "All tokens, over the control socket")
@@ -243,6 +258,7 @@ fn reads() -> Vec<Route> {
             "its periods, times, limits, alarms and policies, and what the plan makes of them",
         ),
         Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
+            .with_query(SINCE_TIME)
             .answers::<HistoryView>(200, "the history"),
         Route::get("/api/v1/drives/{name}/faults", parameter::faults, "What a drive says of its faults")
             .answers::<Faults>(200, "the present faults, the alarms and the history")

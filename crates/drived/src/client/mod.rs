@@ -10,16 +10,15 @@ mod watch;
 
 use std::path::PathBuf;
 
+#[cfg(test)]
+pub(crate) use self::show::overview_text;
 pub(crate) use self::{
     connection::{Answer, Daemon, Way},
     holder::{explain, whose},
     names::{Target, path_of, wanted},
     order::{Told, order},
-    remote::{Remote, timely},
-    show::{
-        age, concern, concerns, fault_in_words, faults, measured, measurement, overview, registers,
-        state_in_words, status_in_words, whole, words,
-    },
+    remote::{AGAIN, GIVEN_UP_AFTER, Remote, timely},
+    show::{faults, overview, registers, whole},
     watch::{Frames, Heard, watch},
 };
 use crate::{failure::Failure, output};

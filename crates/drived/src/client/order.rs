@@ -133,7 +133,12 @@ fn name(command: &CommandView) -> &str {
 fn sentence(told: &Told, command: &CommandView) -> String {
     let shows = command.status.as_ref().and_then(|shown| shown.status());
     let shows = shows.map(|shows| format!(": the drive shows {shows}")).unwrap_or_default();
-    format!("{} {}{shows}", name(command), told.done)
+    if let Some(started) = command.started {
+        return format!("{} {started}{shows}", name(command));
+    }
+    let by = command.stop.is_some().then_some(command.text.as_deref()).flatten();
+    let by = by.map(|by| format!(", {by}")).unwrap_or_default();
+    format!("{} {}{by}{shows}", name(command), told.done)
 }
 
 fn why(command: &CommandView) -> String {

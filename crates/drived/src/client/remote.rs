@@ -15,6 +15,11 @@ use crate::{
 /// How long an answer may take before the daemon is asked on another connection.
 pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
 
+/// A stop that the daemon has not got is told it again, by whoever gives it: so long between two tries, and for so long. The
+/// page does the same. What the daemon has it repeats itself until the drive confirms it.
+pub(crate) const AGAIN: Duration = Duration::from_millis(500);
+pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(60);
+
 /// What is asked again and again what became of a command.
 pub(crate) struct Remote {
     daemon: Daemon,

@@ -1,8 +1,7 @@
 //! What the daemon knows, for a person: every value with its age, an old one never as if it were live.
 
 use drive_core::Faults;
-use drive_fleet::view::ConcernView;
-use serde_json::{Value, json};
+use tokio::time::Instant;
 
 use super::Target;
 use crate::{
@@ -12,7 +11,13 @@ use crate::{
         parameters::ParameterView,
         views::{DriveView, LineLink, StateView},
     },
+    row::{Column, Row},
+    values,
 };
+
+/// The columns of the overview.
+const COLUMNS: [Column; 5] =
+    [Column::State, Column::Frequency, Column::Current, Column::Control, Column::Age];
 
 /// The drives of a target, one a line, and what is wrong with the lines. Those in trouble come first.
 ///
@@ -20,48 +25,54 @@ use crate::{
 ///
 /// A drive does not answer.
 pub(crate) fn overview(state: &StateView, target: &Target) -> Result<(), Failure> {
-    let told: Vec<Value> = of_target(state, target).map(|drive| json!(drive)).collect();
-    let drives: Vec<&Value> = told.iter().collect();
-    let mut sorted = drives.clone();
-    // Stable: behind those in trouble the order is that of the configuration.
-    sorted.sort_by_key(|drive| concern(drive).map_or(usize::MAX, |concern| concern.rank));
-    let mut table = Table::new(["drive", "state", "output", "setpoint", "current", "age"]);
-    for drive in &sorted {
-        let status = &drive["status"];
-        let old = status["quality"] != "good";
-        // An old value is set in brackets: it is what was, not what is.
-        let shown = |text: Option<String>| {
-            let text = output::or_dash(text);
-            if old && text != "-" { format!("({text})") } else { text }
-        };
-        table.row([
-            name(drive).to_owned(),
-            state_in_words(drive),
-            shown(hertz(&status["output_frequency_hz"])),
-            output::or_dash(
-                hertz(&drive["setpoint"]["frequency_hz"]).or_else(|| rpm(&drive["setpoint"]["speed_rpm"])),
-            ),
-            shown(current(status)),
-            output::or_dash(status["age_ms"].as_u64().map(age)),
-        ]);
-    }
-    output::say_table(table)?;
-    for drive in sorted {
-        if let Some(concern) = concern(drive) {
-            output::say(format_args!("{}: {}", name(drive), concern.text))?;
-        }
-    }
-    for line in state.lines.iter().filter(|line| line.link == LineLink::Away) {
-        let why = line.error.as_deref().unwrap_or("nobody answers");
-        output::say(format_args!("line {} is away: {why}", line.name))?;
-    }
+    let drives: Vec<&DriveView> = of_target(state, target).collect();
+    output::say_table(table(&drives, Instant::now()))?;
+    troubles(state, &drives).iter().try_for_each(output::say)?;
     answering(&drives)
 }
 
+/// What [`overview`] says.
+#[cfg(test)]
+pub(crate) fn overview_text(state: &StateView, target: &Target) -> String {
+    let drives: Vec<&DriveView> = of_target(state, target).collect();
+    format!("{}\n{}", table(&drives, Instant::now()), troubles(state, &drives).join("\n"))
+}
+
+/// What troubles drives and lines, in a sentence each.
+fn troubles(state: &StateView, drives: &[&DriveView]) -> Vec<String> {
+    let of_drives = sorted(drives)
+        .into_iter()
+        .filter_map(|drive| Some(format!("{}: {}", drive.name(), drive.snapshot.concern()?.text)));
+    let away = state.lines.iter().filter(|line| line.link == LineLink::Away).map(|line| {
+        let why = line.error.as_deref().unwrap_or("nobody answers");
+        format!("line {} is away: {why}", line.name)
+    });
+    of_drives.chain(away).collect()
+}
+
+/// The drives, one a row.
+fn table(drives: &[&DriveView], now: Instant) -> Table {
+    let heads = ["drive"].into_iter().chain(COLUMNS.map(Column::head));
+    let mut table = Table::headed(heads.map(str::to_owned));
+    for drive in sorted(drives) {
+        let row = Row::of(drive, now);
+        let cells = COLUMNS.map(|column| row.cell(column).to_owned());
+        table.cells([row.name].into_iter().chain(cells));
+    }
+    table
+}
+
+/// Those in trouble first, behind them in the order of the configuration.
+fn sorted<'a>(drives: &[&'a DriveView]) -> Vec<&'a DriveView> {
+    let mut sorted = drives.to_vec();
+    sorted.sort_by_key(|drive| drive.snapshot.rank());
+    sorted
+}
+
 /// Whether every drive answers.
-fn answering(drives: &[&Value]) -> Result<(), Failure> {
-    let silent: Vec<&str> =
-        drives.iter().filter(|drive| drive["status"]["quality"] != "good").map(|drive| name(drive)).collect();
+fn answering(drives: &[&DriveView]) -> Result<(), Failure> {
+    let silent = drives.iter().filter(|drive| !drive.snapshot.status.is_good());
+    let silent: Vec<&str> = silent.map(|drive| drive.name()).collect();
     match silent.len() {
         0 => Ok(()),
         1 => Err(Failure::Drive(format!("{} does not answer", silent.join("")))),
@@ -78,51 +89,61 @@ fn answering(drives: &[&Value]) -> Result<(), Failure> {
 /// # Errors
 ///
 /// The drive does not answer.
-pub(crate) fn whole(drive: &Value, all: bool) -> Result<(), Failure> {
-    let family = drive["family"].as_str().unwrap_or_default();
-    let place = format!("{family}@{} on line {}", drive["slave"], drive["line"].as_str().unwrap_or("?"));
-    output::say(format_args!("{} {place}", name(drive)))?;
+pub(crate) fn whole(drive: &DriveView, all: bool) -> Result<(), Failure> {
+    let DriveView { line, slave, family, snapshot: known, .. } = drive;
+    output::say(format_args!("{} {family}@{slave} on line {line}", drive.name()))?;
     let mut table = Table::texts();
     let mut row = |label: &str, value: Option<String>| {
         if let Some(value) = value {
             table.row([format!("  {label}"), value]);
         }
     };
-    let status = &drive["status"];
-    let fresh = status["quality"] == "good";
-    row("state", Some(state_in_words(drive)));
-    row("status", (!fresh).then(|| old_in_words(status)));
-    row("why", drive["error"].as_str().map(str::to_owned));
-    let dated = |text: String| if fresh { text } else { format!("({text})") };
-    row("output frequency", hertz(&status["output_frequency_hz"]).map(dated));
-    row("motor current", current(status).map(dated));
-    row(
-        "setpoint",
-        hertz(&drive["setpoint"]["frequency_hz"]).or_else(|| rpm(&drive["setpoint"]["speed_rpm"])),
-    );
-    row("control", status["control"].as_str().map(words).map(dated));
-    row("age", status["age_ms"].as_u64().map(age));
-    row("words", raw(status));
-    let fault = &drive["fault"];
-    if fault.is_object() {
-        row("fault", Some(fault_in_words(fault)));
-        row("what to do", fault["remedy"].as_str().map(str::to_owned));
+    let now = Instant::now();
+    let is_live = known.status.is_good();
+    row("state", Some(Row::of(drive, now).cell(Column::State).to_owned()));
+    let status = known.status.value.as_ref();
+    let age = status.and_then(|status| status.at).map(|at| output::age(now.saturating_duration_since(at)));
+    row("status", (!is_live).then(|| old_in_words(age.as_deref())));
+    row("why", known.error.clone());
+    let dated = |text: String| if is_live { text } else { format!("({text})") };
+    for (label, value) in status.into_iter().flat_map(values::status) {
+        row(label, Some(dated(value)));
     }
-    for concern in concerns(drive) {
-        row("trouble", Some(concern.text));
-        row("what to do", Some(concern.remedy));
+    row("setpoint", known.setpoint.map(|setpoint| setpoint.to_string()));
+    row("age", age);
+    if let Some(trip) = &known.fault {
+        row("fault", Some(values::tripped(trip.fault.as_ref())));
+        row("what to do", trip.fault.and_then(|fault| fault.remedy()).map(str::to_owned));
     }
-    row("starts by itself", list(&drive["starts_by_itself"]));
-    row("start", drive["start_refused"].as_str().map(|why| format!("would be refused: {why}")));
-    row("watchdog", drive["watchdog"]["check"].as_str().map(words));
-    if all {
-        for (key, value) in drive["measurements"].as_object().into_iter().flatten() {
-            let (label, value) = measurement(key, value);
-            row(&label, value);
+    for concern in &known.concerns {
+        row("trouble", Some(concern.text.clone()));
+        row("what to do", Some(concern.remedy.clone()));
+    }
+    let restarts = known.starts_by_itself.as_ref().filter(|codes| !codes.is_empty());
+    row("starts by itself", restarts.map(|codes| codes.join(", ")));
+    row("start", known.start_refused.as_ref().map(|why| format!("would be refused: {why}")));
+    row("watchdog", Some(values::watchdog(&known.watchdog)));
+    if let Some(measured) = known.measurements.value.as_ref().filter(|_| all) {
+        let old = |at: Instant| format!("{} ago", output::age(now.saturating_duration_since(at)));
+        row("measured", measured.at.map(old));
+        let is_live = known.measurements.is_good();
+        for (label, value) in values::measurements(measured) {
+            row(label, Some(if is_live { value } else { format!("({value})") }));
         }
     }
     output::say_table(table)?;
     answering(&[drive])
+}
+
+fn old_in_words(age: Option<&str>) -> String {
+    match age {
+        Some(age) => format!("NOT LIVE: what stands in brackets was so {age} ago"),
+        None => "NOT LIVE: nothing is known".to_owned(),
+    }
+}
+
+fn of_target<'a>(state: &'a StateView, target: &'a Target) -> impl Iterator<Item = &'a DriveView> {
+    state.drives.iter().filter(|drive| target.has(state, drive.name()))
 }
 
 /// The present faults and the history of one drive.
@@ -168,183 +189,25 @@ pub(crate) fn registers(rows: &[ParameterView]) -> Result<(), Failure> {
     output::say_table(table)
 }
 
-/// A status in one line; nothing where there is none.
-pub(crate) fn status_in_words(status: &Value) -> Option<String> {
-    let state = status["state"].as_str().map(words)?;
-    let parts = [
-        Some(state),
-        status["direction"].as_str().map(words),
-        hertz(&status["output_frequency_hz"]),
-        current(status),
-        (status["at_reference"] == true).then(|| "at reference".to_owned()),
-        status["control"].as_str().map(|control| format!("control: {}", words(control))),
-    ];
-    Some(parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
-}
-
-fn of_target<'a>(state: &'a StateView, target: &'a Target) -> impl Iterator<Item = &'a DriveView> {
-    state.drives.iter().filter(|drive| target.has(state, drive.name()))
-}
-
-fn name(drive: &Value) -> &str {
-    drive["name"].as_str().unwrap_or("?")
-}
-
-/// All that troubles a drive, as the daemon tells it, the worst first.
-pub(crate) fn concerns(drive: &Value) -> Vec<ConcernView> {
-    serde_json::from_value(drive["concerns"].clone()).unwrap_or_default()
-}
-
-/// The worst that troubles a drive.
-pub(crate) fn concern(drive: &Value) -> Option<ConcernView> {
-    concerns(drive).into_iter().next()
-}
-
-/// What a drive does, as far as that is known: an old state is one that was.
-pub(crate) fn state_in_words(drive: &Value) -> String {
-    let status = &drive["status"];
-    let state = status["state"].as_str().map(words);
-    let state = match (state, status["direction"].as_str()) {
-        (Some(state), Some("reverse")) => Some(format!("{state} reverse")),
-        (state, _) => state,
-    };
-    let pending = if drive["stop"].is_object() { ", stop pending" } else { "" };
-    match (drive["link"].as_str(), status["quality"].as_str(), state) {
-        (Some("connecting"), _, None) => "connecting".to_owned(),
-        (_, Some("good"), Some(state)) => {
-            let fault = drive["fault"]["mnemonic"].as_str().filter(|_| state == "fault");
-            format!("{}{pending}", fault.map_or(state.clone(), |fault| format!("{state} {fault}")))
-        }
-        (_, _, Some(state)) => format!("LOST, was {state}{pending}"),
-        (_, _, None) => format!("LOST{pending}"),
-    }
-}
-
-fn old_in_words(status: &Value) -> String {
-    match status["age_ms"].as_u64() {
-        Some(old) => format!("NOT LIVE: what stands in brackets was so {} ago", age(old)),
-        None => "NOT LIVE: nothing is known".to_owned(),
-    }
-}
-
-/// The code, the mnemonic and the meaning of a fault.
-pub(crate) fn fault_in_words(fault: &Value) -> String {
-    let code = fault["code"].as_u64().map(|code| code.to_string());
-    let mnemonic = fault["mnemonic"].as_str().map(|mnemonic| format!("{mnemonic}:"));
-    let meaning = fault["meaning"].as_str().map(str::to_owned);
-    [code, mnemonic, meaning].into_iter().flatten().collect::<Vec<_>>().join(" ")
-}
-
-fn raw(status: &Value) -> Option<String> {
-    let words = status["raw"].as_array()?.iter();
-    let words =
-        words.filter_map(|word| Some(format!("{} {:04X}h", word["code"].as_str()?, word["value"].as_u64()?)));
-    Some(words.collect::<Vec<_>>().join(", ")).filter(|words| !words.is_empty())
-}
-
-fn list(values: &Value) -> Option<String> {
-    let values: Vec<&str> = values.as_array()?.iter().filter_map(Value::as_str).collect();
-    (!values.is_empty()).then(|| values.join(", "))
-}
-
-/// A key's name and its unit, which is its last word.
-fn key_without_unit(key: &str) -> (&str, &str) {
-    const UNITS: [(&str, &str); 9] = [
-        ("_hz", "Hz"),
-        ("_a", "A"),
-        ("_v", "V"),
-        ("_percent", "%"),
-        ("_kw", "kW"),
-        ("_kwh", "kWh"),
-        ("_rpm", "rpm"),
-        ("_h", "h"),
-        ("_ms", "ms"),
-    ];
-    let unit = UNITS.iter().find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, *unit)));
-    unit.unwrap_or((key, ""))
-}
-
-/// A measurement's label and its value in its unit; no value where it is none for a person.
-pub(crate) fn measurement(key: &str, value: &Value) -> (String, Option<String>) {
-    let label = if key == "age_ms" { "measured".to_owned() } else { words(key_without_unit(key).0) };
-    (label, measured(key, value))
-}
-
-/// A value with the unit that its key says; nothing where it is only a mark.
-pub(crate) fn measured(key: &str, value: &Value) -> Option<String> {
-    let (_, unit) = key_without_unit(key);
-    match (key, value) {
-        ("quality", value) if value == "good" => None,
-        ("age_ms", value) => value.as_u64().map(|old| format!("{} ago", age(old))),
-        ("inputs" | "outputs", value) => value.as_u64().map(|bits| format!("{bits:016b}")),
-        (_, Value::String(text)) => Some(words(text)),
-        (_, Value::Number(number)) => Some(format!("{number} {unit}").trim_end().to_owned()),
-        (_, Value::Bool(yes)) => Some(if *yes { "yes" } else { "no" }.to_owned()),
-        _ => None,
-    }
-}
-
-/// A key, or a word of the API, as a person reads it.
-pub(crate) fn words(text: &str) -> String {
-    text.replace('_', " ")
-}
-
-fn hertz(value: &Value) -> Option<String> {
-    value.as_f64().map(|value| format!("{value:.2} Hz"))
-}
-
-fn rpm(value: &Value) -> Option<String> {
-    value.as_f64().map(|value| format!("{value:.0} rpm"))
-}
-
-fn current(status: &Value) -> Option<String> {
-    let share = || status["current_percent"].as_f64().map(|value| format!("{value:.2} %"));
-    status["current_a"].as_f64().map(|value| format!("{value:.1} A")).or_else(share)
-}
-
-/// An age as a person says it.
-pub(crate) fn age(milliseconds: u64) -> String {
-    match milliseconds {
-        0..10_000 => format!("{}.{} s", milliseconds / 1_000, milliseconds % 1_000 / 100),
-        10_000..120_000 => format!("{} s", milliseconds / 1_000),
-        120_000..7_200_000 => format!("{} min", milliseconds / 60_000),
-        _ => format!("{} h", milliseconds / 3_600_000),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_old_value_is_never_shown_as_if_it_were_live() {
-        let mut drive = json!({
-            "name": "pump 1", "link": "connected",
-            "status": {"quality": "good", "age_ms": 120, "state": "running", "output_frequency_hz": 30.0},
-        });
-        assert_eq!(state_in_words(&drive), "running");
-        assert_eq!(answering(&[&drive]), Ok(()));
-        drive["link"] = "lost".into();
-        drive["status"]["quality"] = "stale".into();
-        drive["status"]["age_ms"] = 21_000.into();
-        assert_eq!(state_in_words(&drive), "LOST, was running");
-        assert_eq!(old_in_words(&drive["status"]), "NOT LIVE: what stands in brackets was so 21 s ago");
-        assert_eq!(answering(&[&drive]), Err(Failure::Drive("pump 1 does not answer".to_owned())));
-    }
+    use crate::plant::testing::{read, told};
 
     #[tokio::test(start_paused = true)]
-    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
-        for (_, drive, worst) in crate::plant::testing::every_pair_of_troubles(tokio::time::Instant::now()) {
-            assert_eq!(concern(&drive).map(|concern| concern.text), Some(worst));
-        }
-    }
-
-    #[test]
-    fn a_measurement_has_the_unit_of_its_key() {
-        assert_eq!(measured("speed_rpm", &json!(890)), Some("890 rpm".to_owned()));
-        assert_eq!(measured("output_power_kw", &json!(0.75)), Some("0.75 kW".to_owned()));
-        assert_eq!(measured("inputs", &json!(3)), Some("0000000000000011".to_owned()));
-        assert_eq!(measured("quality", &json!("good")), None);
-        assert_eq!(key_without_unit("output_energy_kwh"), ("output_energy", "kWh"));
+    async fn who_is_silent_is_named_and_stands_first() {
+        let mut lost = told("pump 2");
+        (lost["shows"], lost["link"]) = ("lost".into(), "lost".into());
+        lost["concerns"] = serde_json::json!([{"kind": "lost", "rank": 8, "severity": "alarm", "wakes": false,
+            "text": "does not answer", "remedy": "look"}]);
+        let mut good = told("pump 1");
+        good["status"] = serde_json::json!({"quality": "good", "state": "ready", "raw": []});
+        let [good, lost] = [read(&good), read(&lost)];
+        assert_eq!(answering(&[&good]), Ok(()));
+        let silent = Failure::Drive("pump 2 does not answer".to_owned());
+        assert_eq!(answering(&[&good, &lost]), Err(silent));
+        let shown = table(&[&good, &lost], Instant::now()).to_string();
+        let rows: Vec<&str> = shown.lines().collect();
+        assert!(rows[1].starts_with("pump 2  lost") && rows[2].starts_with("pump 1"), "{shown}");
     }
 }

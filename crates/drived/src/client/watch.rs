@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use http_body_util::BodyExt as _;
 use serde::de::DeserializeOwned;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use super::{Daemon, DaemonArgs, show};
+use super::{Daemon, DaemonArgs};
 use crate::{
     failure::Failure,
     output,
     plant::views::{CommandView, DriveView, HappenedView, LineView},
+    row,
 };
 
 /// Prints what happens until the daemon ends or nobody reads any more.
@@ -82,9 +83,7 @@ fn text(heard: &Heard, shown: &mut BTreeMap<String, String>) -> Option<String> {
             Some(told.into_iter().flatten().collect())
         }
         Heard::Drive(drive) => {
-            let status = &json!(drive)["status"];
-            let quality = if status["quality"] == "good" { "" } else { "LOST, was " };
-            let now = format!("{quality}{}", show::status_in_words(status)?);
+            let now = row::sentence(&drive.snapshot, drive.snapshot.status.is_good());
             let before = shown.insert(drive.name().to_owned(), now.clone());
             (before.as_ref() != Some(&now)).then(|| format!("{}: {now}", drive.name()))
         }
@@ -155,6 +154,8 @@ mod tests {
         assert_eq!(text(&drive), Some("pump 1: ready".to_owned()));
         assert_eq!(text(&drive), None);
         drive["status"]["quality"] = "stale".into();
-        assert_eq!(text(&drive), Some("pump 1: LOST, was ready".to_owned()));
+        assert_eq!(text(&drive), Some("pump 1: not live: (ready)".to_owned()));
+        (drive["shows"], drive["link"]) = ("lost".into(), "lost".into());
+        assert_eq!(text(&drive), Some("pump 1: lost: (ready)".to_owned()));
     }
 }

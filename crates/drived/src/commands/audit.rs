@@ -3,11 +3,11 @@
 use std::{path::PathBuf, str::FromStr};
 
 use chrono::{DateTime, Days, Local, NaiveDateTime, NaiveTime, TimeZone as _};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::token::ConfigArgs;
 use crate::{
-    doors::audit::{Filter, Verdict, shown, verify_since},
+    doors::audit::{Filter, Found, Verdict, shown, verify_since},
     failure::Failure,
     output::{self, JsonArgs, Table},
 };
@@ -118,7 +118,7 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
             let file = log.file()?;
             let records = shown(&file, &filter, last).map_err(|error| unreadable(&file, &error))?;
             if json.is_json() {
-                return records.iter().try_for_each(output::say_as_it_is);
+                return records.iter().try_for_each(|record| output::say_as_it_is(json!(record)));
             }
             if records.is_empty() {
                 return output::say(format_args!("{}: nothing of that", file.display()));
@@ -132,24 +132,23 @@ fn unreadable(file: &std::path::Path, error: &std::io::Error) -> Failure {
     Failure::Input(format!("{}: cannot be read: {error}", file.display()))
 }
 
-fn show(records: &[Value]) -> Result<(), Failure> {
+fn show(records: &[Found]) -> Result<(), Failure> {
     let mut table = Table::new(["time", "caller", "from", "kind", "what", "outcome"]);
     for record in records {
-        let text = |key: &str| record[key].as_str().unwrap_or_default().to_owned();
-        let time = record["time_unix_ms"].as_i64().and_then(DateTime::from_timestamp_millis);
+        let Found { kind, caller, origin, what, .. } = record.clone();
+        let time = i64::try_from(record.time_unix_ms).ok().and_then(DateTime::from_timestamp_millis);
         let time =
             output::or_dash(time.map(|time| time.with_timezone(&Local).format("%Y-%m-%d %H:%M:%S%.3f")));
-        let body = match &record["body"] {
-            Value::Null => String::new(),
-            body => format!(" {body}"),
-        };
-        let outcome = output::or_dash(
-            record["outcome"]
-                .as_str()
-                .map(str::to_owned)
-                .or_else(|| record["status"].as_u64().map(|status| status.to_string())),
-        );
-        table.row([time, text("caller"), text("origin"), text("kind"), text("what") + &body, outcome]);
+        let body = record.body.as_ref().map(|body| format!(" {body}")).unwrap_or_default();
+        let status = record.status.map(|status| status.to_string());
+        table.row([
+            time,
+            caller,
+            origin,
+            kind,
+            what + &body,
+            output::or_dash(record.outcome.clone().or(status)),
+        ]);
     }
     output::say_table(table)
 }

@@ -5,15 +5,12 @@ use std::{
     time::Duration,
 };
 
-use drive_fleet::{
-    Alarms, Commanders, DriveSettings, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted,
-    OnExitWatchdog, OnFault, OnLoss, Periods,
-};
+use drive_fleet::DriveSettings;
 use drive_sparkplug::NodeName;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    config::{Config, DrivePart, GatewayConfig, LinePart, MqttConfig, SparkplugConfig, Units},
+    config::{Config, DrivePart, GatewayConfig, LinePart, MqttConfig, SparkplugConfig, Units, drive_keys},
     doors::{Rights, Role},
     drive_spec::{self, DriveName},
     failure::Failure,
@@ -228,118 +225,7 @@ fn is_alike(one: &DrivePart, other: &DrivePart) -> bool {
 
 /// What the settings and options of a drive mean, each with its label.
 fn meaning(drive: &DrivePart) -> Vec<(&'static str, String)> {
-    let DrivePart { settings, options, .. } = drive;
-    let Periods { running, rest, slow, max_age } = settings.periods;
-    let status = format!("every {running:?} running, {rest:?} at rest; lost without one for {max_age:?}");
-    let measurements = if slow.is_zero() { "never".to_owned() } else { format!("every {slow:?}") };
-    let watchdog =
-        settings.watchdog.map(|contract| format!("{:?}, then {}", contract.timeout, contract.reaction));
-    let mut lines = vec![("status", status), ("measurements", measurements)];
-    let mut line = |label, text: Option<String>| lines.extend(text.map(|text| (label, text)));
-    line("alarms", alarms(settings.alarms));
-    let said: Vec<String> = options.texts.iter().map(|(name, text)| format!("{name} = {text}")).collect();
-    line("options", (!said.is_empty()).then(|| said.join(", ")));
-    if !settings.control {
-        line("commands", Some("none: it is only read".to_owned()));
-        return lines;
-    }
-    let commanders = match &settings.commanders {
-        Commanders::Anyone => "by anyone".to_owned(),
-        Commanders::Only(names) if names.is_empty() => "by nobody; a stop by anyone".to_owned(),
-        Commanders::Only(names) => format!("by {}; a stop by anyone", names.join(", ")),
-    };
-    line("commands", Some(commanders));
-    line("setpoints", limits(&settings.limits));
-    line("watchdog", Some(watchdog.unwrap_or_else(|| "left as it is".to_owned())));
-    line("at the exit", Some(at_exit(settings.on_exit)));
-    line("turning then", turning_at_exit(settings.on_exit, settings.on_exit_adopted));
-    let wears = drive.name.family.capabilities().watchdog.is_some_and(|watchdog| watchdog.wears);
-    let restores = match settings.on_exit_watchdog {
-        OnExitWatchdog::RestoreInRam => !wears,
-        OnExitWatchdog::Restore => true,
-        OnExitWatchdog::Leave => false,
-    };
-    let afterwards = match restores {
-        true => "put back at standstill to what was found",
-        false => "stays armed: it trips the drive when nobody speaks to it",
-    };
-    line("its watchdog then", settings.watchdog.map(|_| afterwards.to_owned()));
-    line("when lost", Some(when_lost(settings.on_loss)));
-    let tripped = match settings.on_fault {
-        OnFault::Report => "reported",
-        OnFault::ResetWatchdogTrip => "reported; a trip of the watchdog is reset once the line is back",
-    };
-    line("when tripped", Some(tripped.to_owned()));
-    let taken = match settings.on_control_taken {
-        OnControlTaken::Withdraw => {
-            "reported; the run command is withdrawn, so that nothing starts by it afterwards"
-        }
-        OnControlTaken::Report => "reported; the run command stands",
-    };
-    line("control taken", Some(taken.to_owned()));
-    let accepted = settings.accept_self_restart.join(", ");
-    let accepted = match accepted.is_empty() {
-        true => "a start is refused while a setting of the drive does that".to_owned(),
-        false => format!("accepted by {accepted}"),
-    };
-    line("starts by itself", Some(accepted));
-    let resumes: Vec<String> = settings.accept_resume.iter().map(ToString::to_string).collect();
-    let resumes = (!resumes.is_empty())
-        .then(|| format!("goes on by itself when it has its {} again", resumes.join(" or its ")));
-    line("cut off", resumes);
-    line("coasts", settings.coast.map(|time| format!("at rest {time:?} after its output was cut")));
-    lines
-}
-
-fn alarms(alarms: Alarms) -> Option<String> {
-    let Alarms { current, drive_thermal, motor_thermal } = alarms;
-    let above = [
-        current.map(|value| format!("current above {value}")),
-        drive_thermal.map(|value| format!("drive thermal state above {value}")),
-        motor_thermal.map(|value| format!("motor thermal state above {value}")),
-    ];
-    let above: Vec<String> = above.into_iter().flatten().collect();
-    (!above.is_empty()).then(|| above.join(", "))
-}
-
-fn limits(limits: &FrequencyLimits) -> Option<String> {
-    let bounds = [
-        limits.low.map(|low| format!("from {low}")),
-        limits.high.map(|high| format!("to {high}")),
-        limits.change_per_second.map(|change| format!("changed by {change} a second at the most")),
-    ];
-    let bands = limits.forbidden.iter().map(|band| format!("not {} to {}", band.low, band.high));
-    let all: Vec<String> = bounds.into_iter().flatten().chain(bands).collect();
-    (!all.is_empty()).then(|| all.join(", "))
-}
-
-fn at_exit(policy: OnExit) -> String {
-    match policy {
-        OnExit::Stop(mode) => format!("stopped if it was started here ({mode} stop)"),
-        OnExit::Release(mode) => {
-            format!("stopped if it was started here ({mode} stop), control back to panel or terminals")
-        }
-        OnExit::Leave => "left as it is".to_owned(),
-    }
-}
-
-/// What happens at the exit to a motor that turns and was not started here.
-fn turning_at_exit(policy: OnExit, adopted: OnExitAdopted) -> Option<String> {
-    match (policy, adopted) {
-        (OnExit::Leave, _) => None,
-        (_, OnExitAdopted::Stop(mode)) => {
-            Some(format!("a motor that was not started here is stopped too ({mode} stop)"))
-        }
-        (OnExit::Stop(_), OnExitAdopted::Report) => {
-            Some("a motor that was not started here is left, and is an alarm".to_owned())
-        }
-        _ => Some("a motor that was not started here is left".to_owned()),
-    }
-}
-
-fn when_lost(policy: OnLoss) -> String {
-    match policy {
-        OnLoss::Report => "reported".to_owned(),
-        OnLoss::Stop(mode) => format!("reported, and stopped when it is there again ({mode} stop)"),
-    }
+    let told =
+        drive_keys().iter().filter(|key| drive.settings.control || !key.acts).flat_map(|key| key.tells);
+    told.filter_map(|tells| Some((tells.label, (tells.text)(drive)?))).collect()
 }

@@ -10,7 +10,7 @@ use crate::{client::Told, failure::Failure, one_drive::OneDriveArgs, plant::comm
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The drive or the group of the running daemon, which --line and --drive stand for otherwise; and a frequency such as
-    /// 47.5Hz, or a speed such as 1450rpm for the families that take one
+    /// 47.5Hz, or a speed such as 1450rpm or a share such as 50% for the families that take one
     #[arg(value_name = "NAME|SETPOINT", allow_hyphen_values = true)]
     first: String,
     /// The setpoint, behind a name

@@ -43,8 +43,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     let mut one = args.one.command(args.accept_self_restart).await?;
     let order = Order::Start { direction, setpoint, until: Until::InForce };
-    let status = one.start(async |drive| drive.order(order).await).await?;
-    args.one.say_done(&one, "start", &status, &format!("started {direction}"))?;
+    let (started, status) = one.start(async |drive| drive.order(order).await).await?;
+    args.one.say_started(&one, started, &status)?;
     one.close().await;
     Ok(())
 }

@@ -2,21 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::{
     client::Daemon,
     config::{Config, DoorsConfig},
     doors::{
-        Caller, Rights, Role, TOKENS,
+        Caller, MadeToken, RemovedToken, Rights, Role, TOKENS, TokensView,
         audit::{self, Kind, Record},
-        tokens::Tokens,
+        of_days, of_hours, replaced,
+        tokens::{TokenView, Tokens},
     },
     failure::Failure,
     output::{self, JsonArgs, Table},
 };
 
-/// Add, list and remove the tokens of those who command over HTTP
+/// Add, list, replace and remove the tokens of those who command over HTTP
 ///
 /// A running daemon does it itself, over its control socket. Where none runs, the file that the configuration names is changed,
 /// which the next daemon reads.
@@ -30,6 +31,9 @@ pub(crate) enum Command {
         /// What it is for
         #[arg(long, value_enum)]
         role: Role,
+        /// For how many days it is good; for ever unless it is said
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=3_660))]
+        days: Option<u32>,
         #[command(flatten)]
         place: PlaceArgs,
         #[command(flatten)]
@@ -37,6 +41,19 @@ pub(crate) enum Command {
     },
     /// List the tokens by their names
     List {
+        #[command(flatten)]
+        place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
+    },
+    /// Replace a token by another of the same name and role, and print it, once
+    Rotate {
+        /// Whose it is
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// How many hours the one before it is good for yet, so that it can be replaced where it is used
+        #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(0..=8_760))]
+        hours: u32,
         #[command(flatten)]
         place: PlaceArgs,
         #[command(flatten)]
@@ -91,27 +108,36 @@ impl ConfigArgs {
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Add { name, role, place, json } => {
-            let made = match open(&place).await? {
+        Command::Add { name, role, days, place, json } => {
+            let made: MadeToken = match open(&place).await? {
                 Way::Daemon(mut daemon) => {
-                    let asked = json!({ "name": name, "role": role.name() });
+                    let asked = json!({ "name": name, "role": role.name(), "days": days });
                     daemon.post(TOKENS, &asked).await?.done()?
                 }
-                Way::Files(files) => files.add(&name, role)?,
+                Way::Files(files) => files.add(&name, role, days)?,
             };
-            json.say(|| made.clone(), || output::say_as_it_is(made["token"].as_str().unwrap_or_default()))
+            json.say(|| json!(made), || output::say_as_it_is(&made.token))
+        }
+        Command::Rotate { name, hours, place, json } => {
+            let made: MadeToken = match open(&place).await? {
+                Way::Daemon(mut daemon) => {
+                    daemon.put(&format!("{TOKENS}/{name}"), &json!({ "hours": hours })).await?.done()?
+                }
+                Way::Files(files) => files.rotate(&name, hours)?,
+            };
+            json.say(|| json!(made), || output::say_as_it_is(&made.token))
         }
         Command::List { place, json } => {
             let tokens = match open(&place).await? {
-                Way::Daemon(mut daemon) => daemon.get(TOKENS).await?.done::<Value>()?["tokens"].take(),
-                Way::Files(Files { tokens, .. }) => json!(tokens.views().map_err(input)?),
+                Way::Daemon(mut daemon) => daemon.get(TOKENS).await?.done::<TokensView>()?.tokens,
+                Way::Files(Files { tokens, .. }) => tokens.views().map_err(input)?,
             };
-            list(tokens.as_array().map_or(&[], Vec::as_slice), json)
+            list(&tokens, json)
         }
         Command::Remove { name, place, json } => {
             match open(&place).await? {
                 Way::Daemon(mut daemon) => {
-                    daemon.delete(&format!("{TOKENS}/{name}")).await?.done::<Value>()?;
+                    daemon.delete(&format!("{TOKENS}/{name}")).await?.done::<RemovedToken>()?;
                 }
                 Way::Files(files) => files.remove(&name)?,
             }
@@ -142,12 +168,11 @@ async fn open(place: &PlaceArgs) -> Result<Way, Failure> {
     let DoorsConfig { state, socket, .. } = place.config.doors()?;
     let socket = place.socket.clone().or_else(|| socket.and_then(|socket| socket.path));
     if let Ok(mut daemon) = Daemon::connect(socket.as_deref(), None).await {
-        let told = daemon.get(TOKENS).await?;
-        let theirs = told.body["file"].as_str().map(Path::new);
+        let theirs = daemon.get(TOKENS).await?.done::<TokensView>();
         let own = state.tokens.as_deref().filter(|_| state.has_tokens);
         // Where the configuration does not say it, the daemon has it from its own environment.
         let is_it = |theirs: &Path| own.is_none_or(|own| whole(own) == whole(theirs));
-        if told.status.is_success() && theirs.is_some_and(is_it) {
+        if theirs.is_ok_and(|theirs| is_it(&theirs.file)) {
             return Ok(Way::Daemon(daemon));
         }
     }
@@ -165,14 +190,20 @@ fn whole(file: &Path) -> PathBuf {
 }
 
 impl Files {
-    fn add(&self, name: &str, role: Role) -> Result<Value, Failure> {
-        let secret = self.tokens.add(name, role).map_err(input)?;
+    fn add(&self, name: &str, role: Role, days: Option<u32>) -> Result<MadeToken, Failure> {
+        let secret = self.tokens.add(name, role, days.map(of_days)).map_err(input)?;
         if let Err(failure) = tell(self.audit.as_deref(), format!("token {name} added, role {}", role.name()))
         {
             self.tokens.remove(name).map_err(input)?;
             return Err(failure);
         }
-        Ok(json!({ "name": name, "role": role.name(), "token": secret }))
+        Ok(MadeToken { name: name.to_owned(), role, token: secret })
+    }
+
+    fn rotate(&self, name: &str, hours: u32) -> Result<MadeToken, Failure> {
+        let (role, token) = self.tokens.rotate(name, of_hours(hours)).map_err(input)?;
+        tell(self.audit.as_deref(), replaced(name, hours))?;
+        Ok(MadeToken { name: name.to_owned(), role, token })
     }
 
     fn remove(&self, name: &str) -> Result<(), Failure> {
@@ -182,20 +213,23 @@ impl Files {
     }
 }
 
-fn list(tokens: &[Value], json: JsonArgs) -> Result<(), Failure> {
+fn list(tokens: &[TokenView], json: JsonArgs) -> Result<(), Failure> {
     if json.is_json() {
-        return tokens.iter().try_for_each(output::say_as_it_is);
+        return tokens.iter().try_for_each(|token| output::say_as_it_is(json!(token)));
     }
     if tokens.is_empty() {
         return output::say("there is no token: drived token add NAME --role ROLE");
     }
-    let mut table = Table::new(["name", "role", "made"]);
+    let mut table = Table::new(["name", "role", "made", "ends"]);
     for token in tokens {
-        let text = |key: &str| token[key].as_str().unwrap_or_default().to_owned();
-        let made = token["made_unix_s"].as_i64().and_then(|made| chrono::DateTime::from_timestamp(made, 0));
-        let made =
-            output::or_dash(made.map(|made| made.with_timezone(&chrono::Local).format("%Y-%m-%d %H:%M")));
-        table.row([text("name"), text("role"), made]);
+        let time = |unix_s: u64| {
+            let time = chrono::DateTime::from_timestamp(i64::try_from(unix_s).ok()?, 0)?;
+            Some(time.with_timezone(&chrono::Local).format("%Y-%m-%d %H:%M").to_string())
+        };
+        let made = output::or_dash(time(token.made_unix_s));
+        let ends =
+            token.expires_unix_s.map_or_else(|| "never".to_owned(), |ends| output::or_dash(time(ends)));
+        table.row([token.name.clone(), token.role.name().to_owned(), made, ends]);
     }
     output::say_table(table)
 }

@@ -1,32 +1,19 @@
-//! What one field alone does not show: that a safety key acts on nothing, that two lines share a port, that a file is none.
+//! What one table alone does not show: that two lines share a port, that a file is none.
 
 use std::{
     collections::BTreeMap,
     fs::{self, File},
     io::Read as _,
     net::{SocketAddr, ToSocketAddrs as _},
-    ops::Range,
     path::Path,
-    time::Duration,
 };
 
 use drive_bus::Endpoint;
-use drive_core::Capabilities;
-use drive_fleet::{DriveSettings, OnExit};
-use toml::Spanned;
 
-use super::{
-    ConfigError, LinePart,
-    place::Source,
-    raw::{self, DriveEntry},
-    values::{Adopted, Exit, Parsed},
-};
-use crate::duration::Time;
+use super::{ConfigError, LinePart, file, place::Source, table::Entry as _};
 
 /// A configuration that is longer is no configuration.
 const LONGEST_FILE: u64 = 1 << 20;
-/// Snapshots come at most so often.
-const SNAPSHOTS_APART: Duration = Duration::from_millis(100);
 
 /// The text of a configuration. A pipe or a device would never end.
 pub(super) fn read_file(path: &Path) -> Result<String, String> {
@@ -43,95 +30,14 @@ pub(super) fn read_file(path: &Path) -> Result<String, String> {
     }
 }
 
-/// How often snapshots are printed: each is a line for every drive.
-pub(super) fn snapshots(
-    source: Source<'_>,
-    said: Option<&Spanned<Parsed<Time>>>,
-) -> Result<Option<Duration>, ConfigError> {
-    let Some(said) = said else { return Ok(None) };
-    match said.get_ref().0.0 {
-        time if time.is_zero() || time >= SNAPSHOTS_APART => Ok(Some(time)),
-        time => {
-            let problem = format_args!("{time:?}: expected \"0\" for never, or {SNAPSHOTS_APART:?} or more");
-            Err(source.error(said.span(), problem))
-        }
-    }
-}
-
-/// What a drive's settings say against each other and against its family.
-pub(super) fn drive(
-    source: Source<'_>,
-    entry: &DriveEntry,
-    defaults: &DriveEntry,
-    settings: &DriveSettings,
-    capabilities: &Capabilities,
-) -> Result<(), ConfigError> {
-    if !settings.control {
-        return match acts(entry).into_iter().flatten().next() {
-            Some((key, span)) => {
-                let problem = format_args!(
-                    "{key} without control = true: {} is only read, and nothing would act",
-                    settings.name.escape_debug()
-                );
-                Err(source.error(span, problem))
-            }
-            None => Ok(()),
-        };
-    }
-    let mode = entry.stop_mode.as_ref().or(defaults.stop_mode.as_ref());
-    if let Some(mode) = mode.filter(|mode| !capabilities.stop_modes.contains(&mode.get_ref().0)) {
-        let has: Vec<String> = capabilities.stop_modes.iter().map(ToString::to_string).collect();
-        let problem = format_args!(
-            "{}: a {} has no {} stop: expected one of {}",
-            settings.name.escape_debug(),
-            capabilities.name,
-            mode.get_ref().0,
-            has.join(", ")
-        );
-        return Err(source.error(mode.span(), problem));
-    }
-    if let (OnExit::Leave, Some(contract)) = (settings.on_exit, settings.watchdog) {
-        let said = entry.on_exit.as_ref().or(defaults.on_exit.as_ref());
-        let problem = format_args!(
-            "{}: a motor that is left at the exit would be tripped by its watchdog {:?} later: expected on_exit = \
-             \"stop\" or \"release\", or no watchdog",
-            settings.name.escape_debug(),
-            contract.timeout
-        );
-        return Err(source.error(said.map(Spanned::span).unwrap_or_default(), problem));
-    }
-    Ok(())
-}
-
-/// The keys of an entry that promise that something is done to the drive.
-fn acts(entry: &DriveEntry) -> [Option<(&'static str, Range<usize>)>; 12] {
-    let span = |key, span: Option<Range<usize>>| span.map(|span| (key, span));
-    let on_exit = entry.on_exit.as_ref().filter(|policy| policy.get_ref().0.0 != Exit::Leave);
-    let adopted = entry.on_exit_adopted.as_ref().filter(|policy| policy.get_ref().0.0 == Adopted::Stop);
-    [
-        span("watchdog", entry.watchdog.as_ref().map(Spanned::span)),
-        span("frequency", entry.frequency.as_ref().map(Spanned::span)),
-        span("stop_mode", entry.stop_mode.as_ref().map(Spanned::span)),
-        span("commanders", entry.commanders.as_ref().map(Spanned::span)),
-        span("accept_self_restart", entry.accept_self_restart.as_ref().map(Spanned::span)),
-        span("accept_resume", entry.accept_resume.as_ref().map(Spanned::span)),
-        span("on_exit", on_exit.map(Spanned::span)),
-        span("on_exit_adopted", adopted.map(Spanned::span)),
-        span("on_exit_watchdog", entry.on_exit_watchdog.as_ref().map(Spanned::span)),
-        span("on_loss", entry.on_loss.as_ref().filter(|policy| policy.get_ref().0.0).map(Spanned::span)),
-        span("on_fault", entry.on_fault.as_ref().filter(|policy| policy.get_ref().0.0).map(Spanned::span)),
-        span("on_control_taken", entry.on_control_taken.as_ref().map(Spanned::span)),
-    ]
-}
-
 /// Two lines over one port would talk into each other. A gateway for Modbus TCP keeps its connections apart, but not two
 /// masters of one unit.
-pub(super) fn ports(source: Source<'_>, raw: &raw::File, lines: &[LinePart]) -> Result<(), ConfigError> {
+pub(super) fn ports(source: Source<'_>, raw: &file::File, lines: &[LinePart]) -> Result<(), ConfigError> {
     let mut taken: BTreeMap<Wire, &str> = BTreeMap::new();
     let mut hosts = Hosts::default();
     for line in lines {
-        let entry = raw.lines.iter().find(|(name, _)| *name.get_ref() == line.name);
-        let span = entry.map(|(_, entry)| entry.port.span()).unwrap_or_default();
+        let entry = raw.lines().find(|(name, _)| *name.get_ref() == line.name);
+        let span = entry.and_then(|(_, entry)| entry.place("port")).unwrap_or_default();
         let wires = match &line.config.endpoint {
             Endpoint::Serial(path) => {
                 terminal(path).map_err(|problem| source.error(span.clone(), problem))?;

@@ -6,7 +6,10 @@ use drive_bus::LineConfig;
 use drive_families::Options;
 use drive_fleet::{DriveSettings, LineBudget, Periods};
 
-use super::{DrivePart, LinePart, Member, SaidOptions, fitting_stretch};
+use super::{
+    DrivePart, LinePart, SaidOptions,
+    line::{Member, fitting_stretch},
+};
 use crate::drive_spec::DriveName;
 
 impl LinePart {

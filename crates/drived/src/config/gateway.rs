@@ -4,19 +4,19 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fmt,
     net::{IpAddr, Ipv4Addr, SocketAddr},
-    ops::{Range, RangeInclusive},
+    ops::Range,
     str::FromStr,
     time::Duration,
 };
 
 use drive_core::Class;
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
-    LinePart,
+    LinePart, file,
     place::{ConfigError, Source},
-    values::Parsed,
+    table::{Entry as _, settings, within},
+    values::{Parsed, words},
 };
 use crate::{
     doors::{Rights, Role},
@@ -115,132 +115,105 @@ impl FromStr for Network {
     }
 }
 
-/// The class of reads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Reads(Class);
-
-impl FromStr for Reads {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "status" => Ok(Self(Class::Status)),
-            "background" => Ok(Self(Class::Background)),
-            _ => Err("expected status or background"),
-        }
-    }
+words! {
+    /// The class of reads.
+    Reads(Class):
+    "status" => Class::Status,
+    "background" => Class::Background
 }
 
-/// What is answered for a slave that does not answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct NoAnswer {
-    silent: bool,
+words! {
+    /// Whether what a slave does not answer is answered by silence.
+    NoAnswer(bool):
+    "exception" => false,
+    "silence" => true
 }
 
-impl FromStr for NoAnswer {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "exception" => Ok(Self { silent: false }),
-            "silence" => Ok(Self { silent: true }),
-            _ => Err("expected exception or silence"),
-        }
-    }
+words! {
+    /// Whether only registers of the family's map are read.
+    Registers(bool):
+    "any" => false,
+    "map" => true
 }
 
-/// Which registers are read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Registers {
-    mapped_only: bool,
+words! {
+    /// What clients may write.
+    Writes(Role):
+    "nothing" => Role::View,
+    "stop" => Role::Stop,
+    "operate" => Role::Operate
 }
 
-impl FromStr for Registers {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "any" => Ok(Self { mapped_only: false }),
-            "map" => Ok(Self { mapped_only: true }),
-            _ => Err("expected any or map"),
-        }
-    }
+words! {
+    /// Whether a motor is stopped whose client is silent.
+    OnSilence(bool):
+    "report" => false,
+    "stop" => true
 }
 
-/// What clients may write.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Writes(Role);
+settings! {
+    /// `[[gateways]]`.
+    GatewayEntry sets GatewayConfig;
 
-impl FromStr for Writes {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "nothing" => Ok(Self(Role::View)),
-            "stop" => Ok(Self(Role::Stop)),
-            "operate" => Ok(Self(Role::Operate)),
-            _ => Err("expected nothing, stop or operate"),
-        }
-    }
-}
-
-/// What happens to a motor whose client is silent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct OnSilence {
-    stops: bool,
-}
-
-impl FromStr for OnSilence {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "report" => Ok(Self { stops: false }),
-            "stop" => Ok(Self { stops: true }),
-            _ => Err("expected report or stop"),
-        }
-    }
-}
-
-/// One entry as it is written.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GatewayEntry {
-    name: Option<Spanned<String>>,
-    listen: Option<Spanned<SocketAddr>>,
-    #[serde(default)]
-    plain: bool,
-    #[serde(default)]
-    allow: Vec<Parsed<Network>>,
-    clients: Option<Spanned<usize>>,
-    idle: Option<Spanned<Parsed<Time>>>,
-    line: Option<Spanned<String>>,
-    units: Option<BTreeMap<Spanned<String>, Spanned<String>>>,
-    patience: Option<Spanned<Parsed<Time>>>,
-    reads: Option<Parsed<Reads>>,
-    share: Option<Spanned<u8>>,
-    no_answer: Option<Parsed<NoAnswer>>,
-    registers: Option<Parsed<Registers>>,
-    virtual_unit: Option<Spanned<u8>>,
-    max_age: Option<Spanned<Parsed<Time>>>,
-    writes: Option<Spanned<Parsed<Writes>>>,
-    #[serde(default)]
-    raw_writes: bool,
-    #[serde(default)]
-    eeprom_writes: bool,
-    #[serde(default)]
-    broadcast: bool,
-    client_timeout: Option<Spanned<Parsed<Time>>>,
-    on_client_silence: Option<Spanned<Parsed<OnSilence>>>,
+    /// by which it is known to `commanders`, in the audit log and in the events
+    name: String = "`\"gateway\"`";
+    /// address and port
+    listen: SocketAddr = "`\"127.0.0.1:1502\"`", |to, said| to.listen = *said;
+    /// `true`: this address may be reached by others than this machine. Modbus TCP has neither login nor encryption: **whoever
+    /// reaches it has the gateway's rights**
+    plain: bool = "`false`";
+    /// who may connect: addresses and networks, such as `["10.0.0.7", "10.1.0.0/16"]`
+    allow: Vec<Parsed<Network>> = "everybody",
+        |to, said| to.allow = said.iter().map(|network| network.0).collect();
+    /// connections at once, 1 to 256; for one more makes room who has asked nothing the longest, 2 s at least; where nobody has,
+    /// it is closed as it comes, and counted
+    clients: usize = "`16`", |to, said| to.clients = within(*said, 1..=256, "")?;
+    /// how long a client may ask for nothing
+    idle: Parsed<Time> = "`\"60s\"`", |to, said| to.idle = within(said.0.0, SECOND..=DAY, "")?;
+    /// the units are the addresses of the drives of this line
+    line: String = "the only line";
+    /// instead, for drives of many lines or with other numbers: `{ 1 = "pump 1", 2 = "fan 7", 255 = "pump 1" }`, 0 to 255
+    units: BTreeMap<Spanned<String>, Spanned<String>> = "none";
+    /// how long a client waits; a request that has no answer by then is refused, so that its answer is never taken for the next
+    /// one's. Most SCADA give up after 1 s
+    patience: Parsed<Time> = "`\"900ms\"`",
+        |to, said| to.patience = within(said.0.0, Duration::from_millis(50)..=60 * SECOND, "")?;
+    /// the class of its reads: `"status"`, in turn with the daemon's own polls, or `"background"`, behind them
+    reads: Parsed<Reads> = "`\"status\"`", |to, said| to.reads = said.0.0;
+    /// how much of each line it may use, in percent, 1 to 80; less where the line's plan leaves less, with 5 % kept free
+    share: u8 = "`30`", |to, said| to.share = within(*said, 1..=80, "")?;
+    /// `"map"`: only registers of the family's list are read; `"any"`: the drive itself judges
+    registers: Parsed<Registers> = "`\"any\"`", |to, said| to.mapped_only = said.0.0;
+    /// a unit number, such as `247`, that shows all drives of the daemon: [below](#the-virtual-unit)
+    virtual_unit: u8 = "none";
+    /// how old a block may be that a client gets again without an exchange, up to 10 s: it lies whole in one that a client has
+    /// read before, and nothing was written to the drive through this gateway since
+    max_age: Parsed<Time> = "`\"0\"`: never",
+        |to, said| to.max_age = within(said.0.0, Duration::ZERO..=10 * SECOND, "")?;
+    /// what its clients may do: `"nothing"`, `"stop"`, or `"operate"`, to start, stop, give setpoints and reset, by the words of
+    /// the drive's manual
+    writes: Parsed<Writes> = "`\"nothing\"`", |to, said| to.rights = said.0.0.rights();
+    /// `true`: parameters may be written too, with `writes = "operate"`
+    raw_writes: bool = "`false`", |to, said| to.raw_writes = *said;
+    /// `true`: also parameters that go to an EEPROM, or of which the manual does not say where they go
+    eeprom_writes: bool = "`false`", |to, said| to.eeprom_writes = *said;
+    /// `true`: a write to unit 0 that is a stop stops all drives of this gateway, and is confirmed when all have taken it;
+    /// nothing else is carried out for unit 0
+    broadcast: bool = "`false`", |to, said| to.broadcast = *said;
+    /// how long a client that has started a motor may be silent, 1 s to a day
+    client_timeout: Parsed<Time> = "for ever",
+        |to, said| to.client_timeout = Some(within(said.0.0, SECOND..=DAY, "")?);
+    /// what happens then: `"report"`, an alarm among the events, or `"stop"`, a ramp stop
+    on_client_silence: Parsed<OnSilence> = "`\"report\"`", |to, said| to.stops_when_silent = said.0.0;
+    /// what stands for a drive that does not answer: `"exception"` (0Bh), or `"silence"` for a SCADA that takes the whole gateway
+    /// off-line for a 0Bh (Citect)
+    no_answer: Parsed<NoAnswer> = "`\"exception\"`", |to, said| to.silent = said.0.0;
 }
 
 /// Where a gateway listens unless the file says otherwise: 502 is for root.
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 1502);
-const CLIENTS: usize = 16;
-const IDLE: Duration = Duration::from_secs(60);
-/// Most SCADA give up after one second.
-const PATIENCE: Duration = Duration::from_millis(900);
-const SHARE: u8 = 30;
+const SECOND: Duration = Duration::from_secs(1);
+const DAY: Duration = Duration::from_secs(86_400);
 
 /// The gateways of a file with these lines.
 pub(super) fn gateways(
@@ -282,7 +255,7 @@ impl GatewayEntry {
             return Err(source.error(self.place_of_name(whole), problem));
         }
         let listen = self.listen.as_ref().map_or(LISTEN, |listen| *listen.get_ref());
-        if !listen.ip().is_loopback() && !self.plain {
+        if !listen.ip().is_loopback() && !file::of(&self.plain).is_some_and(|plain| *plain) {
             let place = self.listen.as_ref().map_or(whole, Spanned::span);
             let problem = format_args!(
                 "{listen}: others than this machine can reach it, and Modbus TCP has neither login nor encryption: \
@@ -290,50 +263,41 @@ impl GatewayEntry {
             );
             return Err(source.error(place, problem));
         }
-        let clients = within(source, self.clients.as_ref(), CLIENTS, 1..=256)?;
-        let share = within(source, self.share.as_ref(), SHARE, 1..=80)?;
-        let times = |said: &Option<Spanned<Parsed<Time>>>, usual, range| {
-            let said = said.as_ref().map(|time| Spanned::new(time.span(), time.get_ref().0.0));
-            within(source, said.as_ref(), usual, range)
+        let mut gateway = GatewayConfig {
+            name: name.to_owned(),
+            listen,
+            allow: Vec::new(),
+            clients: 16,
+            idle: 60 * SECOND,
+            units: self.units_of(source, whole.clone(), lines)?,
+            patience: Duration::from_millis(900),
+            reads: Class::Status,
+            share: 30,
+            silent: false,
+            mapped_only: false,
+            virtual_unit: self.virtual_unit(source, whole.clone(), lines)?,
+            max_age: Duration::ZERO,
+            rights: Role::View.rights(),
+            raw_writes: false,
+            eeprom_writes: false,
+            broadcast: false,
+            client_timeout: None,
+            stops_when_silent: false,
         };
-        let seconds = Duration::from_secs;
-        let writes = self.writes.as_ref().map_or(Role::View, |writes| writes.get_ref().0.0);
+        self.set(source, &mut gateway)?;
+        let GatewayConfig { rights, raw_writes, eeprom_writes, broadcast, .. } = gateway;
         let missing = [
-            (self.raw_writes && writes < Role::Operate, "raw_writes = true needs writes = \"operate\""),
-            (self.eeprom_writes && !self.raw_writes, "eeprom_writes = true needs raw_writes = true"),
-            (
-                self.broadcast && writes < Role::Stop,
-                "broadcast = true needs writes = \"stop\" or \"operate\"",
-            ),
+            (raw_writes && !rights.operate, "raw_writes = true needs writes = \"operate\""),
+            (eeprom_writes && !raw_writes, "eeprom_writes = true needs raw_writes = true"),
+            (broadcast && !rights.stop, "broadcast = true needs writes = \"stop\" or \"operate\""),
         ];
         if let Some((_, problem)) = missing.iter().find(|(is_so, _)| *is_so) {
-            return Err(source.error(whole.clone(), problem));
+            return Err(source.error(whole, problem));
         }
         if let (None, Some(said)) = (&self.client_timeout, &self.on_client_silence) {
             return Err(source.error(said.span(), "expected client_timeout with it, such as \"10s\""));
         }
-        let client_timeout = times(&self.client_timeout, Duration::ZERO, seconds(1)..=seconds(86_400))?;
-        Ok(GatewayConfig {
-            name: name.to_owned(),
-            listen,
-            allow: self.allow.iter().map(|network| network.0).collect(),
-            clients,
-            idle: times(&self.idle, IDLE, seconds(1)..=seconds(86_400))?,
-            units: self.units_of(source, whole.clone(), lines)?,
-            patience: times(&self.patience, PATIENCE, Duration::from_millis(50)..=seconds(60))?,
-            reads: self.reads.map_or(Class::Status, |reads| reads.0.0),
-            share,
-            silent: self.no_answer.is_some_and(|said| said.0.silent),
-            mapped_only: self.registers.is_some_and(|said| said.0.mapped_only),
-            virtual_unit: self.virtual_unit(source, whole, lines)?,
-            max_age: times(&self.max_age, Duration::ZERO, Duration::ZERO..=seconds(10))?,
-            rights: writes.rights(),
-            raw_writes: self.raw_writes,
-            eeprom_writes: self.eeprom_writes,
-            broadcast: self.broadcast,
-            client_timeout: (!client_timeout.is_zero()).then_some(client_timeout),
-            stops_when_silent: self.on_client_silence.as_ref().is_some_and(|said| said.get_ref().0.stops),
-        })
+        Ok(gateway)
     }
 
     /// The unit of all drives: none of its drives has it.
@@ -373,7 +337,7 @@ impl GatewayEntry {
         lines: &[LinePart],
     ) -> Result<Units, ConfigError> {
         let refuse = |span, problem: String| Err(source.error(span, problem));
-        let entries = match (&self.line, &self.units, lines) {
+        let entries = match (&self.line, file::of(&self.units), lines) {
             (None, Some(units), _) => units,
             (Some(line), None, _) => {
                 let name = line.get_ref();
@@ -408,20 +372,4 @@ impl GatewayEntry {
         }
         Ok(Units::Table(units))
     }
-}
-
-/// What is said, if it is within a range.
-fn within<T: Copy + PartialOrd + fmt::Debug>(
-    source: Source<'_>,
-    said: Option<&Spanned<T>>,
-    usual: T,
-    range: RangeInclusive<T>,
-) -> Result<T, ConfigError> {
-    let Some(said) = said else { return Ok(usual) };
-    let value = *said.get_ref();
-    if range.contains(&value) {
-        return Ok(value);
-    }
-    let problem = format_args!("{value:?}: expected {:?} to {:?}", range.start(), range.end());
-    Err(source.error(said.span(), problem))
 }

@@ -21,7 +21,7 @@ pub(crate) struct Group {
 /// The groups of a file whose drives are these.
 pub(super) fn groups<'a>(
     source: Source<'_>,
-    entries: &Entries,
+    entries: Option<&Entries>,
     drives: impl Iterator<Item = &'a str> + Clone,
 ) -> Result<Vec<Group>, ConfigError> {
     let group = |(name, members): (&Spanned<String>, &Vec<Spanned<String>>)| {
@@ -49,5 +49,5 @@ pub(super) fn groups<'a>(
         let drives = members.iter().map(|member| member.get_ref().clone()).collect();
         Ok(Group { name: text.clone(), drives })
     };
-    entries.iter().map(group).collect()
+    entries.into_iter().flatten().map(group).collect()
 }

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::{
     place::{ConfigError, Source},
     state::State,
-    values::Parsed,
+    values::{Parsed, words},
 };
 use crate::{doors::Role, duration::Time, plant::commands::LONGEST_LIFETIME};
 
@@ -33,21 +33,12 @@ pub(crate) struct SparkplugConfig {
     pub(crate) state: PathBuf,
 }
 
-/// What hosts may do.
-#[derive(Debug, Clone, Copy)]
-struct Commands(Option<Role>);
-
-impl std::str::FromStr for Commands {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "off" => Ok(Self(None)),
-            "stop" => Ok(Self(Some(Role::Stop))),
-            "operate" => Ok(Self(Some(Role::Operate))),
-            _ => Err("expected off, stop or operate"),
-        }
-    }
+words! {
+    /// What hosts may do.
+    Commands(Option<Role>):
+    "off" => None,
+    "stop" => Some(Role::Stop),
+    "operate" => Some(Role::Operate)
 }
 
 /// `[mqtt.sparkplug]`.

@@ -33,12 +33,12 @@ pub(crate) struct State {
 }
 
 /// What the file says of it.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Said<'a> {
-    pub(super) state: Option<&'a Path>,
-    pub(super) watchdogs: Option<&'a Path>,
-    pub(super) tokens: Option<&'a Path>,
-    pub(super) audit: Option<&'a Path>,
+#[derive(Debug, Clone, Default)]
+pub(super) struct Said {
+    pub(super) state: Option<PathBuf>,
+    pub(super) watchdogs: Option<PathBuf>,
+    pub(super) tokens: Option<PathBuf>,
+    pub(super) audit: Option<PathBuf>,
 }
 
 /// What the environment says of it.
@@ -79,18 +79,18 @@ impl Environment {
 }
 
 impl State {
-    pub(super) fn of(source: Source<'_>, said: Said<'_>, environment: &Environment) -> Self {
-        let beside = |path: &Path| source.file.parent().unwrap_or(Path::new("")).join(path);
-        let of_service = said.state.map(beside).or_else(|| environment.of_service());
+    pub(super) fn of(source: Source<'_>, said: &Said, environment: &Environment) -> Self {
+        let beside = |path: &PathBuf| source.file.parent().unwrap_or(Path::new("")).join(path);
+        let of_service = said.state.as_ref().map(beside).or_else(|| environment.of_service());
         let is_said = of_service.is_some();
         let folder = of_service.or_else(|| environment.of_user(source.file));
-        let file = |said: Option<&Path>, name: &str| {
-            said.map(beside).or_else(|| folder.as_ref().map(|folder| folder.join(name)))
+        let file = |said: &Option<PathBuf>, name: &str| {
+            said.as_ref().map(beside).or_else(|| folder.as_ref().map(|folder| folder.join(name)))
         };
         Self {
-            watchdogs: file(said.watchdogs, WATCHDOGS),
-            tokens: file(said.tokens, TOKENS),
-            audit: if is_said { file(said.audit, AUDIT) } else { said.audit.map(beside) },
+            watchdogs: file(&said.watchdogs, WATCHDOGS),
+            tokens: file(&said.tokens, TOKENS),
+            audit: if is_said { file(&said.audit, AUDIT) } else { said.audit.as_ref().map(beside) },
             has_tokens: is_said || said.tokens.is_some(),
             folder,
         }
@@ -109,7 +109,7 @@ impl State {
 mod tests {
     use super::*;
 
-    fn of(said: Said<'_>, environment: &Environment) -> State {
+    fn of(said: &Said, environment: &Environment) -> State {
         State::of(source(), said, environment)
     }
 
@@ -130,10 +130,10 @@ mod tests {
     #[test]
     fn one_folder_is_decided_for_all_that_is_kept() {
         let all = environment(Some("/var/lib/drived:/other"), Some("/home/me/states"), Some("/home/me"));
-        let said = Said { state: Some(Path::new("kept")), ..Said::default() };
-        let state = of(said, &all);
+        let said = Said { state: Some("kept".into()), ..Said::default() };
+        let state = of(&said, &all);
         assert_eq!(state.tokens.as_deref(), Some(Path::new("/etc/drived/kept/tokens")));
-        let state = of(Said::default(), &all);
+        let state = of(&Said::default(), &all);
         assert_eq!(state.watchdogs.as_deref(), Some(Path::new("/var/lib/drived/watchdogs.json")));
         assert_eq!(state.tokens.as_deref(), Some(Path::new("/var/lib/drived/tokens")));
         assert_eq!(state.audit.as_deref(), Some(Path::new("/var/lib/drived/audit")));
@@ -152,11 +152,11 @@ mod tests {
                 "/home/me/.local/state/drived/drives-633ce40a",
             ),
         ] {
-            let state = of(Said::default(), &own);
+            let state = of(&Said::default(), &own);
             assert_eq!(state.tokens, Some(Path::new(folder).join("tokens")));
             assert_eq!(state.audit, None, "nobody has asked for it");
         }
-        let state = of(Said::default(), &Environment::default());
+        let state = of(&Said::default(), &Environment::default());
         assert_eq!((state.folder, state.tokens, state.watchdogs), (None, None, None));
     }
 
@@ -165,11 +165,11 @@ mod tests {
         let path = Path::new;
         let said = Said {
             state: None,
-            watchdogs: Some(path("/kept/watchdogs")),
-            tokens: Some(path("tokens")),
-            audit: Some(path("../log/audit")),
+            watchdogs: Some("/kept/watchdogs".into()),
+            tokens: Some("tokens".into()),
+            audit: Some("../log/audit".into()),
         };
-        let state = of(said, &Environment::default());
+        let state = of(&said, &Environment::default());
         assert_eq!(state.watchdogs.as_deref(), Some(path("/kept/watchdogs")));
         assert_eq!(state.tokens.as_deref(), Some(path("/etc/drived/tokens")));
         assert_eq!(state.audit.as_deref(), Some(path("/etc/drived/../log/audit")));

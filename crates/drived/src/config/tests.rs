@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use drive_core::{Frequency, Reaction};
+use drive_core::{Frequency, Reaction, StopMode};
+use drive_fleet::{Commanders, OnControlTaken, OnExit, OnFault, Periods, WatchdogContract, plan};
 
-use super::*;
+use super::{line::ROOM_PPM, *};
 use crate::doors::Role;
 
 const FULL: &str = r#"
@@ -54,6 +55,26 @@ lines.a.port = "/dev/ttyUSB0"
 line = "a"
 drive = "atv312@1-31"
 "#;
+
+#[test]
+fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
+    let told = |keys: &str| {
+        let text = FULL.replace(
+            "port = \"tcp://gateway:502\"",
+            &format!("port = \"tcp://gateway:502,gateway=3x1s\"\n{keys}"),
+        );
+        read(&text).map(|config| {
+            config.lines.into_iter().find(|line| line.name == "south").unwrap().config.far_end()
+        })
+    };
+    let three = drive_bus::Gateway { at_once: Some(1), wait: Some(Duration::from_secs(3)) };
+    assert_eq!(told(""), Ok(Some(three)));
+    assert_eq!(told("gateway = \"none\""), Ok(None));
+    assert!(told("gateway = \"often\"").unwrap_err().contains("expected none, unknown, or how long"));
+    assert!(told("far_end_paces = false").unwrap_err().contains("Modbus TCP has no speed"));
+    let serial = FULL.replace("19200,8N1\"", "19200,8N1\"\nfar_end_paces = false");
+    assert_eq!(read(&serial).unwrap().lines[0].config.far_end_paces, Some(false));
+}
 
 fn read(text: &str) -> Result<Config, String> {
     let config = Config::read(Path::new("drives.toml"), text);
@@ -189,12 +210,22 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
             "drives.toml:15: port: it is the port of line \"north\" too",
         ),
         ("\"fan {}\"", "\"fan\\u001b {}\"", "drives.toml:21: name: fan\\u{1b} 1: a name has no control"),
+        (
+            "port = \"tcp://gateway:502\"\n",
+            "",
+            "drives.toml:14: lines.south: expected port = \"PORT\", such as",
+        ),
         ("[lines.south]", "[lines.\"\"]", "drives.toml:32: line: there is no line \"south\""),
         ("atv28@20", "atv28@7", "drives.toml:27: drive: address 7 of this line is taken"),
         (
             "on_exit = \"leave\"",
             "on_exit = \"explode\"",
             "drives.toml:29: on_exit: \"explode\": expected one of stop, release, leave",
+        ),
+        (
+            "frequency = {",
+            "injection = \"31s\"\nfrequency = {",
+            "drives.toml:22: injection: fan 1: an injection of 31s: expected more than nothing and 30s at the most",
         ),
         ("max_age = \"5s\"", "max_age = \"1s\"", "drives.toml:8: max_age: fan 1: with a status every 1s"),
         (
@@ -261,6 +292,8 @@ fn what_the_owner_knows_of_a_drive_is_an_option_of_its_entry_or_of_the_defaults(
         let error = read(&text("", own)).expect_err(told);
         assert!(error.starts_with(told), "{error}\nexpected {told}");
     }
+    let table = text("", "saves = 120").replace("options = { saves = 120 }", "options.saves = 120");
+    assert_eq!(read(&table).unwrap().lines[0].drives[0].options.values.saves, Some(120));
 }
 
 #[test]
@@ -352,7 +385,7 @@ fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
         ("line = \"north\"\nallow = [\"10.0.0.0/33\"]", "expected an address or a network"),
         ("line = \"north\"\nshare = 100", "share: 100: expected 1 to 80"),
         ("line = \"north\"\npatience = \"1ms\"", "patience: 1ms: expected 50ms to 60s"),
-        ("line = \"north\"\nreads = \"stop\"", "expected status or background"),
+        ("line = \"north\"\nreads = \"stop\"", "expected one of status, background"),
         ("line = \"north\"\nraw_writes = true", "raw_writes = true needs writes = \"operate\""),
         ("line = \"north\"\nwrites = \"operate\"\neeprom_writes = true", "needs raw_writes = true"),
         ("line = \"north\"\nbroadcast = true", "broadcast = true needs writes"),
@@ -468,7 +501,7 @@ fn what_is_wrong_with_an_edge_node_is_told_with_its_place() {
         ("edge_node = \"x\"".to_owned(), "missing field"),
         ("group = \"a/b\"\nstate = \"x\"".to_owned(), "expected a name without + / #"),
         (format!("{least}primary_host = \"#\""), "expected a name without + / #"),
-        (format!("{least}commands = \"engineer\""), "expected off, stop or operate"),
+        (format!("{least}commands = \"engineer\""), "expected one of off, stop, operate"),
         (format!("{least}lifetime = \"11s\""), "expected up to 10s"),
         (format!("{least}retain = true"), "unknown field"),
     ] {
@@ -482,6 +515,48 @@ fn what_is_wrong_with_an_edge_node_is_told_with_its_place() {
         let text = format!("[mqtt]\nservers = [\"mqtts://broker\"]\n[mqtt.sparkplug]\n{least}{BROKER}{more}");
         let told = read(&text).expect_err(name);
         assert!(told.contains(problem), "{told}");
+    }
+}
+
+#[test]
+fn what_only_a_drive_under_control_can_do_is_refused_without_it() {
+    let with = |said: &str| {
+        read(&format!(
+            "lines.a.port = \"/dev/ttyUSB0,19200,8N1\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n{said}\n"
+        ))
+    };
+    let acting = [
+        ("commanders", "[\"operator\"]"),
+        ("watchdog", "{ time = \"5s\", reaction = \"ramp\" }"),
+        ("frequency", "{ low = 10 }"),
+        ("stop_mode", "\"fast\""),
+        ("on_exit", "\"stop\""),
+        ("on_exit_adopted", "\"stop\""),
+        ("on_exit_watchdog", "\"leave\""),
+        ("on_loss", "\"stop\""),
+        ("on_fault", "\"reset-watchdog-trip\""),
+        ("on_control_taken", "\"withdraw\""),
+        ("accept_self_restart", "[\"Atr\"]"),
+        ("accept_resume", "[\"output\"]"),
+        ("injection", "\"3s\""),
+    ];
+    for (key, value) in acting {
+        let refused = with(&format!("{key} = {value}")).expect_err(key);
+        let told = format!("drives.toml:5: {key}: {key} without control = true: a 1 is only read");
+        assert!(refused.starts_with(&told), "{refused}");
+        with(&format!("{key} = {value}\ncontrol = true")).expect(key);
+    }
+    let declared: Vec<_> = drive_keys().iter().filter(|key| key.acts).map(|key| key.name).collect();
+    assert_eq!(declared, acting.map(|(key, _)| key));
+    for idle in [
+        "on_exit = \"leave\"",
+        "on_exit_adopted = \"leave\"",
+        "on_loss = \"report\"",
+        "on_fault = \"report\"",
+        "alarms = { current = 10 }",
+        "coast = \"30s\"",
+    ] {
+        with(idle).expect(idle);
     }
 }
 
@@ -504,19 +579,60 @@ fn documented(head: &str) -> std::collections::BTreeSet<String> {
 
 #[test]
 fn the_readme_has_every_key_of_the_file_and_no_other() {
-    let mut top = documented("Top level");
-    top.extend(["lines", "drives"].map(str::to_owned));
-    assert_eq!(top, taken(""));
-    for (head, section) in [
-        ("`[lines.NAME]`", "[lines.a]"),
-        ("`[[drives]]`", "[[drives]]"),
-        ("`[http]`", "[http]"),
-        ("`[[gateways]]`", "[[gateways]]"),
-        ("`[mqtt.sparkplug]`", "[mqtt]\nservers = []\n[mqtt.sparkplug]"),
-    ] {
+    for (head, section) in
+        [("`[http]`", "[http]"), ("`[mqtt.sparkplug]`", "[mqtt]\nservers = []\n[mqtt.sparkplug]")]
+    {
         assert_eq!(documented(head), taken(section), "{head}");
     }
     let mut mqtt = documented("`[mqtt]`");
     mqtt.insert("sparkplug".to_owned());
     assert_eq!(mqtt, taken("[mqtt]"));
+}
+
+#[test]
+fn the_readme_says_of_each_key_what_its_table_declares() {
+    let readme = include_str!("../../README.md");
+    for (head, keys) in tables() {
+        let rows = readme.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
+        let rows: Vec<&str> = rows.take_while(|row| row.starts_with('|')).collect();
+        let declared: Vec<String> = keys.iter().map(Key::row).collect();
+        assert_eq!(rows, declared, "expected\n{}", declared.join("\n"));
+    }
+}
+
+#[test]
+fn a_key_that_says_its_default_changes_nothing() {
+    let file = |[top, line, drive, gateway]: [&str; 4]| {
+        let (port, names) = ("lines.a.port = \"/dev/ttyUSB0\"", "line = \"a\"\ndrive = \"atv312@1\"");
+        let drive = format!("[[drives]]\n{names}\ncontrol = true\n{drive}");
+        let config =
+            read(&format!("{top}\n{port}\n{line}\n{drive}\n[[gateways]]\nline = \"a\"\n{gateway}\n"));
+        config.map(|config| format!("{config:?}"))
+    };
+    let plain = file([""; 4]).unwrap();
+    let mut tried = 0;
+    for (head, keys) in tables() {
+        for key in keys {
+            // What is more than code has no word in the file.
+            let Some(default) = key.default().trim_end_matches(" ¹").strip_prefix('`') else { continue };
+            let Some(default) = default.strip_suffix('`') else { continue };
+            let is_value =
+                default.starts_with('"') || default.parse::<bool>().is_ok() || default.parse::<u8>().is_ok();
+            let said = if is_value { default.to_owned() } else { format!("{default:?}") };
+            let said = format!("{} = {said}", key.name);
+            let config = match head {
+                "Top level" if key.name.starts_with('[') => continue,
+                "Top level" => file([&said, "", "", ""]),
+                "`[lines.NAME]`" => file(["", &format!("lines.a.{said}"), "", ""]),
+                // It is refused without the time that it is about.
+                _ if key.name == "on_client_silence" => continue,
+                "`[[gateways]]`" => file(["", "", "", &said]),
+                _ if key.name == "control" => continue,
+                _ => file(["", "", &said, ""]),
+            };
+            assert_eq!(config.as_ref(), Ok(&plain), "{said}");
+            tried += 1;
+        }
+    }
+    assert!(tried > 25, "{tried}");
 }

@@ -2,9 +2,13 @@
 
 use std::{fmt, str::FromStr};
 
-use drive_core::{Current, Frequency, Lack, Percent, Reaction};
-use drive_fleet::{Band, OnControlTaken, OnExitWatchdog};
+use drive_core::{Current, Frequency, Lack, Percent, Reaction, StopMode};
+use drive_fleet::{
+    Alarms, Band, FrequencyLimits, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault, OnLoss,
+};
 use serde::{Deserialize, Deserializer, de};
+
+use crate::duration::Time;
 
 /// A value that is written as a text and read by its own rules, whose error says what was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +32,7 @@ where
 /// A text that is none of a few words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected one of {}", .0.join(", "))]
-pub(super) struct NotAmong(&'static [&'static str]);
+pub(super) struct NotAmong(pub(super) &'static [&'static str]);
 
 /// Declares a value that is one of a few words.
 macro_rules! words {
@@ -37,18 +41,20 @@ macro_rules! words {
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub(super) struct $name(pub(super) $inner);
 
-        impl FromStr for $name {
-            type Err = NotAmong;
+        impl std::str::FromStr for $name {
+            type Err = $crate::config::values::NotAmong;
 
-            fn from_str(text: &str) -> Result<Self, NotAmong> {
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($word => Ok(Self($value)),)+
-                    _ => Err(NotAmong(&[$($word),+])),
+                    _ => Err($crate::config::values::NotAmong(&[$($word),+])),
                 }
             }
         }
     };
 }
+
+pub(super) use words;
 
 words! {
     /// What a watchdog does.
@@ -60,36 +66,20 @@ words! {
     "trip" => Reaction::Trip
 }
 
-/// What happens at the exit; the stop mode is said apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Exit {
-    Stop,
-    Release,
-    Leave,
+words! {
+    /// What happens at the exit; how it stops is said apart.
+    ExitPolicy(OnExit):
+    "stop" => OnExit::Stop(StopMode::Ramp),
+    "release" => OnExit::Release(StopMode::Ramp),
+    "leave" => OnExit::Leave
 }
 
 words! {
-    /// What happens at the exit.
-    ExitPolicy(Exit):
-    "stop" => Exit::Stop,
-    "release" => Exit::Release,
-    "leave" => Exit::Leave
-}
-
-/// What happens at the exit to a motor that turns and that was not started here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Adopted {
-    Report,
-    Stop,
-    Leave,
-}
-
-words! {
-    /// What happens at the exit to a motor that was not started here.
-    AdoptedPolicy(Adopted):
-    "report" => Adopted::Report,
-    "stop" => Adopted::Stop,
-    "leave" => Adopted::Leave
+    /// What happens at the exit to a motor that turns and that was not started here.
+    AdoptedPolicy(OnExitAdopted):
+    "report" => OnExitAdopted::Report,
+    "stop" => OnExitAdopted::Stop(StopMode::Ramp),
+    "leave" => OnExitAdopted::Leave
 }
 
 words! {
@@ -102,16 +92,16 @@ words! {
 
 words! {
     /// Whether a drive that was lost is stopped when it returns.
-    LossPolicy(bool):
-    "report" => false,
-    "stop" => true
+    LossPolicy(OnLoss):
+    "report" => OnLoss::Report,
+    "stop" => OnLoss::Stop(StopMode::Ramp)
 }
 
 words! {
     /// Whether the trip of a watchdog is reset.
-    FaultPolicy(bool):
-    "report" => false,
-    "reset-watchdog-trip" => true
+    FaultPolicy(OnFault):
+    "report" => OnFault::Report,
+    "reset-watchdog-trip" => OnFault::ResetWatchdogTrip
 }
 
 words! {
@@ -216,6 +206,55 @@ impl<'de> Deserialize<'de> for BandValue {
                 "a band of {} frequencies: expected [LOW, HIGH]",
                 other.len()
             ))),
+        }
+    }
+}
+
+/// `watchdog`.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WatchdogEntry {
+    pub(super) time: Parsed<Time>,
+    pub(super) reaction: Parsed<ReactionValue>,
+}
+
+/// `frequency`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FrequencyEntry {
+    low: Option<FrequencyValue>,
+    high: Option<FrequencyValue>,
+    #[serde(default)]
+    forbidden: Vec<BandValue>,
+    change_per_second: Option<FrequencyValue>,
+}
+
+impl FrequencyEntry {
+    pub(super) fn limits(&self) -> FrequencyLimits {
+        FrequencyLimits {
+            low: self.low.map(|value| value.0),
+            high: self.high.map(|value| value.0),
+            forbidden: self.forbidden.iter().map(|band| band.0).collect(),
+            change_per_second: self.change_per_second.map(|value| value.0),
+        }
+    }
+}
+
+/// `alarms`.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AlarmsEntry {
+    current: Option<CurrentValue>,
+    drive_thermal: Option<PercentValue>,
+    motor_thermal: Option<PercentValue>,
+}
+
+impl AlarmsEntry {
+    pub(super) fn alarms(&self) -> Alarms {
+        Alarms {
+            current: self.current.map(|value| value.0),
+            drive_thermal: self.drive_thermal.map(|value| value.0),
+            motor_thermal: self.motor_thermal.map(|value| value.0),
         }
     }
 }

@@ -23,7 +23,8 @@ pub(crate) struct Limits {
     pub(crate) per_address: usize,
     /// Connections besides, when all others ask.
     pub(crate) for_stops: usize,
-    /// Who has said nothing for so long makes room.
+    /// Who has said nothing for so long makes room. Who has never said anything makes room at once for an address that has fewer
+    /// connections than his.
     pub(crate) silent_for: Duration,
     /// Event streams at once: what is left of the connections is for commands.
     pub(crate) streams: usize,
@@ -68,6 +69,8 @@ struct Member {
     address: Option<IpAddr>,
     /// Since when it has not asked for anything, or not to the end of what it asks.
     waits_since: Instant,
+    /// It has said something.
+    heard: bool,
     is_for_stops: bool,
     streams: bool,
     shared: Arc<Shared>,
@@ -107,7 +110,10 @@ impl Crowd {
         if its_own || members.all.len() >= self.limits.connections {
             let may_go = members.all.iter().filter(|(_, member)| !its_own || member.address == address);
             let is_silent = |since| now.saturating_duration_since(since) >= self.limits.silent_for;
-            let waiting = may_go.filter(|(_, member)| !member.asks() && is_silent(member.waits_since));
+            let has = of(&members, address);
+            let crowds = |member: &Member| !member.heard && of(&members, member.address) > has + 1;
+            let waiting = may_go
+                .filter(|(_, member)| !member.asks() && (is_silent(member.waits_since) || crowds(member)));
             let first = waiting.max_by_key(|(id, member)| {
                 let longest = std::cmp::Reverse((member.waits_since, **id));
                 (!member.is_for_stops, of(&members, member.address), longest)
@@ -132,8 +138,14 @@ impl Crowd {
         }
         let (id, shared) = (members.next, Arc::<Shared>::default());
         members.next += 1;
-        let member =
-            Member { address, waits_since: now, is_for_stops, streams: false, shared: Arc::clone(&shared) };
+        let member = Member {
+            address,
+            waits_since: now,
+            heard: false,
+            is_for_stops,
+            streams: false,
+            shared: Arc::clone(&shared),
+        };
         members.all.insert(id, member);
         drop(members);
         Some(Place { crowd: self.clone(), id, shared })
@@ -185,6 +197,7 @@ impl Place {
     pub(crate) fn hear(&self, now: Instant) {
         if let Some(member) = self.crowd.lock().all.get_mut(&self.id) {
             member.waits_since = now;
+            member.heard = true;
         }
     }
 }
@@ -313,6 +326,21 @@ mod tests {
         assert!(crowd.enter(address(101), start + 10 * second).is_none());
         drop(scada);
         assert!(crowd.enter(address(101), start + 10 * second).is_some());
+    }
+
+    #[test]
+    fn one_address_that_comes_again_and_again_and_says_nothing_keeps_no_other_out_of_a_gateway() {
+        let (crowd, start) = (Crowd::new(Limits::of_gateway(16)), Instant::now());
+        let mut held: Vec<Place> = (0..16).map(|_| crowd.enter(address(1), start).unwrap()).collect();
+        let scada = crowd.enter(address(2), start).expect("sixteen of one address have said nothing");
+        assert_eq!(crowd.lock().all.len(), 16);
+        // Nor does he get its place back before it has asked.
+        assert!(crowd.enter(address(1), start).is_none());
+        assert!(crowd.lock().all.contains_key(&scada.id));
+        // Those that ask stay, whatever address they are of.
+        held.iter().for_each(|place| place.hear(start));
+        assert!(crowd.enter(address(3), start).is_none());
+        held.clear();
     }
 
     #[test]

@@ -550,13 +550,14 @@ fn told(caller: &Caller, session: Option<&str>, encrypted: bool) -> Response {
 fn protect(headers: &mut HeaderMap, of_api: bool) {
     const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'";
     for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::REFERRER_POLICY, "no-referrer"),
         (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
     ] {
         headers.insert(name, HeaderValue::from_static(value));
     }
+    // The page's document says itself what may stand in it.
+    headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(POLICY));
     if of_api {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     }

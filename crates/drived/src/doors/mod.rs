@@ -54,7 +54,9 @@ use self::{
 pub(crate) use self::{
     rights::{Caller, Rights, Role},
     tls::{identity, private},
-    token_desk::{MadeToken, NewToken, RemovedToken, TOKENS, TokensView},
+    token_desk::{
+        MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, of_days, of_hours, replaced,
+    },
 };
 use crate::{
     config::{DoorsConfig, HttpConfig, SocketConfig},

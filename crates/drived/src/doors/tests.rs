@@ -104,7 +104,7 @@ impl Rig {
     }
 
     fn token(&self, name: &str, role: Role) -> String {
-        self.gate.tokens.as_ref().unwrap().add(name, role).unwrap()
+        self.gate.tokens.as_ref().unwrap().add(name, role, None).unwrap()
     }
 
     /// Asks from an address.

@@ -1,7 +1,7 @@
-//! `/api/v1/tokens`: whoever has every right on the control socket makes, lists and removes tokens. The daemon does it itself, so that
+//! `/api/v1/tokens`: whoever has every right on the control socket makes, lists, replaces and removes tokens. The daemon does it itself, so that
 //! nobody with more rights than it has writes in its folder.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use axum::{
     body::Body,
@@ -24,10 +24,10 @@ use crate::json::line;
 pub(crate) const TOKENS: &str = "/api/v1/tokens";
 
 /// The tokens, and where they are kept.
-#[derive(Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct TokensView {
-    file: PathBuf,
-    tokens: Vec<TokenView>,
+    pub(crate) file: PathBuf,
+    pub(crate) tokens: Vec<TokenView>,
 }
 
 /// A token that is wished for.
@@ -36,21 +36,47 @@ pub(crate) struct TokensView {
 pub(crate) struct NewToken {
     name: String,
     role: Role,
+    /// For how many days; for ever where it is not said.
+    #[serde(default)]
+    days: Option<u32>,
+}
+
+/// How a token is replaced.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Rotation {
+    /// How many hours that which it was is good for yet.
+    hours: u32,
 }
 
 /// A token that was made: what it is itself is told this once.
-#[derive(Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct MadeToken {
-    name: String,
-    role: Role,
-    token: String,
+    pub(crate) name: String,
+    pub(crate) role: Role,
+    pub(crate) token: String,
 }
 
 /// A token that is no more.
-#[derive(Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct RemovedToken {
-    name: String,
-    removed: bool,
+    pub(crate) name: String,
+    pub(crate) removed: bool,
+}
+
+/// For so many days.
+pub(crate) const fn of_days(days: u32) -> Duration {
+    Duration::from_secs(days as u64 * 86_400)
+}
+
+/// For so many hours.
+pub(crate) const fn of_hours(hours: u32) -> Duration {
+    Duration::from_secs(hours as u64 * 3_600)
+}
+
+/// What the log of who did what says of a token that was replaced.
+pub(crate) fn replaced(name: &str, hours: u32) -> String {
+    format!("token {name} replaced; the one before it is good for {hours} h yet")
 }
 
 /// Whether a path is one of tokens, and the name that it has.
@@ -77,13 +103,15 @@ pub(super) async fn answer(
             Ok(told(&TokensView { file, tokens: tokens.views().map_err(refused)? }))
         }
         (&Method::POST, None) => {
-            let NewToken { name, role } = serde_json::from_slice(body).map_err(|error| {
+            let NewToken { name, role, days } = serde_json::from_slice(body).map_err(|error| {
                 Refusal::new(
                     StatusCode::BAD_REQUEST,
                     format!("expected {{\"name\": …, \"role\": …}}: {error}"),
                 )
             })?;
-            let token = changed(&tokens, name.clone(), move |tokens, name| tokens.add(name, role)).await?;
+            let token =
+                changed(&tokens, name.clone(), move |tokens, name| tokens.add(name, role, days.map(of_days)))
+                    .await?;
             let written = record(format!("token {name} added, role {}", role.name())).done().await;
             if let Err(error) = written {
                 changed(&tokens, name, Tokens::remove).await?;
@@ -91,13 +119,24 @@ pub(super) async fn answer(
             }
             Ok(told(&MadeToken { name, role, token }))
         }
+        (&Method::PUT, Some(name)) => {
+            let Rotation { hours } = serde_json::from_slice(body).map_err(|error| {
+                Refusal::new(StatusCode::BAD_REQUEST, format!("expected {{\"hours\": …}}: {error}"))
+            })?;
+            let rotate = move |tokens: &Tokens, name: &str| tokens.rotate(name, of_hours(hours));
+            let (role, token) = changed(&tokens, name.to_owned(), rotate).await?;
+            record(replaced(name, hours)).whenever();
+            Ok(told(&MadeToken { name: name.to_owned(), role, token }))
+        }
         (&Method::DELETE, Some(name)) => {
             let name = name.to_owned();
             changed(&tokens, name.clone(), Tokens::remove).await?;
             record(format!("token {name} removed")).whenever();
             Ok(told(&RemovedToken { name, removed: true }))
         }
-        _ => Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "tokens are listed, made and removed")),
+        _ => {
+            Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "tokens are listed, made, replaced and removed"))
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::{
     fmt,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 use schemars::JsonSchema;
@@ -35,6 +35,11 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
+/// Now, in seconds since 1970.
+fn now() -> u64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs()
+}
+
 /// In hexadecimal digits.
 pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
@@ -50,14 +55,41 @@ pub(crate) struct Token {
     pub(super) sha256: String,
     /// When it was made, in seconds since 1970.
     pub(crate) made: u64,
+    /// When it ends by itself, in seconds since 1970; never where it is not said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) expires: Option<u64>,
+    /// The one before it, which is good for a while after it was replaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) before: Option<Before>,
+}
+
+/// A token that was replaced.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Before {
+    sha256: String,
+    /// In seconds since 1970.
+    until: u64,
+}
+
+impl Token {
+    /// Whether this is its hash now, or that of the one before it, compared in the same time whether it is right or wrong.
+    fn is(&self, wanted: &str, now: u64) -> bool {
+        let same = |hash: &str| bool::from(hash.as_bytes().ct_eq(wanted.as_bytes()));
+        let before = self.before.as_ref().map(|before| same(&before.sha256) & (now < before.until));
+        (same(&self.sha256) | before.unwrap_or_default()) & self.expires.is_none_or(|expires| now < expires)
+    }
 }
 
 /// A token as it is told.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct TokenView {
-    name: String,
-    role: Role,
-    made_unix_s: u64,
+    pub(crate) name: String,
+    pub(crate) role: Role,
+    pub(crate) made_unix_s: u64,
+    /// When it ends by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) expires_unix_s: Option<u64>,
 }
 
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -137,7 +169,12 @@ impl Tokens {
 
     /// All of them, as they are told.
     pub(crate) fn views(&self) -> Result<Vec<TokenView>, TokenError> {
-        let view = |Token { name, role, made, .. }: Token| TokenView { name, role, made_unix_s: made };
+        let view = |Token { name, role, made, expires, .. }: Token| TokenView {
+            name,
+            role,
+            made_unix_s: made,
+            expires_unix_s: expires,
+        };
         Ok(self.all()?.into_iter().map(view).collect())
     }
 
@@ -148,12 +185,15 @@ impl Tokens {
 
     /// The token with this hash.
     pub(super) fn of_hash(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
-        let same = |token: &Token| bool::from(token.sha256.as_bytes().ct_eq(wanted.as_bytes()));
-        Ok(self.all()?.into_iter().fold(None, |found, token| if same(&token) { Some(token) } else { found }))
+        let now = now();
+        Ok(self
+            .all()?
+            .into_iter()
+            .fold(None, |found, token| if token.is(wanted, now) { Some(token) } else { found }))
     }
 
-    /// Adds a token and gives its secret, which nobody can ever read again.
-    pub(crate) fn add(&self, name: &str, role: Role) -> Result<String, TokenError> {
+    /// Adds a token, for so long or for ever, and gives its secret, which nobody can ever read again.
+    pub(crate) fn add(&self, name: &str, role: Role, lasts: Option<Duration>) -> Result<String, TokenError> {
         let allowed = |character: char| character.is_ascii_alphanumeric() || matches!(character, '-' | '_');
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(allowed) {
             return Err(TokenError::Name(name.to_owned()));
@@ -167,11 +207,28 @@ impl Tokens {
             return Err(TokenError::Taken(name.to_owned()));
         }
         let secret = new_secret()?;
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let sha256 = sha256(secret.as_bytes());
-        tokens.push(Token { name: name.to_owned(), role, sha256, made: now.as_secs() });
+        let (sha256, made) = (sha256(secret.as_bytes()), now());
+        let expires = lasts.map(|lasts| made.saturating_add(lasts.as_secs()));
+        tokens.push(Token { name: name.to_owned(), role, sha256, made, expires, before: None });
         self.write(tokens)?;
         Ok(secret)
+    }
+
+    /// Gives a token of this name another secret. That which it had is good for `overlap` yet, so that whoever uses it can be
+    /// told the new one without being shut out; the times that it ends by itself stays.
+    pub(crate) fn rotate(&self, name: &str, overlap: Duration) -> Result<(Role, String), TokenError> {
+        let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
+        let mut tokens = self.all()?;
+        let Some(token) = tokens.iter_mut().find(|token| token.name == name) else {
+            let there = tokens.into_iter().map(|token| token.name).collect();
+            return Err(TokenError::Unknown { name: name.to_owned(), there });
+        };
+        let (secret, role) = (new_secret()?, token.role);
+        let until = now().saturating_add(overlap.as_secs());
+        let replaced = std::mem::replace(&mut token.sha256, sha256(secret.as_bytes()));
+        token.before = Some(Before { sha256: replaced, until }).filter(|_| !overlap.is_zero());
+        self.write(tokens)?;
+        Ok((role, secret))
     }
 
     /// Removes a token; whoever uses it is refused from now on.
@@ -208,12 +265,12 @@ mod tests {
         let folder = crate::doors::tests::Folder::new("tokens");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         assert_eq!(tokens.find("drv_0"), Ok(None));
-        let secret = tokens.add("panel-1", Role::Operate).unwrap();
+        let secret = tokens.add("panel-1", Role::Operate, None).unwrap();
         assert!(secret.starts_with("drv_") && secret.len() == 68, "256 bits");
         let found = tokens.find(&secret).unwrap().unwrap();
         assert_eq!((found.name.as_str(), found.role), ("panel-1", Role::Operate));
         assert_eq!(tokens.find(&secret[..67]), Ok(None));
-        assert_eq!(tokens.add("panel-1", Role::View), Err(TokenError::Taken("panel-1".to_owned())));
+        assert_eq!(tokens.add("panel-1", Role::View, None), Err(TokenError::Taken("panel-1".to_owned())));
         let text = fs::read_to_string(folder.file("tokens")).unwrap();
         assert!(!text.contains(&secret[4..]), "{text}");
         // Another program removes it.
@@ -222,11 +279,27 @@ mod tests {
     }
 
     #[test]
+    fn a_token_ends_when_its_time_is_over_and_one_that_was_replaced_when_its_overlap_is() {
+        let folder = crate::doors::tests::Folder::new("lasting");
+        let tokens = Tokens::open(&folder.file("tokens")).unwrap();
+        let hour = Duration::from_secs(3_600);
+        let first = tokens.add("scada", Role::Operate, Some(hour)).unwrap();
+        let (role, second) = tokens.rotate("scada", Duration::from_secs(60)).unwrap();
+        assert_eq!(role, Role::Operate);
+        let token = tokens.find(&first).unwrap().expect("it is good for a while yet");
+        assert_eq!(tokens.find(&second), Ok(Some(token.clone())));
+        let [first, second] = [&first, &second].map(|secret| sha256(secret.as_bytes()));
+        assert!(token.is(&first, token.made + 58) && !token.is(&first, token.made + 62));
+        assert!(token.is(&second, token.made + 3_599) && !token.is(&second, token.made + 3_600));
+        assert!(matches!(tokens.rotate("gone", hour), Err(TokenError::Unknown { .. })));
+    }
+
+    #[test]
     fn a_name_that_nobody_could_tell_apart_is_refused() {
         let folder = crate::doors::tests::Folder::new("token-names");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         for name in ["", "local", "anonymous", "a b", "päuse", "line\nbreak", &"x".repeat(65)] {
-            assert!(tokens.add(name, Role::View).is_err(), "{name:?}");
+            assert!(tokens.add(name, Role::View, None).is_err(), "{name:?}");
         }
         assert!(matches!(tokens.remove("gone"), Err(TokenError::Unknown { .. })));
     }
@@ -242,7 +315,7 @@ mod tests {
         for name in ["tokens.new", ".tokens.new"] {
             symlink(&precious, folder.file(name)).unwrap();
         }
-        Tokens::open(&file).unwrap().add("panel", Role::View).unwrap();
+        Tokens::open(&file).unwrap().add("panel", Role::View, None).unwrap();
         assert_eq!(fs::read_to_string(&precious).unwrap(), "precious");
         assert!(fs::symlink_metadata(&file).unwrap().is_file());
         fs::remove_file(&file).unwrap();
@@ -257,7 +330,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = crate::doors::tests::Folder::new("open-tokens");
         let file = folder.file("tokens");
-        Tokens::open(&file).unwrap().add("panel", Role::View).unwrap();
+        Tokens::open(&file).unwrap().add("panel", Role::View, None).unwrap();
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
         fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
         assert_eq!(Tokens::open(&file).unwrap_err(), TokenError::Open(file));

@@ -117,7 +117,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
     for address in 1..=6 {
         let pump = by("operator", address);
         assert_eq!(pump.set_setpoint(Frequency::from_hertz(30)).await, Outcome::Confirmed);
-        assert_eq!(pump.start(Direction::Forward).await, Outcome::Confirmed);
+        assert!(pump.start(Direction::Forward).await.is_confirmed());
     }
     at(1, 0).await;
     // Half of the pumps are behind a terminal that comes loose.
@@ -129,7 +129,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
     at(3, 0).await;
     assert_eq!(by("operator", 1).reset_faults().await, Outcome::Confirmed);
     assert_eq!(by("operator", 1).set_setpoint(Frequency::from_hertz(30)).await, Outcome::Confirmed);
-    assert_eq!(by("operator", 1).start(Direction::Forward).await, Outcome::Confirmed);
+    assert!(by("operator", 1).start(Direction::Forward).await.is_confirmed());
     at(3, 30).await;
     machines[6].power(false);
     at(5, 0).await;
@@ -141,7 +141,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         let pump = by("operator", address);
         assert_eq!(pump.reset_faults().await, Outcome::Confirmed);
         assert_eq!(pump.set_setpoint(Frequency::from_hertz(30)).await, Outcome::Confirmed);
-        assert_eq!(pump.start(Direction::Forward).await, Outcome::Confirmed);
+        assert!(pump.start(Direction::Forward).await.is_confirmed());
     }
     at(7, 0).await;
     simulated.set_fault(Fault::Flipped, 100_000);
@@ -183,7 +183,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
             Level::ERROR,
             &["north: back after up to 2", "pump 3 tripped: SLF, ", "by its communication watchdog"],
         ),
-        (Level::ERROR, &["north: pump 7 back after 2", " s, tripped: SLF, "]),
+        (Level::ERROR, &["north: pump ", " back after 2", " s, tripped: SLF, "]),
         // A trip with its mnemonic, and its reset.
         (Level::ERROR, &["north: pump 1 tripped at 30 Hz: OCF, "]),
         // Dead for ten minutes.
@@ -226,7 +226,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
     }
     // A line is read in two seconds; those of the commands, which say who did what, are not the trouble.
     let all = told.all();
-    let trouble = all.iter().filter(|(_, entry)| !entry.text.ends_with("by operator: confirmed")).count();
+    let trouble = all.iter().filter(|(_, entry)| !entry.text.contains(" by operator: confirmed")).count();
     assert!(trouble <= 30, "{trouble} lines:\n{text}");
     for (_, one) in &all {
         let same = all.iter().filter(|(_, other)| other.text == one.text).count();

@@ -48,7 +48,9 @@ fn tell_whole(
 ) {
     let [line, name] = labels;
     let identity = match &snapshot.identity {
-        IdentityCheck::Same(identity) | IdentityCheck::Changed { found: identity, .. } => Some(identity),
+        IdentityCheck::Same(identity)
+        | IdentityCheck::Changed { found: identity, .. }
+        | IdentityCheck::OtherFamily { found: identity, .. } => Some(identity),
         IdentityCheck::Unchecked | IdentityCheck::CannotSay => None,
     };
     let said =
@@ -106,7 +108,7 @@ fn tell_status(status: &Status, snapshot: &Snapshot, labels: [&str; 2], samples:
     match snapshot.setpoint {
         Some(Setpoint::Frequency(setpoint)) => samples.add(Id::DriveSetpoint, &labels, hertz(setpoint)),
         Some(Setpoint::Speed(setpoint)) => samples.add(Id::DriveSetpointSpeed, &labels, rpm(setpoint)),
-        None => {}
+        Some(Setpoint::Share(_)) | None => {}
     }
     if let Some(control) = status.control {
         samples.add(Id::DriveInControl, &[line, name, &control.to_string().replace(' ', "_")], 1.0);

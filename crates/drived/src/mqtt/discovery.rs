@@ -44,10 +44,11 @@ const STATES: [State; 9] = [
 ];
 
 /// The events that somebody should look at now.
-const ALARMS: [&str; 10] = [
+const ALARMS: [&str; 11] = [
     "lost",
     "tripped",
     "identity_changed",
+    "other_family",
     "watchdog_broken",
     "watchdog_not_in_force",
     "stop_unconfirmed",

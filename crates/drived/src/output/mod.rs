@@ -129,6 +129,18 @@ pub(crate) fn or_dash(value: Option<impl fmt::Display>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| value.to_string())
 }
 
+/// An age or a length of time, in one unit that a person takes in at a glance.
+pub(crate) fn age(time: Duration) -> String {
+    let milliseconds = time.as_millis();
+    match milliseconds {
+        0..1_000 => format!("{milliseconds} ms"),
+        1_000..10_000 => format!("{}.{} s", milliseconds / 1_000, milliseconds % 1_000 / 100),
+        10_000..120_000 => format!("{} s", milliseconds / 1_000),
+        120_000..7_200_000 => format!("{} min", milliseconds / 60_000),
+        _ => format!("{} h", milliseconds / 3_600_000),
+    }
+}
+
 /// A short time as a person compares it.
 pub(crate) fn milliseconds(time: Duration) -> String {
     let micros = time.as_micros();

@@ -1,11 +1,13 @@
 //! The files of the page, each with the path that it is served under.
 
+use super::bundle;
+
 /// A file.
 pub(super) struct File {
     /// Its path, from the root.
     pub(super) path: &'static str,
     /// What is in it.
-    pub(super) content: &'static [u8],
+    pub(super) content: Vec<u8>,
 }
 
 impl File {
@@ -21,17 +23,42 @@ impl File {
     }
 }
 
+/// All of them.
+pub(super) fn files() -> Vec<File> {
+    let served = SERVED.iter().map(|(path, content)| File { path, content: content.to_vec() });
+    let made = [("/", index()), ("/app.js", bundle::of(MODULES, "main.js"))];
+    served.chain(made.map(|(path, text)| File { path, content: text.into_bytes() })).collect()
+}
+
+/// The document, with what stops the motors in its first bytes.
+fn index() -> String {
+    INDEX.replace("{stop.css}", STOP_STYLE).replace("{stop.js}", STOP_SCRIPT)
+}
+
+const INDEX: &str = include_str!("web/index.html");
+/// The path of a stop, which stands in the document itself.
+pub(super) const STOP_SCRIPT: &str = include_str!("web/stop.js");
+pub(super) const STOP_STYLE: &str = include_str!("web/stop.css");
+
 macro_rules! files {
-    ($($name:literal),* $(,)?) => {
-        /// All of them.
-        pub(super) const FILES: &[File] = &[
-            File { path: "/", content: include_bytes!("web/index.html") },
-            $(File { path: concat!("/", $name), content: include_bytes!(concat!("web/", $name)) },)*
-        ];
+    ($name:ident: $type:ty = $read:ident($prefix:literal), $($file:literal),* $(,)?) => {
+        pub(super) const $name: &[(&str, $type)] = &[$((concat!($prefix, $file), $read!(concat!("web/", $file))),)*];
     };
 }
 
 files![
+    SERVED: &[u8] = include_bytes("/"),
+    "faults_fr.js",
+    "icon.svg",
+    "page.css",
+    "sentences_fr.js",
+    "vendor/uplot.LICENSE",
+    "vendor/uplot.css",
+    "vendor/uplot.js",
+];
+
+files![
+    MODULES: &str = include_str(""),
     "api.js",
     "ask.js",
     "demo.js",
@@ -41,31 +68,22 @@ files![
     "drive_orders.js",
     "drive_tables.js",
     "events.js",
-    "fault_texts.js",
-    "faults_fr.js",
     "follow.js",
     "format.js",
-    "icon.svg",
     "line.js",
     "line_last.js",
     "login.js",
     "main.js",
     "orders.js",
     "overview.js",
-    "page.css",
     "plant.js",
     "row.js",
-    "sentences_fr.js",
     "setpoint.js",
     "status_bits.js",
-    "stop.js",
     "stream.js",
     "texts.js",
     "told.js",
     "trend.js",
     "trouble.js",
-    "vendor/uplot.LICENSE",
-    "vendor/uplot.css",
-    "vendor/uplot.js",
     "words.js",
 ];

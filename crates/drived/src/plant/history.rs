@@ -92,15 +92,22 @@ impl History {
         }
     }
 
-    pub(super) fn of(&self, drive: &str) -> HistoryView {
+    /// What is known of a drive: all, or what a reader lacks who has the sample of this time. A time that is still to come
+    /// was told before the clock was put back, and its reader is told everything again.
+    pub(super) fn of(&self, drive: &str, since_unix_ms: Option<u64>) -> HistoryView {
         let rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let samples = || rings.drives.get(drive).into_iter().flatten();
+        let times: Vec<u64> = rings.times.iter().map(|at| unix(*at)).collect();
+        let half = milliseconds(STEP / 2);
+        let is_past = |since: &u64| times.last().is_some_and(|last| *since <= last + half);
+        let known =
+            since_unix_ms.filter(is_past).map_or(0, |since| times.partition_point(|at| *at <= since + half));
+        let samples = || rings.drives.get(drive).into_iter().flatten().skip(known);
         let column = |of: fn(&Sample) -> i32, step: f64| {
             samples().map(of).map(|count| (count != NOTHING).then(|| f64::from(count) / step)).collect()
         };
         HistoryView {
             step_ms: milliseconds(STEP),
-            time_unix_ms: rings.times.iter().map(|at| unix(*at)).collect(),
+            time_unix_ms: times[known..].to_vec(),
             frequency_hz: column(|sample| sample.frequency, 100.0),
             setpoint_hz: column(|sample| sample.setpoint, 100.0),
             current_a: column(|sample| sample.current, 10.0),

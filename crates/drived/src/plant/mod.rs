@@ -182,8 +182,8 @@ impl Plant {
     }
 
     /// The last ten minutes of a drive.
-    pub(crate) fn history(&self, name: &str) -> Option<HistoryView> {
-        self.0.fleet.drive(name).map(|_| self.0.history.of(name))
+    pub(crate) fn history(&self, name: &str, since_unix_ms: Option<u64>) -> Option<HistoryView> {
+        self.0.fleet.drive(name).map(|_| self.0.history.of(name, since_unix_ms))
     }
 
     fn members(&self) -> impl Iterator<Item = (Arc<str>, DriveHandle)> {

@@ -1,19 +1,24 @@
 //! A simulated plant in virtual time, for the tests of what stands on it.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
 
 use drive_bus::{Line, LineConfig};
 use drive_core::{
-    Control, Current, Direction, Error, Identity, Lease, SelfRestart, SerialSettings, State, Status, StopMode,
+    Control, Current, Direction, Error, Fault, FaultEntry, Faults, Identity, Lease, Motion, SelfRestart,
+    SerialSettings, State, Status, StopMode,
 };
 use drive_families::Family;
 use drive_fleet::{
-    Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, WatchdogCheck,
+    Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, Trip,
+    WatchdogCheck,
 };
 use drive_sim::{SimLine, SimSlave, Wiring};
 use tokio::time::Instant;
 
-use super::Plant;
+use super::{Plant, views::DriveView};
 use crate::{
     config::Group,
     simulated::{self, SetUp},
@@ -64,11 +69,16 @@ impl TestPlant {
 /// A drive as the API tells it, of which little is known.
 pub(crate) fn told(name: &str) -> serde_json::Value {
     serde_json::json!({
-        "name": name, "line": "north", "slave": 1, "family": "atv312", "control": true, "link": "connected",
-        "status": {"quality": "missing"}, "measurements": {"quality": "missing"}, "started_here": false,
-        "identity": {"check": "unchecked"}, "watchdog": {"check": "no_contract"}, "concerns": [],
+        "name": name, "line": "north", "slave": 1, "family": "atv312", "control": true,
+        "shows": "unknown", "link": "connected", "status": {"quality": "missing"},
+        "measurements": {"quality": "missing"}, "started_here": false, "identity": {"check": "unchecked"}, "watchdog": {"check": "no_contract"}, "concerns": [],
         "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0},
     })
+}
+
+/// A drive as somebody reads it who was told this.
+pub(crate) fn read(told: &serde_json::Value) -> DriveView {
+    serde_json::from_value(told.clone()).unwrap_or_else(|error| panic!("{error}: {told}"))
 }
 
 impl Plant {
@@ -78,9 +88,9 @@ impl Plant {
     }
 }
 
-/// A drive with every pair of troubles, which came in either order: what is known of it, as the API tells it, and its worst
-/// trouble in words.
-pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json::Value, String)> {
+/// A drive with every pair of troubles, which came in either order: what is known of it, the same as somebody reads it whom
+/// the API has told it, and its worst trouble in words.
+pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, DriveView, String)> {
     type Trouble = Box<dyn Fn(&mut Snapshot)>;
     let shown = |snapshot: &mut Snapshot, change: fn(&mut Status)| {
         let timed = snapshot.status.as_mut().expect("it has a status");
@@ -102,9 +112,19 @@ pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json:
         Box::new(|drive| drive.link = Link::Lost),
         Box::new(|drive| drive.link = Link::Connecting),
         Box::new(move |drive| shown(drive, |status| status.state = State::Fault)),
+        Box::new(move |drive| {
+            shown(drive, |status| status.state = State::Fault);
+            let status = drive.status.clone().expect("it has a status");
+            let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OCF) }], ..Faults::default() };
+            drive.trips = Arc::new([trip(status, faults, now)].into());
+        }),
         Box::new(move |drive| shown(drive, |status| status.warning = Some(true))),
         Box::new(move |drive| {
             drive.identity = IdentityCheck::Changed { remembered: identity(), found: identity() };
+        }),
+        Box::new(move |drive| {
+            let it_is = "it is an Altivar 28: atv28".into();
+            drive.identity = IdentityCheck::OtherFamily { it_is, found: identity() };
         }),
         Box::new(|drive| drive.watchdog = WatchdogCheck::Broken("not kept".to_owned())),
         Box::new(|drive| drive.max_age = Duration::ZERO),
@@ -125,7 +145,12 @@ pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json:
             let mut drive = plain.clone();
             one(&mut drive);
             other(&mut drive);
-            let told = serde_json::to_value(&drive).expect("it is told");
+            let mut told = told("pump 1");
+            let known = serde_json::to_value(&drive).expect("it is told");
+            if let Some((told, known)) = told.as_object_mut().zip(known.as_object()) {
+                told.extend(known.clone());
+            }
+            let told = read(&told);
             let worst = drive.concern(now).unwrap_or_else(|| panic!("{first} and {second} trouble nobody"));
             all.push((drive, told, worst.to_string()));
         }
@@ -133,15 +158,32 @@ pub(crate) fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, serde_json:
     all
 }
 
+/// A fault as a manual lists it.
+static OCF: FaultEntry = FaultEntry::new(9, "OCF", "overcurrent", "check the motor and the load");
+
+fn trip(status: Timed<Status>, faults: Faults, at: Instant) -> Trip {
+    Trip {
+        at,
+        wall: SystemTime::UNIX_EPOCH,
+        found: false,
+        before: None,
+        status,
+        faults: Some(Arc::new(faults)),
+        by_watchdog: false,
+        watchdog_after: None,
+    }
+}
+
 /// A drive that answers, stands, and that nothing troubles; its status is a while old already.
 fn untroubled(now: Instant) -> Snapshot {
-    let status = Status { state: State::Ready, at: Some(now), ..Status::default() };
+    let status = Status { state: State::Ready, motion: Motion::AtRest, at: Some(now), ..Status::default() };
     let at = now.checked_sub(Duration::from_millis(1)).unwrap_or(now);
     Snapshot {
         name: "pump 1".into(),
         link: Link::Connected,
         error: None,
         status: Some(Timed { value: Arc::new(status), at }),
+        retracted: false,
         measurements: None,
         setpoint: None,
         identity: IdentityCheck::CannotSay,
@@ -150,6 +192,7 @@ fn untroubled(now: Instant) -> Snapshot {
         restarts_accepted: true,
         control_taken: None,
         run_command_stands: None,
+        eeprom_worn: None,
         exceeded: Vec::new(),
         stop: None,
         lease: None,

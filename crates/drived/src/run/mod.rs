@@ -1,12 +1,15 @@
 //! `drived run`: the fleet as a daemon.
 
 mod descriptors;
+mod eeprom;
 mod exit;
 mod json;
 mod notify;
 mod picture;
+mod records;
 pub(crate) mod reload;
 mod report;
+mod runs;
 mod watchdogs;
 
 use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
@@ -14,13 +17,14 @@ use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder};
 use futures_util::future::OptionFuture;
+use tokio::sync::mpsc;
 
 use self::{
     notify::Notify,
     picture::Picture,
-    reload::Reloader,
+    records::{Records, in_folder},
+    reload::{Before, Reloader},
     report::{Form, Report},
-    watchdogs::Kept as Watchdogs,
 };
 use crate::{
     api,
@@ -30,6 +34,7 @@ use crate::{
         audit::{Audit, Kind, Record},
     },
     failure::Failure,
+    findings,
     gateway::Gateways,
     journal, logging, metrics,
     mqtt::Mqtt,
@@ -76,9 +81,19 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let notify = Notify::start();
     let mut wishes = Wishes::listen()?;
     let lines = start_lines(&config)?;
-    let watchdogs = Watchdogs::open(config.doors.state.watchdogs.as_deref());
-    let fleet =
-        build(&config, &lines, &watchdogs).start().map_err(|error| Failure::Input(error.to_string()))?;
+    let state = &config.doors.state;
+    let watchdogs = Records::open(state.watchdogs.as_deref(), watchdogs::LOSS);
+    let started = Records::open(in_folder(state.folder.as_deref(), runs::FILE).as_deref(), runs::LOSS);
+    let eeproms = Records::open(in_folder(state.folder.as_deref(), eeprom::FILE).as_deref(), eeprom::LOSS);
+    let before = |drive: &str| Before {
+        watchdog: watchdogs.of(drive).cloned(),
+        run: started.of(drive).cloned(),
+        eeprom: eeproms.of(drive).cloned(),
+    };
+    let (tell_runs, told_runs) = mpsc::unbounded_channel();
+    let builder = build(&config, &lines, before).keep_runs(tell_runs);
+    let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+    let kept = runs::follow(started, told_runs);
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let with_table = !args.json && logging::may_be_shown();
     let form = match with_table {
@@ -88,7 +103,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
-    let watchdogs = watchdogs.follow(fleet.events());
+    let watchdogs = records::follow(watchdogs, fleet.events(), watchdogs::note);
+    let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
+    let findings = tokio::spawn(findings::follow(fleet.clone()));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let gateways = Gateways::open(&config, &plant, &doors.audit());
     let shutdown = config.shutdown;
@@ -128,6 +145,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         }
     }
     drop(watching);
+    findings.abort();
     // What becomes of the motors is told in words.
     let screen = OptionFuture::from(screen.map(Screen::close));
     let screen = tokio::spawn(screen);
@@ -147,6 +165,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     // It ends with the fleet, and what it says last is not lost.
     let _ = journal.await;
     let _ = watchdogs.await;
+    let _ = eeproms.await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, kept).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
     if read.is_none() {
         report.finish().await;
@@ -198,13 +218,24 @@ fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     lines.map_err(|error| Failure::Input(error.to_string()))
 }
 
-fn build(config: &Config, lines: &[Line], watchdogs: &Watchdogs) -> FleetBuilder {
+fn build(config: &Config, lines: &[Line], before: impl Fn(&str) -> Before) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        builder = part.drives.iter().fold(builder, |builder, drive| {
-            reload::add(builder, part, drive, watchdogs.of(&drive.settings.name))
-        });
+        builder = part
+            .drives
+            .iter()
+            .fold(builder, |builder, drive| reload::add(builder, part, drive, before(&drive.settings.name)));
     }
     builder
+}
+
+/// The picture of `run` of these drives, on a wide terminal.
+#[cfg(test)]
+pub(crate) fn screen_of(drives: &[crate::plant::views::DriveView]) -> String {
+    let backend = ratatui::backend::TestBackend::new(400, 24);
+    let mut terminal = ratatui::Terminal::new(backend).expect("it has a size");
+    let picture = Picture::with(drives.to_vec(), Vec::new(), Vec::new());
+    terminal.draw(|frame| picture.draw(frame)).expect("it is drawn");
+    terminal.backend().to_string()
 }

@@ -1,41 +1,32 @@
 //! `drived run` on a terminal: the drives and the lines as a table, the log below it.
 
-use std::sync::Arc;
-
-use drive_core::Setpoint;
-use drive_fleet::{DriveHandle, Freshness, Link, Snapshot};
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
     style::{Color, Modifier, Style, Stylize},
     text::Line,
-    widgets::{Block, Borders, Cell, Paragraph, Row, Table},
+    widgets::{Block, Borders, Paragraph},
 };
 use tokio::time::Instant;
 
 use crate::{
-    drive_cells::{bar, colour, control, direction, hertz},
     output,
     plant::{
         Plant,
-        views::{LineLink, LineView},
+        views::{DriveView, LineLink, LineView},
     },
+    row::{Column, Columns, Row, line_of_plant},
 };
 
-/// From this width on there is room for a bar, and from this one for why a start would be refused.
-const WITH_BAR: u16 = 76;
-const WITH_REMARK: u16 = 110;
-const BAR: u16 = 12;
-/// What the columns behind the name take, with their gaps.
-const NUMBERS: u16 = 12 + 3 + 11 + 7 + 5 + 5 + 6;
+/// From this width on there is room for a whole sentence in the title.
+const WIDE: u16 = 76;
 /// The log has so many lines at the least, and the lines of the plant so many at the most.
 const LOG: u16 = 6;
 const LINES: usize = 4;
 
 pub(super) struct Picture {
-    now: Instant,
     /// Those in trouble first.
-    drives: Vec<Arc<Snapshot>>,
+    drives: Vec<Row>,
     lines: Vec<LineView>,
     /// The newest last.
     log: Vec<String>,
@@ -43,12 +34,16 @@ pub(super) struct Picture {
 
 impl Picture {
     pub(super) fn of(plant: &Plant, log: Vec<String>) -> Self {
-        let mut drives: Vec<_> = plant.fleet().drives().iter().map(DriveHandle::snapshot).collect();
-        let now = Instant::now();
+        Self::with(plant.drives(), plant.lines(), log)
+    }
+
+    /// A picture of these.
+    pub(super) fn with(mut drives: Vec<DriveView>, lines: Vec<LineView>, log: Vec<String>) -> Self {
         // Stable: who troubles nobody stands in the order of the configuration.
-        drives
-            .sort_by_cached_key(|drive| drive.concern(now).map_or(usize::MAX, |concern| concern.kind.rank()));
-        Self { now, drives, lines: plant.lines(), log }
+        drives.sort_by_key(|drive| drive.snapshot.rank());
+        let now = Instant::now();
+        let drives = drives.iter().map(|drive| Row::of(drive, now)).collect();
+        Self { drives, lines, log }
     }
 
     pub(super) fn draw(&self, frame: &mut Frame<'_>) {
@@ -65,18 +60,18 @@ impl Picture {
         .areas(frame.area());
         frame.render_widget(self.title(title.width), title);
         frame.render_widget(self.drives(drives), drives);
-        frame.render_widget(self.lines(), lines);
+        frame.render_widget(self.lines(lines.width), lines);
         frame.render_widget(self.log(log), log);
     }
 
     fn title(&self, width: u16) -> Line<'_> {
         let (all, troubled) =
-            (self.drives.len(), self.drives.iter().filter(|drive| in_trouble(drive, self.now)).count());
+            (self.drives.len(), self.drives.iter().filter(|row| row.is_in_trouble()).count());
         let (left, colour) = match troubled {
             0 => (format!(" drived: {all} drives"), Color::Cyan),
             _ => (format!(" drived: {all} drives, {troubled} in trouble"), Color::Yellow),
         };
-        let right = if width < WITH_BAR { " Ctrl-C: end " } else { " Ctrl-C: end, by each drive's policy " };
+        let right = if width < WIDE { " Ctrl-C: end " } else { " Ctrl-C: end, by each drive's policy " };
         let room = usize::from(width).saturating_sub(right.len());
         let left: String = left.chars().take(room).collect();
         Line::styled(
@@ -85,57 +80,23 @@ impl Picture {
         )
     }
 
-    fn drives(&self, area: Rect) -> Table<'_> {
-        let with_bar = area.width >= WITH_BAR;
-        let with_remark = area.width >= WITH_REMARK;
-        let longest = self.drives.iter().map(|drive| drive.name.chars().count()).max().unwrap_or(0).max(7);
-        let free = area.width.saturating_sub(NUMBERS + if with_bar { BAR + 1 } else { 0 });
-        let name = u16::try_from(longest).unwrap_or(u16::MAX).min(free.max(7)).min(24);
+    fn drives(&self, area: Rect) -> Paragraph<'_> {
+        let columns = Columns::of(&self.drives, &Column::ALL, usize::from(area.width));
         let shown = usize::from(area.height.saturating_sub(1));
         // The last row says how many more there are.
-        let rows = match self.drives.len() > shown {
-            true => shown.saturating_sub(1),
-            false => shown,
-        };
+        let rows = if self.drives.len() > shown { shown.saturating_sub(1) } else { shown };
         let more = self.drives.len().saturating_sub(rows);
-        let more =
-            (more > 0 && shown > 0).then(|| Row::new([format!("and {more}"), "more".to_owned()]).dim());
-        let rows = self.drives.iter().take(rows).map(|drive| {
-            let cells = cells(drive, self.now, usize::from(name), with_bar, with_remark);
-            Row::new(cells)
-        });
-        let mut widths = vec![Constraint::Length(name), Constraint::Length(12), Constraint::Length(3)];
-        let mut heads = vec!["drive", "state", "dir"];
-        if with_bar {
-            widths.push(Constraint::Length(BAR));
-            heads.push("frequency");
-        }
-        widths.extend([11, 7, 5, 5].map(Constraint::Length));
-        heads.extend(["out/set Hz", "current", "ctrl", "fault"]);
-        if with_remark {
-            widths.push(Constraint::Fill(1));
-            heads.push("");
-        }
-        Table::new(rows.chain(more).collect::<Vec<_>>(), widths)
-            .header(Row::new(heads).style(Style::new().add_modifier(Modifier::DIM)))
-            .column_spacing(1)
+        let more = (more > 0 && shown > 0).then(|| Line::from(format!("  and {more} more")).dim());
+        let head = [Line::from(columns.head("")).dim()].into_iter();
+        let rows = self.drives.iter().take(rows).map(|row| columns.line(row, false));
+        Paragraph::new(head.chain(rows).chain(more).collect::<Vec<_>>())
     }
 
-    fn lines(&self) -> Paragraph<'_> {
-        let of = |line: &LineView| match line.link {
-            LineLink::Connected => Line::from(format!(
-                "{}: {:.0} % used, a stop waits {} ms at most",
-                line.name, line.utilisation_percent, line.worst_case_stop_ms
-            ))
-            .dim(),
-            LineLink::Away => {
-                let why = line.error.as_deref().unwrap_or("its port is not there");
-                Line::from(format!("{}: AWAY, {why}", line.name)).red()
-            }
-        };
+    fn lines(&self, width: u16) -> Paragraph<'_> {
         let away_first = |link| self.lines.iter().filter(move |line| line.link == link);
         let lines = away_first(LineLink::Away).chain(away_first(LineLink::Connected));
-        Paragraph::new(lines.take(LINES).map(of).collect::<Vec<_>>())
+        let lines = lines.take(LINES).map(|line| line_of_plant(line, true, usize::from(width)));
+        Paragraph::new(lines.collect::<Vec<_>>())
     }
 
     fn log(&self, area: Rect) -> Paragraph<'_> {
@@ -170,94 +131,14 @@ fn with_time_alone(line: &str) -> String {
     }
 }
 
-/// Whether somebody should look at it.
-fn in_trouble(drive: &Snapshot, now: Instant) -> bool {
-    drive.concern(now).is_some_and(|concern| concern.kind.severity().is_trouble())
-}
-
-fn cells(
-    drive: &Snapshot,
-    now: Instant,
-    name: usize,
-    with_bar: bool,
-    with_remark: bool,
-) -> Vec<Cell<'static>> {
-    let name = match drive.name.chars().count() > name {
-        true => drive.name.chars().take(name.saturating_sub(1)).chain(['…']).collect(),
-        false => drive.name.to_string(),
-    };
-    let name = Cell::from(name).bold();
-    let fresh = drive.status.as_ref().filter(|_| drive.freshness(now) == Freshness::Fresh);
-    // What is old is not shown as if it were so now.
-    let Some(status) = fresh.map(|status| &status.value) else {
-        let (word, colour) = match drive.link {
-            Link::Connecting => ("connecting", Color::Gray),
-            Link::Connected => ("no news", Color::Yellow),
-            Link::Lost => ("LOST", Color::Red),
-        };
-        let mut cells = vec![name, Cell::from(word).fg(colour)];
-        if with_remark {
-            let empty = if with_bar { 7 } else { 6 };
-            cells.extend(std::iter::repeat_n(Cell::default(), empty - 1));
-            cells.push(remark(drive, now));
-        }
-        return cells;
-    };
-    let output = status.output_frequency.unwrap_or_default();
-    let setpoint = match drive.setpoint {
-        Some(Setpoint::Frequency(frequency)) => Some(frequency),
-        _ => None,
-    };
-    let is_there = setpoint.is_none_or(|setpoint| setpoint == output);
-    let colour = colour(status, is_there);
-    let state = match drive.stop {
-        Some(_) => Cell::from("stop pending").fg(Color::Yellow),
-        None => Cell::from(status.state.to_string()).fg(colour),
-    };
-    let mut cells = vec![name, state, Cell::from(direction(status))];
-    if with_bar {
-        cells.push(Cell::from(bar(output, setpoint.unwrap_or_default(), usize::from(BAR), colour)));
-    }
-    let asked = setpoint.map_or_else(|| "-".to_owned(), hertz);
-    cells.push(Cell::from(format!("{:>5}/{asked:<5}", hertz(output))));
-    cells.push(Cell::from(format!("{:>7}", output::current(status).unwrap_or_else(|| "-".to_owned()))));
-    cells.push(Cell::from(control(status)));
-    let fault = drive.trips.back().filter(|_| status.is_fault());
-    let known = fault.and_then(|trip| trip.faults.as_ref()?.present.first().copied());
-    let fault = match (status.is_fault(), known) {
-        (true, Some(fault)) => Cell::from(fault.mnemonic()).fg(Color::Red),
-        (true, None) => {
-            Cell::from(status.fault_code.map_or_else(|| "yes".to_owned(), |code| code.to_string()))
-                .fg(Color::Red)
-        }
-        (false, _) => Cell::from("-"),
-    };
-    cells.push(fault);
-    if with_remark {
-        cells.push(remark(drive, now));
-    }
-    cells
-}
-
-fn remark(drive: &Snapshot, now: Instant) -> Cell<'static> {
-    let cell = Cell::from(remark_text(drive, now));
-    if in_trouble(drive, now) { cell.fg(Color::Yellow) } else { cell.dim() }
-}
-
-/// What troubles it, or why a start would be refused.
-fn remark_text(drive: &Snapshot, now: Instant) -> String {
-    let refused = || drive.start_refused(now).map(ToString::to_string).unwrap_or_default();
-    drive.concern(now).map_or_else(refused, |concern| concern.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use drive_core::{Direction, Frequency};
-    use drive_fleet::DriveSettings;
+    use drive_fleet::{DriveSettings, Link};
     use ratatui::{Terminal, backend::TestBackend};
 
     use super::*;
-    use crate::plant::testing::{TestPlant, every_pair_of_troubles};
+    use crate::plant::testing::TestPlant;
 
     fn drawn(plant: &Plant, log: &[&str], width: u16, height: u16) -> String {
         let log = log.iter().map(|line| (*line).to_owned()).collect();
@@ -268,7 +149,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn sixty_columns_cut_no_number_and_who_is_lost_shows_none_and_stands_first() {
+    async fn sixty_columns_cut_no_number_and_who_is_lost_stands_first_with_what_it_showed_in_brackets() {
         let TestPlant { plant, machines, line: _line } = TestPlant::of(3).await;
         let drive = plant.fleet().drive("pump 1").unwrap();
         assert!(drive.set_setpoint(Frequency::from_decihertz(405)).await.is_confirmed());
@@ -283,22 +164,19 @@ mod tests {
             let screen = drawn(&plant, &[], width, 20);
             let rows: Vec<&str> = screen.lines().collect();
             assert!(rows[0].contains("drived: 3 drives, 1 in trouble"), "{screen}");
-            assert!(rows[2].contains("pump 3") && rows[2].contains("LOST"), "{screen}");
-            assert!(!rows[2].contains("Hz") && !rows[2].contains("0.0"), "{screen}");
+            assert!(
+                rows[2].contains("!pump 3") && rows[2].contains("lost") && rows[2].contains(" old"),
+                "{screen}"
+            );
+            assert_eq!(rows[2].matches("0.0").count(), rows[2].matches("(0.0").count(), "{screen}");
             let running = rows.iter().find(|row| row.contains("pump 1")).unwrap();
             assert!(
-                running.contains("rev") && running.contains("40.5/40.5 ") && running.contains(" A bus"),
+                running.contains("running rev")
+                    && running.contains("40.5/40.5 ")
+                    && running.contains(" A bus "),
                 "{screen}"
             );
             assert!(screen.contains("north: ") && screen.contains("% used, a stop waits"), "{screen}");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
-        let now = Instant::now();
-        for (drive, _, worst) in every_pair_of_troubles(now) {
-            assert_eq!(remark_text(&drive, now), worst);
         }
     }
 
@@ -308,7 +186,7 @@ mod tests {
         let log = ["2026-11-21 14:03:21.350+01:00 WARN  north: pump 3 lost", "another form"];
         let screen = drawn(&plant, &log, 80, 16);
         // A title, eight rows with their heads, one line, the log.
-        assert!(screen.contains("and 14  more"), "{screen}");
+        assert!(screen.contains("and 14 more"), "{screen}");
         assert!(screen.contains("14:03:21 WARN  north: pump 3 lost") && !screen.contains("2026"), "{screen}");
         assert!(screen.contains("another form"), "{screen}");
     }

@@ -8,7 +8,9 @@ use std::{
 };
 
 use drive_bus::Line;
-use drive_fleet::{DriveSettings, Fleet, FleetBuilder, FleetError, LineBudget, WatchdogBefore};
+use drive_fleet::{
+    DriveSettings, EepromLedger, Fleet, FleetBuilder, FleetError, LineBudget, RunRecord, WatchdogBefore,
+};
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
@@ -170,7 +172,7 @@ fn add_all(
                 .drives
                 .iter()
                 .filter(is_added)
-                .fold(builder, |builder, drive| add(builder, part, drive, None));
+                .fold(builder, |builder, drive| add(builder, part, drive, Before::default()));
         }
         // The file was planned as a whole.
         builder.whatever_the_plan()
@@ -224,15 +226,19 @@ impl Source for Reloader {
     }
 }
 
+/// What an earlier run of the program has left of a drive.
+#[derive(Debug, Default)]
+pub(crate) struct Before {
+    pub(crate) watchdog: Option<WatchdogBefore>,
+    pub(crate) run: Option<RunRecord>,
+    pub(crate) eeprom: Option<EepromLedger>,
+}
+
 /// Adds a drive of a line.
-pub(crate) fn add(
-    builder: FleetBuilder,
-    line: &LinePart,
-    drive: &DrivePart,
-    watchdog_before: Option<WatchdogBefore>,
-) -> FleetBuilder {
+pub(crate) fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, before: Before) -> FleetBuilder {
     let DrivePart { name, settings, options } = drive;
-    let settings = DriveSettings { watchdog_before, ..settings.clone() };
+    let Before { watchdog: watchdog_before, run: run_before, eeprom: eeprom_before } = before;
+    let settings = DriveSettings { watchdog_before, run_before, eeprom_before, ..settings.clone() };
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, &options.values)
     })

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use drive_fleet::{Events, Fleet, Link, Received, Snapshot};
+use drive_fleet::{Events, Fleet, Received, Snapshot, view::SnapshotView};
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinHandle,
@@ -16,7 +16,7 @@ use tokio::{
 };
 
 use super::json;
-use crate::failure::Failure;
+use crate::{failure::Failure, row};
 
 /// Lines that wait for the writer.
 const WAITING: usize = 64;
@@ -112,14 +112,8 @@ impl Writer {
 
 /// What a person reads of a drive.
 pub(super) fn text(snapshot: &Snapshot) -> String {
-    let status = snapshot.status.as_ref().map(|status| status.value.to_string());
-    let pending = if snapshot.stop.is_some() { "; stop pending" } else { "" };
-    match (snapshot.link, status) {
-        (Link::Connected, Some(status)) => format!("{status}{pending}"),
-        (Link::Lost, Some(status)) => format!("LOST, was {status}{pending}"),
-        (Link::Lost, None) => format!("LOST{pending}"),
-        (Link::Connecting, _) | (Link::Connected, None) => format!("no status yet{pending}"),
-    }
+    let known = SnapshotView::from(snapshot);
+    row::sentence(&known, known.status.is_good())
 }
 
 async fn read(fleet: Fleet, mut events: Events, snapshots: Duration, mut writer: Writer) {

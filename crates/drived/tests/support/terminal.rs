@@ -101,7 +101,12 @@ impl Terminal {
     pub(crate) fn end(mut self) -> (Option<i32>, String, bool) {
         let code = self.child.wait().expect("it can be waited for").code();
         let modes = tcgetattr(&self.end).expect("it has modes").local_modes;
-        while let Ok(bytes) = self.said.recv_timeout(Duration::from_millis(200)) {
+        // What was said last may take its time through a terminal on a busy machine.
+        let quiet = |screen: &Screen| match screen.is_alternate || screen.is_cursor_hidden {
+            true => Duration::from_secs(10),
+            false => Duration::from_millis(200),
+        };
+        while let Ok(bytes) = self.said.recv_timeout(quiet(&self.screen)) {
             self.screen.take(&bytes);
         }
         use rustix::termios::LocalModes;

@@ -1,15 +1,14 @@
 //! The settings of a protocol as a text: each with its name, its values, and how they are said.
 
-use std::{fmt, time::Duration};
+use std::fmt;
 
 use super::ProtocolError;
 #[cfg(feature = "ascii")]
 use crate::protocol::AsciiSettings;
+use crate::protocol::time;
 #[cfg(feature = "unitelway")]
 use crate::protocol::{NetworkHeader, UniTelwaySettings};
 
-/// Milliseconds that a setting can have: longer ones are somebody's mistake.
-const LONGEST: u64 = 60_000;
 #[cfg(feature = "unitelway")]
 const NUMBER: &str = "a whole number";
 const TIME: &str = "a time such as 150ms or 2s, at most 60s";
@@ -31,8 +30,8 @@ pub(super) const ASCII: &[Setting<AsciiSettings>] = &[
     Setting {
         name: "character-gap",
         expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.character_gap = value),
-        say: |settings| said(settings.character_gap),
+        set: |settings, text| time::read(text).map(|value| settings.character_gap = value),
+        say: |settings| time::said(settings.character_gap),
     },
     Setting {
         name: "delimiter",
@@ -77,14 +76,14 @@ pub(super) const UNI_TELWAY: &[Setting<UniTelwaySettings>] = &[
     Setting {
         name: "link-timeout",
         expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.link_timeout = value),
-        say: |settings| said(settings.link_timeout),
+        set: |settings, text| time::read(text).map(|value| settings.link_timeout = value),
+        say: |settings| time::said(settings.link_timeout),
     },
     Setting {
         name: "poll-pause",
         expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.poll_pause = value),
-        say: |settings| said(settings.poll_pause),
+        set: |settings, text| time::read(text).map(|value| settings.poll_pause = value),
+        say: |settings| time::said(settings.poll_pause),
     },
     Setting {
         name: "repeats",
@@ -95,8 +94,8 @@ pub(super) const UNI_TELWAY: &[Setting<UniTelwaySettings>] = &[
     Setting {
         name: "busy-timeout",
         expected: TIME,
-        set: |settings, text| time(text).map(|value| settings.busy_timeout = value),
-        say: |settings| said(settings.busy_timeout),
+        set: |settings, text| time::read(text).map(|value| settings.busy_timeout = value),
+        say: |settings| time::said(settings.busy_timeout),
     },
 ];
 
@@ -147,23 +146,5 @@ fn header(text: &str) -> Option<NetworkHeader> {
             Some(NetworkHeader::Standard { network, station, gate, extensions: [first, second] })
         }
         _ => None,
-    }
-}
-
-fn time(text: &str) -> Option<Duration> {
-    let (number, unit) = match text.strip_suffix("ms") {
-        Some(number) => (number, 1),
-        None => (text.strip_suffix('s')?, 1_000),
-    };
-    let millis = number.trim_end().parse::<u32>().ok().map(|number| u64::from(number) * unit)?;
-    (millis <= LONGEST).then(|| Duration::from_millis(millis))
-}
-
-fn said(time: Duration) -> String {
-    let millis = time.as_millis();
-    if millis >= 1_000 && millis.is_multiple_of(1_000) {
-        format!("{}s", millis / 1_000)
-    } else {
-        format!("{millis}ms")
     }
 }

@@ -83,7 +83,7 @@ fn another_drive_at_the_address_is_not_moved_until_it_is_accepted() {
     assert_eq!(rig.outcome(accept), Some(&Outcome::Confirmed));
     let start = rig.order(START);
     rig.pass(500 * MS);
-    assert_eq!(rig.outcome(start), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed));
 }
 
 #[test]
@@ -199,6 +199,30 @@ fn a_stream_of_orders_does_not_blind_the_fleet() {
 }
 
 #[test]
+fn a_reply_for_which_no_frame_was_sent_does_not_put_off_the_frame_that_feeds_the_watchdog() {
+    let mut rig = Rig::ready();
+    let feed_at = rig.machine.checks.feed_at();
+    assert!(feed_at.is_some_and(|at| at <= rig.now + CONTRACT.timeout / 2), "{feed_at:?}");
+    rig.now += 500 * MS;
+    let error = Error::Unsupported { what: "identity", reason: "it has none" };
+    rig.machine.handle_reply(rig.now, Reply::Identity(Err(error)));
+    assert_eq!(rig.machine.checks.feed_at(), feed_at);
+}
+
+#[test]
+fn a_status_whose_frames_are_answered_is_not_cut_for_a_keep_alive() {
+    let mut rig = Rig::ready();
+    while !matches!(rig.machine.next(rig.now), Step::Do { job: Job::Status { .. }, .. }) {
+        rig.now += 20 * MS;
+    }
+    let feed_at = rig.machine.checks.feed_at().expect("it has a watchdog");
+    assert_eq!(rig.machine.goes_on(feed_at), None, "nothing was heard in time");
+    rig.machine.handle_heard(feed_at - 100 * MS);
+    let until = feed_at - 100 * MS + CONTRACT.timeout / 2;
+    assert_eq!(rig.machine.goes_on(feed_at), Some(until));
+}
+
+#[test]
 fn control_that_panel_or_terminals_take_is_told_and_told_when_it_is_back() {
     let mut rig = Rig::ready();
     rig.drive.status.control = Some(Control::Panel);
@@ -245,4 +269,103 @@ fn a_status_is_as_old_as_the_exchange_that_brought_it_and_not_as_its_call() {
     assert_eq!(snapshot.status.as_ref().map(|status| status.at), Some(read));
     assert_eq!(snapshot.freshness(read + snapshot.max_age), Freshness::Fresh);
     assert_eq!(snapshot.freshness(read + snapshot.max_age + MS), Freshness::Stale);
+}
+
+#[test]
+fn a_value_that_another_answer_withdraws_is_told_is_not_good_any_more_and_moves_nothing() {
+    let mut rig = Rig::ready();
+    let read = rig.snapshot().status.map(|status| status.at).unwrap();
+    let freshness = |rig: &Rig| rig.snapshot().freshness(rig.now);
+    assert_eq!(freshness(&rig), Freshness::Fresh);
+    for _ in 0..3 {
+        rig.machine.handle_retracted(rig.now, read);
+    }
+    rig.collect();
+    assert_eq!(rig.events(), ["value withdrawn"], "it is told once");
+    assert_eq!(freshness(&rig), Freshness::Stale);
+    let refused = rig.machine.leave(rig.now, "tester", None);
+    assert_eq!(refused, Err(Refused::Stale), "nothing rests on it");
+    rig.pass(100 * MS);
+    assert_eq!(freshness(&rig), Freshness::Fresh, "the next is asked for at once");
+    // That of a value which nothing shows any more withdraws nothing.
+    rig.machine.handle_retracted(rig.now, read - MS);
+    rig.collect();
+    assert_eq!(freshness(&rig), Freshness::Fresh);
+    assert_eq!(rig.events(), ["value withdrawn"]);
+}
+
+#[test]
+fn a_stop_that_was_confirmed_by_a_value_which_is_withdrawn_goes_on() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.stop(StopMode::Fast);
+    let mut read = None;
+    while rig.snapshot().stop.is_some() {
+        rig.pass(20 * MS);
+        read = rig.snapshot().status.map(|status| status.at);
+    }
+    rig.drive.log.clear();
+    rig.drive.run();
+    rig.machine.handle_retracted(rig.now, read.unwrap());
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Fast)]);
+    assert_eq!(rig.cause_of("stop confirmed"), Some(Cause::Policy { policy: Policy::ValueWithdrawn }));
+}
+
+#[test]
+fn a_watchdog_that_is_changed_under_a_contract_is_told_and_nothing_starts_before_it_is_the_contracts_again() {
+    let mut rig = Rig::ready();
+    // Somebody else has set it to nothing, and it takes no other setting any more.
+    rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
+    rig.drive.keeps_watchdog = true;
+    rig.machine.handle_changed(rig.now, drive_core::Ground::Watchdog);
+    let start = rig.order(START);
+    rig.pass(3_000 * MS);
+    assert!(rig.events().contains(&"contract changed"), "{:?}", rig.events());
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::WatchdogUnverified)));
+    assert!(!rig.drive.log.contains(&Job::Start(Direction::Forward)));
+    assert!(matches!(rig.snapshot().watchdog, WatchdogCheck::Broken(_)));
+}
+
+#[test]
+fn a_watchdog_that_is_changed_under_a_motor_that_turns_is_an_alarm() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.outputs.clear();
+    rig.drive.log.clear();
+    rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
+    rig.machine.handle_changed(rig.now, drive_core::Ground::Watchdog);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.events(), ["contract changed", "watchdog not in force"]);
+    assert_eq!(rig.drive.writes(), [], "a motor that turns is not disturbed");
+}
+
+#[test]
+fn a_setpoint_that_was_given_before_the_limits_or_the_units_changed_is_believed_no_more() {
+    for ground in [drive_core::Ground::Limits, drive_core::Ground::Units] {
+        let mut rig = Rig::ready();
+        rig.order(setpoint(40));
+        rig.pass(500 * MS);
+        assert!(rig.snapshot().setpoint.is_some());
+        rig.machine.handle_changed(rig.now, ground);
+        rig.pass(100 * MS);
+        assert_eq!(rig.snapshot().setpoint, None, "{ground}");
+        assert!(rig.events().contains(&"contract changed"), "{:?}", rig.events());
+    }
+}
+
+#[test]
+fn a_motor_that_gets_too_hot_is_told_and_told_when_it_is_back() {
+    let mut rig = Rig::ready();
+    rig.machine.settings.alarms.motor_thermal = Some(drive_core::Percent::from_percent(90));
+    for (percent, told) in [(90, 0), (95, 1), (96, 1), (80, 2)] {
+        let motor_thermal = Some(drive_core::Percent::from_percent(percent));
+        let measurements = Measurements { motor_thermal, ..Measurements::default() };
+        rig.machine.handle_reply(rig.now, Reply::Measurements(Ok(measurements)));
+        rig.collect();
+        let limits = rig.happened().filter(|happened| matches!(happened.kind, EventKind::Limit { .. }));
+        assert_eq!(limits.count(), told, "{percent} %");
+    }
 }

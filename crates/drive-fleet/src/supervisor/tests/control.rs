@@ -111,12 +111,21 @@ const GUARD: Refusal = Refusal::Overridden { by: "a guard", remedy: "close it" }
 
 #[test]
 fn a_run_command_whose_output_is_cut_or_whose_reference_is_taken_is_told_and_withdrawn() {
-    for (lacks, name) in [(Lack::Output, "output blocked"), (Lack::Reference, "reference taken")] {
+    for (lacks, name, policy) in [
+        (Lack::Output, "output blocked", Policy::OutputBlocked),
+        (Lack::Reference, "reference taken", Policy::ReferenceTaken),
+        (Lack::Command, "command overridden", Policy::ControlTaken),
+    ] {
         let mut rig = running(settings());
         says(&mut rig, Verdict::lacks(lacks, GUARD));
         rig.pass(2_000 * MS);
         assert_eq!(rig.drive.writes(), [Job::Withdraw]);
         assert_eq!(rig.events(), [name, "command"]);
+        assert_eq!(
+            rig.cause_of("command"),
+            Some(Cause::Policy { policy }),
+            "the withdrawal names what lacks"
+        );
         assert_eq!(rig.snapshot().lease, None);
     }
 }

@@ -1,16 +1,19 @@
 //! The machine alone: a made-up drive answers what it is asked, time is a number.
 
+mod adoption;
 mod causes;
 mod connection;
 mod control;
+mod eeprom;
+mod matrix;
 mod orders;
 mod questions;
 mod stops;
 
 use drive_core::{
     Command, Control, Direction, Exchange, Frequency, Identity, Lack, Lease, Measurements, Motion, PortError,
-    Reaction, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Verdict, Watchdog,
-    Withdrawn, Written, registers::Storage,
+    Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Verdict,
+    Watchdog, Withdrawn, Written, registers::Storage,
 };
 
 use super::*;
@@ -25,10 +28,13 @@ const MS: Duration = Duration::from_millis(1);
 const CONTRACT: WatchdogContract =
     WatchdogContract { timeout: Duration::from_secs(2), reaction: Reaction::Ramp };
 
+const ANOTHER_WORD: Refusal = Refusal::Overridden { by: "another word", remedy: "see whose it is" };
+
 /// A drive of paper: what it is, and whether it answers.
 struct Paper {
     status: Status,
     identity: Identity,
+    recognised: Recognised,
     watchdog: Watchdog,
     reference: Option<drive_core::Setpoint>,
     /// The error of every job while it lasts.
@@ -44,10 +50,14 @@ struct Paper {
     self_restarts: Vec<SelfRestart>,
     /// It confirms the write of its watchdog and keeps what it had.
     keeps_watchdog: bool,
+    /// It says so in its answer to the write.
+    denies_watchdog: bool,
     /// It refuses the write of its watchdog: not now.
     refuses_watchdog: bool,
     /// The run command of this side that it holds.
     lease: Option<Lease>,
+    /// The run command that stands in it, whoever has given it, once one of before was taken for ours.
+    held: Option<Option<Lease>>,
     /// What its statuses say of that, whatever else they show.
     says: Option<Verdict>,
     /// The content of every register.
@@ -75,6 +85,7 @@ impl Paper {
                 ..Status::default()
             },
             identity: Identity { model: Some("one".to_owned()), ..Identity::default() },
+            recognised: Recognised::CannotTell,
             watchdog: Watchdog { timeout: None, reaction: None },
             reference: None,
             failing: None,
@@ -84,8 +95,10 @@ impl Paper {
             withdraws: true,
             self_restarts: Vec::new(),
             keeps_watchdog: false,
+            denies_watchdog: false,
             refuses_watchdog: false,
             lease: None,
+            held: None,
             says: None,
             register: 0,
             log: Vec::new(),
@@ -127,7 +140,13 @@ impl Paper {
     }
 
     /// As a family judges it: by who commands, whether it has tripped, and whether it runs.
-    fn verdict(&self) -> Option<Verdict> {
+    fn verdict(&mut self) -> Option<Verdict> {
+        if let Some(held) = self.held.take()
+            && held != self.lease
+        {
+            self.lease = None;
+            return Some(Verdict::lacks(Lack::Command, ANOTHER_WORD));
+        }
         self.lease.map(|_| self.says.unwrap_or_else(|| self.shown()))
     }
 
@@ -215,6 +234,11 @@ impl Paper {
                 let meaning = drive_core::ExceptionMeaning::NotNow;
                 Reply::Watchdog(Err(Error::Exception { slave: slave(), exchange, code: 4, meaning }))
             }
+            Job::ArmWatchdog(..) if self.denies_watchdog => {
+                let (slave, command) = (slave(), Command::Configure("watchdog"));
+                let status = Box::new(self.status.clone());
+                Reply::Watchdog(Err(Error::NotConfirmed { slave, command, status, because: None }))
+            }
             Job::ArmWatchdog(timeout, reaction) => {
                 if reached && !self.keeps_watchdog {
                     self.watchdog = Watchdog { timeout: Some(timeout), reaction: Some(reaction) };
@@ -232,7 +256,7 @@ impl Paper {
             Job::KeepAlive => Reply::KeptAlive(self.result(())),
             Job::Status { .. } => Reply::Status(self.status()),
             Job::Identify => {
-                let identity = self.identity.clone();
+                let identity = (self.identity.clone(), self.recognised);
                 Reply::Identity(self.result(identity))
             }
             Job::Watchdog => {
@@ -270,6 +294,8 @@ impl Paper {
 struct Rig {
     machine: Supervisor,
     drive: Paper,
+    /// The run command that stands in the drive from before, whoever has given it.
+    stands: Option<Lease>,
     now: Instant,
     outputs: Vec<Output>,
     next_call: u64,
@@ -277,9 +303,15 @@ struct Rig {
 
 impl Rig {
     fn new(settings: DriveSettings) -> Self {
+        Self::over(settings, false)
+    }
+
+    /// Over a drive whose watchdog stands in its EEPROM, or not.
+    fn over(settings: DriveSettings, wears: bool) -> Self {
         let now = Instant::now();
-        let machine = Supervisor::new(now, settings, CAPABILITIES.watchdog, CAPABILITIES.communication_fault);
-        Self { machine, drive: Paper::new(), now, outputs: Vec::new(), next_call: 0 }
+        let watchdog = CAPABILITIES.watchdog.map(|watchdog| WatchdogCapability { wears, ..watchdog });
+        let machine = Supervisor::new(now, settings, watchdog, CAPABILITIES.communication_fault);
+        Self { machine, drive: Paper::new(), stands: None, now, outputs: Vec::new(), next_call: 0 }
     }
 
     fn controlled() -> Self {
@@ -306,11 +338,18 @@ impl Rig {
         while self.now < until {
             turns += 1;
             assert!(turns < 10_000, "the machine spins at {:?}", self.machine);
+            if let Some(lease) = self.machine.take_adoption() {
+                (self.drive.held, self.drive.lease) = (Some(self.stands), Some(lease));
+                self.machine.handle_lease(self.drive.lease);
+            }
             match self.machine.next(self.now) {
                 Step::Do { job, until, .. } => {
                     assert!(until.is_none_or(|until| until > self.now), "{job:?} would never be done");
                     self.now += 20 * MS;
                     let reply = self.drive.answer(job);
+                    if reply.error().is_none() {
+                        self.machine.handle_heard(self.now);
+                    }
                     self.machine.handle_lease(self.drive.lease);
                     self.machine.handle_reply(self.now, reply);
                 }
@@ -357,7 +396,7 @@ impl Rig {
     fn happened(&self) -> impl Iterator<Item = &Happened> {
         self.outputs.iter().filter_map(|output| match output {
             Output::Event(happened) => Some(happened),
-            Output::InForce(_) | Output::Answer(..) | Output::Told(..) => None,
+            Output::InForce(..) | Output::Answer(..) | Output::Told(..) => None,
         })
     }
 

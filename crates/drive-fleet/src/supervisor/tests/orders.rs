@@ -7,7 +7,7 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
     let mut rig = Rig::ready();
     let id = rig.order(run_at(40));
     rig.pass(500 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     let setpoint = Frequency::from_hertz(40).into();
     assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint), Job::Start(Direction::Forward)]);
     assert!(rig.snapshot().started_here());
@@ -30,7 +30,7 @@ fn a_start_whose_answer_was_lost_is_read_back_and_confirmed() {
     rig.drive.loses_answer = true;
     let id = rig.order(START);
     rig.pass(500 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward)], "it is not written twice");
 }
 
@@ -183,4 +183,26 @@ fn a_watchdog_that_the_drive_refuses_at_standstill_is_an_alarm_and_not_waited_fo
     rig.drive.refuses_watchdog = true;
     rig.pass(600_000 * MS);
     assert!(rig.events().contains(&"watchdog broken"), "{:?}", rig.events());
+}
+
+#[test]
+fn a_start_tells_the_setpoint_that_it_uses_and_that_at_zero_nothing_turns() {
+    let zero = "confirmed: started forward at 0.00 Hz: its setpoint is zero";
+    for (reference, sentence) in [
+        (Some(Frequency::from_hertz(30)), "confirmed: started forward at 30.00 Hz"),
+        (Some(Frequency::ZERO), zero),
+        (None, "confirmed: started forward"),
+    ] {
+        for loses_answer in [false, true] {
+            for until in [Until::InForce, Until::AtReference] {
+                let mut rig = Rig::ready();
+                rig.drive.status.reference = reference;
+                rig.drive.loses_answer = loses_answer;
+                let id = rig.order(Order::Start { direction: Direction::Forward, setpoint: None, until });
+                rig.pass(3_000 * MS);
+                let told = rig.outcome(id).map(ToString::to_string);
+                assert_eq!(told.as_deref(), Some(sentence), "answer lost: {loses_answer}, {until:?}");
+            }
+        }
+    }
 }

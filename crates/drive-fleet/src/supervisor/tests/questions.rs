@@ -4,7 +4,7 @@ use drive_core::registers::{Access, Confidence, Factory, Range, Row, Unit};
 
 use super::*;
 
-const ROW: Row = Row {
+pub(super) const ROW: Row = Row {
     address: 9001,
     code: "ACC",
     name: "acceleration",

@@ -1,6 +1,7 @@
 //! Stops and the exit.
 
 use super::*;
+use crate::outcome::StopModes;
 
 #[test]
 fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
@@ -18,7 +19,7 @@ fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
     rig.pass(100 * MS);
     assert_eq!(rig.outcome(start), Some(&Outcome::NotConfirmed(Unconfirmed::Stopped)));
     assert_eq!(rig.outcome(waiting), Some(&Outcome::Refused(Refused::Stopped)));
-    assert_eq!(rig.outcome(stop), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed));
 }
 
 #[test]
@@ -57,7 +58,7 @@ fn a_stop_that_the_drive_takes_back_is_sent_again() {
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
     assert_eq!(rig.outcome(id), None);
     rig.pass(2_000 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
 }
 
@@ -71,7 +72,7 @@ fn a_stop_mode_that_the_drive_replaces_is_told_with_the_reason_and_confirmed() {
     rig.drive.stops_by = Some((StopMode::Freewheel, why));
     let id = rig.stop(StopMode::DcInjection);
     rig.pass(100 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::DcInjection)]);
     let (asked, used) = (StopMode::DcInjection, StopMode::Freewheel);
     let told = EventKind::StopModeReplaced { asked, used, why: Some(why) };
@@ -104,7 +105,7 @@ fn whoever_stops_by_injection_ends_it_once_the_motor_is_held_and_not_when_the_ou
         rig.drive.status = Status { state, motion, ..rig.drive.status.clone() };
         rig.pass(1_000 * MS);
         assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)], "{state}");
-        assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed), "{state}");
+        assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed), "{state}");
     }
 }
 
@@ -153,7 +154,7 @@ fn a_ramp_of_three_minutes_is_no_alarm_as_long_as_the_motor_comes_down() {
     assert!(!rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
     rig.drive.stand();
     rig.pass(1_000 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
 }
 
 #[test]
@@ -170,7 +171,7 @@ fn a_freewheel_is_confirmed_as_an_output_that_is_off_and_a_shaft_that_may_coast(
     let (mut rig, id) = coming_down();
     rig.drive.status.motion = Motion::Coasting;
     rig.pass(1_000 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     let told = rig.outputs.iter().find_map(|output| match output {
         Output::Event(Happened { kind: kind @ EventKind::StopConfirmed { .. }, .. }) => {
             Some(kind.to_string())
@@ -193,7 +194,7 @@ fn a_stop_that_never_left_for_the_line_is_no_attempt_and_is_sent_when_the_port_i
     assert_eq!(rig.snapshot().stop.map(|stop| stop.attempts), Some(0));
     rig.drive.failing = None;
     rig.pass(1_000 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Confirmed));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
 }
 
 #[test]
@@ -239,10 +240,13 @@ fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
     assert!(said.contains("the drive was last seen stopping") && said.ends_with(" s ago"), "{said}");
 }
 
+/// Asked for, and done.
+const BY_RAMP: StopModes = StopModes { asked: StopMode::Ramp, used: Some(StopMode::Ramp), why: None };
+
 #[test]
 fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
     for (started, policy, expected) in [
-        (true, OnExit::Stop(StopMode::Ramp), ExitAction::Stopped(Outcome::Confirmed)),
+        (true, OnExit::Stop(StopMode::Ramp), ExitAction::Stopped(Outcome::Stopped(BY_RAMP))),
         (false, OnExit::Stop(StopMode::Ramp), ExitAction::LeftTurning),
         (true, OnExit::Leave, ExitAction::Left),
         (true, OnExit::Release(StopMode::Ramp), ExitAction::Released(Outcome::Confirmed)),
@@ -347,4 +351,66 @@ fn a_stop_whose_call_takes_long_is_an_alarm_in_its_time() {
     assert!(rig.events().contains(&"stop unconfirmed"));
     assert!(rig.outcome(id).is_some_and(|outcome| !outcome.is_confirmed()));
     assert_eq!(rig.machine.stop_alarm_at(), None, "it is told once");
+}
+
+#[test]
+fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
+    const WHY: &str = "its settings have no fast stop";
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.stops_by = Some((StopMode::Ramp, WHY));
+    let replaced = StopModes { asked: StopMode::Fast, used: Some(StopMode::Ramp), why: Some(WHY) };
+    let id = rig.stop(StopMode::Fast);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Stopped(replaced)));
+    let said = rig.outcome(id).map(ToString::to_string);
+    let words =
+        "confirmed: asked for a fast stop, the drive did a ramp stop because its settings have no fast stop";
+    assert_eq!(said.as_deref(), Some(words));
+
+    // One that goes on turning.
+    let (mut rig, id) = coming_down();
+    rig.drive.status.output_frequency = Some(Frequency::from_hertz(7));
+    rig.pass(70_000 * MS);
+    assert_eq!(rig.outcome(id).and_then(Outcome::stop), Some(BY_RAMP), "{:?}", rig.outcome(id));
+
+    // One of which nothing is heard.
+    let mut rig = Rig::ready();
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    let id = rig.stop(StopMode::Freewheel);
+    rig.pass(8_000 * MS);
+    let unknown = StopModes { asked: StopMode::Freewheel, used: None, why: None };
+    assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(id));
+    assert_eq!(rig.outcome(id).and_then(Outcome::stop), Some(unknown));
+
+    // An injection is ended along the ramp, and was an injection.
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    let id = rig.stop(StopMode::DcInjection);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    rig.drive.status.motion = Motion::Held;
+    let stopped = Stopped::by(StopMode::DcInjection, rig.drive.status.clone());
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
+    rig.pass(3_000 * MS);
+    let injected = StopModes { asked: StopMode::DcInjection, used: Some(StopMode::DcInjection), why: None };
+    assert_eq!(rig.outcome(id), Some(&Outcome::Stopped(injected)));
+}
+
+#[test]
+fn a_stop_that_never_left_is_not_confirmed_by_a_motor_that_stands_anyway() {
+    let mut rig = Rig::ready();
+    let id = rig.stop(StopMode::Ramp);
+    let step = rig.machine.next(rig.now);
+    assert!(matches!(step, Step::Do { job: Job::Stop(StopMode::Ramp), .. }), "{step:?}");
+    let unplugged = port_error(PortError::LineDown("unplugged".to_owned()));
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Err(unplugged)));
+    let status = rig.drive.status();
+    rig.machine.handle_reply(rig.now, Reply::Status(status));
+    rig.collect();
+    assert_eq!(rig.outcome(id), None, "its run command may stand");
+    rig.pass(1_000 * MS);
+    assert!(rig.drive.writes().contains(&Job::Stop(StopMode::Ramp)));
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
 }

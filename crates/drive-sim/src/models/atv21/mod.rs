@@ -66,6 +66,8 @@ const RATED_POWER: u32 = 75;
 #[derive(Debug, Clone)]
 pub struct Atv21 {
     bank: Bank,
+    /// What function 43/14 says it is.
+    reference: &'static str,
     readings: Readings,
     /// The slots that were configured at the last reset.
     read_slots: [u16; 5],
@@ -133,6 +135,7 @@ impl Atv21 {
         }
         let mut drive = Self {
             bank,
+            reference: "ATV21H075M3X",
             readings: Readings::default(),
             read_slots: [0; 5],
             write_slots: [0; 2],
@@ -166,6 +169,13 @@ impl Atv21 {
     #[must_use]
     pub fn restarting_in(mut self, restart: Duration) -> Self {
         self.restart = restart;
+        self
+    }
+
+    /// The same drive, which says by function 43/14 that it is another one.
+    #[must_use]
+    pub fn identified_as(mut self, reference: &'static str) -> Self {
+        self.reference = reference;
         self
     }
 

@@ -69,7 +69,7 @@ impl Model for Atv21 {
     fn other(&mut self, request: &[u8]) -> Result<Vec<u8>, Exception> {
         match *request {
             [0x2B, 0x0E, code @ 1..=3, 0x00] => {
-                Ok(identification(code, 0x01, &["Telemecanique", "ATV21H075M3X", "0201"]))
+                Ok(identification(code, 0x01, &["Telemecanique", self.reference, "0201"]))
             }
             [0x2B, 0x0E, ..] => Err(Exception::ILLEGAL_VALUE),
             _ => Err(Exception::ILLEGAL_FUNCTION),

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use drive_core::{Direction, Motion, Status, StopMode, Verdict};
+use drive_core::{Status, StopMode, Verdict};
 use tokio::time::{Instant, sleep};
 
-use super::{Complaint, SETTLED, Stage, TOLERANCE};
-use crate::{contract::Contract, recorder::Habit};
+use super::{Complaint, SETTLED, Stage};
+use crate::{contract::Contract, recorder::Habit, truth::contradiction};
 
 impl Contract {
     /// What it says of its run command and of the shaft holds, in every status.
@@ -118,19 +118,8 @@ impl Stage {
     }
 
     fn judge_motion(&mut self, status: &Status) {
-        let seen = self.seen();
-        let turns = seen.shaft_frequency.abs() > TOLERANCE;
-        if status.motion == Motion::AtRest && turns {
-            self.blame(format!("told {} ({status}); {seen:?}", status.motion));
-        }
-        if status.verdict == Some(Verdict::InForce) && !seen.running {
-            self.blame(format!("told in force ({status}); {seen:?}"));
-        }
-        if status.verdict == Some(Verdict::InForce)
-            && turns
-            && status.direction.is_some_and(|way| (way == Direction::Reverse) != (seen.shaft_frequency < 0))
-        {
-            self.blame(format!("told {:?}; {seen:?}", status.direction));
+        if let Some(seen) = contradiction(status, &self.seen()) {
+            self.blame(seen);
         }
     }
 }

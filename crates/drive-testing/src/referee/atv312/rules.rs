@@ -82,6 +82,7 @@ silences! { Atv312 SILENCES
     PRESET_AND_BUS "BBV p.14" "preset speeds and jog are said to go before analog references: whether before a reference of the bus too, and which speed two inputs make";
     REFERENCE_NONE "BBV p.36 (Fr2)" "what the motor does when rFC selects an Fr2 that is not assigned";
     ASSIGNED_BITS "BBV p.19 (CMD bits 11, 12)" "L3: whether bits 11 and 12 keep reverse and stop when they are assigned too";
+    STOP_BITS_ELSEWHERE "BBV p.40 (FSt, dCI), p.8" "whether a bit of CMD that a stop is assigned to acts while another channel commands: p.40 prints the bit, p.8 names the inputs only";
     LIMIT_SWITCHES "BBV p.50 (LAF, LAr)" "at which level a limit switch stops, and whether the motor goes on when it is left";
     RESTART_BY_BUS "BBV p.51 (Atr)" "automatic restart under bus control: the chart is in fault and then in switch on disabled, yet Atr restarts";
     RESTART_AFTER_RESET "BBV p.52 (FLr)" "whether a run at terminals in 3-wire control starts again at the reset of a fault: FLr speaks of 2-wire level only";

@@ -5,7 +5,10 @@ use std::{collections::VecDeque, time::Duration};
 use drive_bus::stats::{SlaveStats, Stats};
 use tokio::time::Instant;
 
-use super::plant::{Plant, PlantLine};
+use super::{
+    plant::{Plant, PlantLine},
+    unit::Unit,
+};
 use crate::output;
 
 /// Over how many samples the numbers are taken.
@@ -53,7 +56,7 @@ impl Meter {
         }
         self.stats = line.line.stats();
         let units = plant.units.get(line.units.clone()).unwrap_or_default();
-        let polls = units.iter().map(|unit| unit.view().polls).sum();
+        let polls = units.iter().map(Unit::answered).sum();
         if self.samples.len() == SAMPLES {
             self.samples.pop_front();
         }

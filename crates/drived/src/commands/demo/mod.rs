@@ -131,7 +131,7 @@ impl Act {
 /// The drives that do not stand yet, with their frequency where they tell one.
 fn waited_for(plant: &Plant) -> String {
     let turning = plant.units.iter().filter(|unit| !unit.stands());
-    let named = turning.map(|unit| match unit.view().status.and_then(|status| status.output_frequency) {
+    let named = turning.map(|unit| match unit.status().and_then(|status| status.output_frequency) {
         Some(frequency) => format!("{} {frequency}", unit.name),
         None => format!("{} no status", unit.name),
     });
@@ -145,7 +145,7 @@ fn farewell(plant: &Plant, why: Why) -> Result<(), Failure> {
     let mut turning = Vec::new();
     let mut table = Table::texts();
     for unit in &plant.units {
-        let status = unit.view().status.map_or_else(|| "no status".to_owned(), |status| status.to_string());
+        let status = unit.status().map_or_else(|| "no status".to_owned(), |status| status.to_string());
         let action =
             actions.iter().find(|(name, _)| **name == *unit.name.to_string()).map(|(_, action)| action);
         let verdict = match action {

@@ -52,7 +52,7 @@ pub(super) async fn run(show: Show<'_>) -> Result<Why, Failure> {
             began,
             waited_for: (act != Act::Playing).then(|| waited_for(plant)),
             page: &page,
-            units: plant.units.iter().map(|unit| (unit.name, unit.view())).collect(),
+            units: plant.units.iter().map(|unit| (unit.drive(), unit.last())).collect(),
             lines: plant.lines.iter().zip(&meters).map(|(line, meter)| meter.cells(line)).collect(),
             events: &events,
         };

@@ -9,19 +9,22 @@ use ratatui::{
     layout::{Constraint, Layout, Rect},
     style::{Color, Modifier, Style, Stylize},
     text::{Line, Span},
-    widgets::{Block, Borders, Cell, Paragraph, Row, Table},
+    widgets::{self, Block, Borders, Paragraph, Table},
 };
 use tokio::time::Instant;
 
 use super::{
     meter::HEADS,
-    unit::{Done, Order, View},
+    unit::{Done, Order},
 };
 use crate::{
-    drive_cells::{bar, colour, control, direction, hertz},
-    drive_spec::DriveName,
     output,
+    plant::views::DriveView,
+    row::{Column, Columns, Row, hertz},
 };
+
+/// What stands beside the last command.
+const COLUMNS: [Column; 3] = [Column::State, Column::Frequency, Column::Current];
 
 /// Before the text of an event: its time and its drive.
 const EVENT_INDENT: usize = 20;
@@ -35,7 +38,8 @@ pub(super) struct Picture<'a> {
     pub(super) waited_for: Option<String>,
     /// Where its page is, in words.
     pub(super) page: &'a str,
-    pub(super) units: Vec<(DriveName, View)>,
+    /// The drives, with how their last commands ended.
+    pub(super) units: Vec<(DriveView, Option<Done>)>,
     /// The cells of each line, under [`HEADS`].
     pub(super) lines: Vec<[String; 8]>,
     /// The newest first.
@@ -78,33 +82,27 @@ impl Picture<'_> {
         )
     }
 
-    fn drives(&self, width: u16) -> Table<'_> {
-        let wide = width >= WIDE;
-        let bar = if wide { 24 } else { 10 };
-        let rows = self.units.iter().map(|(name, view)| row(name, view, bar, wide));
-        let widths = [
-            Constraint::Length(9),
-            Constraint::Length(10),
-            Constraint::Length(3),
-            Constraint::Length(bar),
-            Constraint::Length(11),
-            Constraint::Length(7),
-            Constraint::Length(5),
-            Constraint::Length(5),
-            Constraint::Fill(1),
-        ];
-        let heads =
-            ["drive", "state", "dir", "frequency", "out/set Hz", "current", "ctrl", "fault", "last command"];
-        Table::new(rows, widths)
-            .header(Row::new(heads).style(Style::new().add_modifier(Modifier::DIM)))
-            .column_spacing(1)
+    fn drives(&self, width: u16) -> Paragraph<'_> {
+        let now = Instant::now();
+        let rows = self.units.iter().map(|(drive, last)| {
+            let mut row = Row::of(drive, now);
+            if !row.is_in_trouble() {
+                row.note = last.as_ref().map_or_else(String::new, |last| told(last, width >= WIDE));
+            }
+            row
+        });
+        let rows: Vec<_> = rows.collect();
+        let columns = Columns::of(&rows, &COLUMNS, usize::from(width));
+        let head = Line::from(columns.head("")).dim();
+        let drawn = rows.iter().map(|row| columns.line(row, false));
+        Paragraph::new([head].into_iter().chain(drawn).collect::<Vec<_>>())
     }
 
     fn lines(&self) -> Table<'_> {
         let widths =
             HEADS.map(|head| Constraint::Length(u16::try_from(head.len()).unwrap_or(u16::MAX).max(9)));
-        Table::new(self.lines.iter().map(|cells| Row::new(cells.iter().map(String::as_str))), widths)
-            .header(Row::new(HEADS).style(Style::new().add_modifier(Modifier::DIM)))
+        Table::new(self.lines.iter().map(|cells| widgets::Row::new(cells.iter().map(String::as_str))), widths)
+            .header(widgets::Row::new(HEADS).style(Style::new().add_modifier(Modifier::DIM)))
             .column_spacing(1)
     }
 
@@ -128,33 +126,8 @@ impl Picture<'_> {
     }
 }
 
-fn row(name: &DriveName, view: &View, bar_width: u16, wide: bool) -> Row<'static> {
-    let Some(status) = &view.status else {
-        return Row::new([name.to_string(), "no answer".to_owned()]).style(Style::new().fg(Color::Red));
-    };
-    let output = status.output_frequency.unwrap_or_default();
-    let setpoint = view.setpoint.unwrap_or_default();
-    let colour = colour(status, output == setpoint);
-    Row::new([
-        Cell::from(name.to_string()).bold(),
-        Cell::from(status.state.to_string()).fg(colour),
-        Cell::from(direction(status)),
-        Cell::from(bar(output, setpoint, usize::from(bar_width), colour)),
-        Cell::from(format!("{:>5}/{:<5}", hertz(output), hertz(setpoint))),
-        Cell::from(format!("{:>7}", output::current(status).unwrap_or_else(|| "-".to_owned()))),
-        Cell::from(control(status)),
-        Cell::from(view.fault.map_or("-", |fault| fault.mnemonic())).fg(if view.fault.is_some() {
-            Color::Red
-        } else {
-            Color::Reset
-        }),
-        last(view.last.as_ref(), wide),
-    ])
-}
-
 /// The last command and how it ended: a word or two, or the whole sentence where there is room.
-fn last(done: Option<&Done>, wide: bool) -> Cell<'static> {
-    let Some(done) = done else { return Cell::from("-") };
+fn told(done: &Done, wide: bool) -> String {
     let order = match (done.order, wide) {
         (order, true) => order.to_string(),
         (Order::Setpoint(frequency), false) => format!("{} Hz", hertz(frequency)),
@@ -164,10 +137,10 @@ fn last(done: Option<&Done>, wide: bool) -> Cell<'static> {
         (Order::Reset, false) => "reset".to_owned(),
     };
     match (done.outcome.is_confirmed(), wide) {
-        (true, true) => Cell::from(format!("{order}: confirmed, {} ms", done.took.as_millis())),
-        (true, false) => Cell::from(format!("✓ {order}")),
-        (false, true) => Cell::from(format!("{order}: {}", done.outcome)).fg(Color::Red),
-        (false, false) => Cell::from(format!("✗ {order}")).fg(Color::Red),
+        (true, true) => format!("{order}: confirmed, {} ms", done.took.as_millis()),
+        (false, true) => format!("{order}: {}", done.outcome),
+        (true, false) => format!("✓ {order}"),
+        (false, false) => format!("✗ {order}"),
     }
 }
 
@@ -175,39 +148,36 @@ fn last(done: Option<&Done>, wide: bool) -> Cell<'static> {
 mod tests {
     use std::time::Duration;
 
-    use drive_core::{Control, Current, Frequency, State, Status};
     use drive_fleet::{Cause, EventKind, Outcome};
     use ratatui::{Terminal, backend::TestBackend};
+    use serde_json::json;
 
     use super::*;
-    use crate::drive_spec::DriveSpec;
+    use crate::plant::testing::{read, told};
 
     fn drawn(width: u16, height: u16) -> String {
-        let name = |text: &str| text.parse::<DriveSpec>().unwrap().single().unwrap();
-        let status = Status {
-            state: State::Running,
-            direction: Some(Direction::Reverse),
-            output_frequency: Some(Frequency::from_hertz(25)),
-            current: Some(Current::from_deciamperes(23)),
-            control: Some(Control::Bus),
-            ..Status::default()
+        let named = |name: &str, status: serde_json::Value, shows: &str| {
+            let mut drive = told(name);
+            (drive["status"], drive["shows"]) = (status, shows.into());
+            drive["setpoint"] = json!({"frequency_hz": 40.0});
+            read(&drive)
         };
-        let view = View {
-            status: Some(status),
-            setpoint: Some(Frequency::from_hertz(40)),
-            last: Some(Done {
-                order: Order::Start(Direction::Reverse),
-                took: Duration::from_millis(48),
-                outcome: Outcome::Confirmed,
-            }),
-            ..View::default()
+        let status = json!({"quality": "good", "state": "running", "direction": "reverse",
+            "output_frequency_hz": 25.0, "current_a": 2.3, "control": "bus", "raw": []});
+        let started = Done {
+            order: Order::Start(Direction::Reverse),
+            took: Duration::from_millis(48),
+            outcome: Outcome::Confirmed,
         };
         let events = VecDeque::from([Event::now("atv312@1", EventKind::ControlReturned, Cause::Drive)]);
         let picture = Picture {
             began: Instant::now(),
             waited_for: None,
             page: "page: http://127.0.0.1:7580/",
-            units: vec![(name("atv312@1"), view), (name("atv21@2"), View::default())],
+            units: vec![
+                (named("atv312@1", status, "running"), Some(started)),
+                (named("atv21@2", json!({"quality": "missing"}), "lost"), None),
+            ],
             lines: vec![
                 ["19200 8E1", "97.00 %", "7.1", "900", "2.01 ms", "2.00 ms", "0", "0"].map(str::to_owned),
             ],
@@ -221,10 +191,12 @@ mod tests {
     #[test]
     fn a_small_screen_shows_each_drive_in_a_line() {
         let screen = drawn(80, 24);
-        assert!(screen.contains("atv312@1  running    rev █████···┃·  25.0/40.0    2.3 A bus"), "{screen}");
-        assert!(screen.contains("✓ start rev"), "{screen}");
+        assert!(
+            screen.contains("atv312@1 running rev  ██████···┃··  25.0/40.0   2.3 A ✓ start rev"),
+            "{screen}"
+        );
         assert!(screen.contains("page: http://127.0.0.1:7580/ "), "{screen}");
-        assert!(screen.contains("atv21@2   no answer"), "{screen}");
+        assert!(screen.contains("atv21@2  lost "), "{screen}");
         assert!(screen.contains("19200 8E1 97.00 %   7.1       900"), "{screen}");
     }
 

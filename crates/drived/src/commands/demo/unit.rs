@@ -2,13 +2,13 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use drive_core::{Direction, Fault, Frequency, Setpoint, Status, StopMode};
+use drive_core::{Direction, Frequency, Status, StopMode};
 use drive_fleet::{DriveHandle, Freshness, Outcome};
 use drive_sim::SimSlave;
 use tokio::{sync::watch, time::Instant};
 
 use super::story::TELLER;
-use crate::drive_spec::DriveName;
+use crate::{drive_spec::DriveName, plant::views::DriveView};
 
 /// A handle of one drive; cheap to clone.
 #[derive(Clone)]
@@ -47,17 +47,6 @@ pub(super) struct Done {
     pub(super) outcome: Outcome,
 }
 
-/// What is seen of a drive.
-#[derive(Debug, Clone, Default)]
-pub(super) struct View {
-    pub(super) status: Option<Status>,
-    pub(super) setpoint: Option<Frequency>,
-    pub(super) fault: Option<Fault>,
-    pub(super) last: Option<Done>,
-    /// Status polls that were answered.
-    pub(super) polls: u64,
-}
-
 impl Unit {
     pub(super) fn new(name: DriveName, machine: SimSlave, handle: DriveHandle) -> Self {
         Self { name, machine, handle: handle.commanded_by(TELLER), last: Arc::new(watch::Sender::new(None)) }
@@ -83,22 +72,26 @@ impl Unit {
         drop(self.handle.ready(by.saturating_duration_since(Instant::now())).await);
     }
 
-    pub(super) fn view(&self) -> View {
+    /// What is known of it.
+    pub(super) fn drive(&self) -> DriveView {
+        DriveView::of("demo", &self.handle)
+    }
+
+    /// How its last order ended.
+    pub(super) fn last(&self) -> Option<Done> {
+        self.last.borrow().clone()
+    }
+
+    /// Status polls that were answered.
+    pub(super) fn answered(&self) -> u64 {
+        self.handle.snapshot().counters.answered
+    }
+
+    /// What it shows, if that is so now.
+    pub(super) fn status(&self) -> Option<Arc<Status>> {
         let snapshot = self.handle.snapshot();
-        let fresh = snapshot.freshness(Instant::now()) == Freshness::Fresh;
-        let status = snapshot.status.as_ref().filter(|_| fresh).map(|status| Status::clone(&status.value));
-        let tripped = status.as_ref().is_some_and(Status::is_fault);
-        let faults = snapshot.trips.back().filter(|_| tripped).and_then(|trip| trip.faults.as_ref());
-        View {
-            setpoint: match snapshot.setpoint {
-                Some(Setpoint::Frequency(frequency)) => Some(frequency),
-                _ => None,
-            },
-            fault: faults.and_then(|faults| faults.present.first().copied()),
-            last: self.last.borrow().clone(),
-            polls: snapshot.counters.answered,
-            status,
-        }
+        let is_fresh = snapshot.freshness(Instant::now()) == Freshness::Fresh;
+        snapshot.status.as_ref().filter(|_| is_fresh).map(|status| Arc::clone(&status.value))
     }
 
     /// Whether the drive itself says that its motor is not driven.

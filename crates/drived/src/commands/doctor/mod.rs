@@ -85,10 +85,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         progress.at(seconds(began.elapsed()).min(of));
     };
     let port = Port(task.config.endpoint.clone());
-    let observed = tokio::select! {
-        observed = observe::observe(&task, &port, show) => observed,
-        () = ending.asked() => Err(Failure::Drive("asked to end before anything could be said".to_owned())),
-    };
+    let observed = observe::observe(&task, &port, show, ending.asked()).await;
     drop(progress);
     if observed.is_err()
         && let Some(path) = &args.report
@@ -115,9 +112,12 @@ fn tell(args: &Args, seen: &Observations, file: Option<&mut File>) -> Result<(),
             output::say(format_args!("report: {}", path.display()))?;
         }
     }
-    match diagnosis.verdicts.len() {
-        0 => Ok(()),
-        found => Err(Failure::Drive(format!(
+    match (diagnosis.verdicts.len(), &seen.cut_short) {
+        (0, Some(why)) => {
+            Err(Failure::Drive(format!("nothing wrong was found until the end, which came early: {why}")))
+        }
+        (0, None) => Ok(()),
+        (found, _) => Err(Failure::Drive(format!(
             "{} with this line",
             if found == 1 { "1 thing is wrong".to_owned() } else { format!("{found} things are wrong") }
         ))),

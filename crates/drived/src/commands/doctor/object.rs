@@ -17,6 +17,8 @@ struct Object<'a> {
     latency_timer_ms: Option<u64>,
     driver: Option<&'a str>,
     took_ms: u64,
+    /// Why it ended before its time.
+    cut_short: Option<&'a str>,
     verdicts: Vec<VerdictObject<'a>>,
     slaves: Vec<SlaveObject>,
     listened_ms: u64,
@@ -89,6 +91,7 @@ pub(super) fn of(diagnosis: &Diagnosis<'_>) -> String {
         latency_timer_ms: seen.adapter.latency.map(milliseconds),
         driver: seen.adapter.driver.as_deref(),
         took_ms: milliseconds(seen.took),
+        cut_short: seen.cut_short.as_deref(),
         verdicts: diagnosis.verdicts.iter().map(verdict).collect(),
         slaves: diagnosis.figures().into_iter().map(slave).collect(),
         listened_ms: milliseconds(seen.listened.time),

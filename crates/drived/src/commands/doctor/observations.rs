@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, time::Duration};
 
 use drive_bus::{
     LineConfig,
+    evidence::Finding,
     listen::{Heard, Role},
 };
 use drive_core::serial::SerialSettings;
@@ -30,6 +31,10 @@ pub(super) struct Observations {
     pub(super) overdue: Vec<(u8, u64)>,
     /// Whether a question could not be sent because the line was never quiet.
     pub(super) never_quiet: bool,
+    /// What the line itself has found wrong.
+    pub(super) findings: Vec<Finding>,
+    /// Why it ended before its time, if it did.
+    pub(super) cut_short: Option<String>,
     /// How long it all took.
     pub(super) took: Duration,
 }

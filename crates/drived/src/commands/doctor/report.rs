@@ -60,6 +60,9 @@ impl Diagnosis<'_> {
         if self.verdicts.is_empty() {
             lines.push(self.healthy());
         }
+        if let Some(why) = &self.seen.cut_short {
+            lines.push(format!("judged from the first {}: {why}", output::bound(self.seen.took)));
+        }
         lines
     }
 
@@ -236,5 +239,14 @@ const fn title(defect: Defect) -> &'static str {
         Defect::LateAnswers => "LATE ANSWERS",
         Defect::SlowDrive => "A SLOW DRIVE",
         Defect::Noise => "NOISE",
+        Defect::FarEndFaster => "THE FAR END IS FASTER THAN ITS SPEED",
+        Defect::FirstByteCut => "ANSWERS LACK THEIR FIRST BYTE",
+        Defect::LastByteCut => "ANSWERS LACK THEIR LAST BYTE",
+        Defect::BytesBehind => "BYTES BEHIND EACH ANSWER",
+        Defect::OneAnswerBehind => "ANSWERS COME WITH THE NEXT QUESTION",
+        Defect::RefusesAll => "EVERYTHING IS REFUSED",
+        Defect::NumberZero => "ANSWERS WITHOUT THEIR TRANSACTION NUMBER",
+        Defect::FellSilent => "IT FELL SILENT",
+        Defect::LinkTimeout => "ACKNOWLEDGEMENTS COME TOO LATE",
     }
 }

@@ -23,6 +23,15 @@ pub(super) enum Defect {
     LateAnswers,
     SlowDrive,
     Noise,
+    FarEndFaster,
+    FirstByteCut,
+    LastByteCut,
+    BytesBehind,
+    OneAnswerBehind,
+    RefusesAll,
+    NumberZero,
+    FellSilent,
+    LinkTimeout,
 }
 
 /// How sure a verdict is.

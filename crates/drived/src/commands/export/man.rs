@@ -7,6 +7,7 @@ use roff::{Inline, Roff, bold, italic, roman};
 
 use crate::{
     cli::{Cli, ENVIRONMENT, EXIT_CODES},
+    config,
     failure::Failure,
     output,
 };
@@ -58,6 +59,12 @@ fn of(command: &mut Command, parent: Option<&str>, pages: &mut Vec<(String, Stri
     let notes = command.get_after_help().map(ToString::to_string).unwrap_or_default();
     let mut notes = notes.split("\n\n");
     let map = notes.next().unwrap_or_default().lines().filter_map(|line| line.split_once(':'));
+    if name == "drived-check" {
+        for (table, keys) in config::tables() {
+            let keys = keys.iter().map(|key| (vec![bold(key.name)], plain(&key.sentence())));
+            list(&mut page, &plain(table).to_uppercase(), keys);
+        }
+    }
     list(&mut page, "WHAT FOR", map.map(|(what, how)| (vec![bold(what)], how.trim().to_owned())));
     let naming = notes.next().map(|naming| vec![roman(naming.replace('\n', " "))]);
     section(&mut page, "LINES AND DRIVES", naming);
@@ -94,6 +101,19 @@ fn list(page: &mut Roff, heading: &str, entries: impl IntoIterator<Item = (Vec<I
         page.text(term);
         page.text([roman(meaning)]);
     }
+}
+
+/// Markdown without its marks, and without where its links lead.
+fn plain(text: &str) -> String {
+    let text = text.replace('`', "");
+    let mut parts = text.split("](#");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |mut text, rest| {
+        if let Some(link) = text.rfind('[') {
+            text.remove(link);
+        }
+        text + rest.split_once(')').map_or("", |(_, rest)| rest)
+    })
 }
 
 /// An argument and what it means, with its values and what it is without being given.

@@ -108,7 +108,6 @@ impl Happening {
 
 /// What was asked, by whom, from where, what became of it, and how long that took.
 fn sentence(told: &CommandView) -> String {
-    let is_confirmed = told.outcome == OutcomeWord::Confirmed;
     let counts = told.several.as_ref().map(|several| {
         let SeveralView { confirmed, pending, not_reachable, .. } = several;
         format!("{confirmed} confirmed, {pending} pending, {not_reachable} not reachable")
@@ -118,7 +117,7 @@ fn sentence(told: &CommandView) -> String {
         format!("{} by {}, {}", escaped(&told.command), escaped(&told.caller), escaped(&told.origin)),
         words::outcome(told.outcome),
         counts.unwrap_or_default(),
-        told.text.as_deref().filter(|_| !is_confirmed).map(escaped).unwrap_or_default(),
+        told.text.as_deref().map(escaped).unwrap_or_default(),
         took.map(|took| format!("after {took} ms")).unwrap_or_default(),
     ];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(": ")

@@ -167,3 +167,15 @@ fn keys() -> mpsc::UnboundedReceiver<Event> {
 fn locked(model: &Mutex<Model>) -> MutexGuard<'_, Model> {
     model.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+/// What stands on a wide terminal when this is told.
+#[cfg(test)]
+pub(crate) fn screen_of(state: crate::plant::views::StateView) -> String {
+    let now = Instant::now();
+    let mut model = Model::new("a test".to_owned(), now);
+    model.take(model::News::State { state: Box::new(state), recent: Vec::new() }, now);
+    let backend = ratatui::backend::TestBackend::new(400, 24);
+    let mut terminal = ratatui::Terminal::new(backend).expect("it has a size");
+    terminal.draw(|frame| view::draw(&mut model, now, frame)).expect("it is drawn");
+    terminal.backend().to_string()
+}

@@ -15,14 +15,11 @@ use super::{
     source::Source,
 };
 use crate::{
-    client::{Answer, Daemon, Remote, Target, timely},
+    client::{AGAIN, Answer, Daemon, GIVEN_UP_AFTER, Remote, Target, timely},
     desk::follow::{self, Follower},
     failure::Failure,
 };
 
-/// Between two tries, and how long it is tried.
-const AGAIN: Duration = Duration::from_millis(500);
-const GIVEN_UP_AFTER: Duration = Duration::from_secs(60);
 /// Between two questions what became of it.
 const LOOK: Duration = Duration::from_millis(250);
 

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use drive_bus::{Echo, LineConfig};
+use drive_bus::{Echo, Gateway, LineConfig};
 use drive_core::Capabilities;
 use drive_fleet::{Demand, Forecast, LineBudget, forecast};
 
-use crate::{drive_spec::DriveName, line_spec};
+use crate::{drive_spec::DriveName, line_spec, output};
 
 /// Bytes of a PDU around its words: function, address, quantity and count of a write; function and count of an answer.
 const AROUND_WRITE: usize = 6;
@@ -69,8 +69,41 @@ impl PlannedLine {
         let stop_to_the_wire = self.stop_to_the_wire(config);
         let stop_all = forecast.plan.stop_all(u32::try_from(dead).unwrap_or(u32::MAX));
         // It begins with an exchange of the usual length that is under way, and here the longest is counted.
-        let all_stopped = stop_all.saturating_sub(budget.lost_slot()) + stop_to_the_wire;
+        // A gateway waits for each dead drive as it waits for one.
+        let waits = config.far_end().map_or(Duration::ZERO, |gateway| {
+            gateway.wait.unwrap_or(Gateway::ASSUMED_WAIT) * u32::try_from(dead).unwrap_or(u32::MAX)
+        });
+        let all_stopped = stop_all.saturating_sub(budget.lost_slot()) + stop_to_the_wire + waits;
         Case { label, forecast, stop_to_the_wire, all_stopped, hypothetical: None }
+    }
+
+    /// What of the stop's wait is a gateway's, and where that is from; `None` where there is none.
+    pub(super) fn behind_gateway(&self) -> Option<String> {
+        let gateway = self.config.far_end()?;
+        let waits = output::bound(gateway.stop_waits());
+        let without = LineConfig { gateway: Some(Gateway::NONE), ..self.config.clone() };
+        let alone = output::bound(self.stop_to_the_wire(&without));
+        let said = match (self.config.gateway, gateway.wait) {
+            (None, _) => format!(
+                "{waits} of a stop's wait are a gateway's, of which nothing is said: assumed are {:?} for a drive that does not answer, \
+                 and perhaps one request at a time. Say gateway=none where each drive answers for itself: then it is {alone}; or what \
+                 the gateway is set to, such as gateway=3x1s",
+                Gateway::ASSUMED_WAIT
+            ),
+            (Some(_), None) => format!(
+                "{waits} of a stop's wait are assumed, for a gateway that is unknown: {:?} for a drive that does not answer",
+                Gateway::ASSUMED_WAIT
+            ),
+            (Some(_), Some(wait)) => format!(
+                "{waits} of a stop's wait are the gateway's, which waits {wait:?} for a drive that does not answer{}",
+                if gateway.at_once.is_some() {
+                    ""
+                } else {
+                    "; how many requests it serves at once is not said, so twice"
+                }
+            ),
+        };
+        Some(said)
     }
 
     /// The longest wait of a stop, once the line knows whether its adapter echoes.

@@ -43,6 +43,9 @@ impl Sheet<'_> {
             self.line.budget.response_timeout,
         ))?;
         output::say_table(self.table())?;
+        if let Some(said) = self.line.behind_gateway() {
+            output::say(said)?;
+        }
         for case in self.cases {
             if let Some(forbidden) = &case.hypothetical {
                 output::say(format_args!("{}: for comparison only, {forbidden}", case.label))?;
@@ -88,6 +91,7 @@ impl Sheet<'_> {
         json!({
             "line": self.line.name,
             "port": line_spec::written(&self.line.config),
+            "gateway": self.line.behind_gateway(),
             "cases": self.cases.iter().map(case).collect::<Vec<_>>(),
             "drives": drives.collect::<Vec<_>>(),
         })

@@ -9,6 +9,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
+use drive_bus::Stats;
 use drive_core::{Drive, Error, ErrorKind, PortError, Status};
 use drive_fleet::FEED_PART;
 use tokio::{sync::mpsc, task::JoinSet, time};
@@ -19,6 +20,7 @@ use crate::{
     drive_spec::{self, DriveName, DriveSpec},
     duration::Time,
     failure::Failure,
+    findings,
     line_spec::{self, LineSpec},
     one_drive, output,
     signals::Ending,
@@ -26,6 +28,9 @@ use crate::{
 
 /// Readings that may wait for a slow reader of our output; then the polls wait too.
 const WAITING: usize = 1_024;
+
+/// After how long a drive of which nothing was heard is named: longer than the attempts of one poll.
+const UNHEARD: Duration = Duration::from_secs(2);
 
 /// How long a drive is left alone when the line did not even send its poll.
 const NOT_SENT_PAUSE: Duration = Duration::from_millis(100);
@@ -77,10 +82,18 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     }
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let mut book = Book::default();
+    let mut look = time::interval_at(time::Instant::now() + UNHEARD, UNHEARD);
     loop {
         tokio::select! {
             () = ending.asked() => break,
             () = reached(until) => break,
+            _ = look.tick() => {
+                for (name, text) in book.unheard(&names, &line.stats()) {
+                    if !args.json {
+                        output::say(format_args!("{name:<12} {text}"))?;
+                    }
+                }
+            }
             Some(reading) = incoming.recv() => {
                 if args.json {
                     output::say_as_it_is(json::reading(&reading))?;
@@ -91,6 +104,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
             }
         }
     }
+    let proposal = line_spec::proposal(&config, &line.stats());
+    let findings = findings::told(&line, &names);
     polls.shutdown().await;
     link::read_counters(&line, &names, &config).await;
     let stats = line.stats();
@@ -101,7 +116,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     } else {
         output::say_table(summary.table())?;
         output::say(summary.of_line())?;
-        for text in link::told(&summary) {
+        for text in link::told(&summary).chain(findings).chain(proposal) {
             output::say(text)?;
         }
     }
@@ -178,6 +193,24 @@ impl Book {
         }
         self.last.insert(reading.name, (text.clone(), failed));
         Some(text)
+    }
+
+    /// The drives of which nothing is known yet, each once, and why.
+    fn unheard(&mut self, names: &[DriveName], stats: &Stats) -> Vec<(DriveName, String)> {
+        let owed = stats.far_end.map_or(0, |far_end| far_end.owed);
+        let unheard: Vec<DriveName> =
+            names.iter().copied().filter(|name| !self.last.contains_key(name)).collect();
+        let told = unheard.into_iter().map(|name| {
+            let asked = stats.slaves.get(&name.slave.number()).map_or(0, |slave| slave.sent);
+            let text = match (asked, owed) {
+                (_, 1..) => "no answer yet: a gateway may still be waiting for another drive (gateway=none where there is none)",
+                (0, 0) => "not asked yet: its line has no time for it",
+                (_, 0) => "no answer yet",
+            };
+            self.last.insert(name, (text.to_owned(), false));
+            (name, text.to_owned())
+        });
+        told.collect()
     }
 
     fn note(&mut self, reading: &Reading) {

@@ -1,9 +1,9 @@
 //! Everything that a report is made of, read from a daemon: what could not be read stands there with the reason.
 
+use drive_core::Faults;
 use drive_families::Family;
 use futures_util::future::try_join_all;
 use serde::de::DeserializeOwned;
-use serde_json::{Value, json};
 
 use crate::{
     client::{Daemon, Way, wanted},
@@ -39,10 +39,10 @@ pub(super) type Told<T> = Result<T, String>;
 #[derive(Debug)]
 pub(super) struct DriveTold {
     /// As the API has it.
-    pub(super) view: Value,
+    pub(super) view: DriveView,
     pub(super) family: Result<Family, String>,
     pub(super) settings: Told<SettingsView>,
-    pub(super) faults: Told<Value>,
+    pub(super) faults: Told<Faults>,
     pub(super) parameters: Result<Compared, String>,
 }
 
@@ -76,7 +76,7 @@ impl Gathered {
         let mut drives: Vec<DriveTold> = read.into_iter().flatten().collect();
         for drive in &mut drives {
             if let Some(now) = state.drives.iter().find(|now| now.name() == drive.name()) {
-                drive.view = json!(now);
+                drive.view = now.clone();
             }
             drive.ask_again(&mut daemon).await;
         }
@@ -95,18 +95,17 @@ async fn read_drives(
     for view in drives {
         let name = view.name();
         let family = view.family.parse().map_err(|error| drive_families::UnknownFamily::to_string(&error));
-        let (drive, view) = (view, json!(view));
         let settings = ask(&mut daemon, &["drives", name, "settings"]).await;
-        let is_there = view["status"]["quality"] == "good";
+        let is_there = view.snapshot.status.is_good();
         let (faults, parameters) = match (is_there, with_parameters) {
             (false, _) => (Err(SILENT.to_owned()), Err(SILENT.to_owned())),
             (true, false) => (ask(&mut daemon, &["drives", name, "faults"]).await, Err(LEFT_OUT.to_owned())),
             (true, true) => (
                 ask(&mut daemon, &["drives", name, "faults"]).await,
-                compared(way.connect().await?, drive).await,
+                compared(way.connect().await?, view).await,
             ),
         };
-        told.push(DriveTold { view, family, settings, faults, parameters });
+        told.push(DriveTold { view: view.clone(), family, settings, faults, parameters });
     }
     Ok(told)
 }
@@ -114,12 +113,10 @@ async fn read_drives(
 impl DriveTold {
     /// Reads the faults of a drive again that has tripped, or was reset, since they were read.
     async fn ask_again(&mut self, daemon: &mut Daemon) {
-        let is_present =
-            |faults: &Value| faults["present"].as_array().is_some_and(|present| !present.is_empty());
-        let is_known =
-            self.faults.as_ref().is_ok_and(|faults| is_present(faults) == self.view["fault"].is_object());
-        if self.view["status"]["quality"] == "good" && !is_known {
-            let name = self.view["name"].as_str().unwrap_or_default();
+        let is_tripped = self.view.snapshot.fault.is_some();
+        let is_known = self.faults.as_ref().is_ok_and(|faults| faults.present.is_empty() != is_tripped);
+        if self.is_there() && !is_known {
+            let name = self.view.name();
             self.faults = ask(daemon, &["drives", name, "faults"]).await;
         }
     }

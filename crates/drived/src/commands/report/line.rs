@@ -1,12 +1,12 @@
 //! The chapter of one line: the plan beside what was measured, how it was used, how its slaves answered, what went wrong.
 
 use maud::{Markup, html};
-use serde_json::Value;
 
 use super::{
+    gather::DriveTold,
     own::LINE,
     plot::{self, Axis, Step},
-    words::{cell, count, milliseconds, percent, share, span, table},
+    words::{cell, milliseconds, percent, share, span, table},
 };
 use crate::plant::views::{AnswersView, LineDetailView, LineErrors, LineLink, SlaveView, StepView};
 
@@ -36,7 +36,7 @@ impl Verdict {
     }
 }
 
-pub(super) fn chapter(detail: &LineDetailView, drives: &[Value]) -> Markup {
+pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
     let LineDetailView { line, measured, .. } = detail;
     html! {
         section.line {
@@ -238,12 +238,11 @@ fn errors(detail: &LineDetailView) -> Markup {
     }
 }
 
-fn availability(detail: &LineDetailView, drives: &[Value]) -> Markup {
+fn availability(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
     let rows = slaves(detail).map(|(name, slave, answers)| {
-        let drive = drives.iter().find(|drive| drive["name"].as_str() == slave.drive.as_deref());
-        let counters = drive.map_or(&Value::Null, |drive| &drive["counters"]);
-        let (polls, answered) = (count(&counters["polls"]), count(&counters["answered"]));
-        let answered = answered.min(polls);
+        let drive = drives.iter().find(|drive| Some(drive.name()) == slave.drive.as_deref());
+        let (answered, polls) = drive.map(DriveTold::statuses).unwrap_or_default();
+        let counters = drive.map(|drive| drive.view.snapshot.counters).unwrap_or_default();
         let now = match (slave.off_line, slave.next_probe_ms) {
             (false, _) => "asked".to_owned(),
             (true, Some(next)) => format!("OFF-LINE, asked again in {}", milliseconds(next as f64)),
@@ -255,8 +254,8 @@ fn availability(detail: &LineDetailView, drives: &[Value]) -> Markup {
             plot::shares(&[("good", answered as f64)], polls.max(1) as f64, &about),
             cell(share(answered, polls)),
             cell(polls),
-            cell(count(&counters["missed"])),
-            cell(count(&counters["lost"])),
+            cell(counters.missed),
+            cell(counters.lost),
             cell(answers.map_or(0, |answers| answers.went_offline)),
             cell(now),
         ]

@@ -18,6 +18,8 @@ use std::path::PathBuf;
 use chrono::Local;
 use serde_json::json;
 
+#[cfg(test)]
+pub(crate) use self::summary::worst_of;
 use self::{gather::Gathered, own::Own, page::Page};
 use crate::{
     client::{DaemonArgs, Way},

@@ -62,8 +62,10 @@ impl Own {
         // Drives that do not fit are shown as they are: nobody plans the line here.
         let builder = Fleet::builder().whatever_the_plan();
         let builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        let builder =
-            part.drives.iter().fold(builder, |builder, drive| reload::add(builder, part, drive, None));
+        let builder = part
+            .drives
+            .iter()
+            .fold(builder, |builder, drive| reload::add(builder, part, drive, reload::Before::default()));
         let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
         let plant = Plant::start(fleet.clone(), Vec::new(), false);
         for drive in fleet.drives() {

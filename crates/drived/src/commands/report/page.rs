@@ -48,7 +48,7 @@ impl Page<'_> {
                         h2.new { "Lines" }
                         @for told in lines {
                             @match told {
-                                Ok(line) => (line::chapter(line, &self.views())),
+                                Ok(line) => (line::chapter(line, drives)),
                                 Err(why) => p { (unread(why)) },
                             }
                         }
@@ -87,10 +87,6 @@ impl Page<'_> {
         ];
         rows.extend(self.notes.iter().map(|note| ("note".to_owned(), html! { (note) })));
         facts(rows)
-    }
-
-    fn views(&self) -> Vec<serde_json::Value> {
-        self.gathered.drives.iter().map(|drive| drive.view.clone()).collect()
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     words::{cell, facts, milliseconds, moment, table, unread},
 };
 use crate::{
-    client, output,
+    output,
     plant::{
         recent::RecentView,
         views::{HappenedView, SettingsView},
@@ -43,7 +43,7 @@ fn rows(told: &SettingsView) -> Vec<(String, Markup)> {
     let mut rows = Vec::new();
     let settings = json!(told.settings);
     for (key, value) in settings.as_object().into_iter().flatten().filter(|(key, _)| *key != "name") {
-        flatten(&client::words(key), value, &mut rows);
+        flatten(&spoken(key), value, &mut rows);
     }
     for (age, label) in [
         (told.running_age_ms, "by the plan, a status is never older, running"),
@@ -56,13 +56,18 @@ fn rows(told: &SettingsView) -> Vec<(String, Markup)> {
     rows
 }
 
+/// A key, or a word of the API, as a person reads it.
+fn spoken(text: &str) -> String {
+    text.replace('_', " ")
+}
+
 /// Each value of an object in a row of its own, under the names that lead to it.
 fn flatten(label: &str, value: &Value, rows: &mut Vec<(String, Markup)>) {
     match value {
         Value::Object(members) if members.is_empty() => rows.push((label.to_owned(), cell("none"))),
         Value::Object(members) => {
             for (key, value) in members {
-                flatten(&format!("{label}: {}", client::words(key)), value, rows);
+                flatten(&format!("{label}: {}", spoken(key)), value, rows);
             }
         }
         Value::Array(all) if all.is_empty() => rows.push((label.to_owned(), cell("none"))),
@@ -87,7 +92,7 @@ fn plain(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.to_owned(),
-        Value::String(text) => client::words(text),
+        Value::String(text) => spoken(text),
         Value::Array(all) => all.iter().map(plain).collect::<Vec<_>>().join(" to "),
         other => other.to_string(),
     }

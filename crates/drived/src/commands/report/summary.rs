@@ -2,16 +2,17 @@
 
 use drive_fleet::Severity;
 use maud::{Markup, html};
-use serde_json::Value;
+use tokio::time::Instant;
 
 use super::{
     drive::UNWATCHED,
     gather::{DriveTold, Gathered, LEFT_OUT, Told},
-    words::{cell, count, list, share, table, text, unread},
+    words::{cell, share, table, unread},
 };
 use crate::{
-    client,
-    plant::views::{LineDetailView, LineLink},
+    plant::views::{DriveView, LineDetailView, LineLink},
+    row::{Column, Row},
+    values,
 };
 
 /// Exchanges that go wrong more often than this deserve a word: one in a hundred.
@@ -21,30 +22,27 @@ const OFTEN: u64 = 100;
 pub(super) fn overview(gathered: &Gathered) -> Markup {
     let rows = gathered.drives.iter().map(|drive| {
         let view = &drive.view;
-        let counters = &view["counters"];
-        let (polls, answered) = (count(&counters["polls"]), count(&counters["answered"]));
-        let hours = client::measured("running_time_h", &view["measurements"]["running_time_h"]);
+        let (answered, polls) = drive.statuses();
+        let worked = view.snapshot.measurements.value.as_ref().map(values::worked);
+        let [running_time, ..] = worked.unwrap_or_default();
         let differs = match &drive.parameters {
             Ok(compared) => cell(compared.factory.differences.len()),
             Err(why) if why == LEFT_OUT => cell("left out"),
             Err(_) => html! { span.unread { "not read" } },
         };
+        let row = Row::of(view, Instant::now());
         vec![
             html! { a href={ "#" (drive.anchor()) } { (drive.name()) } },
             cell(drive.family_name()),
-            html! { (text(&view["line"])) ", " (view["slave"]) },
-            html! { span.trouble[trouble(drive)] { (client::state_in_words(view)) } },
-            cell(share(answered.min(polls), polls)),
-            cell(hours.unwrap_or_else(|| "–".to_owned())),
+            html! { (view.line) ", " (view.slave) },
+            html! { span.trouble[row.is_in_trouble()] { (row.cell(Column::State)) } },
+            cell(share(answered, polls)),
+            cell(running_time.1.unwrap_or_else(|| "–".to_owned())),
             differs,
         ]
     });
     let heads = ["drive", "family", "line, address", "state", "answered", "run time", "differ from factory"];
     table("list overview", &heads, 4, rows.collect())
-}
-
-fn trouble(drive: &DriveTold) -> bool {
-    client::concern(&drive.view).is_some_and(|concern| concern.severity.is_trouble())
 }
 
 /// What needs somebody, the worst first; what is the same of several drives stands once.
@@ -97,22 +95,21 @@ enum Grade {
 }
 
 /// What troubles a drive by itself, the worst first.
-fn concerns(view: &Value) -> Vec<Finding> {
-    let concerns = client::concerns(view).into_iter().map(|concern| Finding {
+fn concerns(view: &DriveView) -> Vec<Finding> {
+    let concerns = view.snapshot.concerns.iter().map(|concern| Finding {
         grade: match concern.severity {
             Severity::Alarm => Grade::Severe,
             Severity::Warning | Severity::Note => Grade::Worth,
         },
         rank: concern.rank,
         what: concern.kind.to_string(),
-        more: concern.detail.unwrap_or_default(),
+        more: concern.detail.clone().unwrap_or_default(),
     });
     concerns.collect()
 }
 
 fn of_drive(drive: &DriveTold) -> Vec<Finding> {
-    let view = &drive.view;
-    let mut told = concerns(view);
+    let mut told = concerns(&drive.view);
     let mut say = |grade, what: &str, more: String| {
         told.push(Finding { grade, rank: usize::MAX, what: what.to_owned(), more });
     };
@@ -122,8 +119,8 @@ fn of_drive(drive: &DriveTold) -> Vec<Finding> {
     } else if settings.is_ok_and(|told| told.watchdog_armed == Some(false)) {
         say(Grade::Worth, "the communication watchdog is off", UNWATCHED.to_owned());
     }
-    for warning in drive.faults.iter().flat_map(|faults| list(&faults["warnings"])) {
-        say(Grade::Worth, "alarm", client::fault_in_words(warning));
+    for warning in drive.faults.iter().flat_map(|faults| &faults.warnings) {
+        say(Grade::Worth, "alarm", warning.to_string());
     }
     if drive.is_there() {
         let all = [settings.err(), drive.faults.as_ref().err(), drive.parameters.as_ref().err()];
@@ -165,20 +162,11 @@ fn of_line(detail: &Told<LineDetailView>) -> Vec<Markup> {
     told
 }
 
+/// The first that a report says of what troubles a drive.
 #[cfg(test)]
-mod tests {
-    use tokio::time::Instant;
-
-    use super::*;
-    use crate::plant::testing::every_pair_of_troubles;
-
-    #[tokio::test(start_paused = true)]
-    async fn of_every_pair_of_troubles_the_worst_is_told_as_by_everybody() {
-        for (_, view, worst) in every_pair_of_troubles(Instant::now()) {
-            let all = concerns(&view);
-            assert!(all.is_sorted_by_key(|finding| (finding.grade, finding.rank)), "{all:?}");
-            let Finding { what, more, .. } = &all[0];
-            assert_eq!(if more.is_empty() { what.clone() } else { format!("{what}: {more}") }, worst);
-        }
-    }
+pub(crate) fn worst_of(view: &DriveView) -> String {
+    let all = concerns(view);
+    assert!(all.is_sorted_by_key(|finding| (finding.grade, finding.rank)), "{all:?}");
+    let Finding { what, more, .. } = &all[0];
+    if more.is_empty() { what.clone() } else { format!("{what}: {more}") }
 }

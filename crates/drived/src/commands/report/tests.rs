@@ -5,11 +5,11 @@ use std::time::Duration;
 use chrono::Local;
 use drive_bus::{Line, LineConfig};
 use drive_core::{
-    SlaveAddress,
+    Identity, SlaveAddress,
     serial::{CharacterFormat, SerialSettings},
 };
 use drive_families::Family;
-use drive_fleet::Periods;
+use drive_fleet::{IdentityCheck, Periods, WatchdogCheck};
 use drive_sim::{SimLine, SimSlave, Wiring};
 
 use super::{
@@ -173,10 +173,12 @@ async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
     let mut gathered = bench.read(false).await;
     let name = "<script>alert(1)</script>\"><img src=x onerror=alert(2)>";
     for drive in &mut gathered.drives {
-        drive.view["name"] = name.into();
-        drive.view["error"] = name.into();
-        drive.view["identity"]["model"] = name.into();
-        drive.view["watchdog"] = serde_json::json!({"check": "broken", "why": name});
+        let known = &mut drive.view.snapshot;
+        known.name = name.into();
+        known.error = Some(name.to_owned());
+        let identity = Identity { model: Some(name.to_owned()), ..Identity::default() };
+        known.identity = IdentityCheck::Same(identity.into());
+        known.watchdog = WatchdogCheck::Broken(name.to_owned());
         drive.faults = Err(name.to_owned());
         let settings = &mut drive.settings.as_mut().unwrap().settings;
         settings.commanders = drive_fleet::Commanders::Only(vec![name.to_owned()]);

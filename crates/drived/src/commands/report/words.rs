@@ -1,11 +1,13 @@
 //! Values as a person reads them on paper: each with its unit, and what is not known said.
 
+use std::time::Duration;
+
 use chrono::{DateTime, Local};
+use drive_fleet::Counters;
 use maud::{Markup, Render, html};
-use serde_json::Value;
 
 use super::gather::DriveTold;
-use crate::client;
+use crate::{output, plant::views::DriveView};
 
 /// What was not read, and why.
 pub(super) fn unread(why: &str) -> Markup {
@@ -57,7 +59,8 @@ pub(super) fn milliseconds(time: impl Into<Option<f64>>) -> String {
 
 /// A span of time: `34 s`, `5 min`, `12 h`.
 pub(super) fn span(milliseconds: impl Into<Option<u64>>) -> String {
-    milliseconds.into().map_or_else(|| "an unknown time".to_owned(), client::age)
+    let time = milliseconds.into().map(Duration::from_millis);
+    time.map_or_else(|| "an unknown time".to_owned(), output::age)
 }
 
 /// A share of a whole, in per cent; a dash where there is no whole.
@@ -85,29 +88,20 @@ pub(super) fn moment(unix_ms: impl Into<Option<u64>>) -> String {
     )
 }
 
-/// A whole number, 0 where there is none.
-pub(super) fn count(value: &Value) -> u64 {
-    value.as_u64().unwrap_or_default()
-}
-
-/// A list of the API.
-pub(super) fn list(value: &Value) -> &[Value] {
-    value.as_array().map_or(&[], Vec::as_slice)
-}
-
-/// A text of the API.
-pub(super) fn text(value: &Value) -> &str {
-    value.as_str().unwrap_or_default()
-}
-
 impl DriveTold {
     pub(super) fn name(&self) -> &str {
-        text(&self.view["name"])
+        self.view.name()
     }
 
     /// Whether it answers, and what it says is young.
-    pub(super) fn is_there(&self) -> bool {
-        self.view["status"]["quality"] == "good"
+    pub(super) const fn is_there(&self) -> bool {
+        self.view.snapshot.status.is_good()
+    }
+
+    /// Its statuses that came, and those that were due.
+    pub(super) fn statuses(&self) -> (u64, u64) {
+        let Counters { polls, answered, .. } = self.view.snapshot.counters;
+        (answered.min(polls), polls)
     }
 
     /// The anchor of its chapter.
@@ -116,12 +110,12 @@ impl DriveTold {
             .name()
             .chars()
             .map(|character| if character.is_ascii_alphanumeric() { character } else { '-' });
-        let (line, slave) = (text(&self.view["line"]).len(), &self.view["slave"]);
-        format!("drive-{line}-{slave}-{}", plain.collect::<String>())
+        let DriveView { line, slave, .. } = &self.view;
+        format!("drive-{}-{slave}-{}", line.len(), plain.collect::<String>())
     }
 
     /// Its family by its whole name.
     pub(super) fn family_name(&self) -> &str {
-        self.family.as_ref().map_or_else(|_| text(&self.view["family"]), |family| family.capabilities().name)
+        self.family.as_ref().map_or_else(|_| &*self.view.family, |family| family.capabilities().name)
     }
 }

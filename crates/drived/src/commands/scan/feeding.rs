@@ -18,7 +18,8 @@ pub(super) fn interval(family: Family, is_ascii: bool, told: Option<Watchdog>) -
         Some(Watchdog { timeout: Some(timeout), .. }) => Some(timeout / 2),
         None => {
             let capability = family.watchdog(is_ascii, &Options::default());
-            Some(capability.map_or(UNKNOWN, |capability| capability.min / 2))
+            // That it does not tell is no reason to believe that it is as short as it can be.
+            Some(capability.map_or(UNKNOWN, |capability| (capability.min / 2).max(UNKNOWN / 2)))
         }
     }
 }
@@ -50,6 +51,11 @@ impl Feeding {
         let soon = |fed: &&Fed| Some(fed.step.trial) == at && fed.due <= until(fed) + fed.interval / 4;
         let anybody = self.0.iter().filter(|fed| fed.due <= until(fed)).min_by_key(|fed| fed.due)?;
         Some(*self.0.iter().find(soon).unwrap_or(anybody))
+    }
+
+    /// Whether it is among them.
+    pub(super) fn has(&self, step: Step) -> bool {
+        self.0.iter().any(|fed| fed.step == step)
     }
 
     /// It was asked.

@@ -2,9 +2,14 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, Protocol, record::Ending};
+use drive_bus::{
+    Line, Protocol,
+    evidence::{Defect, Fact, Finding, What},
+    record::Ending,
+};
 use drive_core::{Drive, Error, Identity, PortError, SlaveAddress, Watchdog};
 use drive_families::Family;
+use tokio::time::Instant;
 
 use super::answer::{Answer, Likeness};
 use crate::{failure::Failure, one_drive};
@@ -19,6 +24,9 @@ const EVERY_TIME: u32 = 4;
 /// How often something is asked that takes several exchanges, of which now one and now another is damaged.
 const ASKED: u32 = 12;
 
+/// How many exchanges the line keeps: those of one status.
+const KEPT: usize = 8;
+
 /// Whether an address answers at all.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Heard {
@@ -28,47 +36,71 @@ pub(super) enum Heard {
     Somebody,
 }
 
+/// How often an address has to answer twice to one question until that is no chance.
+const TWICE: u32 = 2;
+
 /// Asks an address for one register, and listens on for a second answer where one has come.
 pub(super) async fn ask(line: &Line, slave: SlaveAddress, wait: Duration) -> Result<Heard, Failure> {
+    for _ in 0..TWICE {
+        let began = Instant::now();
+        if let Some(heard) = ask_once(line, slave).await? {
+            return Ok(heard);
+        }
+        tokio::time::sleep(wait).await;
+        let mut since = line.evidence();
+        since.retain(|fact| fact.at >= began);
+        let is_second = |fact: &Fact| {
+            fact.slave == Some(slave.number()) && matches!(fact.what, What::Doubled | What::Contradicted)
+        };
+        // Where another master asks the same slave its answer to him is no second answer to us.
+        let is_shared = since.iter().any(|fact| fact.what == What::OthersRequest);
+        if is_shared || !since.iter().any(is_second) {
+            return Ok(Heard::Somebody);
+        }
+    }
+    let why = format!("{TWICE} of {TWICE} times another answer came after the first");
+    Ok(Heard::Damaged(Answer::Two { alike: Vec::new(), why }))
+}
+
+/// Asks it once, and again where the answer is damaged. `None`: it answers.
+async fn ask_once(line: &Line, slave: SlaveAddress) -> Result<Option<Heard>, Failure> {
     // The shortest read that a family has; an exception is an answer too.
     let mut drive = open(line, Family::Atv312, slave);
-    let mut before = 0;
-    let asked = often(line, async || {
-        before = unasked(line);
-        drive.keep_alive().await
-    });
-    match asked.await {
-        Asked::Refused(Error::Exception { code, .. }) if GATEWAY.contains(&code) => {
-            return Ok(Heard::Nothing);
-        }
-        Asked::Refused(Error::Port { problem: PortError::Timeout { .. }, .. }) => return Ok(Heard::Nothing),
+    Ok(match often(line, async || drive.keep_alive().await).await {
+        Asked::Refused(Error::Exception { code, .. }) if GATEWAY.contains(&code) => Some(Heard::Nothing),
+        Asked::Refused(Error::Port { problem: PortError::Timeout { .. }, .. }) => Some(Heard::Nothing),
         Asked::Refused(Error::Port { problem: PortError::Expired, .. }) => {
             return Err(Failure::Drive(one_drive::NEVER_QUIET.to_owned()));
         }
         Asked::Refused(Error::Port { problem, .. }) => return Err(Failure::Input(problem.to_string())),
-        Asked::Told(()) | Asked::Refused(_) => {}
+        Asked::Told(()) | Asked::Refused(_) => None,
         Asked::Damaged(why) => {
             let begins =
                 line.exchanges().pop().is_some_and(|last| last.answer.first() == Some(&slave.number()));
-            return Ok(Heard::Damaged(match begins {
-                true => Answer::Two {
+            Some(Heard::Damaged(match cut(line, slave) {
+                Some(cut) => Answer::Damaged(cut),
+                None if begins => Answer::Two {
                     alike: Vec::new(),
                     why: format!(
                         "all {EVERY_TIME} answers begin with this address and are damaged behind it"
                     ),
                 },
-                false => Answer::Damaged(why),
-            }));
+                None => Answer::Damaged(why),
+            }))
         }
-    }
-    tokio::time::sleep(wait).await;
-    match unasked(line) - before {
-        0 => Ok(Heard::Somebody),
-        strays => {
-            let why = format!("another answer came after the first ({strays} bytes or frames)");
-            Ok(Heard::Damaged(Answer::Two { alike: Vec::new(), why }))
-        }
-    }
+    })
+}
+
+/// What the line has found to be done to every answer of a slave, which is no second one.
+pub(super) fn cut(line: &Line, slave: SlaveAddress) -> Option<String> {
+    let is_it = |finding: &Finding| {
+        finding.slave == Some(slave.number())
+            && matches!(
+                finding.defect,
+                Defect::FirstByteCut | Defect::LastByteCut | Defect::BytesBehind | Defect::OneAnswerBehind
+            )
+    };
+    line.findings().into_iter().find(is_it).map(|finding| finding.to_string())
 }
 
 /// What came of reading a slave as a drive of a family.
@@ -102,6 +134,18 @@ pub(super) async fn status(line: &Line, family: Family, slave: SlaveAddress) -> 
     }
 }
 
+/// The most words that a slave was last seen to answer a read with, over Modbus RTU. Who answers more than a family's manual
+/// lets it is none of that family, whatever its words look like.
+pub(super) fn longest_read(line: &Line, slave: SlaveAddress) -> u16 {
+    let words = line.exchanges().into_iter().filter_map(|exchange| {
+        let is_read = matches!(exchange.ending, Ending::Answered)
+            && exchange.request.first() == Some(&slave.number())
+            && matches!(exchange.request.get(1), Some(0x03 | 0x04));
+        exchange.request.get(4..6).filter(|_| is_read).map(|count| u16::from_be_bytes([count[0], count[1]]))
+    });
+    words.max().unwrap_or(0)
+}
+
 /// What a drive of a family says it is, and how its watchdog is set, where it tells.
 pub(super) async fn identity(
     line: &Line,
@@ -114,7 +158,19 @@ pub(super) async fn identity(
         Asked::Refused(_) => None,
         Asked::Damaged(_) => return Looks::Damaged,
     };
-    Looks::Like((likeness(family, identity), drive.watchdog().await.ok()))
+    Looks::Like((likeness(family, identity), watchdog(&mut *drive).await))
+}
+
+/// How its watchdog is set. One answer that does not come says nothing of it.
+async fn watchdog(drive: &mut dyn Drive) -> Option<Watchdog> {
+    for _ in 0..EVERY_TIME {
+        match drive.watchdog().await {
+            Ok(watchdog) => return Some(watchdog),
+            Err(Error::Port { .. }) => {}
+            Err(_) => break,
+        }
+    }
+    None
 }
 
 /// Reads what two drives alike differ in, if in anything: voltages, temperatures, hours.
@@ -149,7 +205,7 @@ enum Asked<T> {
 
 /// Asks until an answer is intact or refuses, but not for ever.
 async fn often<T>(line: &Line, mut ask: impl AsyncFnMut() -> Result<T, Error>) -> Asked<T> {
-    line.keep_exchanges(1);
+    line.keep_exchanges(KEPT);
     // The beginning of a request up to its register; how many words it asks for may change.
     let register = if line.config().protocol == Protocol::Rtu { 4 } else { 9 };
     let (mut last, mut in_a_row) = (None, 0);

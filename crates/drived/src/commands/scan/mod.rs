@@ -12,7 +12,10 @@ mod tests;
 
 use std::{path::PathBuf, time::Duration};
 
-use drive_bus::{LineConfig, Protocol};
+use drive_bus::{
+    LineConfig, Protocol,
+    listen::{Listener, Role},
+};
 use drive_core::serial::CharacterFormat;
 use tokio::time::Instant;
 
@@ -36,6 +39,9 @@ pub(crate) use self::save::Save;
 /// Why nobody may scan at other speeds while motors run.
 const WARNING: &str = "every motor on this line has to stand until the scan has ended: frames at another speed than theirs are \
      noise to drives that run, and a drive whose watchdog is armed begins to count by the first message that it hears";
+
+/// How long the line is listened to before anything is asked: a panel or a PLC asks once a second or more often.
+const LISTENING: Duration = Duration::from_secs(2);
 
 /// Find out who answers on a line, at which speed and format, and which family is likely there; nothing is written
 ///
@@ -103,6 +109,10 @@ pub(crate) async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Resu
     let plan = plan.switching_in(began.elapsed());
     let mut sweep = Sweep::new(&plan, line.clone(), what.wait.0, one_drive::open_line);
     what.announce(&line, &plan, is_json)?;
+    tokio::select! {
+        () = listen_first(&line) => {}
+        () = ending.asked() => return Ok(()),
+    }
     let began = Instant::now();
     let mut finds = Finds::on(line, is_json);
     let whole = {
@@ -137,13 +147,38 @@ pub(crate) async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Resu
         };
         ended.map(|is_whole| (is_whole, asked))
     };
+    let findings = sweep.findings();
     sweep.close().await;
     let (is_whole, asked) = whole?;
+    findings.into_iter().for_each(output::complain);
     finds.conclude(asked, what.addresses.0.len(), (began.elapsed(), is_whole))?;
     match save {
         Some(save) if is_json => save.write(&finds, is_whole).map(drop),
         Some(save) => output::say(save.write(&finds, is_whole)?),
         None => Ok(()),
+    }
+}
+
+/// Hears whether somebody else asks on this line before anything is asked: his questions and ours would destroy each other.
+async fn listen_first(line: &LineConfig) {
+    if !line.protocol.is_paced() {
+        return;
+    }
+    // A port that cannot be listened to is told of when it is asked.
+    let Ok(mut listener) = Listener::open(line).await else { return };
+    let mut requests = 0_u32;
+    let listening = async {
+        while let Ok(Some(heard)) = listener.next().await {
+            requests += u32::from(matches!(heard.role, Role::Request | Role::Either));
+        }
+        std::future::pending::<()>().await;
+    };
+    let _ = tokio::time::timeout(LISTENING, listening).await;
+    if requests > 0 {
+        output::complain(format_args!(
+            "somebody else asks on this line: {requests} requests in {LISTENING:?}. This scan disturbs him, and he it: end his \
+             asking first, then scan again"
+        ));
     }
 }
 
@@ -204,7 +239,14 @@ impl What {
             "asking {addresses} on {on}: {} if none answers, up to about {} more for each that does; only reads",
             long(plan.time()),
             long(plan.one_more()),
-        ))
+        ))?;
+        if line.protocol.is_paced() {
+            output::say(format_args!(
+                "before that it listens for {LISTENING:?}. What it disturbs: another master on this line, and drives whose watchdog is \
+                 armed, which count from the first message that they hear"
+            ))?;
+        }
+        Ok(())
     }
 }
 

@@ -17,6 +17,9 @@ use crate::{drive_spec::DriveName, failure::Failure, line_spec, one_drive};
 /// How long one look at a slave takes at the slowest settings: some watchdogs are not much longer.
 const LOOK: Duration = Duration::from_millis(600);
 
+/// How much longer one is waited for whose answer came too late.
+const SLOWER: u32 = 10;
+
 /// The scan of a line.
 pub(super) struct Sweep<'a, Open> {
     plan: &'a Plan,
@@ -57,7 +60,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         mut is_wanted: impl FnMut(Step, Option<usize>) -> bool,
         mut tell: impl FnMut(Told) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let mut found = None;
+        let mut found: Option<usize> = None;
         for (done, &step) in self.plan.steps.iter().enumerate() {
             if !is_wanted(step, found) {
                 continue;
@@ -68,7 +71,45 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 tell(Told::Found(find))?;
             }
         }
+        self.ask_slow(tell).await
+    }
+
+    /// Asks those once more, and waits longer, whose answer came when another was asked.
+    async fn ask_slow(&mut self, mut tell: impl FnMut(Told) -> Result<(), Failure>) -> Result<(), Failure> {
+        let Some((trial, line)) = self.at.clone() else { return Ok(()) };
+        let is_late = |slave: u8| line.stats().slaves.get(&slave).is_some_and(|stats| stats.late > 0);
+        let steps: Vec<Step> = self
+            .plan
+            .steps
+            .iter()
+            .filter(|step| step.trial == trial && is_late(step.slave.number()) && !self.feeding.has(**step))
+            .copied()
+            .collect();
+        for step in steps {
+            let config = line.config();
+            let kept = config.slaves.get(&step.slave.number()).copied().unwrap_or_default();
+            line.configure_slave(
+                step.slave.number(),
+                SlaveSettings { response_timeout: Some(self.wait * SLOWER), ..kept },
+            );
+            if let Some(find) = self.ask(step).await? {
+                tell(Told::Found(find))?;
+            }
+        }
         Ok(())
+    }
+
+    /// What is wrong with the line by what was heard, and what its far end was seen to be like.
+    pub(super) fn findings(&self) -> Vec<String> {
+        let Some((_, line)) = &self.at else { return Vec::new() };
+        // What is wrong with one address is told of that.
+        let of_line = line.findings().into_iter().filter(|finding| finding.slave.is_none());
+        let told = of_line.map(|finding| {
+            let next = finding.next().first().map_or_else(String::new, |next| format!(": {next}"));
+            format!("{finding}{next}")
+        });
+        let proposal = line_spec::proposal(&line.config(), &line.stats());
+        told.chain(proposal).collect()
     }
 
     /// Lets the port go.
@@ -99,13 +140,16 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// Reads whoever answers as each family that can be set so, and says how often he is to be fed.
     async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
         let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
+        let mut longest = 0;
         for family in Family::ALL {
             let line = self.line_fed_for(step, LOOK).await?;
             let config = line.config();
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
                 continue;
             }
-            match look::status(&line, family, step.slave).await {
+            let looks = look::status(&line, family, step.slave).await;
+            longest = longest.max(look::longest_read(&line, step.slave));
+            match looks {
                 Looks::Like(()) => {}
                 Looks::Unlike => continue,
                 Looks::Damaged => {
@@ -115,7 +159,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             }
             let line = self.line_fed_for(step, LOOK).await?;
             if let Looks::Like((likeness, watchdog)) = look::identity(&line, family, step.slave).await {
-                intervals.push((likeness.certain, interval(family, config.protocol.is_ascii(), watchdog)));
+                intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
                 alike.push(likeness);
             } else {
                 is_damaged = true;
@@ -123,12 +167,18 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             let line = self.line_fed_for(step, LOOK).await?;
             is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;
         }
-        if alike.iter().any(|likeness| likeness.certain) {
-            alike.retain(|likeness| likeness.certain);
-            intervals.retain(|(certain, _)| *certain);
-        }
+        let named = alike.iter().any(|likeness| likeness.certain);
+        alike.retain(|likeness| match named {
+            true => likeness.certain,
+            false => longest <= likeness.family.capabilities().read_words,
+        });
+        intervals.retain(|(family, _)| alike.iter().any(|likeness| likeness.family == *family));
         let unknown = alike.is_empty().then_some(Duration::from_secs(1));
         let interval = intervals.into_iter().filter_map(|(_, interval)| interval).chain(unknown).min();
+        let line = self.line(step.trial).await?;
+        if let Some(cut) = look::cut(&line, step.slave).filter(|_| is_damaged) {
+            return Ok((Answer::Damaged(cut), interval));
+        }
         if is_damaged {
             let why = "short answers come intact, longer ones are damaged every time".to_owned();
             return Ok((Answer::Two { alike, why }, interval));

@@ -29,7 +29,7 @@ pub(crate) use self::verify::verify;
 use self::{file::File, gap::Gap, said::masked};
 pub(crate) use self::{
     said::bounded,
-    show::{Filter, shown},
+    show::{Filter, Found, shown},
     verify::{Verdict, verify_since},
 };
 use super::rights::{Caller, Rights};

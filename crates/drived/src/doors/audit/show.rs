@@ -5,7 +5,8 @@ use std::{
     path::Path,
 };
 
-use serde_json::Value;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use super::{
     REFUSED,
@@ -25,15 +26,36 @@ pub(crate) struct Filter {
     pub(crate) refused: bool,
 }
 
+/// A line of the log as it is read back, whichever program has written it: what is missing in it is empty, and what this one
+/// does not know is passed on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Found {
+    pub(crate) time_unix_ms: u64,
+    #[serde(default)]
+    pub(crate) kind: String,
+    #[serde(default)]
+    pub(crate) caller: String,
+    #[serde(default)]
+    pub(crate) origin: String,
+    #[serde(default)]
+    pub(crate) what: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) body: Option<Value>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) outcome: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) status: Option<u16>,
+    #[serde(flatten)]
+    rest: Map<String, Value>,
+}
+
 impl Filter {
-    fn has(&self, record: &Value) -> bool {
-        let time = record["time_unix_ms"].as_u64().unwrap_or_default();
-        let text = |key: &str| record[key].as_str().unwrap_or_default();
-        let about = |about: &String| decoded(text("what")).contains(about.as_str());
+    fn has(&self, found: &Found) -> bool {
+        let time = found.time_unix_ms;
         self.since_unix_ms.is_none_or(|since| time >= since)
             && self.until_unix_ms.is_none_or(|until| time < until)
-            && self.caller.as_ref().is_none_or(|caller| text("caller") == caller)
-            && self.about.as_ref().is_none_or(about)
+            && self.caller.as_ref().is_none_or(|caller| *caller == found.caller)
+            && self.about.as_ref().is_none_or(|about| found.what.contains(about.as_str()))
     }
 }
 
@@ -41,19 +63,17 @@ impl Filter {
 ///
 /// # Errors
 /// A file cannot be read.
-pub(crate) fn shown(path: &Path, filter: &Filter, last: usize) -> io::Result<Vec<Value>> {
+pub(crate) fn shown(path: &Path, filter: &Filter, last: usize) -> io::Result<Vec<Found>> {
     let log = Kept::at(path);
     let log = if filter.refused { log.beside(REFUSED) } else { log };
     let mut found = std::collections::VecDeque::new();
     for file in (1..=KEPT).rev().map(|number| aside(&log, number)).chain([log.clone()]) {
         let Some(open) = file.open()? else { continue };
         for line in BufReader::new(open).split(b'\n') {
-            let Ok(mut record) = serde_json::from_slice::<Value>(&line?) else { continue };
+            let Ok(mut record) = serde_json::from_slice::<Found>(&line?) else { continue };
+            record.what = decoded(&record.what);
             if !filter.has(&record) {
                 continue;
-            }
-            if let Some(what) = record["what"].as_str().map(decoded) {
-                record["what"] = what.into();
             }
             if found.len() >= last {
                 found.pop_front();
@@ -91,8 +111,30 @@ fn decoded(path: &str) -> String {
 mod tests {
     use std::fs;
 
-    use super::*;
+    use serde_json::json;
+
+    use super::{
+        super::{Kind, Line, Record},
+        *,
+    };
     use crate::doors::tests::Folder;
+
+    #[test]
+    fn what_is_written_reads_back_as_it_was_written_with_what_a_newer_program_has_added() {
+        let record = Record {
+            body: Some(json!({"setpoint": {"frequency_hz": 30.0}})),
+            outcome: Some("confirmed".to_owned()),
+            status: Some(200),
+            id: Some("c-1".to_owned()),
+            ..Record::of_program(Kind::Command, "POST /api/v1/stop")
+        };
+        let line = Line { number: 7, time_unix_ms: 100, record: &record, previous: "00" };
+        let mut written = serde_json::to_value(&line).unwrap();
+        written.as_object_mut().unwrap().insert("newer".to_owned(), json!([1]));
+        let found: Found = serde_json::from_value(written.clone()).unwrap();
+        assert_eq!((&*found.kind, &*found.what), ("command", "POST /api/v1/stop"));
+        assert_eq!(serde_json::to_value(&found).unwrap(), written);
+    }
 
     #[test]
     fn who_did_what_at_a_time_is_found_in_all_files_of_the_log() {
@@ -107,7 +149,7 @@ mod tests {
         fs::write(folder.file("audit.refused"), line(150, "guest", "POST /api/v1/reload")).unwrap();
         let found = |filter: Filter, last| {
             let shown = shown(&folder.file("audit"), &filter, last).unwrap();
-            shown.iter().map(|record| record["time_unix_ms"].as_u64().unwrap()).collect::<Vec<_>>()
+            shown.iter().map(|record| record.time_unix_ms).collect::<Vec<_>>()
         };
         assert_eq!(found(Filter::default(), 10), [100, 200, 300]);
         assert_eq!(found(Filter::default(), 2), [200, 300]);

@@ -1,8 +1,9 @@
 // Requests to the daemon that this page came from.
 
 const ROOT = 'api/v1/';
+const WITHIN_MS = 10_000;
 
-/** What the daemon answered instead of doing it, or that it could not be reached (`status` 0). */
+/** What the daemon answered instead of doing it, or that nobody knows what it did. */
 export class Problem extends Error {
   constructor(status, document) {
     super(document.detail ?? document.title ?? `HTTP ${status}`);
@@ -13,6 +14,11 @@ export class Problem extends Error {
   /** Whether a token with more rights would help. */
   get lacksRight() {
     return this.status === 401 || this.status === 403;
+  }
+
+  /** Whether it was not the daemon that answered, but somebody between or nobody: what it did with the request is not known. */
+  get isUnheard() {
+    return this.status === 0;
   }
 }
 
@@ -37,21 +43,22 @@ export function address(where) {
 }
 
 async function send(where, options) {
-  let response;
+  const limit = new AbortController();
+  const timer = setTimeout(() => limit.abort(), WITHIN_MS);
   try {
-    response = await fetch(ROOT + where, { credentials: 'same-origin', ...options });
+    const response = await fetch(ROOT + where, { credentials: 'same-origin', signal: limit.signal, ...options });
+    const text = await response.text();
+    if (response.status === 204) return {};
+    // What does not say that it is JSON is a proxy's, and nobody's word about the motors.
+    if (!/json/.test(response.headers.get('content-type') ?? '')) throw new Problem(0, { detail: `HTTP ${response.status}` });
+    const document = JSON.parse(text);
+    if (!response.ok) throw new Problem(response.status, document);
+    return document;
   } catch (error) {
-    throw new Problem(0, { detail: String(error.message ?? error) });
+    throw error instanceof Problem ? error : new Problem(0, { detail: String(error.message ?? error) });
+  } finally {
+    clearTimeout(timer);
   }
-  const text = await response.text().catch(() => '');
-  let document = {};
-  try {
-    document = text ? JSON.parse(text) : {};
-  } catch {
-    document = { detail: text.slice(0, 200) };
-  }
-  if (!response.ok) throw new Problem(response.status, document);
-  return document;
 }
 
 /** An id for a command, so that one that is sent twice is carried out once. */

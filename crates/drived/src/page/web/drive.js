@@ -41,7 +41,7 @@ export function drive(root, name) {
     el('div', {}, el('h1', { tabindex: -1 }, name), place),
     el('p.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, turns), freshness);
   const remark = el('p.remark');
-  const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('small')));
+  const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('dd.since')));
   const trendPlace = el('section.panel.trend', { 'aria-label': t('trend') });
   const fault = faultPanel(name);
   const orders = ordersPanel(name);
@@ -65,6 +65,11 @@ export function drive(root, name) {
     },
   };
 
+  /** Measurements are read seldom: after a trip they tell of the time before it. */
+  function qualityOf(group) {
+    return quality(shown[group], group === 'measurements' ? shown : undefined);
+  }
+
   function update(names) {
     if (!names.has('state') && !names.has(`drive ${name}`)) return;
     shown = plant.drives.get(name) ?? shown;
@@ -81,7 +86,7 @@ export function drive(root, name) {
     remark.hidden = !said;
     BIG.forEach(([, value, group], index) => {
       setText(big[index].children[1], value(shown));
-      setAttribute(big[index], 'data-quality', group ? quality(shown[group]) : 'good');
+      setAttribute(big[index], 'data-quality', group ? qualityOf(group) : 'good');
     });
     fault.update(shown);
     orders.update(shown);
@@ -95,7 +100,7 @@ export function drive(root, name) {
     setAttribute(freshness, 'data-quality', quality(shown.status));
     BIG.forEach(([, , group], index) => {
       const ms = group && age(shown[group], shown);
-      const isDated = ms !== undefined && (quality(shown[group]) === 'stale' || ms > DATED_FROM_MS);
+      const isDated = ms !== undefined && (qualityOf(group) === 'stale' || ms > DATED_FROM_MS);
       setText(big[index].children[2], isDated ? old(ms) : '');
     });
   }

@@ -2,10 +2,9 @@
 
 import { path, read } from './api.js';
 import { el, table } from './dom.js';
-import { faultMeaning, faultRemedy } from './fault_texts.js';
 import { clock, MISSING, quantity } from './format.js';
 import { named, t } from './texts.js';
-import { told } from './told.js';
+import { faultMeaning, faultRemedy, told } from './told.js';
 import { word } from './words.js';
 
 const FRAME = [
@@ -45,7 +44,7 @@ export function faultPanel(name) {
 
   function frame(fault) {
     const columns = [['before_trip', fault.before], ['at_trip', fault.at_trip]].filter(([, status]) => status);
-    return el('div.wide', {}, table(`${t('freeze_frame')}, ${clock(fault.time_unix_ms)}`, ['', ...columns.map(([text]) => t(text))],
+    return el('div.wide', {}, table(`${t('freeze_frame')}, ${clock(fault.time_unix_ms)}`, [t('what'), ...columns.map(([text]) => t(text))],
       FRAME.map(([text, value]) => el('tr', {}, el('th', { scope: 'row' }, t(text)), ...columns.map(([, status]) => el('td', {}, value(status)))))));
   }
 

@@ -1,10 +1,10 @@
 // The commands of one drive, each with a question first but the stop, and what became of them.
 
-import { commandId, path, post } from './api.js';
+import { path } from './api.js';
 import { confirmed } from './ask.js';
 import { el, setAttribute, setClass, setText } from './dom.js';
 import { quantity } from './format.js';
-import { carryOut, isDone, onOrder, orderText, ordersOf } from './orders.js';
+import { command, isDone, onOrder, orderText, ordersOf } from './orders.js';
 import { plant } from './plant.js';
 import { setpointControl } from './setpoint.js';
 import { t } from './texts.js';
@@ -64,7 +64,7 @@ export function ordersPanel(name) {
 
   function order(action, body = {}) {
     const expiry = action === 'stop' ? {} : { expires_in_ms: EXPIRES_MS };
-    return carryOut(name, action, () => post(`${path('drives', name, action)}?wait=0`, { id: commandId(), ...expiry, ...body }));
+    return command(name, action, path('drives', name, action), { ...expiry, ...body });
   }
 
   function writeLatest() {

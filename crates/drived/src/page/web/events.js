@@ -71,6 +71,6 @@ function cells(event) {
   const time = clock(event.time_unix_ms);
   if (event.kind !== 'command') return [time, event.drive ?? '', word(event.event), eventText(event), '', '', ''];
   return [time, event.drive ?? '', word('command'), command(event), [event.caller, event.origin].filter(Boolean).join(', '),
-    [outcome(event.outcome), event.outcome === 'confirmed' ? '' : told(event.text)].filter(Boolean).join(': '),
+    [outcome(event.outcome), event.text ? told(event.text) : ''].filter(Boolean).join(': '),
     event.outcome === 'pending' ? '' : duration(event.took_ms)];
 }

@@ -23,7 +23,7 @@ export async function follow(last, tell, isWanted = () => true) {
       isOutOfSight = false;
       news = { told: last };
     } catch (problem) {
-      if (problem.status >= 400 && problem.status < 500) last = { open: false };
+      if (!problem.isUnheard && problem.status < 500) last = { open: false };
       else if (isOutOfSight) continue;
       isOutOfSight = true;
       news = last.open ? { outOfSight: problem.message } : { gone: problem.message };

@@ -2,53 +2,63 @@
 
 import { writeDemo } from './demo.js';
 import { setAttribute, setClass, setText } from './dom.js';
+import { drive } from './drive.js';
+import { events } from './events.js';
 import { clock } from './format.js';
+import { line, lines } from './line.js';
 import { askToken, logOut } from './login.js';
 import { overview } from './overview.js';
-import { onChange, plant, start } from './plant.js';
-import { watchStop, writeAccount } from './stop.js';
+import { onChange, plant, rest, start } from './plant.js';
 import { named, switchLanguage, t, writeTexts } from './texts.js';
+import { knowLanguage, told } from './told.js';
 import { eventText, word } from './words.js';
 
-/** The views by the first word of the address; those that are not needed for the first look are loaded when they are. */
+/** The views by the first word of the address. */
 const VIEWS = {
-  '': async () => overview,
-  drive: async () => (await import('./drive.js')).drive,
-  lines: async () => (await import('./line.js')).lines,
-  line: async () => (await import('./line.js')).line,
-  events: async () => (await import('./events.js')).events,
+  '': overview,
+  drive,
+  lines,
+  line,
+  events,
 };
 
 const place = id => document.getElementById(id);
 let view;
-let told;
-let opening = 0;
+let alarm;
 
 writeTexts();
-watchStop();
+place('view').before(place('stop-account'));
+Object.assign(stopAll.later, {
+  closeStream: rest, openStream: start, lacksRight: askToken, told,
+  isAlarmed: name => plant.drives.get(name)?.concerns?.some(concern => concern.kind === 'stop_unconfirmed'),
+});
 addEventListener('hashchange', open);
-place('language').addEventListener('click', () => {
+place('language').addEventListener('click', async () => {
   switchLanguage();
+  await knowLanguage();
   writeTexts();
-  writeAccount();
+  stopAll.write();
   writeFrame();
   open();
 });
+// A page that nobody looks at keeps no connection from those that somebody does.
+document.addEventListener('visibilitychange', () => (document.hidden ? rest() : start()));
 place('login').addEventListener('click', () => (isKnown() ? logOut() : askToken()));
 onChange(names => {
   writeFrame();
   view?.update(names);
+  stopAll.write();
   if (names.has('event')) tellAlarm();
 });
 setInterval(() => view?.tick?.(), 1_000);
 writeFrame();
 start().then(open);
+// The daemon's sentences in French come after the first values.
+knowLanguage().then(() => view?.update(new Set(['state', 'event'])));
 
-async function open() {
-  const mine = ++opening;
+function open() {
   const [, name = '', argument = ''] = location.hash.split('/');
-  const show = await (VIEWS[name] ?? VIEWS[''])();
-  if (mine !== opening) return;
+  const show = VIEWS[name] ?? overview;
   view?.end?.();
   const root = place('view');
   root.replaceChildren();
@@ -90,8 +100,8 @@ function isKnown() {
 /** Says a new alarm to whoever does not see the page. */
 function tellAlarm() {
   const newest = plant.events.find(event => event.kind === 'event' && event.alarm && event.live);
-  if (!newest || newest === told) return;
-  told = newest;
+  if (!newest || newest === alarm) return;
+  alarm = newest;
   const text = [word(newest.event), eventText(newest)].filter(Boolean).join(' ');
   setText(place('alarms'), newest.drive ? named(newest.drive, text) : text);
 }

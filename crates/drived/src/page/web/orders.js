@@ -1,15 +1,20 @@
 // Commands on their way: sent once, followed until they are settled, told in words and time.
 
+import { commandId, path, post, read } from './api.js';
 import { el, setClass, setText } from './dom.js';
 import { follow } from './follow.js';
 import { clock, duration } from './format.js';
 import { askToken } from './login.js';
+import { daemonNow } from './plant.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
-import { command, outcome, word } from './words.js';
+import { command as commandText, outcome, word } from './words.js';
 
 const KEPT = 20;
 const SHOWN_MS = 12_000;
+/** How often a command is asked after of which nobody knows whether it arrived. */
+const TRIES = 20;
+const AGAIN_MS = 1_000;
 
 const orders = [];
 const listeners = new Set();
@@ -25,9 +30,15 @@ export function onOrder(listener) {
   return () => listeners.delete(listener);
 }
 
-/** Sends by `send`, and ends when the outcome is known; what becomes of it later is told all the same. */
-export async function carryOut(to, action, send) {
-  const order = { to, action, at: Date.now(), outcome: 'pending' };
+/** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. */
+export function command(to, action, where, body = {}) {
+  const id = commandId();
+  return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }), id);
+}
+
+/** Sends by `send`, as `command` does; what has no id cannot be asked after. */
+export async function carryOut(to, action, send, id) {
+  const order = { to, action, id, at: daemonNow(), outcome: 'pending' };
   orders.unshift(order);
   orders.length = Math.min(orders.length, KEPT);
   tell(order);
@@ -36,7 +47,7 @@ export async function carryOut(to, action, send) {
     answer = await send();
     take(order, answer);
   } catch (problem) {
-    answer = fail(order, problem);
+    answer = fail(order, problem) ?? (problem.isUnheard && await find(order));
   }
   tell(order);
   if (answer?.open) await settled(order, answer);
@@ -44,7 +55,7 @@ export async function carryOut(to, action, send) {
 
 /** An order in words: "Start: confirmed at 14:03:22, after 0.4 s". */
 export function orderText(order) {
-  const what = order.command ? command(order) : word(order.action);
+  const what = order.command ? commandText(order) : word(order.action);
   if (order.outcome === 'pending') return named(what, t('sent_at', { time: clock(order.at) }));
   if (order.outcome === 'not_sent') return named(what, t('not_sent', { why: told(order.text) }));
   const how = t('outcome_after', { outcome: outcome(order.outcome), time: clock(order.endedAt), took: duration(order.took_ms ?? order.endedAt - order.at) });
@@ -63,16 +74,35 @@ function settled(order, answer) {
     isSettled();
     follow(answer, news => {
       if (news.told) take(order, news.told);
-      if (news.gone) Object.assign(order, { outcome: 'unknown', text: news.gone, endedAt: Date.now() });
+      if (news.gone) Object.assign(order, { outcome: 'unknown', text: news.gone, endedAt: daemonNow() });
       tell(order);
       isSettled();
     }).then(over);
   });
 }
 
+/** Asks what became of a command of which nobody knows whether it arrived: the daemon knows it by its id. */
+async function find(order) {
+  if (!order.id) return undefined;
+  for (let tries = 0; tries < TRIES; tries++) {
+    tell(order);
+    await new Promise(over => setTimeout(over, AGAIN_MS));
+    try {
+      const answer = await read(`${path('commands', order.id)}?wait=0`);
+      take(order, answer);
+      return answer;
+    } catch (problem) {
+      if (problem.isUnheard) continue;
+      order.text = t(problem.status === 404 ? 'not_found_again' : 'not_reached');
+      return undefined;
+    }
+  }
+  return undefined;
+}
+
 function take(order, answer) {
   const { id, outcome: what, text, took_ms: took, command: said, drives, confirmed } = answer;
-  Object.assign(order, { id, outcome: what ?? 'confirmed', text, took_ms: took, command: said, drives, confirmed, endedAt: Date.now() });
+  Object.assign(order, { id, outcome: what ?? 'confirmed', text, took_ms: took, command: said, drives, confirmed, endedAt: daemonNow() });
 }
 
 function fail(order, problem) {
@@ -81,8 +111,8 @@ function fail(order, problem) {
     take(order, { text: problem.message, ...problem.document });
     return problem.document;
   }
-  const why = problem.status === 0 ? t('not_reached') : problem.message;
-  Object.assign(order, { outcome: problem.status === 0 ? 'unknown' : 'not_sent', text: why, endedAt: Date.now() });
+  const why = problem.isUnheard ? t('not_reached') : problem.message;
+  Object.assign(order, { outcome: problem.isUnheard ? 'unknown' : 'not_sent', text: why, endedAt: daemonNow() });
   return undefined;
 }
 

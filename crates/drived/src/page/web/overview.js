@@ -1,10 +1,10 @@
 // All drives, trouble first, with the lines' health above them.
 
-import { post, path } from './api.js';
+import { path } from './api.js';
 import { confirmed } from './ask.js';
 import { arrange, el, setAttribute, setClass, setText } from './dom.js';
 import { quantity } from './format.js';
-import { carryOut } from './orders.js';
+import { command } from './orders.js';
 import { plant } from './plant.js';
 import { COLUMNS, makeRow } from './row.js';
 import { named, t } from './texts.js';
@@ -119,7 +119,7 @@ export function overview(root) {
     const chosen = plant.groups.find(one => one.name === asked.group);
     if (action === 'start'
       && !await confirmed(t('confirm_start_group', { count: chosen.drives.length, group: chosen.name }), t('start_group'))) return;
-    carryOut(chosen.name, action, () => post(`${path('groups', chosen.name, action)}?wait=0`));
+    command(chosen.name, action, path('groups', chosen.name, action));
   }
 }
 

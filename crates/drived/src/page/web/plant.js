@@ -12,12 +12,15 @@ export const plant = {
   connection: 'reading',
   /** When the daemon was heard last, by its own clock and by ours. */
   heardUnixMs: 0,
+  /** The daemon's wall clock where this page's own began: every time that is shown is the daemon's. */
+  beganUnixMs: Date.now() - performance.now(),
 };
 
 const listeners = new Set();
 const changed = new Set();
 let endStream;
 let due = false;
+let starts = 0;
 
 /** Calls `listener(names)` at most once a frame; `names` holds what has changed: `drive NAME`, `line NAME`, `event`, `state`. */
 export function onChange(listener) {
@@ -27,11 +30,14 @@ export function onChange(listener) {
 
 /** Reads the state, again and again until there is one, and follows the events from there. */
 export async function start() {
-  endStream?.();
-  endStream = undefined;
+  rest();
+  const mine = starts;
   try {
-    takeState(await read('state'));
+    const state = await read('state');
+    if (mine !== starts) return;
+    takeState(state);
   } catch (problem) {
+    if (mine !== starts) return;
     plant.connection = problem.lacksRight ? 'refused' : 'away';
     tell('state');
     if (!problem.lacksRight) setTimeout(start, 2_000);
@@ -53,21 +59,37 @@ export async function start() {
   });
 }
 
+/** Closes the page's stream: a stop needs its connection. `start` follows the events again. */
+export function rest() {
+  starts++;
+  endStream?.();
+  endStream = undefined;
+}
+
+/** Now, by the daemon's clock. */
+export function daemonNow() {
+  return plant.beganUnixMs + performance.now();
+}
+
 /** How old a group of values is now, in milliseconds; `undefined` where there are none. */
 export function age(values, drive) {
   if (!values || values.quality === 'missing' || typeof values.age_ms !== 'number') return undefined;
   return values.age_ms + performance.now() - drive.receivedAt;
 }
 
-/** `good`, `stale` or `missing`; nothing is good while the daemon is silent. */
-export function quality(values) {
+/** `good`, `stale` or `missing`; nothing is good while the daemon is silent, or from before the drive's last change of state. */
+export function quality(values, drive) {
   if (!values || values.quality === 'missing') return 'missing';
+  if (drive?.changedAt && drive.receivedAt - values.age_ms < drive.changedAt) return 'stale';
   return plant.connection === 'live' || plant.connection === 'interrupted' ? values.quality : 'stale';
 }
 
 /** A fresh `DRIVE` that came another way than by the events. */
 export function takeDrive(drive) {
   drive.receivedAt = performance.now();
+  const before = plant.drives.get(drive.name);
+  const isSame = before && before.status?.state === drive.status?.state;
+  drive.changedAt = isSame ? before.changedAt : before && drive.receivedAt;
   plant.drives.set(drive.name, drive);
   tell(`drive ${drive.name}`);
 }
@@ -79,13 +101,14 @@ function takeState(state) {
   plant.groups = state.groups ?? [];
   plant.drives = new Map(state.drives.map(drive => [drive.name, Object.assign(drive, { receivedAt })]));
   plant.lines = new Map(state.lines.map(line => [line.name, line]));
-  plant.heardUnixMs = Date.now();
+  plant.beganUnixMs = state.time_unix_ms - receivedAt;
+  plant.heardUnixMs = daemonNow();
   plant.connection = 'live';
   tell('state');
 }
 
 function take(kind, data) {
-  plant.heardUnixMs = Date.now();
+  plant.heardUnixMs = daemonNow();
   if (plant.connection === 'interrupted') {
     plant.connection = 'live';
     tell('state');
@@ -96,6 +119,7 @@ function take(kind, data) {
     tell(`line ${data.name}`);
   }
   if (kind === 'command') {
+    stopAll.news(data);
     const known = plant.events.find(event => event.id === data.id);
     if (known) Object.assign(known, data);
     else keep({ kind, ...data });

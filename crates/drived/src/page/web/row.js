@@ -13,7 +13,7 @@ const ARROWS = { forward: '▶', reverse: '◀' };
 /** The heads of the columns, in the order of a row's cells. */
 export const COLUMNS = ['drive', 'state', 'frequency', 'current', 'note', 'control', 'age'];
 
-const template = el('article.row', { role: 'row' },
+const template = el('div.row', { role: 'row' },
   el('div.name', { role: 'rowheader' }, el('a'), el('small')),
   el('div.state', { role: 'cell' }, el('span.mark', { 'aria-hidden': 'true' }), el('b'), el('span.turns')),
   el('div.frequency', { role: 'cell' }, el('span.number'), ' ', el('small'), bar(true)),

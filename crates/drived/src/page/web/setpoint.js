@@ -34,7 +34,10 @@ export function setpointControl(send) {
       input.disabled = readOnly;
     }
     // Nobody's choice is pulled from under his finger by what the drive reports.
-    if (!touched && drive.setpoint?.frequency_hz !== undefined) slider.value = field.value = String(drive.setpoint.frequency_hz);
+    if (!touched) {
+      field.value = String(drive.setpoint?.frequency_hz ?? '');
+      slider.value = field.value || limits.low;
+    }
     draw(drive);
     judge();
   }

@@ -26,24 +26,6 @@ const TABLE = {
   yes: ['yes', 'oui'],
   no: ['no', 'non'],
 
-  // Stop all.
-  stop_all: ['STOP ALL', 'ARRÊT GÉNÉRAL'],
-  stop_key: ['Ctrl+Shift+S', 'Ctrl+Maj+S'],
-  stop_note: ['No emergency stop: that one is wired.', 'N’est pas un arrêt d’urgence : celui-ci est câblé.'],
-  stop_account: ['Account of the stop', 'Bilan de l’arrêt'],
-  stop_sending: ['Sending the stop to {count} drives…', 'Envoi de l’arrêt à {count} variateurs…'],
-  stop_sent: ['Stop sent to {count} drives at {time}', 'Arrêt envoyé à {count} variateurs à {time}'],
-  stop_done: ['All {count} drives have confirmed the stop, {time}', 'Les {count} variateurs ont confirmé l’arrêt, {time}'],
-  stop_confirmed: ['confirmed', 'confirmés'],
-  stop_pending: ['pending', 'en attente'],
-  stop_not_reachable: ['not reachable', 'injoignables'],
-  stop_not_confirmed: ['not confirmed', 'non confirmés'],
-  stop_others: ['and {count} more', 'et {count} de plus'],
-  stop_failed: ['STOP NOT SENT: the daemon cannot be reached. Use the emergency stop.', 'ARRÊT NON ENVOYÉ : le service est injoignable. Utilisez l’arrêt d’urgence.'],
-  stop_failed_why: ['STOP NOT SENT: {why}. Use the emergency stop.', 'ARRÊT NON ENVOYÉ : {why}. Utilisez l’arrêt d’urgence.'],
-  stop_tried_again: ['Tried again {count} times, for at most 30 s.', 'Nouvel essai n° {count}, pendant 30 s au plus.'],
-  stop_given_up: ['Given up after 30 s: press again.', 'Abandon après 30 s : appuyez de nouveau.'],
-  stop_lost_sight: ['Sent, but its account cannot be read now: look at the drives.', 'Envoyé, mais son bilan est illisible pour l’instant : regardez les variateurs.'],
 
   // The overview.
   search: ['Search', 'Rechercher'],
@@ -75,11 +57,13 @@ const TABLE = {
   concern_tripped: ['tripped', 'en défaut'],
   concern_run_suspended: ['its run command is not in force, the motor may start by it', 'son ordre de marche n’est pas en vigueur, le moteur peut démarrer par lui'],
   concern_identity_changed: ['another drive than before answers at its address', 'un autre variateur qu’auparavant répond à son adresse'],
+  concern_other_family: ['a drive of another family answers at its address', 'un variateur d’une autre famille répond à son adresse'],
   concern_watchdog_broken: ['its watchdog is not as the contract says', 'sa surveillance n’est pas conforme au contrat'],
   concern_watchdog_not_in_force: ['its motor turns without the watchdog of its contract', 'son moteur tourne sans la surveillance de son contrat'],
   concern_lost: ['does not answer', 'ne répond pas'],
   concern_stale: ['what it shows is old', 'ce qu’il montre est ancien'],
   concern_restarts_itself: ['its own settings start the motor again by themselves', 'ses propres réglages redémarrent le moteur seuls'],
+  concern_eeprom_worn: ['its EEPROM is written more often than it lasts', 'son EEPROM est écrite plus souvent qu’elle ne dure'],
   concern_limit_exceeded: ['above its limit', 'au-dessus de sa limite'],
   concern_warning: ['the drive shows an alarm', 'le variateur montre une alarme'],
   concern_control_taken: ['somebody else has taken control', 'quelqu’un d’autre a pris la commande'],
@@ -130,6 +114,7 @@ const TABLE = {
   sent_at: ['sent at {time}', 'envoyé à {time}'],
   outcome_after: ['{outcome} at {time}, after {took}', '{outcome} à {time}, après {took}'],
   not_sent: ['not done: {why}', 'non exécuté : {why}'],
+  not_found_again: ['not known: the daemon has no record of it. It did not arrive, or the daemon was restarted since', 'inconnu : le service n’en a pas trace. Il n’est pas arrivé, ou le service a redémarré depuis'],
   not_reached: ['the daemon cannot be reached; whether it took the command is not known', 'le service est injoignable ; on ignore s’il a pris la commande'],
   latest_orders: ['Latest commands', 'Dernières commandes'],
   measurements: ['Measurements', 'Mesures'],
@@ -252,7 +237,8 @@ const TABLE = {
 
 const LANGUAGES = ['en', 'fr'];
 const KEPT = 'drived.language';
-let column = LANGUAGES.indexOf(chosen());
+// The path of the stop, which comes first, has chosen it.
+let column = LANGUAGES.indexOf(document.documentElement.lang);
 
 /** The language, as in `lang` attributes. */
 export function language() {
@@ -285,16 +271,4 @@ export function writeTexts(root = document) {
   document.documentElement.lang = language();
   for (const element of root.querySelectorAll('[data-text]')) element.textContent = t(element.dataset.text);
   for (const element of root.querySelectorAll('[data-label]')) element.setAttribute('aria-label', t(element.dataset.label));
-}
-
-function chosen() {
-  let kept;
-  try {
-    kept = localStorage.getItem(KEPT);
-  } catch {
-    kept = null;
-  }
-  if (LANGUAGES.includes(kept)) return kept;
-  const asked = navigator.languages ?? [navigator.language ?? 'en'];
-  return asked.map(tag => tag.slice(0, 2)).find(tag => LANGUAGES.includes(tag)) ?? 'en';
 }

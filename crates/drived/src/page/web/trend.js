@@ -1,16 +1,19 @@
-// The trend of one drive: ten minutes of the daemon's own history, then what the events bring.
+// The trend of one drive: the daemon's own record of ten minutes, and nothing else; what was not recorded is a gap.
 
 import { path, read } from './api.js';
 import { el, setText, table } from './dom.js';
 import { clock, quantity } from './format.js';
-import { plant, quality } from './plant.js';
+import { daemonNow } from './plant.js';
 import { language, t } from './texts.js';
 import { told } from './told.js';
 
 const KEPT_S = 600;
 const WINDOWS = { trend_minute: 60, trend_ten: KEPT_S };
+const READ_EVERY_MS = 1_000;
 const TABLE_STEP_S = 5;
 const TABLE_ROWS = 24;
+/** Where so many samples are missing nothing was recorded. */
+const GAP_STEPS = 3;
 const HEIGHTS = [190, 150];
 
 /** Where the API keeps each column, with unit and digits. */
@@ -29,6 +32,7 @@ export function trend(root, name) {
   let held;
   let ended = false;
   let stepMs = 500;
+  let reading = false;
 
   const pause = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => hold(held ? undefined : range()) }, t('trend_pause'));
   const windows = Object.entries(WINDOWS).map(([text, length]) =>
@@ -44,12 +48,12 @@ export function trend(root, name) {
     plot.setSize({ width: canvas.clientWidth, height: HEIGHTS[index] })));
   resized.observe(canvas);
   begin();
-  const sampling = setInterval(sample, stepMs);
+  const reads = setInterval(readOn, READ_EVERY_MS);
 
   return {
     end() {
       ended = true;
-      clearInterval(sampling);
+      clearInterval(reads);
       resized.disconnect();
       dark.removeEventListener('change', draw);
       plots.forEach(plot => plot.destroy());
@@ -61,29 +65,47 @@ export function trend(root, name) {
     try {
       const [history] = await Promise.all([read(path('drives', name, 'history')), loadPlotter()]);
       if (ended) return;
-      stepMs = history.step_ms ?? stepMs;
-      const since = values[0].length;
-      values[0].unshift(...history.time_unix_ms.map(ms => ms / 1000));
-      COLUMNS.forEach(({ key }, index) => values[index + 1].unshift(...(history[key] ?? history.time_unix_ms.map(() => null))));
-      // What was sampled while the history came is in it already.
-      for (const column of values) column.splice(history.time_unix_ms.length, since);
+      take(history);
       draw();
     } catch (problem) {
       setText(said, t('trend_missing', { why: told(problem.message) }));
     }
   }
 
-  function sample() {
-    if (!plots.length) return;
-    const drive = plant.drives.get(name);
-    const fresh = quality(drive?.status) === 'good';
-    const torque = quality(drive?.measurements) === 'good' ? drive.measurements.torque_percent : null;
-    const now = [fresh ? drive.status.output_frequency_hz : null, drive?.setpoint?.frequency_hz, fresh ? drive.status.current_a : null, torque];
-    values[0].push(Date.now() / 1000);
-    now.forEach((value, index) => values[index + 1].push(value ?? null));
-    while (values[0][0] < Date.now() / 1000 - KEPT_S) for (const column of values) column.shift();
+  /** Reads what was recorded since. What was not read for a while is read now: the record has it. */
+  async function readOn() {
+    if (!plots.length || reading || document.hidden) return;
+    reading = true;
+    try {
+      const last = values[0].at(-1);
+      take(await read(`${path('drives', name, 'history')}${last ? `?since_unix_ms=${Math.round(last * 1000)}` : ''}`));
+    } catch {
+      // What is missing now is asked for the next time.
+    }
+    reading = false;
+    if (ended) return;
     plots.forEach((plot, index) => plot.setData(columnsOf(index), false));
     follow();
+  }
+
+  function take(history) {
+    stepMs = history.step_ms ?? stepMs;
+    const times = history.time_unix_ms.map(ms => ms / 1000);
+    const isEarlier = times.length && times[0] <= values[0].at(-1);
+    // The daemon's clock was put back: all that was drawn stands at other times now.
+    if (isEarlier) for (const column of values) column.length = 0;
+    times.forEach((time, at) => {
+      const before = values[0].at(-1);
+      const isGap = before !== undefined && time - before > GAP_STEPS * stepMs / 1000;
+      if (isGap) put(before + stepMs / 1000, () => null);
+      put(time, ({ key }) => history[key]?.[at] ?? null);
+    });
+    while (values[0][0] < values[0].at(-1) - KEPT_S) for (const column of values) column.shift();
+  }
+
+  function put(time, of) {
+    values[0].push(time);
+    COLUMNS.forEach((column, index) => values[index + 1].push(of(column)));
   }
 
   function columnsOf(index) {
@@ -96,7 +118,7 @@ export function trend(root, name) {
   }
 
   function range() {
-    const max = Date.now() / 1000;
+    const max = daemonNow() / 1000;
     return { min: max - seconds, max };
   }
 

@@ -1,8 +1,7 @@
 // What troubles a drive, as the daemon tells it: the worst, and its words in the language of the page.
 
-import { faultMeaning } from './fault_texts.js';
 import { t } from './texts.js';
-import { told } from './told.js';
+import { faultMeaning, told } from './told.js';
 import { word } from './words.js';
 
 /** How a drive stands that nothing troubles. */
@@ -12,8 +11,7 @@ const NOTHING = { rank: Infinity, severity: 'none', text: '', remedy: '' };
 export function trouble(drive) {
   const [worst] = drive.concerns ?? [];
   if (!worst) return drive.control === false ? { ...NOTHING, text: t('only_read') } : NOTHING;
-  const detail = worst.kind === 'tripped' ? faultText(drive) : told(worst.detail);
-  const text = [t(`concern_${worst.kind}`), detail].filter(Boolean).join(': ');
+  const text = [t(`concern_${worst.kind}`), told(worst.detail)].filter(Boolean).join(': ');
   return { rank: worst.rank, severity: worst.severity, text, remedy: told(worst.remedy) };
 }
 

@@ -5,7 +5,8 @@ import { language, named, t } from './texts.js';
 import { told } from './told.js';
 
 const WORDS = {
-  // States of a drive.
+  // What a drive does.
+  stop_pending: ['Stop pending', 'Arrêt en attente'],
   not_ready: ['Not ready', 'Non prêt'],
   disabled: ['Disabled', 'Verrouillé'],
   ready: ['Ready', 'Prêt'],
@@ -93,6 +94,7 @@ const WORDS = {
   restarts_itself: ['Restarts itself', 'Redémarre seul'],
   identified: ['Identified', 'Identifié'],
   identity_changed: ['Identity changed', 'Identité changée'],
+  other_family: ['Another family', 'Autre famille'],
   watchdog_verified: ['Watchdog verified', 'Surveillance vérifiée'],
   watchdog_broken: ['Watchdog broken', 'Surveillance non conforme'],
   stop_mode_replaced: ['Stop mode replaced', 'Type d’arrêt remplacé'],
@@ -100,6 +102,14 @@ const WORDS = {
   stop_unconfirmed: ['STOP NOT CONFIRMED', 'ARRÊT NON CONFIRMÉ'],
   stop_confirmed: ['Stop confirmed', 'Arrêt confirmé'],
   command: ['Command', 'Commande'],
+  eeprom_written: ['EEPROM written', 'EEPROM écrite'],
+  value_withdrawn: ['Value withdrawn', 'Valeur retirée'],
+  output_blocked: ['Output blocked', 'Sortie bloquée'],
+  reference_taken: ['Reference taken', 'Consigne prise'],
+  command_overridden: ['Command overridden', 'Commande supplantée'],
+  contract_changed: ['Contract changed', 'Contrat modifié'],
+  run_adopted: ['Run is ours again', 'Marche reprise à son compte'],
+  run_not_adopted: ['Run is not ours', 'Marche étrangère'],
   exit: ['Exit', 'Fin du service'],
   removed: ['Removed', 'Retiré'],
   reconfigured: ['Settings changed', 'Réglages modifiés'],
@@ -161,18 +171,16 @@ export function eventText({ event, text = '' }) {
   return told(rest);
 }
 
-/** The state of a drive as its row says it first: a lost drive is lost, whatever it showed last. */
+/** What a drive does, in the one word with which its row begins everywhere: the daemon says which. */
 export function stateWord(drive) {
-  if (drive.link === 'lost') return word('lost');
-  if (drive.link === 'connecting' || !drive.status?.state) return word(drive.link === 'connecting' ? 'connecting' : 'missing');
-  return word(drive.status.state);
+  return word(drive.shows);
 }
 
 /** A setpoint of the API. */
 export function setpointText(setpoint) {
   if (typeof setpoint?.frequency_hz === 'number') return quantity(setpoint.frequency_hz, 1, 'Hz');
   if (typeof setpoint?.speed_rpm === 'number') return quantity(setpoint.speed_rpm, 0, t('rpm'));
-  return quantity(undefined);
+  return quantity(setpoint?.share_percent, 1, '%');
 }
 
 function number(text) {

@@ -9,7 +9,7 @@ use std::{
 use drive_core::StopMode;
 use drive_fleet::{
     Act, DriveHandle, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
-    StopTicket, Ticket,
+    StopTicket, Ticket, view::StopModesView,
 };
 use futures_util::future::join_all;
 use tokio::{
@@ -84,6 +84,9 @@ impl Work {
             time_unix_ms: unix(request.arrived),
             took_ms: None,
             status: None,
+            counted: None,
+            started: None,
+            stop: None,
             several: None,
         };
         let part = |member: &DriveHandle| {
@@ -213,9 +216,9 @@ impl Work {
         let Action::Start { direction, setpoint, until } = self.0.request.action else { return };
         let start = GroupStart { direction, setpoint, spacing: Duration::ZERO, until };
         match self.group().start(start).await {
-            Ok(()) => {
-                for number in 0..self.0.members.len() {
-                    self.end(number, &Outcome::Confirmed);
+            Ok(started) => {
+                for (name, outcome) in started {
+                    self.end_of(&name, &outcome);
                 }
             }
             Err(GroupFailure::NotReady(reasons)) => {
@@ -268,8 +271,7 @@ impl Work {
     }
 
     fn end(&self, number: usize, outcome: &Outcome) {
-        let (word, reason, text) = told(outcome);
-        self.end_as(number, word, reason, text);
+        self.end_with(number, Some(outcome), told(outcome));
     }
 
     /// Ends what has no outcome of its own.
@@ -286,11 +288,22 @@ impl Work {
     }
 
     fn end_as(&self, number: usize, word: OutcomeWord, reason: Option<&'static str>, text: Option<String>) {
+        self.end_with(number, None, (word, reason, text));
+    }
+
+    fn end_with(
+        &self,
+        number: usize,
+        outcome: Option<&Outcome>,
+        (word, reason, text): (OutcomeWord, Option<&'static str>, Option<String>),
+    ) {
         let Some(member) = self.0.members.get(number) else { return };
         let mut parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(part) = parts.get_mut(number) {
             let is_first = part.outcome == OutcomeWord::Pending;
             *part = part.clone().ended_as(word, reason, text, member, self.0.request.arrived);
+            part.stop = outcome.and_then(Outcome::stop).map(StopModesView::from).or(part.stop.take());
+            part.started = outcome.and_then(Outcome::started).or(part.started);
             if is_first {
                 self.0.plant.tally().count(part);
             }

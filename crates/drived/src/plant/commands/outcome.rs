@@ -1,6 +1,6 @@
 //! The words for what became of a command, which are the same at every face.
 
-use drive_fleet::{Outcome, Refused, Unconfirmed};
+use drive_fleet::{Became, Outcome, Refused};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -45,17 +45,18 @@ pub(super) const READ_ONLY: &str = Refused::ReadOnly.word();
 
 /// The word, the reason and a sentence for an outcome of the fleet.
 pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Option<String>) {
-    let word = match outcome {
-        Outcome::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
-        | Outcome::Refused(Refused::Superseded | Refused::Stopped) => OutcomeWord::Superseded,
-        Outcome::Confirmed => OutcomeWord::Confirmed,
-        Outcome::NotConfirmed(_) => OutcomeWord::NotConfirmed,
-        Outcome::Expired => OutcomeWord::Expired,
-        Outcome::OutcomeUnknown(_) => OutcomeWord::Unknown,
-        Outcome::Refused(_) => OutcomeWord::Refused,
+    let word = match outcome.became() {
+        Became::Confirmed => OutcomeWord::Confirmed,
+        Became::NotConfirmed => OutcomeWord::NotConfirmed,
+        Became::Unknown => OutcomeWord::Unknown,
+        Became::Refused => OutcomeWord::Refused,
+        Became::Expired => OutcomeWord::Expired,
+        Became::Superseded => OutcomeWord::Superseded,
     };
     let text = match outcome {
-        Outcome::Confirmed => None,
+        Outcome::Started(started) => Some(started.to_string()),
+        Outcome::Stopped(stop) if stop.is_replaced() => Some(stop.to_string()),
+        Outcome::Confirmed | Outcome::Stopped(_) => None,
         Outcome::Expired => Some("its time was over before it was sent: it never will be".to_owned()),
         Outcome::NotConfirmed(why) => Some(why.to_string()),
         Outcome::OutcomeUnknown(unknown) => Some(unknown.to_string()),

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use drive_fleet::{Started, view::StopModesView};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +31,7 @@ pub(crate) struct CommandView {
     /// Why, in one word.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) reason: Option<Cow<'static, str>>,
-    /// The reason in words.
+    /// The reason in words; of a start that is in force, at what.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) text: Option<String>,
     /// When it arrived.
@@ -41,8 +42,32 @@ pub(crate) struct CommandView {
     /// What the drive showed then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) status: Option<Shown>,
+    /// Of one of several drives: as what it is counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) counted: Option<Counted>,
+    /// Of a start that is in force: which way, and the setpoint that it uses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) started: Option<Started>,
+    /// Of a stop that was sent: how it was asked for, and how the drive stops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) stop: Option<StopModesView>,
     #[serde(flatten)]
     pub(crate) several: Option<SeveralView>,
+}
+
+/// As what a drive is counted that a command for several was meant for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Counted {
+    Confirmed,
+    /// Its outcome is not known yet, and it answers.
+    Pending,
+    /// It is not confirmed and does not answer.
+    NotReachable,
+    /// The command was refused for it, such as for a drive that is only read.
+    Refused,
+    /// It answers, and the command ended otherwise.
+    Failed,
 }
 
 impl CommandView {
@@ -72,18 +97,24 @@ pub(crate) struct SeveralView {
 }
 
 impl SeveralView {
-    pub(crate) fn of(drives: Vec<CommandView>, is_silent: impl Fn(&CommandView) -> bool) -> Self {
-        let (mut confirmed, mut pending, mut not_reachable, mut refused, mut failed) = (0, 0, 0, 0, 0);
-        for drive in &drives {
-            let count = match drive.outcome {
-                OutcomeWord::Confirmed => &mut confirmed,
-                OutcomeWord::Refused => &mut refused,
-                _ if is_silent(drive) => &mut not_reachable,
-                OutcomeWord::Pending => &mut pending,
-                _ => &mut failed,
-            };
-            *count += 1;
+    pub(crate) fn of(mut drives: Vec<CommandView>, is_silent: impl Fn(&CommandView) -> bool) -> Self {
+        for drive in &mut drives {
+            drive.counted = Some(match drive.outcome {
+                OutcomeWord::Confirmed => Counted::Confirmed,
+                OutcomeWord::Refused => Counted::Refused,
+                _ if is_silent(drive) => Counted::NotReachable,
+                OutcomeWord::Pending => Counted::Pending,
+                _ => Counted::Failed,
+            });
         }
-        Self { drives, confirmed, pending, not_reachable, refused, failed }
+        let count = |kind| drives.iter().filter(|drive| drive.counted == Some(kind)).count();
+        Self {
+            confirmed: count(Counted::Confirmed),
+            pending: count(Counted::Pending),
+            not_reachable: count(Counted::NotReachable),
+            refused: count(Counted::Refused),
+            failed: count(Counted::Failed),
+            drives,
+        }
     }
 }

@@ -5,6 +5,7 @@
 
 mod address;
 mod cable;
+mod heard;
 mod masters;
 mod timing;
 mod whole;
@@ -43,7 +44,13 @@ impl Case<'_> {
 pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     let is_shared = seen.listened.frames().next().is_some();
     let case = Case { seen, figures: seen.figures(), is_shared };
-    let mut verdicts: Vec<Verdict> = masters::second(&case).into_iter().collect();
+    let mut verdicts: Vec<Verdict> =
+        masters::second(&case).or_else(|| heard::second_master(&case)).into_iter().collect();
+    let heard = heard::verdicts(&case);
+    if heard.iter().any(heard::explains_all) || !heard.is_empty() && case.there().next().is_none() {
+        verdicts.extend(heard);
+        return verdicts;
+    }
     if let Some(whole) = whole::verdict(&case) {
         verdicts.push(whole);
         return verdicts;
@@ -55,6 +62,9 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
             verdicts.push(verdict);
         }
     };
+    for verdict in heard {
+        of_one(Some(verdict), &mut explained);
+    }
     of_one(address::absent(&case), &mut explained);
     // Two that speak for one disturb whoever is asked next.
     let is_doubled = case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some());

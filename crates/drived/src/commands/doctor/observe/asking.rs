@@ -325,6 +325,7 @@ impl Asking {
         let stats = self.line.stats();
         let late = stats.slaves.iter().filter(|(_, stats)| stats.late > 0);
         seen.overdue = late.map(|(slave, stats)| (*slave, stats.late)).collect();
+        seen.findings = self.line.findings();
         seen.asked = self.asked;
         seen.own_waits = self.own_waits;
         seen.never_quiet = self.never_quiet;

@@ -5,7 +5,7 @@ mod chance;
 mod noting;
 mod terms;
 
-use std::time::Duration;
+use std::{pin::pin, time::Duration};
 
 use drive_bus::{Line, LineConfig, listen::Listener};
 use drive_core::{
@@ -67,13 +67,15 @@ impl Task {
     }
 }
 
-/// Listens, asks, and gives what was noticed.
+/// Listens, asks, and gives what was noticed: until it is done, is asked to `end`, or loses its port.
 pub(super) async fn observe(
     task: &Task,
     ways: &impl Ways,
     mut progress: impl FnMut(&str),
+    end: impl Future<Output = ()>,
 ) -> Result<Observations, Failure> {
     let began = Instant::now();
+    let mut end = pin!(end);
     let mut seen = Observations {
         config: task.config.clone(),
         adapter: Adapter::default(),
@@ -85,26 +87,49 @@ pub(super) async fn observe(
         own_waits: Vec::new(),
         overdue: Vec::new(),
         never_quiet: false,
+        findings: Vec::new(),
+        cut_short: None,
         took: Duration::ZERO,
     };
     if task.config.protocol.is_paced() {
-        progress("listening");
-        seen.listened = listen(ways, &task.config, LISTENING).await?;
-        listen_elsewhere(task, ways, &mut seen, &mut progress).await?;
+        tokio::select! {
+            heard = listen_first(task, ways, &mut seen, &mut progress) => heard?,
+            () = &mut end => return Err(Failure::Drive("asked to end before anything could be said".to_owned())),
+        }
     }
     let mut asking = Asking::open(task, ways, began).await?;
-    let result = asking.all(task, &mut progress).await;
+    let ended = tokio::select! {
+        ended = asking.all(task, &mut progress) => ended,
+        () = &mut end => Err(Failure::Drive("it was asked to end".to_owned())),
+    };
     one_drive::close(&asking.line).await;
-    result?;
+    if let Err(failure) = ended {
+        if asking.asked.is_empty() {
+            return Err(failure);
+        }
+        seen.cut_short = Some(failure.to_string());
+    }
     asking.into(&mut seen);
     let good = seen.asked.iter().filter(|asked| asked.is_good()).count();
-    if task.config.protocol.is_paced() && good * 4 < seen.asked.len() {
+    let nobody_answers = good * 4 < seen.asked.len() && seen.cut_short.is_none();
+    if task.config.protocol.is_paced() && nobody_answers {
         progress("others are understood, but nobody answers: listening with another parity");
         listen_with_parity(task, ways, &mut seen).await?;
     }
     seen.adapter = ways.adapter();
     seen.took = began.elapsed();
     Ok(seen)
+}
+
+async fn listen_first(
+    task: &Task,
+    ways: &impl Ways,
+    seen: &mut Observations,
+    progress: &mut impl FnMut(&str),
+) -> Result<(), Failure> {
+    progress("listening");
+    seen.listened = listen(ways, &task.config, LISTENING).await?;
+    listen_elsewhere(task, ways, seen, progress).await
 }
 
 async fn listen(ways: &impl Ways, config: &LineConfig, time: Duration) -> Result<Listened, Failure> {

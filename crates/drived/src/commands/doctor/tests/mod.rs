@@ -2,6 +2,7 @@
 
 mod defects;
 mod healthy;
+mod heard;
 
 use std::time::Duration;
 
@@ -88,7 +89,9 @@ impl Bench {
     /// What the doctor notices of the line in memory.
     async fn seen(&self, time: Duration) -> Observations {
         let task = self.task(LineConfig::stream(self.serial), time);
-        let seen = observe::observe(&task, &InMemory(self.line.clone()), |_| {}).await.unwrap();
+        let seen = observe::observe(&task, &InMemory(self.line.clone()), |_| {}, std::future::pending())
+            .await
+            .unwrap();
         self.nothing_was_written();
         seen
     }
@@ -100,7 +103,7 @@ impl Bench {
         let serving = self.line.serve_pty(&link).unwrap();
         let task = self.task(LineConfig::serial(&link, self.serial), time);
         let port = super::Port(task.config.endpoint.clone());
-        let seen = observe::observe(&task, &port, |_| {}).await.unwrap();
+        let seen = observe::observe(&task, &port, |_| {}, std::future::pending()).await.unwrap();
         drop(serving);
         self.nothing_was_written();
         seen

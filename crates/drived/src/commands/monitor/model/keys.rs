@@ -121,7 +121,7 @@ impl Model {
         let shown = match &self.view {
             View::Line(name) => names.iter().position(|known| *known == name).unwrap_or_default(),
             View::Drive(name) => {
-                let line = self.plant.drive(name).map(|drive| &drive.line);
+                let line = self.plant.drive(name).map(|drive| &drive.told.line);
                 names.iter().position(|known| Some(*known) == line).unwrap_or_default()
             }
             _ => 0,
@@ -135,7 +135,7 @@ impl Model {
     fn in_view(&mut self, code: KeyCode) {
         match (&self.view, code) {
             (View::Fleet, KeyCode::Enter | KeyCode::Right) => {
-                let first = || self.rows().first().map(|drive| drive.name.clone());
+                let first = || self.rows().first().map(|drive| drive.name().to_owned());
                 if let Some(name) = self.marked().or_else(first) {
                     self.selected = Some(name.clone());
                     self.show(View::Drive(name));
@@ -166,7 +166,7 @@ impl Model {
 
     /// Moves the mark among the rows.
     fn mark(&mut self, code: KeyCode) {
-        let names: Vec<String> = self.rows().iter().map(|drive| drive.name.clone()).collect();
+        let names: Vec<String> = self.rows().iter().map(|drive| drive.name().to_owned()).collect();
         let at = names.iter().position(|name| Some(name) == self.selected.as_ref());
         let to = match at {
             Some(at) => moved(at, code, self.page).min(names.len().saturating_sub(1)),

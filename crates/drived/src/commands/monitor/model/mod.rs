@@ -19,8 +19,9 @@ use crate::{
     plant::{
         history::HistoryView,
         recent::RecentView,
-        views::{LineDetailView, LineView, StateView},
+        views::{DriveView, LineDetailView, LineView, StateView},
     },
+    row,
 };
 
 /// How many stops are told of at a time: the newest.
@@ -160,20 +161,21 @@ impl Model {
         let mut rows: Vec<&Drive> =
             self.plant.drives.iter().filter(|drive| self.is_searched(drive)).collect();
         // Stable: behind those in trouble the order is that of the daemon.
-        rows.sort_by_key(|drive| drive.rank());
+        rows.sort_by_key(|drive| drive.told.snapshot.rank());
         rows
     }
 
     fn is_searched(&self, drive: &Drive) -> bool {
-        let in_group = self.group.as_ref().is_none_or(|group| self.plant.has(group, &drive.name));
+        let in_group = self.group.as_ref().is_none_or(|group| self.plant.has(group, drive.name()));
         let text = || {
+            let DriveView { line, family, snapshot, .. } = &drive.told;
             let parts = [
-                drive.name.as_str(),
-                &drive.line,
-                &drive.state(),
-                drive.told["family"].as_str().unwrap_or_default(),
-                &drive.fault().unwrap_or_default(),
-                &drive.remark(),
+                drive.name(),
+                line,
+                &snapshot.shows.to_string(),
+                family,
+                &row::fault(snapshot).unwrap_or_default(),
+                &row::note(&drive.told),
             ];
             parts.join(" ").to_lowercase()
         };
@@ -202,8 +204,8 @@ impl Model {
             View::Drive(name) => Some(name.clone()),
             // One that is not in sight is not meant.
             View::Fleet => {
-                let marked = |drive: &&Drive| Some(&drive.name) == self.selected.as_ref();
-                self.rows().into_iter().find(marked).map(|drive| drive.name.clone())
+                let marked = |drive: &&Drive| Some(drive.name()) == self.selected.as_deref();
+                self.rows().into_iter().find(marked).map(|drive| drive.name().to_owned())
             }
             View::Line(_) | View::Events => None,
         }

@@ -2,7 +2,6 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use serde_json::json;
 use tokio::time::Instant;
 
 use super::{
@@ -68,7 +67,7 @@ impl Plant {
     }
 
     pub(in super::super) fn drive(&self, name: &str) -> Option<&Drive> {
-        self.drives.iter().find(|drive| drive.name == name)
+        self.drives.iter().find(|drive| drive.name() == name)
     }
 
     /// Whether what is told is told now.
@@ -93,7 +92,7 @@ impl Plant {
         self.heard = now;
         self.may_stop = state.daemon.rights.stop;
         self.is_demo = state.daemon.demo;
-        self.drives = state.drives.into_iter().filter_map(|drive| Drive::told(json!(drive), now)).collect();
+        self.drives = state.drives.into_iter().map(|drive| Drive::told(drive, now)).collect();
         self.lines = state.lines.into_iter().map(|line| (line.name.clone(), line)).collect();
         self.groups = state.groups.into_iter().map(|group| (group.name, group.drives)).collect();
         let told: VecDeque<_> = recent.iter().filter_map(|one| Happening::lately(&one.what)).collect();
@@ -108,8 +107,8 @@ impl Plant {
         self.heard = now;
         match heard {
             Heard::Drive(drive) => {
-                let Some(drive) = Drive::told(json!(drive), now) else { return };
-                match self.drives.iter_mut().find(|known| known.name == drive.name) {
+                let drive = Drive::told(*drive, now);
+                match self.drives.iter_mut().find(|known| known.name() == drive.name()) {
                     Some(known) => *known = drive,
                     None => self.drives.push(drive),
                 }

@@ -3,13 +3,13 @@
 use ratatui::{
     Frame,
     layout::Rect,
-    style::{Color, Modifier, Style, Stylize as _},
+    style::{Modifier, Style, Stylize as _},
     text::{Line, Span},
     widgets::Paragraph,
 };
 
 use super::super::model::Model;
-use crate::output;
+use crate::{output, row::old};
 
 /// How wide the labels are.
 const LABEL: usize = 18;
@@ -76,14 +76,4 @@ impl Document {
         let shown = self.lines.into_iter().skip(model.scroll).take(height);
         frame.render_widget(Paragraph::new(shown.collect::<Vec<_>>()), area);
     }
-}
-
-/// What is old. The brackets say it where nothing is dim.
-pub(super) fn old() -> Style {
-    Style::new().fg(Color::DarkGray).add_modifier(Modifier::DIM)
-}
-
-/// What somebody has to see to.
-pub(super) fn alarm() -> Style {
-    Style::new().fg(Color::Red).add_modifier(Modifier::BOLD)
 }

@@ -4,8 +4,9 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{
     super::{happening::Kind, model::Model, words},
-    document::{Document, alarm},
+    document::Document,
 };
+use crate::row::alarm;
 
 pub(super) fn draw(model: &mut Model, frame: &mut Frame<'_>, area: Rect) {
     let mut document = Document::new(usize::from(area.width));

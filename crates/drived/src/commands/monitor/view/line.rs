@@ -11,11 +11,13 @@ use ratatui::{
 
 use super::{
     super::{model::Model, words},
-    document::{Document, alarm, old},
+    document::Document,
 };
 use crate::{
     logging::escaped,
+    output,
     plant::views::{AnswerTimes, AnswersView, ExchangeView, LineLink, LineView, ResultWord, TimesView},
+    row::{alarm, old},
 };
 
 /// The longest bar of the histogram, and where its bars end, in milliseconds.
@@ -50,7 +52,7 @@ pub(super) fn draw(model: &mut Model, name: &str, frame: &mut Frame<'_>, area: R
 }
 
 fn summary(document: &mut Document, line: &LineView) {
-    let time = |milliseconds| words::time(Duration::from_millis(milliseconds));
+    let time = |milliseconds| output::age(Duration::from_millis(milliseconds));
     if line.link == LineLink::Away {
         let why = line.error.as_deref().map_or_else(|| "its port is not there".to_owned(), escaped);
         document.say(&format!("AWAY: {why}"), alarm());
@@ -105,7 +107,7 @@ fn slaves(document: &mut Document, line: &LineView) {
     document.heading("drives");
     for slave in &line.slaves {
         let name = slave.drive.as_deref().map_or_else(|| "no drive".to_owned(), escaped);
-        let next = slave.next_probe_ms.map(|next| words::time(Duration::from_millis(next)));
+        let next = slave.next_probe_ms.map(|next| output::age(Duration::from_millis(next)));
         let state = match slave.off_line {
             true => {
                 format!("OFF-LINE, only probed, next in {}", next.unwrap_or_else(|| "a while".to_owned()))

@@ -9,7 +9,6 @@ mod line;
 mod plot;
 #[cfg(test)]
 mod tests;
-mod text;
 
 use ratatui::{
     Frame,
@@ -20,12 +19,14 @@ use ratatui::{
 };
 use tokio::time::Instant;
 
-use self::text::{fitted, height_of};
 use super::{
     model::{Connection, Model, View},
     words,
 };
-use crate::output;
+use crate::{
+    output,
+    row::{fitted, height_of},
+};
 
 /// What stands beside every stop.
 const NO_EMERGENCY_STOP: &str = "no emergency stop";
@@ -104,10 +105,10 @@ fn has_colours() -> bool {
 
 /// What makes everything on the screen old.
 fn troubles(model: &Model, now: Instant, width: usize) -> Vec<Line<'static>> {
-    let silent = model.plant.silent_for(now).map(words::time);
+    let silent = model.plant.silent_for(now).map(output::age);
     let text = match &model.plant.connection {
         Connection::Gone { since, why } => {
-            let since = words::time(now.saturating_duration_since(*since));
+            let since = output::age(now.saturating_duration_since(*since));
             format!("NOT CONNECTED for {since}, trying again: everything below is old. {why}")
         }
         Connection::Reading => format!("reading the state: {}", model.plant.source),

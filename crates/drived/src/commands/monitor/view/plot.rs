@@ -9,13 +9,11 @@ use ratatui::{
     widgets::{Axis, Chart, Dataset, GraphType, Paragraph},
 };
 
-use super::{
-    super::{
-        curves::{Curves, Sample},
-        words,
-    },
-    text::fitted,
+use super::super::{
+    curves::{Curves, Sample},
+    words,
 };
+use crate::row::fitted;
 
 /// With fewer lines there is room for the frequency alone.
 const WITH_BOTH: u16 = 14;

@@ -7,7 +7,10 @@ use drive_fleet::{Concern, ConcernKind, view::ConcernView};
 use proptest::prelude::*;
 use ratatui::{Terminal, backend::TestBackend};
 use serde_json::{Value, json};
-use tokio::time::Instant;
+use tokio::{
+    runtime::{Builder, EnterGuard, Runtime},
+    time::{Instant, advance},
+};
 
 use super::{
     super::{
@@ -30,7 +33,7 @@ fn drive(name: &str) -> Value {
                    "raw": [{"address": 3201, "code": "ETA", "value": 1575}]},
         "measurements": {"quality": "good", "age_ms": 2_000, "torque_percent": 40.0, "running_time_h": 1200.5,
                          "before_trip": false, "raw": []},
-        "setpoint": {"frequency_hz": 30.0},
+        "setpoint": {"frequency_hz": 30.0}, "shows": "running",
     });
     drive.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
     drive
@@ -54,6 +57,7 @@ fn concern(kind: ConcernKind, detail: &str) -> Value {
 fn tripped(name: &str) -> Value {
     let mut drive =
         with(name, &[("/status/state", json!("fault")), ("/status/output_frequency_hz", json!(0.0))]);
+    drive["shows"] = "fault".into();
     drive["fault"] = json!({
         "code": 9, "mnemonic": "OLF", "meaning": "motor overload", "remedy": "let the motor cool down",
         "by_watchdog": false, "time_unix_ms": 1_700_000_000_000_u64,
@@ -68,7 +72,7 @@ fn lost(name: &str) -> Value {
     let stale =
         [("/link", json!("lost")), ("/status/quality", json!("stale")), ("/status/age_ms", json!(21_000))];
     let mut drive = with(name, &stale);
-    drive["error"] = "no answer".into();
+    (drive["error"], drive["shows"]) = ("no answer".into(), "lost".into());
     drive["concerns"] = concern(ConcernKind::Lost, "no answer");
     drive
 }
@@ -113,18 +117,31 @@ fn command(told: Value) -> Arc<CommandView> {
     serde_json::from_value(command).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The monitor, what it was told and when.
+/// The monitor, what it was told and when. The clock goes on only while somebody waits: what is told to be so old is so old.
 struct Monitor {
     model: Model,
     now: Instant,
+    _clock: EnterGuard<'static>,
+}
+
+thread_local! {
+    static CLOCK: &'static Runtime = {
+        let clock = Builder::new_current_thread().enable_time().start_paused(true).build().unwrap();
+        Box::leak(Box::new(clock))
+    };
+}
+
+fn standing_clock() -> EnterGuard<'static> {
+    CLOCK.with(|clock| clock.enter())
 }
 
 impl Monitor {
     fn of(drives: &[Value]) -> Self {
+        let _clock = standing_clock();
         let now = Instant::now();
         let mut model = Model::new("a test".to_owned(), now);
         model.take(told(state(drives), json!([])), now);
-        Self { model, now }
+        Self { model, now, _clock }
     }
 
     fn tell(&mut self, kind: &str, data: Value) {
@@ -132,7 +149,8 @@ impl Monitor {
     }
 
     fn wait(&mut self, seconds: u64) {
-        self.now += Duration::from_secs(seconds);
+        CLOCK.with(|clock| clock.block_on(advance(Duration::from_secs(seconds))));
+        self.now = Instant::now();
     }
 
     fn press(&mut self, code: KeyCode) -> Option<Ask> {
@@ -363,7 +381,7 @@ fn one_drive_shows_its_fault_with_what_to_do_and_what_it_was_before() {
     let screen = monitor.screen(120, 40);
     for expected in [
         "atv312@1 on north",
-        "Tripped 9 OLF: motor overload",
+        "Tripped: 9 OLF: motor overload",
         "let the motor cool down",
         "running, forward, 48.50 Hz, 9.9 A",
         "1200.5 h",
@@ -446,6 +464,7 @@ fn a_line_tells_how_it_is_used_what_went_wrong_and_who_is_off_it() {
 
 #[test]
 fn events_tell_who_asked_from_where_what_came_of_it_and_how_long_it_took_also_from_before() {
+    let _clock = standing_clock();
     let now = Instant::now();
     let mut model = Model::new("a test".to_owned(), now);
     let at = 1_700_000_000_000_u64;
@@ -458,7 +477,7 @@ fn events_tell_who_asked_from_where_what_came_of_it_and_how_long_it_took_also_fr
          "command": "ramp stop", "caller": "operator", "origin": "page 10.0.0.7", "outcome": "pending", "open": true},
     ]);
     model.take(told(state(&[drive("pump 1")]), recent), now);
-    let mut monitor = Monitor { model, now };
+    let mut monitor = Monitor { model, now, _clock };
     monitor.tell(
         "command",
         json!({"id": "c-1", "time_unix_ms": at + 1, "drive": "pump 1", "action": "stop", "command": "ramp stop",
@@ -566,7 +585,7 @@ proptest! {
         let upper = |hertz: f64| ((hertz * 10.0 - 1e-6).ceil() / 10.0).max(0.0) + 0.0;
         let mut whole = numbers(&name);
         whole.extend([format!("{:.1}", upper(output)), format!("{:.1}", upper(setpoint)), format!("{current:.1}")]);
-        whole.extend(numbers(&super::words::time(Duration::from_millis(age))));
+        whole.extend(numbers(&crate::output::age(Duration::from_millis(age))));
         let shown = numbers(rows[2]);
         for number in &shown {
             prop_assert!(whole.contains(number), "{number} is none of {whole:?}:\n{screen}");

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use chrono::{SecondsFormat, Utc};
-use drive_core::ErrorKind;
-use serde_json::{Value, json};
+use drive_core::{ErrorKind, Identity};
 
 use super::{Source, Unread};
 use crate::{
@@ -12,6 +11,7 @@ use crate::{
     failure::Failure,
     line_spec,
     output::Progress,
+    values,
 };
 
 /// A drive that does not answer so often in a row is not asked for the rest.
@@ -70,7 +70,7 @@ impl Source {
                     Err(error) if error.kind() == ErrorKind::NoAnswer => return Err(one.failure(&error)),
                     Err(_) => None,
                 };
-                let part = |part: fn(&drive_core::Identity) -> &Option<String>| {
+                let part = |part: fn(&Identity) -> &Option<String>| {
                     identity.as_ref().and_then(|identity| part(identity).clone())
                 };
                 Ok(Head {
@@ -85,17 +85,17 @@ impl Source {
                 })
             }
             Self::OfDaemon { view, .. } => {
-                let drive = json!(view);
-                let text = |value: &Value| value.as_str().map(str::to_owned);
-                let identity = &drive["identity"];
+                let identity = values::identity(&view.snapshot.identity);
+                let part =
+                    |part: fn(&Identity) -> &Option<String>| identity.and_then(|all| part(all).clone());
                 Ok(Head {
                     name,
                     family,
                     line: view.line.clone(),
                     slave: view.slave,
-                    vendor: text(&identity["vendor"]),
-                    model: text(&identity["model"]),
-                    firmware: text(&identity["firmware"]),
+                    vendor: part(|identity| &identity.vendor),
+                    model: part(|identity| &identity.model),
+                    firmware: part(|identity| &identity.version),
                     date,
                 })
             }

@@ -1,12 +1,12 @@
 //! Texts in the room that there is: no number and no word is cut in two.
 
 /// A count of lines as a height.
-pub(super) fn height_of(lines: usize) -> u16 {
+pub(crate) fn height_of(lines: usize) -> u16 {
     u16::try_from(lines).unwrap_or(u16::MAX)
 }
 
 /// A text in at most so many characters: what has no room is left out by whole words, and that is shown.
-pub(super) fn fitted(text: &str, room: usize) -> String {
+pub(crate) fn fitted(text: &str, room: usize) -> String {
     if text.chars().count() <= room {
         return text.to_owned();
     }

@@ -1,0 +1,104 @@
+//! What bytes are that came to a question of Modbus RTU.
+
+use crate::exchange::rtu;
+
+/// Address and check around a PDU.
+const AROUND: usize = 3;
+
+/// What came in vain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Came {
+    /// The answer but for its first byte, which is its address: the check fits with it.
+    WithoutFirst,
+    /// The answer but for its last byte: the other half of the check fits.
+    WithoutLast,
+    /// Two whole answers of one length that differ.
+    TwoThatDiffer,
+    /// Whole frames and nothing else.
+    Frames,
+    Other,
+}
+
+/// What these bytes are, where an answer with a PDU of `expected` bytes was due from `slave`.
+pub(super) fn what_came(came: &[u8], slave: u8, expected: usize) -> Came {
+    let lens = [expected + AROUND, 2 + AROUND];
+    if lens.iter().any(|len| came.len() + 1 == *len) {
+        let whole: Vec<u8> = [slave].iter().chain(came).copied().collect();
+        if rtu::is_frame(&whole) {
+            return Came::WithoutFirst;
+        }
+        if came.first() == Some(&slave)
+            && let Some((low, body)) = came.split_last()
+            && rtu::frame(slave, body.get(1..).unwrap_or_default()).get(body.len()) == Some(low)
+        {
+            return Came::WithoutLast;
+        }
+    }
+    let len = expected + AROUND;
+    if let (Some(first), Some(second)) = (came.get(..len), came.get(len..2 * len))
+        && [first, second].iter().all(|frame| frame.first() == Some(&slave) && rtu::is_frame(frame))
+        && first != second
+    {
+        return Came::TwoThatDiffer;
+    }
+    if is_whole(came) { Came::Frames } else { Came::Other }
+}
+
+/// What stands behind the whole answer of `len` bytes of PDU.
+pub(super) fn behind(came: &[u8], slave: u8, len: usize) -> &[u8] {
+    let len = len + AROUND;
+    let is_it = |start: &usize| {
+        came.get(*start..*start + len)
+            .is_some_and(|frame| frame.first() == Some(&slave) && rtu::is_frame(frame))
+    };
+    let start = (0..=came.len().saturating_sub(len)).find(is_it);
+    start.and_then(|start| came.get(start + len..)).unwrap_or_default()
+}
+
+/// Whether these are whole frames and nothing else.
+pub(super) fn is_whole(mut bytes: &[u8]) -> bool {
+    while !bytes.is_empty() {
+        let Some(len) = (4..=bytes.len()).find(|len| bytes.get(..*len).is_some_and(rtu::is_frame)) else {
+            return false;
+        };
+        bytes = bytes.get(len..).unwrap_or_default();
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // MODBUS over Serial Line V1.02, appendix B: the answer 02 07 with its check 41 12 is the one printed there.
+    const ANSWER: [u8; 4] = [0x02, 0x07, 0x41, 0x12];
+
+    #[test]
+    fn a_check_proves_that_one_byte_is_missing_and_which() {
+        assert!(rtu::is_frame(&ANSWER));
+        let frame = rtu::frame(3, &[3, 2, 0x12, 0x34]);
+        assert_eq!(what_came(&frame[1..], 3, 4), Came::WithoutFirst);
+        assert_eq!(what_came(&frame[..6], 3, 4), Came::WithoutLast);
+        assert_eq!(what_came(&frame[..5], 3, 4), Came::Other);
+        assert_eq!(what_came(&frame[1..], 4, 4), Came::Other, "it is another's");
+        let refusal = rtu::frame(3, &[0x83, 2]);
+        assert_eq!(what_came(&refusal[1..], 3, 4), Came::WithoutFirst);
+        assert_eq!(what_came(&refusal[..4], 3, 4), Came::WithoutLast);
+    }
+
+    #[test]
+    fn two_answers_to_one_question_are_told_from_one_that_comes_twice() {
+        let (one, other) = (rtu::frame(3, &[3, 2, 0, 1]), rtu::frame(3, &[3, 2, 0, 2]));
+        assert_eq!(what_came(&[&one[..], &other].concat(), 3, 4), Came::TwoThatDiffer);
+        assert_eq!(what_came(&[&one[..], &one].concat(), 3, 4), Came::Frames);
+    }
+
+    #[test]
+    fn what_stands_behind_an_answer_is_found_whatever_stands_before_it() {
+        let frame = rtu::frame(3, &[3, 2, 0, 1]);
+        let bytes = [&[0], &frame[..], &[0xFF, 0xFE]].concat();
+        assert_eq!(behind(&bytes, 3, 4), [0xFF, 0xFE]);
+        assert_eq!(behind(&frame, 3, 4), [0; 0]);
+        assert!(is_whole(&frame) && is_whole(&ANSWER) && !is_whole(&bytes));
+    }
+}

@@ -1,0 +1,253 @@
+//! What proves a run command of this side from status to status, and what the shaft does, the same for each family of the
+//! chart: the control word that the drive holds, the reference that it follows, and the one further exchange behind a status.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::{
+    chart::ChartState,
+    limits::{follows_frequency, follows_speed},
+};
+use crate::{
+    lease::{Ground, Lease},
+    motion::{Motion, Output},
+    own_run::RunWord,
+    units::Frequency,
+    watch::Watch,
+};
+
+/// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
+/// change them.
+const LIMITS_HOLD: Duration = Duration::from_secs(10);
+
+/// A low and a high limit.
+pub type Limits = (Frequency, Frequency);
+
+/// What of a drive's fast words is another question when it is another.
+pub type Question = (u16, u16, u16);
+
+/// Whose reference the motor follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Followed {
+    /// The setpoint that this side has given, or found when it gave its run command.
+    Ours,
+    /// One that another master has written.
+    AnotherMasters,
+    /// None of the bus.
+    Elsewhere,
+    /// Nothing tells yet.
+    NotTold,
+}
+
+/// What is known of a run command of this side, and of the shaft. `L` are the family's further exchanges.
+#[derive(Debug, Clone)]
+pub struct Proof<L> {
+    /// The run command of this side, the shaft, turns and grounds.
+    pub watch: Watch,
+    /// What the shaft did at the last status.
+    pub motion: Motion,
+    /// The register and the word of the setpoint that is to be in force.
+    pub given: Option<(u16, u16)>,
+    /// The first reference of the bus, `LFr`, as it was read or written last.
+    pub reference: Option<u16>,
+    /// `LFRD` and `FRHD`, once they were looked for behind the present words.
+    pub speeds: Option<(u16, u16)>,
+    /// The control word that the drive was last seen to hold: read, or written and confirmed.
+    held: Option<u16>,
+    /// The limits of a setpoint, where the drive has any, and when they were read.
+    limits: Option<(Option<Limits>, Instant)>,
+    question: Option<Question>,
+    looked: Vec<L>,
+    /// The status before showed the reaction to a fault.
+    reacted: bool,
+}
+
+impl<L> Default for Proof<L> {
+    fn default() -> Self {
+        Self {
+            watch: Watch::default(),
+            motion: Motion::NotKnown,
+            given: None,
+            reference: None,
+            speeds: None,
+            held: None,
+            limits: None,
+            question: None,
+            looked: Vec::new(),
+            reacted: false,
+        }
+    }
+}
+
+impl<L: Copy + PartialEq> Proof<L> {
+    /// What was read may be another drive's from now on. The run command, the shaft and the setpoint of a run stay.
+    pub fn forget(&mut self) {
+        self.watch.lose_sight();
+        (self.held, self.reference, self.limits, self.question) = (None, None, None, None);
+        if self.watch.run.lease().is_none() {
+            self.given = None;
+        }
+    }
+
+    /// Takes a run command of an earlier run of the program. What the drive holds is read with the next status.
+    pub const fn adopt(&mut self, lease: Lease) {
+        self.watch.adopt(lease);
+        self.held = None;
+    }
+
+    /// The control word that the drive was last seen to hold.
+    #[must_use]
+    pub const fn held(&self) -> Option<u16> {
+        self.held
+    }
+
+    /// The drive was read to hold this control word and this reference.
+    pub const fn was_read(&mut self, word: u16, reference: u16) {
+        self.watch.run.reads(word);
+        (self.held, self.reference) = (Some(word), Some(reference));
+    }
+
+    /// A control word is about to be written: what the drive holds is not known until it has confirmed it.
+    pub const fn is_writing(&mut self, word: u16) {
+        self.watch.run.sends(word);
+        self.held = None;
+    }
+
+    /// The drive has confirmed the control word.
+    pub const fn was_written(&mut self, word: u16) {
+        self.held = Some(word);
+    }
+
+    /// What the drive holds is not known any more, unless `it_can` still hold it.
+    pub fn holds_if(&mut self, it_can: impl FnOnce(u16) -> bool) {
+        self.held = self.held.filter(|&word| it_can(word));
+        if self.held.is_none() {
+            self.watch.run.unread();
+        }
+    }
+
+    /// What the control word that the drive holds says of a lease, by `stands`. One that was only written tells of no other.
+    #[must_use]
+    pub fn told_word(&self, stands: impl FnOnce(u16) -> RunWord) -> RunWord {
+        let is_read = self.watch.run.held().is_some();
+        match self.held.map(stands) {
+            None => RunWord::NotTold,
+            Some(RunWord::Gone) if !is_read => RunWord::NotTold,
+            Some(told) => told,
+        }
+    }
+
+    /// A setpoint was written.
+    pub const fn gives(&mut self, register: u16, word: u16, is_first: bool) {
+        self.given = Some((register, word));
+        if is_first {
+            self.reference = Some(word);
+        }
+    }
+
+    /// Whose reference the motor follows, by `FrH`, with what a `count` of `LFr` is and the registers of `LFr` and `LFRD`.
+    #[must_use]
+    pub fn followed(
+        &self,
+        frh: Frequency,
+        count: impl Fn(u16) -> Frequency,
+        [first, second]: [u16; 2],
+    ) -> Followed {
+        let Some((limits, _)) = self.limits else { return Followed::NotTold };
+        let follows = |&lfr: &u16| {
+            let asked = count(lfr);
+            follows_frequency(frh, asked, limits.unwrap_or((asked, asked)))
+        };
+        let by_first = self.reference.filter(follows);
+        let by_second = self.speeds.filter(|&(lfrd, frhd)| follows_speed(frhd, lfrd)).map(|(lfrd, _)| lfrd);
+        let ours = match self.given {
+            None => by_first.or(by_second).is_some(),
+            Some((at, word)) => {
+                (at == first && by_first == Some(word)) || (at == second && by_second == Some(word))
+            }
+        };
+        match by_first.or(by_second) {
+            Some(_) if ours => Followed::Ours,
+            _ if self.speeds.is_none() => Followed::NotTold,
+            Some(_) => Followed::AnotherMasters,
+            None => Followed::Elsewhere,
+        }
+    }
+
+    /// The limits of a setpoint as far as they were read; the inner `None`: the drive tells none.
+    #[must_use]
+    pub fn limits(&self) -> Option<Option<Limits>> {
+        self.limits.map(|(limits, _)| limits)
+    }
+
+    /// The same where they were read lately.
+    #[must_use]
+    pub fn fresh_limits(&self) -> Option<Option<Limits>> {
+        self.limits.filter(|(_, at)| at.elapsed() < LIMITS_HOLD).map(|(limits, _)| limits)
+    }
+
+    /// Takes the limits as they were just read. Whether they are others than before, which is a ground that has changed.
+    pub fn take_limits(&mut self, limits: Option<Limits>) -> bool {
+        let before = self.limits.replace((limits, Instant::now()));
+        let are_others = before.is_some_and(|(before, _)| before != limits);
+        if are_others {
+            self.watch.changes(Ground::Limits);
+        }
+        are_others
+    }
+
+    /// The limits may be others: they are read again when they are needed.
+    pub const fn doubt_limits(&mut self) {
+        self.limits = None;
+    }
+
+    /// Other words than before are another question: each look is taken once for the same. Whether it is another.
+    pub fn doubt_anew(&mut self, question: Question) -> bool {
+        let is_another = self.question != Some(question);
+        if is_another {
+            (self.question, self.speeds) = (Some(question), None);
+            self.looked.clear();
+        }
+        is_another
+    }
+
+    /// This look was taken.
+    pub fn looked(&mut self, look: L) {
+        self.looked.push(look);
+    }
+
+    /// The one further exchange behind a status: the one that it cannot be told without, `needed`, the first of `wanted` that was
+    /// not looked for yet behind these words, or what has its turn of so many `things`; 0: nothing has. What is needed behind each
+    /// status leaves the others their turn all the same, once the drive is known to hold a word.
+    pub fn choose(
+        &mut self,
+        needed: Option<L>,
+        wanted: impl IntoIterator<Item = (L, bool)>,
+        things: usize,
+        turned: impl FnOnce(usize) -> L,
+    ) -> Option<L> {
+        let turn = if things == 0 { None } else { self.watch.turns.pass(things) };
+        let open = |(look, is_wanted): (L, bool)| (is_wanted && !self.looked.contains(&look)).then_some(look);
+        let look = match needed {
+            Some(_) if turn.is_some() && self.held.is_some() => None,
+            Some(_) => needed,
+            None => wanted.into_iter().find_map(open),
+        };
+        if look.is_some() && turn.is_some() {
+            self.watch.turns.again();
+        }
+        look.or(turn.map(turned))
+    }
+
+    /// Whether the status before showed a motor that the reaction to a fault brought down; `chart` is what this one shows.
+    pub fn has_reacted(&mut self, chart: Option<ChartState>) -> bool {
+        let reacts = chart == Some(ChartState::FaultReactionActive);
+        std::mem::replace(&mut self.reacted, reacts) && self.watch.shaft.was_braked()
+    }
+
+    /// What the shaft does, by what a status shows of the output.
+    pub fn see(&mut self, at: Option<Instant>, shown: Output, frequency: Option<Frequency>) {
+        self.motion = self.watch.shaft.see(at.unwrap_or_else(Instant::now), shown, frequency);
+    }
+}

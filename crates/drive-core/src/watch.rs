@@ -1,0 +1,149 @@
+//! What every family keeps of a drive from status to status: [`Watch`].
+
+use std::collections::BTreeMap;
+
+use crate::{
+    lease::{Ground, Lease},
+    motion::Shaft,
+    own_run::OwnRun,
+    turns::Turns,
+};
+
+/// The run command of this side, the shaft, and what a contract rests on: looked at with every status, and what no ordinary
+/// status carries by [`Turns`]. [`watched_by!`](crate::watched_by) tells it as a [`Drive`](crate::Drive) has to.
+#[derive(Debug, Clone, Default)]
+pub struct Watch {
+    /// The run command of this side that stands, or may.
+    pub run: OwnRun,
+    /// The shaft.
+    pub shaft: Shaft,
+    /// Whose turn it is.
+    pub turns: Turns,
+    /// Settings that a contract rests on, by register, as they were last read or written.
+    settings: BTreeMap<u16, u16>,
+    /// What was found otherwise, and not told yet.
+    changed: Vec<Ground>,
+    armed: bool,
+}
+
+impl Watch {
+    /// Of a family whose [`Turns`] come behind every so many statuses.
+    #[must_use]
+    pub fn every(statuses: u16) -> Self {
+        Self { turns: Turns::every(statuses), ..Self::default() }
+    }
+
+    /// Whether anything rests on this drive: a run command of this side that stands, or a watchdog that it has armed.
+    #[must_use]
+    pub const fn is_kept(&self) -> bool {
+        self.run.lease().is_some() || self.armed
+    }
+
+    /// Whether this side has armed the drive's communication watchdog.
+    pub const fn set_armed(&mut self, armed: bool) {
+        self.armed = armed;
+    }
+
+    /// Whether this side has armed the drive's communication watchdog.
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.armed
+    }
+
+    /// A setting was read or written for its own sake: what is found later is held against it.
+    pub fn knows(&mut self, register: u16, word: u16) {
+        self.settings.insert(register, word);
+    }
+
+    /// A setting whose turn it was. One that is otherwise than it was known to be is a `ground` that has changed: true.
+    pub fn finds(&mut self, register: u16, word: u16, ground: Ground) -> bool {
+        let changed = self.settings.insert(register, word).is_some_and(|known| known != word);
+        if changed {
+            self.changes(ground);
+        }
+        changed
+    }
+
+    /// Something that a contract rests on is otherwise than it was. It is told once, and only while anything rests on it.
+    pub fn changes(&mut self, ground: Ground) {
+        if self.is_kept() && !self.changed.contains(&ground) {
+            self.changed.push(ground);
+        }
+    }
+
+    /// What is told of it: see [`Drive::take_changed`](crate::Drive::take_changed).
+    pub fn take_changed(&mut self) -> Option<Ground> {
+        (!self.changed.is_empty()).then(|| self.changed.remove(0))
+    }
+
+    /// What is known of the settings may be otherwise by this side's own doing.
+    pub fn forget_settings(&mut self) {
+        self.settings.clear();
+    }
+
+    /// The line was lost: what was read proves nothing any more. The run command stays, and so does what the shaft did.
+    pub fn lose_sight(&mut self) {
+        self.run.unread();
+        self.shaft.lose_sight();
+        self.forget_settings();
+    }
+
+    /// See [`Drive::adopt`](crate::Drive::adopt).
+    pub const fn adopt(&mut self, lease: Lease) {
+        self.run.adopt(lease);
+    }
+}
+
+/// The methods of a [`Drive`](crate::Drive) that its [`Watch`] answers, for its implementation.
+#[macro_export]
+macro_rules! watched_by {
+    ($($watch:ident).+) => {
+        fn lease(&self) -> Option<$crate::Lease> {
+            self.$($watch).+.run.lease()
+        }
+
+        fn take_changed(&mut self) -> Option<$crate::Ground> {
+            self.$($watch).+.take_changed()
+        }
+
+        fn set_coast_time(&mut self, time: Option<std::time::Duration>) {
+            self.$($watch).+.shaft.set_coast_time(time);
+        }
+
+        fn set_injection_time(&mut self, time: Option<std::time::Duration>) {
+            self.$($watch).+.shaft.set_injection_time(time);
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::setpoint::Direction;
+
+    use super::*;
+
+    #[test]
+    fn a_ground_is_told_once_when_it_is_found_otherwise_and_only_while_anything_rests_on_it() {
+        let mut watch = Watch::default();
+        watch.knows(7, 30);
+        assert!(watch.finds(7, 31, Ground::Limits));
+        assert_eq!(watch.take_changed(), None, "nothing rests on it");
+        watch.set_armed(true);
+        assert!(!watch.finds(8, 1, Ground::Watchdog), "it was not known before");
+        assert!(watch.finds(8, 0, Ground::Watchdog) && watch.finds(7, 30, Ground::Limits));
+        assert!(watch.finds(8, 2, Ground::Watchdog));
+        let told: Vec<_> = std::iter::from_fn(|| watch.take_changed()).collect();
+        assert_eq!(told, [Ground::Watchdog, Ground::Limits]);
+    }
+
+    #[test]
+    fn a_lost_line_leaves_the_run_command_and_no_setting_that_is_held_against_a_later_one() {
+        let mut watch = Watch::every(3);
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        watch.run.reads(1);
+        watch.knows(7, 30);
+        watch.lose_sight();
+        assert!(watch.is_kept() && watch.run.held().is_none());
+        assert!(!watch.finds(7, 31, Ground::Limits));
+    }
+}

@@ -1,0 +1,99 @@
+//! A run command that an earlier run of the program has given: ours again only where the record of it, the drive's identity
+//! and the drive's own words agree. Without all three somebody else has started the motor.
+
+use drive_core::{Lease, Verdict};
+use tokio::time::Instant;
+
+use super::Supervisor;
+use crate::{
+    cause::Cause,
+    event::EventKind,
+    settings::{DriveSettings, RunRecord},
+    snapshot::IdentityCheck,
+};
+
+/// How far it is known whether a run of before is ours.
+#[derive(Debug)]
+pub(super) enum Adoption {
+    /// There is none, or it is decided.
+    Decided,
+    /// There is a record, and the drive has not said which it is.
+    Kept(RunRecord),
+    /// It is the drive of the record; its family is to be told.
+    Due(Lease),
+    /// The next words of the drive decide.
+    Asked,
+}
+
+impl Adoption {
+    pub(super) fn of(settings: &DriveSettings) -> Self {
+        settings.run_before.clone().map_or(Self::Decided, Self::Kept)
+    }
+}
+
+impl Supervisor {
+    /// It has been asked which drive it is.
+    pub(super) fn adopt_run(&mut self, now: Instant) {
+        let Adoption::Kept(record) = &self.adoption else { return };
+        let why = match self.checks.identity() {
+            IdentityCheck::Unchecked => return,
+            _ if !self.settings.control => "the drive is only read",
+            _ if self.says_what_it_is() == record.identity && !self.checks.is_another() => {
+                self.adoption = Adoption::Due(record.lease);
+                return self.pace.hurry(now);
+            }
+            _ => "it was given to another drive than answers here",
+        };
+        self.not_adopted(why.to_owned());
+    }
+
+    /// What the drive says of itself, where it does.
+    pub(crate) fn says_what_it_is(&self) -> Option<String> {
+        self.checks.says()
+    }
+
+    /// The run command that the family is to take for ours, once.
+    pub(crate) fn take_adoption(&mut self) -> Option<Lease> {
+        match std::mem::replace(&mut self.adoption, Adoption::Decided) {
+            Adoption::Due(lease) => {
+                self.adoption = Adoption::Asked;
+                Some(lease)
+            }
+            other => {
+                self.adoption = other;
+                None
+            }
+        }
+    }
+
+    /// Whether a record of an earlier run still waits for the drive's words.
+    pub(crate) const fn is_adopting(&self) -> bool {
+        !matches!(self.adoption, Adoption::Decided)
+    }
+
+    /// What the drive's words say of it. Gives whether the verdict is on a run command that is not ours.
+    pub(super) fn judge_adoption(&mut self, verdict: Option<Verdict>) -> bool {
+        if !matches!(self.adoption, Adoption::Asked) {
+            return false;
+        }
+        match (self.lease, verdict) {
+            (Some(_), None | Some(Verdict::NotKnown)) => false,
+            (Some(lease), Some(_)) => {
+                self.adoption = Adoption::Decided;
+                self.emit_shown(EventKind::RunAdopted(lease), Cause::Found);
+                false
+            }
+            (None, verdict) => {
+                let because = verdict.and_then(|verdict| verdict.because());
+                let gone = || "it does not stand in the drive any more".to_owned();
+                self.not_adopted(because.map_or_else(gone, |because| because.to_string()));
+                true
+            }
+        }
+    }
+
+    fn not_adopted(&mut self, why: String) {
+        self.adoption = Adoption::Decided;
+        self.emit_by(EventKind::RunNotAdopted(why), Cause::Found);
+    }
+}

@@ -1,0 +1,154 @@
+//! A run command of an earlier run of the program, and drives that are none of their family.
+
+use super::*;
+use crate::{ConcernKind, settings::RunRecord};
+
+const RUN: Lease = Lease::new(Direction::Forward, 0x000F);
+
+/// A motor that turns, a record of before, and what stands in the drive.
+fn restarted(record: Option<RunRecord>, stands: Option<Lease>) -> Rig {
+    let mut rig = Rig::new(DriveSettings { run_before: record, ..settings() });
+    rig.drive.run();
+    rig.stands = stands;
+    rig.pass(2_000 * MS);
+    rig
+}
+
+/// As the program of before has kept it.
+fn record(rig: &Rig) -> Option<RunRecord> {
+    Some(RunRecord { identity: Some(rig.drive.identity.to_string()), lease: RUN })
+}
+
+fn exits(rig: &mut Rig) -> Option<ExitAction> {
+    rig.machine.handle_exit(rig.now, Policy::Exit);
+    rig.pass(3_000 * MS);
+    rig.machine.exit_action().cloned()
+}
+
+#[test]
+fn a_run_is_ours_again_where_record_identity_and_the_drives_own_words_agree_and_the_exit_stops_it() {
+    let mut rig = restarted(record(&Rig::controlled()), Some(RUN));
+    assert_eq!(rig.times_told(&EventKind::RunAdopted(RUN)), 1, "{:?}", rig.events());
+    assert!(rig.snapshot().started_here());
+    assert_eq!(rig.drive.writes(), [], "nothing is written for it");
+    assert!(matches!(exits(&mut rig), Some(ExitAction::Stopped(outcome)) if outcome.is_confirmed()));
+    assert!(rig.drive.writes().contains(&Job::Stop(StopMode::Ramp)));
+}
+
+#[test]
+fn a_run_whose_record_the_drives_word_denies_is_not_ours_is_not_withdrawn_and_left_at_the_exit() {
+    for stands in [None, Some(Lease::new(Direction::Reverse, 0x080F))] {
+        let mut rig = restarted(record(&Rig::controlled()), stands);
+        assert!(rig.events().contains(&"run not adopted"), "{:?}", rig.events());
+        assert!(!rig.snapshot().started_here());
+        assert_eq!(exits(&mut rig), Some(ExitAction::LeftTurning));
+        assert_eq!(rig.drive.writes(), [], "whoever has started it goes on");
+    }
+}
+
+#[test]
+fn a_run_without_a_record_is_somebody_elses_whatever_word_stands() {
+    let mut rig = restarted(None, Some(RUN));
+    assert!(!rig.snapshot().started_here());
+    assert_eq!(exits(&mut rig), Some(ExitAction::LeftTurning));
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn a_record_of_another_drive_makes_no_run_ours() {
+    let other = RunRecord { identity: Some("two".to_owned()), lease: RUN };
+    let mut rig = restarted(Some(other), Some(RUN));
+    assert!(rig.events().contains(&"run not adopted"), "{:?}", rig.events());
+    assert!(!rig.snapshot().started_here());
+    assert_eq!(exits(&mut rig), Some(ExitAction::LeftTurning));
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn a_run_that_is_ours_again_and_not_in_force_is_withdrawn() {
+    let mut rig = Rig::new(DriveSettings { run_before: record(&Rig::controlled()), ..settings() });
+    rig.stands = Some(RUN);
+    rig.drive.says = Some(Verdict::lacks(Lack::Output, ANOTHER_WORD));
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.times_told(&EventKind::RunAdopted(RUN)), 1);
+    assert!(rig.drive.writes().contains(&Job::Withdraw), "{:?}", rig.drive.writes());
+    assert!(!rig.snapshot().started_here());
+}
+
+#[test]
+fn a_record_waits_for_a_drive_that_is_away_when_the_program_starts() {
+    let mut rig = Rig::new(DriveSettings { run_before: record(&Rig::controlled()), ..settings() });
+    rig.stands = Some(RUN);
+    rig.drive.run();
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(20_000 * MS);
+    assert!(rig.machine.is_adopting());
+    rig.drive.failing = None;
+    rig.pass(2_000 * MS);
+    assert!(rig.snapshot().started_here(), "{:?}", rig.events());
+}
+
+const AN_ATV71: Recognised = Recognised::NotMine { it_is: "an Altivar 71, which no family here fits" };
+
+/// A drive that says it is of another family.
+fn stranger() -> Rig {
+    let mut rig = Rig::controlled();
+    rig.drive.recognised = AN_ATV71;
+    rig.pass(2_000 * MS);
+    rig
+}
+
+#[test]
+fn a_drive_of_another_family_is_read_and_stopped_and_nothing_else_is_written_to_it() {
+    let mut rig = stranger();
+    let told = rig.happened().find_map(|happened| match &happened.kind {
+        kind @ EventKind::OtherFamily { .. } => Some((kind.to_string(), kind.is_alarm())),
+        _ => None,
+    });
+    assert_eq!(told, Some(("other family: an Altivar 71, which no family here fits".to_owned(), true)));
+    assert_eq!(rig.snapshot().concern(rig.now).map(|worst| worst.kind), Some(ConcernKind::OtherFamily));
+    rig.drive.run();
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.snapshot().status.as_ref().map(|status| status.value.state), Some(State::Running));
+    for order in
+        [START, setpoint(20), Order::ResetFaults, Order::Release, Order::Persist, Order::AcceptIdentity]
+    {
+        let id = rig.order(order);
+        rig.pass(1_500 * MS);
+        assert!(
+            matches!(rig.outcome(id), Some(Outcome::Refused(Refused::OtherFamily(_)))),
+            "{order:?}: {:?}",
+            rig.outcome(id)
+        );
+    }
+    assert_eq!(rig.drive.writes(), [], "neither orders nor the watchdog of the contract");
+    let stop = rig.stop(StopMode::Ramp);
+    rig.pass(1_500 * MS);
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+}
+
+#[test]
+fn a_drive_that_is_exchanged_for_one_of_another_family_has_no_run_command_withdrawn_and_no_parameter_written()
+{
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    rig.drive.failing = Some(PortError::Offline { retry_in: 500 * MS });
+    rig.pass(5_000 * MS);
+    rig.drive.failing = None;
+    rig.drive.recognised = AN_ATV71;
+    rig.drive.says = Some(Verdict::lacks(Lack::Command, ANOTHER_WORD));
+    rig.pass(5_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+    let id = CallId(1_000);
+    rig.machine.handle_question(id, "tester", Question::Write(&super::questions::ROW, 7));
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+    let refused = rig
+        .outputs
+        .iter()
+        .any(|output| matches!(output, Output::Told(asked, Err(Refused::OtherFamily(_))) if *asked == id));
+    assert!(refused, "{:?}", rig.outputs);
+}

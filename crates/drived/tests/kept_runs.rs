@@ -1,0 +1,106 @@
+//! The daemon is killed while a motor runs by its command, and started again: whose run it is then. Over a pty, in real time;
+//! nothing here asserts a duration.
+#![cfg(unix)]
+
+mod support;
+
+use std::{fs, path::PathBuf};
+
+use support::{File, Running, Sim, path, run};
+
+/// One drive whose watchdog is patient, and the program over it again and again.
+struct Plant {
+    sim: Sim,
+    file: File,
+    state: PathBuf,
+    socket: String,
+}
+
+impl Plant {
+    fn new(name: &str) -> Self {
+        let sim = Sim::serve(name, &["atv312@1"]);
+        let state = path(&format!("{name}-state"));
+        let text = format!(
+            "state = \"{}\"\n[http]\nlisten = \"off\"\n[lines.bench]\nport = \"{},19200,8E1\"\n[[drives]]\n\
+             line = \"bench\"\ndrive = \"atv312@1\"\nname = \"pump\"\ncontrol = true\n",
+            state.display(),
+            sim.link()
+        );
+        let file = File::new(name, &text);
+        let socket = path(&format!("{name}.sock")).to_str().expect("the path is text").to_owned();
+        Self { sim, file, state, socket }
+    }
+
+    fn daemon(&self) -> Running {
+        Running::start(&["run", "--config", self.file.path(), "--socket", &self.socket])
+    }
+
+    /// The motor runs forward by the command of a daemon, and that is killed.
+    fn run_and_kill(&self) {
+        let mut daemon = self.daemon();
+        daemon.wait_for(r#""event":"identified""#);
+        run(&["start", "pump", "--setpoint", "20Hz", "--socket", &self.socket]).assert_done();
+        assert!(self.record().exists(), "it is kept before the run command is given");
+        daemon.signal("-KILL");
+        assert_eq!(daemon.end().0, None);
+    }
+
+    fn record(&self) -> PathBuf {
+        self.state.join("runs.json")
+    }
+
+    /// What the drive shows to somebody who only asks.
+    fn shown(&self) -> String {
+        self.sim.on("atv312@1", &["status"]).out
+    }
+}
+
+impl Drop for Plant {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.state);
+    }
+}
+
+#[test]
+fn a_run_of_a_killed_daemon_is_ours_again_after_its_restart_and_the_exit_stops_it() {
+    let plant = Plant::new("kept-ours");
+    plant.run_and_kill();
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"run_adopted""#);
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    assert!(last.contains(r#""action":"stopped""#), "{last}");
+    let shown = plant.shown();
+    assert!(shown.contains("0.00 Hz") && !shown.contains("running"), "{shown}");
+    let kept = fs::read_to_string(plant.record()).expect("it is there");
+    assert_eq!(kept.trim(), "{}", "it was seen to stand no more");
+}
+
+#[test]
+fn a_run_that_somebody_else_has_given_since_is_not_ours_and_the_exit_leaves_it_and_says_so() {
+    let plant = Plant::new("kept-other");
+    plant.run_and_kill();
+    let turned = plant.sim.on("atv312@1", &["start", "--direction", "reverse"]);
+    assert_eq!(turned.code, Some(0), "{turned:?}");
+    let mut daemon = plant.daemon();
+    let told = daemon.wait_for(r#""event":"run_not_adopted""#);
+    assert!(told.contains("not ours"), "{told}");
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(1), "a motor that turns on is an alarm: {last}");
+    assert!(last.contains(r#""action":"left_turning""#), "{last}");
+    assert!(plant.shown().contains("running"), "{}", plant.shown());
+}
+
+#[test]
+fn a_run_without_a_record_is_somebody_elses_and_the_exit_leaves_it_and_says_so() {
+    let plant = Plant::new("kept-none");
+    plant.run_and_kill();
+    fs::remove_file(plant.record()).expect("it can be removed");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    daemon.wait_for(r#""snapshot""#);
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(1), "{last}");
+    assert!(last.contains(r#""action":"left_turning""#), "{last}");
+    assert!(plant.shown().contains("running"), "{}", plant.shown());
+}

@@ -1,0 +1,277 @@
+//! The referee beside a drive: everything that is written on the wire or happens around the machine is told to the manual, by its own
+//! transcription, which is asked then what it makes of the motor.
+
+use drive_core::{
+    drivecom::ChartState,
+    registers::{Row, Storage},
+};
+use drive_families::Family;
+use drive_sim::{Observation, SimSlave};
+use drive_testing::{
+    referee::{self, Answer, Change, Key, Motion, Order, State, Verdict, Who, World},
+    truth::TOLERANCE,
+};
+use tokio::time::Instant;
+
+/// The manual's world of one machine.
+pub struct Judge {
+    family: Family,
+    machine: SimSlave,
+    world: World,
+    /// What happened and was not told to the manual yet.
+    happened: Vec<(Instant, Vec<Change>)>,
+    heard_until: Instant,
+    /// Something happened that the referee has no word for.
+    lost: bool,
+    /// Another master has commanded the motor: what turns by the bus may turn by him.
+    another: bool,
+}
+
+const fn manual(family: Family) -> referee::Family {
+    match family {
+        Family::Atv21 => referee::Family::Atv21,
+        Family::Atv28 => referee::Family::Atv28,
+        Family::Atv58 => referee::Family::Atv58,
+        Family::Atv312 => referee::Family::Atv312,
+        Family::Omron3g3ev => referee::Family::Omron3g3ev,
+    }
+}
+
+impl Judge {
+    /// A machine as it is set up now, at rest, before anything is written to it.
+    #[must_use]
+    pub fn of(family: Family, machine: SimSlave) -> Self {
+        let is_setting = |row: &&Row| row.access.is_writable() && row.storage != Storage::Volatile;
+        let settings = family.capabilities().rows.iter().filter(is_setting);
+        let words = settings.filter_map(|row| Some((row.address, machine.peek(row.address)?))).collect();
+        let world = World::switched_on(manual(family), words);
+        let mut judge = Self {
+            family,
+            machine,
+            world,
+            happened: Vec::new(),
+            heard_until: Instant::now(),
+            lost: false,
+            another: false,
+        };
+        judge.world.inputs = match family {
+            Family::Atv312 => judge.machine.peek(5240).unwrap_or(0) & 0x3F,
+            Family::Atv28 => judge.machine.peek(478).unwrap_or(0) & 0x3F,
+            _ => 0,
+        };
+        if let Some(state) = judge.chart() {
+            judge.world.state = state;
+        }
+        judge
+    }
+
+    /// Something happens around the machine, in the simulator's text.
+    pub fn happens(&mut self, deed: &str) {
+        self.happened_at(Instant::now(), deed);
+    }
+
+    /// The same, which has happened at this moment.
+    pub fn happened_at(&mut self, at: Instant, deed: &str) {
+        self.another |= deed.starts_with("master");
+        match self.changes(deed) {
+            Some(changes) => self.happened.push((at, changes)),
+            None => self.lost = true,
+        }
+    }
+
+    fn changes(&self, deed: &str) -> Option<Vec<Change>> {
+        let words: Vec<&str> = deed.split_whitespace().collect();
+        let number = |name: &str| name.trim_start_matches(char::is_alphabetic).parse::<u8>().ok();
+        let pressed = |key| vec![Change::Key { key, held: true }, Change::Key { key, held: false }];
+        Some(match *words.as_slice() {
+            ["terminal", name, level] if self.family == Family::Atv21 => {
+                // ST has no bit in FD06.
+                let (_, bit) =
+                    [("F", 0), ("R", 1), ("RES", 2), ("VIA", 7)].into_iter().find(|it| it.0 == name)?;
+                vec![Change::Input { bit, closed: level == "on" }]
+            }
+            // The manual knows none of them: what they do shows in 002Ch.
+            ["terminal", ..] if self.family == Family::Omron3g3ev => Vec::new(),
+            ["terminal", name, level] if name.starts_with("LI") => {
+                vec![Change::Input { bit: number(name)? - 1, closed: level == "on" }]
+            }
+            ["analog", name, level] => {
+                let number = match name {
+                    "AIV1" => 16,
+                    "VIA" => 1,
+                    "VIB" => 2,
+                    _ => number(name)?,
+                };
+                let percent: i16 = level.trim_end_matches('%').parse().ok()?;
+                vec![Change::Analog { number, value: percent * 100 }]
+            }
+            ["panel", "takes" | "releases"] if self.family == Family::Atv21 => {
+                vec![Change::Key { key: Key::Local, held: words[1] == "takes" }]
+            }
+            // Whether its STOP acts while the bus commands, their manuals do not say.
+            ["panel", "stop"] if matches!(self.family, Family::Atv21 | Family::Omron3g3ev) => return None,
+            ["panel", "run"] => pressed(Key::Run),
+            ["panel", "stop"] => pressed(Key::Stop),
+            ["power", level] => vec![Change::Mains(level == "on")],
+            ["trip", code] => vec![Change::Trip(code.parse().ok()?), Change::CauseGone],
+            ["master", code, value] => {
+                let row = Row::find(self.family.capabilities().rows, code)?;
+                let value = row.read(value)?;
+                vec![Change::Write { address: row.address, value }]
+            }
+            // Forced local and the reference of the panel are read from the world that `ask` corrects.
+            ["panel", "takes" | "releases" | "reference", ..] => Vec::new(),
+            _ => return None,
+        })
+    }
+
+    /// Tells the manual what was written to the machine since.
+    pub fn follow(&mut self) {
+        let since = self.heard_until;
+        let written = self.machine.received().into_iter().filter(|request| request.at > since);
+        for request in written {
+            self.heard_until = request.at;
+            self.happened.push((request.at, writes(&request.pdu)));
+        }
+        self.happened.sort_by_key(|(at, _)| *at);
+        for (_, changes) in std::mem::take(&mut self.happened) {
+            for change in changes {
+                self.world = referee::next(&self.world, &change);
+            }
+        }
+        let seen = self.machine.observe();
+        self.world.turning = seen.running || seen.shaft_frequency.abs() > TOLERANCE;
+    }
+
+    /// What the manual has against the motor as it is seen, and against what is said of our run command: `held`, a run command of
+    /// this side stands; `in_force`, it is said to act.
+    #[must_use]
+    pub fn objects(&mut self, held: bool, in_force: bool) -> Option<String> {
+        self.follow();
+        let cmd = if self.family == Family::Atv312 { 8501 } else { 400 };
+        // Of two words at the same moment the wire does not tell which was the later.
+        let is_told = self.world.command.is_none_or(|command| self.machine.peek(cmd) == Some(command));
+        if self.lost || !is_told {
+            return None;
+        }
+        self.correct();
+        let seen = self.machine.observe();
+        let ruling = referee::ruling(&self.world, motion(&seen));
+        if ruling.verdict == Verdict::MustNot {
+            return Some(format!("{} ({}): {seen:?}", ruling.because, ruling.source));
+        }
+        match referee::order(&self.world) {
+            Answer::Says(Order::Drive { by: Who::Bus, .. }, rule)
+                if !held && !self.another && seen.running =>
+            {
+                Some(format!(
+                    "it turns by a command of the bus ({}), and no lease stands: {seen:?}",
+                    rule.source
+                ))
+            }
+            Answer::Says(Order::Drive { by: Who::Bus, .. }, _) => None,
+            Answer::Says(order, rule) if in_force => {
+                Some(format!("told in force, and the manual says {order:?} ({}): {seen:?}", rule.source))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the manual decides anything here.
+    #[must_use]
+    pub fn decides(&self) -> bool {
+        !self.lost && !referee::order(&self.world).is_silent()
+    }
+
+    /// What the drive's own words show stands for what the manual leaves open: forced local, and of a family without channels on
+    /// its bus who commands.
+    fn correct(&mut self) {
+        match self.family {
+            // Its manual follows the inputs and the keypad as far as it goes.
+            Family::Atv21 => {}
+            // n02 acts at the next power-up, and the panel is none of its: bits 9 and A of 002Ch show what is in force.
+            Family::Omron3g3ev => {
+                let state = self.machine.peek(0x002C).unwrap_or(0);
+                let mode = match (state >> 0xA & 1 == 1, state >> 9 & 1 == 1) {
+                    (false, false) => 5,
+                    (false, true) => 2,
+                    (true, false) => 4,
+                    (true, true) => 0,
+                };
+                self.world.words.insert(0x0102, mode);
+            }
+            _ => self.correct_altivar(),
+        }
+    }
+
+    fn correct_altivar(&mut self) {
+        let seen = self.machine.observe();
+        let word = |address| self.machine.peek(address).unwrap_or(0);
+        let (eta, eti) = match self.family {
+            Family::Atv312 => (word(3201), word(3206)),
+            _ => (word(458), word(459)),
+        };
+        let forced = eta & 1 << 9 == 0;
+        match self.family {
+            Family::Atv312 => self.world.forced_local = Some(forced),
+            Family::Atv28 => {
+                self.world.told = Some(match (forced, eti >> 13 & 3) {
+                    (false, 2) => Who::Bus,
+                    (false, 1) => Who::RemoteTerminal,
+                    _ => Who::Terminals,
+                });
+            }
+            _ => self.world.told = Some(if forced { Who::Terminals } else { Who::Bus }),
+        }
+        if matches!(self.family, Family::Atv28 | Family::Atv58) {
+            // Their inputs have no address: what they did shows in the chart.
+            if let Some(state) = self.chart() {
+                self.world.state = state;
+                self.world.unsure = None;
+            }
+            self.world.tripped = seen.trip;
+        }
+    }
+
+    fn chart(&self) -> Option<State> {
+        if matches!(self.family, Family::Atv21 | Family::Omron3g3ev) {
+            return None;
+        }
+        let eta = if self.family == Family::Atv312 { 3201 } else { 458 };
+        Some(match ChartState::of(self.machine.peek(eta)?)? {
+            ChartState::SwitchOnDisabled => State::SwitchOnDisabled,
+            ChartState::ReadyToSwitchOn => State::Ready,
+            ChartState::SwitchedOn => State::SwitchedOn,
+            ChartState::OperationEnabled => State::OperationEnabled,
+            ChartState::QuickStopActive => State::QuickStop,
+            ChartState::Fault | ChartState::FaultReactionActive => State::Fault,
+            ChartState::NotReadyToSwitchOn => return None,
+        })
+    }
+}
+
+fn motion(seen: &Observation) -> Motion {
+    if seen.running && seen.output_frequency.abs() > TOLERANCE && seen.setpoint != 0 {
+        Motion::Turning { reverse: seen.output_frequency < 0, tends: Some(seen.setpoint.unsigned_abs()) }
+    } else if seen.shaft_frequency.abs() > TOLERANCE || seen.output_frequency.abs() > TOLERANCE {
+        Motion::ComingDown
+    } else {
+        Motion::AtRest
+    }
+}
+
+/// The words that a request writes.
+fn writes(pdu: &[u8]) -> Vec<Change> {
+    let word = |at: usize| Some(u16::from_be_bytes([*pdu.get(at)?, *pdu.get(at + 1)?]));
+    let (Some(function), Some(first)) = (pdu.first(), word(1)) else { return Vec::new() };
+    let count = match function {
+        0x06 => 1,
+        0x10 => word(3).unwrap_or(0),
+        _ => 0,
+    };
+    let begin = if *function == 0x06 { 3 } else { 6 };
+    let value = |index: u16| word(begin + 2 * usize::from(index));
+    (0..count)
+        .filter_map(|index| Some(Change::Write { address: first + index, value: value(index)? }))
+        .collect()
+}
