@@ -11,8 +11,9 @@ const COLUMNS = ['time', 'slave', 'request', 'answer', 'outcome', 'took'];
 /** A panel with the last exchanges of the line `name`; `update()` reads them, unless they are held. */
 export function lastExchanges(name) {
   const body = el('tbody');
+  let held = false;
   const hold = el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => {
-    const held = hold.getAttribute('aria-pressed') !== 'true';
+    held = !held;
     hold.setAttribute('aria-pressed', held);
     setText(hold, t(held ? 'go_on' : 'hold'));
     if (!held) update();
@@ -25,10 +26,12 @@ export function lastExchanges(name) {
   return { panel, update };
 
   async function update() {
-    if (reading || document.hidden || hold.getAttribute('aria-pressed') === 'true') return;
+    if (reading || document.hidden || held) return;
     reading = true;
     try {
       const { last, slaves } = await read(path('lines', name));
+      // Asked before they were held: what somebody looks at does not move any more.
+      if (held) return;
       const drives = new Map(slaves.map(slave => [slave.slave, slave.drive]));
       body.replaceChildren(...last.reverse().map(exchange => row(exchange, drives)));
     } catch {
