@@ -132,7 +132,7 @@ fn browser() -> Option<PathBuf> {
 }
 
 fn caller() -> Caller {
-    Caller { name: "hmi".to_owned(), origin: "test".to_owned(), rights: Rights::ALL }
+    Caller::new("hmi", "test", Rights::ALL)
 }
 
 /// The plant as a client of the API reads it now, and what a metrics store scrapes.

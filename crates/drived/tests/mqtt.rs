@@ -14,7 +14,7 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use support::{File, Running, Sim, free_port, is_there, path, python_with};
+use support::{File, Running, Sim, free_port, is_there, path, python_with, run};
 
 /// Longer than anything here takes: what hangs fails.
 const PATIENCE_S: &str = "60";
@@ -161,9 +161,14 @@ struct Daemon {
 
 impl Daemon {
     fn start(name: &str, mqtt: &str) -> Self {
+        Self::start_with(name, "", mqtt)
+    }
+
+    /// The same with more at the head of its configuration.
+    fn start_with(name: &str, head: &str, mqtt: &str) -> Self {
         let sim = Sim::serve(name, &["atv312@1-2"]);
         let text = format!(
-            "[http]\nlisten = \"off\"\n[mqtt]\ncommands = true\n{mqtt}\n[defaults]\ncontrol = true\n\
+            "{head}[http]\nlisten = \"off\"\n[mqtt]\ncommands = true\n{mqtt}\n[defaults]\ncontrol = true\n\
              watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\nfrequency = {{ forbidden = [[20, 22]] }}\n\
              [lines.bench]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n",
@@ -336,6 +341,63 @@ fn nothing_waits_at_the_broker_for_a_daemon_that_is_away() {
     broker.kill();
     let (code, _) = daemon.running.take().expect("it runs").interrupt();
     assert_eq!(code, Some(0));
+}
+
+/// What a recorder of the broker has is out of reach of who has the daemon's folder.
+#[test]
+fn the_broker_is_told_how_the_audit_log_ends_and_by_that_a_log_is_known_that_was_put_back() {
+    let Some(broker) = Mosquitto::start("mqtt-audit") else { return };
+    let folder = path("mqtt-audit-state");
+    let mut ear = broker.hear(&["drived/#"]);
+    let mut daemon = Daemon::start_with(
+        "mqtt-audit",
+        &format!("state = {:?}\n", folder.to_str().expect("the path is text")),
+        &format!("servers = [\"mqtt://127.0.0.1:{}\"]\nheartbeat = \"1s\"", broker.port),
+    );
+    let head = |ear: &mut Ear, unlike: &str| {
+        let is_new = |to: &str, said: &Value| to == "drived/audit" && said["head"] != unlike;
+        ear.until(is_new).1["head"].as_str().expect("a text").to_owned()
+    };
+    let first = head(&mut ear, "");
+    ready(&mut ear, 1);
+    // Kept as the thief will put it back, with its key and with what says how it ends.
+    let copy = path("mqtt-audit-copy");
+    let copied = |from: &Path, to: &Path| {
+        let mut copying = Command::new("cp");
+        assert!(copying.arg("-rT").args([from, to]).status().expect("cp runs").success());
+    };
+    copied(&folder, &copy);
+    broker.publish(STOP, r#"{"id": "s"}"#, &["-q", "1"]);
+    assert_eq!(ear.outcome("s")["outcome"], "confirmed");
+    // The command, what was answered, and what became of it at the drive: until all is told.
+    let log = || fs::read_to_string(folder.join("audit")).expect("it is kept there");
+    let mut newest = head(&mut ear, &first);
+    while !log().lines().last().is_some_and(|line| newest.starts_with(&number(line))) {
+        newest = head(&mut ear, &newest);
+    }
+    daemon.kill();
+    let file = folder.join("audit").display().to_string();
+    let verify = |since: &str| run(&["audit", "verify", &file, "--since", since]);
+    for told in [&first, &newest] {
+        assert!(verify(told).assert_done().contains("unbroken"), "{told}");
+    }
+    // Whoever comes late reads the newest.
+    let (_, said, retained) = broker.hear(&["drived/audit"]).until(|to, _| to == "drived/audit");
+    assert_eq!((&said["head"], retained), (&newest.as_str().into(), true));
+    // Put back whole, it is unbroken by itself, and not by what the broker was told.
+    copied(&copy, &folder);
+    assert!(run(&["audit", "verify", &file]).assert_done().contains("unbroken"));
+    assert!(verify(&first).assert_done().contains("unbroken"));
+    verify(&newest).assert_refused(1, "it was rewritten or put back as it was earlier");
+    for folder in [folder, copy] {
+        fs::remove_dir_all(folder).expect("it is ours");
+    }
+}
+
+/// The number of a record, as a head begins with it.
+fn number(line: &str) -> String {
+    let record: Value = serde_json::from_str(line).expect("a record");
+    format!("{}-", record["number"])
 }
 
 #[test]

@@ -14,7 +14,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use support::{File, Running, Sim};
+use support::{File, Running, Sim, path, run};
 
 /// One browser at a time is enough for a machine with two processors.
 static ONE_BY_ONE: Mutex<()> = Mutex::new(());
@@ -37,6 +37,7 @@ fn stop_all_by_its_key_accounts_for_every_drive_and_stands_in_the_events() {
 #[test]
 fn on_a_phone_nothing_scrolls_sideways_and_stop_all_is_in_reach_of_a_thumb() {
     look_at_the_demo("phone");
+    look_at_the_demo("phone_french");
 }
 
 #[test]
@@ -85,6 +86,16 @@ fn a_long_name_of_a_group_pushes_nothing_off_a_phone() {
 }
 
 #[test]
+fn what_somebody_may_not_do_is_not_offered_to_him_and_a_stop_is() {
+    look_at_three_pumps("scoped");
+}
+
+#[test]
+fn while_the_account_of_a_stop_cannot_be_read_nothing_is_called_live() {
+    look_at_three_pumps("unread");
+}
+
+#[test]
 fn a_stop_of_a_dead_line_is_told_as_not_confirmed_of_every_drive() {
     look_at_three_pumps("dead");
 }
@@ -116,28 +127,41 @@ fn two_hundred_drives_are_listed_and_searched() {
         );
     }
     let config = File::new("page-200", &text);
-    look(&python, "many", &["run", "--config", config.path()], None);
+    look(&python, "many", &["run", "--config", config.path()], &[], None);
 }
 
+/// Three pumps, of which whoever has no token sees and stops all; the tokens that a scene asks for are for all and for one.
 fn look_at_three_pumps(scene: &str) {
     let Some(python) = python() else { return };
     let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-3"]);
+    let state = path(&format!("page-{scene}-state"));
     let text = format!(
-        "[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
+        "state = {:?}\n[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
+        state.to_str().expect("the path is text"),
         pumps.link()
     );
     let config = File::new(&format!("page-{scene}"), &text);
-    look(&python, scene, &["run", "--config", config.path()], Some(&mut pumps));
+    let token = |words: &[&str]| {
+        let add = ["token", "add", "--role", "operate", "--config", config.path()];
+        run(&[&add, words].concat()).assert_done().trim().to_owned()
+    };
+    let tokens: &[String] = match scene {
+        "trip" | "questions" | "axe" | "axe_dark" => &[token(&["operator"])],
+        "scoped" => &[token(&["operator"]), token(&["second", "--drive", "pump 2"])],
+        _ => &[],
+    };
+    look(&python, scene, &["run", "--config", config.path()], tokens, Some(&mut pumps));
+    let _ = std::fs::remove_dir_all(state);
 }
 
 fn look_at_the_demo(scene: &str) {
     if let Some(python) = python() {
-        look(&python, scene, &["demo"], None);
+        look(&python, scene, &["demo"], &[], None);
     }
 }
 
 /// Plays a scene with the page of the program that these arguments start; what it wants to happen is said to the drives.
-fn look(python: &Path, scene: &str, arguments: &[&str], mut drives: Option<&mut Sim>) {
+fn look(python: &Path, scene: &str, arguments: &[&str], tokens: &[String], mut drives: Option<&mut Sim>) {
     let _alone = ONE_BY_ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let port =
         TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
@@ -147,6 +171,7 @@ fn look(python: &Path, scene: &str, arguments: &[&str], mut drives: Option<&mut 
     let mut looking = Command::new(python)
         .arg(script)
         .args([scene, &format!("http://{address}/")])
+        .args(tokens)
         .stdout(Stdio::piped())
         .spawn()
         .expect("the script starts");

@@ -37,13 +37,16 @@ pub(super) struct Cable {
 }
 
 pub(super) async fn trip(
-    State(_): State<Plant>,
+    State(plant): State<Plant>,
     By(caller): By,
     Extension(stage): Extension<Stage>,
     Sent(Trip { drive }): Sent<Trip>,
 ) -> Result<StatusCode, Problem> {
     if !caller.rights.operate {
         return Err(Problem::lacks_right(&caller, "operate"));
+    }
+    if !plant.may_command(&caller, &drive) {
+        return Err(Problem::out_of_scope(&caller, &drive));
     }
     let (machine, code) = stage.machines.get(&drive).ok_or_else(|| no_drive(&drive))?;
     machine.trip(*code);
@@ -56,7 +59,7 @@ pub(super) async fn cable(
     Extension(stage): Extension<Stage>,
     Sent(Cable { line, connected }): Sent<Cable>,
 ) -> Result<StatusCode, Problem> {
-    if !caller.rights.operate {
+    if !caller.rights.operate || caller.scope.is_some() {
         return Err(Problem::lacks_right(&caller, "operate"));
     }
     let found = stage.lines.get(&line);

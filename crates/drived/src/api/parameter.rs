@@ -89,6 +89,9 @@ pub(super) async fn write(
     if !caller.rights.engineer {
         return Err(Problem::lacks_right(&caller, "change parameters"));
     }
+    if !plant.may_command(&caller, &name) {
+        return Err(Problem::out_of_scope(&caller, &name));
+    }
     let drive = find(&plant, &name)?.commanded_by(Act::of(&caller.name).through(&caller.origin));
     let row = row(&drive, &register)?;
     let text = match value {

@@ -127,10 +127,19 @@ impl Problem {
         Self { why: Some(Why::Refused(why)), ..Self::new(status, detail) }
     }
 
+    /// A caller has the right, and for other drives.
+    pub(super) fn out_of_scope(caller: &Caller, drive: &str) -> Self {
+        let rejected = Rejected::OutOfScope { caller: caller.name.clone(), drive: drive.to_owned() };
+        let (outcome, reason) = rejected.told();
+        let why = Some(Why::Refused(Refused { outcome, reason }));
+        Self { why, ..Self::new(StatusCode::FORBIDDEN, rejected.to_string()) }
+    }
+
     pub(super) fn rejected(rejected: &Rejected, caller: &Caller) -> Self {
         let detail = rejected.to_string();
         match rejected {
             Rejected::NoRight { right, .. } => Self::lacks_right(caller, right),
+            Rejected::OutOfScope { drive, .. } => Self::out_of_scope(caller, drive),
             Rejected::NoDrive(_) | Rejected::NoGroup(_) => Self::not_found(detail),
             Rejected::Stopped(_) | Rejected::IdReused(_) => {
                 let (outcome, reason) = rejected.told();

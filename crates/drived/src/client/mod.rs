@@ -10,8 +10,6 @@ mod watch;
 
 use std::path::PathBuf;
 
-#[cfg(test)]
-pub(crate) use self::show::overview_text;
 pub(crate) use self::{
     connection::{Answer, Daemon, Way},
     holder::{explain, whose},
@@ -21,6 +19,8 @@ pub(crate) use self::{
     show::{faults, overview, registers, whole},
     watch::{Frames, Heard, watch},
 };
+#[cfg(test)]
+pub(crate) use self::{remote::ANSWERED_WITHIN, show::overview_text};
 use crate::{failure::Failure, output};
 
 /// How a subcommand finds the daemon, and how it answers.

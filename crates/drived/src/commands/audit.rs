@@ -19,7 +19,7 @@ pub(crate) enum Command {
     ///
     /// The files that were put aside (FILE.1 and so on) are read too. Exit code 1 where a line was changed, added or taken
     /// out, also at the beginning and at the end. A log that was put back as it was earlier, with its key, is known by a newest line
-    /// that was noted elsewhere: the daemon tells it in its own log, at its start and every hour.
+    /// that was noted elsewhere: the daemon tells it in its own log, at its start and every hour, and to its MQTT broker.
     Verify {
         #[command(flatten)]
         log: LogArgs,

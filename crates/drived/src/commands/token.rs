@@ -8,7 +8,7 @@ use crate::{
     client::Daemon,
     config::{Config, DoorsConfig},
     doors::{
-        Caller, MadeToken, RemovedToken, Rights, Role, TOKENS, TokensView,
+        Caller, MadeToken, RemovedToken, Rights, Role, Scope, TOKENS, TokensView, added,
         audit::{self, Kind, Record},
         of_days, of_hours, replaced,
         tokens::{TokenView, Tokens},
@@ -31,6 +31,12 @@ pub(crate) enum Command {
         /// What it is for
         #[arg(long, value_enum)]
         role: Role,
+        /// The drives that it may command, again for each; all of them unless drives or groups are said. A stop is of all
+        #[arg(long = "drive", value_name = "NAME")]
+        drives: Vec<String>,
+        /// The groups whose drives it may command, again for each
+        #[arg(long = "group", value_name = "NAME")]
+        groups: Vec<String>,
         /// For how many days it is good; for ever unless it is said
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=3_660))]
         days: Option<u32>,
@@ -96,6 +102,24 @@ impl ConfigArgs {
         Ok(config.doors)
     }
 
+    /// A scope, whose drives and groups are all there: one that is misspelt would be for nothing.
+    fn known(&self, scope: Option<Scope>) -> Result<Option<Scope>, Failure> {
+        let Some(scope) = scope else { return Ok(None) };
+        let config = Config::load(&self.config).map_err(input)?;
+        let drives = config.lines.iter().flat_map(|line| &line.drives).map(|drive| &drive.settings.name);
+        let groups = config.groups.iter().map(|group| &group.name);
+        let missing =
+            |wanted: &[String], there: Vec<&String>| wanted.iter().find(|one| !there.contains(one)).cloned();
+        let drive = missing(&scope.drives, drives.collect()).map(|name| format!("drive {name:?}"));
+        let group = missing(&scope.groups, groups.collect()).map(|name| format!("group {name:?}"));
+        match drive.or(group) {
+            Some(missing) => {
+                Err(Failure::Input(format!("there is no {missing} in {}", self.config.display())))
+            }
+            None => Ok(Some(scope)),
+        }
+    }
+
     /// One of the files that are kept.
     pub(crate) fn named(&self, key: &str, file: Option<PathBuf>) -> Result<PathBuf, Failure> {
         let config = self.config.display();
@@ -108,13 +132,20 @@ impl ConfigArgs {
 
 pub(crate) async fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Add { name, role, days, place, json } => {
+        Command::Add { name, role, drives, groups, days, place, json } => {
+            let scope = place.config.known(Scope::of(drives, groups))?;
             let made: MadeToken = match open(&place).await? {
                 Way::Daemon(mut daemon) => {
-                    let asked = json!({ "name": name, "role": role.name(), "days": days });
+                    let mut asked = json!({ "name": name, "role": role.name() });
+                    if let Some(days) = days {
+                        asked["days"] = days.into();
+                    }
+                    if let Some(scope) = &scope {
+                        asked["scope"] = json!(scope);
+                    }
                     daemon.post(TOKENS, &asked).await?.done()?
                 }
-                Way::Files(files) => files.add(&name, role, days)?,
+                Way::Files(files) => files.add(&name, (role, scope), days)?,
             };
             json.say(|| json!(made), || output::say_as_it_is(&made.token))
         }
@@ -190,20 +221,24 @@ fn whole(file: &Path) -> PathBuf {
 }
 
 impl Files {
-    fn add(&self, name: &str, role: Role, days: Option<u32>) -> Result<MadeToken, Failure> {
-        let secret = self.tokens.add(name, role, days.map(of_days)).map_err(input)?;
-        if let Err(failure) = tell(self.audit.as_deref(), format!("token {name} added, role {}", role.name()))
-        {
+    fn add(
+        &self,
+        name: &str,
+        (role, scope): (Role, Option<Scope>),
+        days: Option<u32>,
+    ) -> Result<MadeToken, Failure> {
+        let token = self.tokens.add(name, (role, scope.clone()), days.map(of_days)).map_err(input)?;
+        if let Err(failure) = tell(self.audit.as_deref(), added(name, role, scope.as_ref())) {
             self.tokens.remove(name).map_err(input)?;
             return Err(failure);
         }
-        Ok(MadeToken { name: name.to_owned(), role, token: secret })
+        Ok(MadeToken { name: name.to_owned(), role, scope, token })
     }
 
     fn rotate(&self, name: &str, hours: u32) -> Result<MadeToken, Failure> {
-        let (role, token) = self.tokens.rotate(name, of_hours(hours)).map_err(input)?;
+        let (token, secret) = self.tokens.rotate(name, of_hours(hours)).map_err(input)?;
         tell(self.audit.as_deref(), replaced(name, hours))?;
-        Ok(MadeToken { name: name.to_owned(), role, token })
+        Ok(MadeToken::of(token, secret))
     }
 
     fn remove(&self, name: &str) -> Result<(), Failure> {
@@ -220,7 +255,7 @@ fn list(tokens: &[TokenView], json: JsonArgs) -> Result<(), Failure> {
     if tokens.is_empty() {
         return output::say("there is no token: drived token add NAME --role ROLE");
     }
-    let mut table = Table::new(["name", "role", "made", "ends"]);
+    let mut table = Table::new(["name", "role", "for", "made", "ends"]);
     for token in tokens {
         let time = |unix_s: u64| {
             let time = chrono::DateTime::from_timestamp(i64::try_from(unix_s).ok()?, 0)?;
@@ -229,7 +264,8 @@ fn list(tokens: &[TokenView], json: JsonArgs) -> Result<(), Failure> {
         let made = output::or_dash(time(token.made_unix_s));
         let ends =
             token.expires_unix_s.map_or_else(|| "never".to_owned(), |ends| output::or_dash(time(ends)));
-        table.row([token.name.clone(), token.role.name().to_owned(), made, ends]);
+        let scope = token.scope.as_ref().map_or_else(|| "every drive".to_owned(), ToString::to_string);
+        table.row([token.name.clone(), token.role.name().to_owned(), scope, made, ends]);
     }
     output::say_table(table)
 }
@@ -237,7 +273,7 @@ fn list(tokens: &[TokenView], json: JsonArgs) -> Result<(), Failure> {
 /// Writes a change into the audit log, if there is one.
 fn tell(audit: Option<&Path>, what: String) -> Result<(), Failure> {
     let Some(audit) = audit else { return Ok(()) };
-    let caller = Caller { name: "local".to_owned(), origin: origin(), rights: Rights::ALL };
+    let caller = Caller::new("local", origin(), Rights::ALL);
     let written = audit::write_one(audit, &Record::new(Kind::Token, &caller, what));
     written.map_err(|error| {
         Failure::Input(format!("the audit log {} cannot be written: {error}", audit.display()))

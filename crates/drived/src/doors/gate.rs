@@ -58,6 +58,7 @@ pub(crate) const LOGOUT: &str = "/api/v1/logout";
 
 /// By which a session begins.
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct LoginBody {
     token: String,
 }
@@ -182,7 +183,7 @@ impl Gate {
         // An answer that is made as it goes, such as an event stream or a capture.
         let goes_on = answer.status().is_success() && answer.body().size_hint().exact().is_none();
         let authority = authority.ends(Arc::clone(self), self.changes.subscribe());
-        protect(answer.headers_mut(), of_api);
+        protect(answer.headers_mut(), of_api, door.encrypted);
         answer.map(|body| {
             Body::new(match goes_on {
                 true => Kept::stream(body, asking, self.end.clone(), authority),
@@ -395,7 +396,9 @@ impl Gate {
             .map(|(_, secret)| secret.trim());
         match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
             Some(token) => {
-                let authority = Authority::Token { sha256: token.sha256.clone(), role: token.role };
+                // By that which was brought: it may end before the one that has replaced it.
+                let sha256 = tokens::sha256(secret.unwrap_or_default().as_bytes());
+                let authority = Authority::Token { sha256, role: token.role };
                 Ok(Some((token, authority)))
             }
             None => Err(Unlet::Refused(self.failed(peer, without))),
@@ -410,11 +413,12 @@ impl Gate {
         self.wait(peer)?;
         let LoginBody { token: secret } = serde_json::from_slice(body)
             .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
-        let Some(token) = self.token(secret.trim()).map_err(unreadable)? else {
+        let secret = secret.trim();
+        let Some(token) = self.token(secret).map_err(unreadable)? else {
             return Err(self.failed(peer, &caller));
         };
         let session = tokens::new_secret().map_err(unreadable)?;
-        lock(&self.sessions).begin(&session, &token.sha256, Instant::now());
+        lock(&self.sessions).begin(&session, &tokens::sha256(secret.as_bytes()), Instant::now());
         let caller = of_token(&token, caller);
         self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
         Ok(told(&caller, Some(&session), door.encrypted))
@@ -490,14 +494,15 @@ fn freely(door: &Door, peer: Peer, proxied: bool, headers: &HeaderMap) -> Caller
         Peer::User(Some(uid)) => ("local", format!("socket uid {uid}")),
         Peer::User(None) => ("local", "socket".to_owned()),
     };
-    Caller { name: name.to_owned(), origin, rights: if proxied { door.through_a_proxy } else { door.freely } }
+    Caller::new(name, origin, if proxied { door.through_a_proxy } else { door.freely })
 }
 
 fn of_token(token: &Token, without: Caller) -> Caller {
     let rights = token.role.rights();
     // Nobody stops less because he has said who he is.
     let stop = rights.stop || without.rights.stop;
-    Caller { name: token.name.clone(), rights: Rights { stop, ..rights }, ..without }
+    let rights = Rights { stop, ..rights };
+    Caller { name: token.name.clone(), rights, scope: token.scope.clone(), ..without }
 }
 
 /// Why somebody is not let in.
@@ -547,7 +552,9 @@ fn told(caller: &Caller, session: Option<&str>, encrypted: bool) -> Response {
 }
 
 /// What a browser is told about every answer.
-fn protect(headers: &mut HeaderMap, of_api: bool) {
+fn protect(headers: &mut HeaderMap, of_api: bool, encrypted: bool) {
+    /// A browser that has been here once comes by TLS for a year, also where somebody types the address without it.
+    const ONLY_ENCRYPTED: &str = "max-age=31536000";
     const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'";
     for (name, value) in [
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -555,6 +562,9 @@ fn protect(headers: &mut HeaderMap, of_api: bool) {
         (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
     ] {
         headers.insert(name, HeaderValue::from_static(value));
+    }
+    if encrypted {
+        headers.insert(header::STRICT_TRANSPORT_SECURITY, HeaderValue::from_static(ONLY_ENCRYPTED));
     }
     // The page's document says itself what may stand in it.
     headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(POLICY));

@@ -52,10 +52,10 @@ use self::{
     tokens::Tokens,
 };
 pub(crate) use self::{
-    rights::{Caller, Rights, Role},
+    rights::{Caller, Rights, Role, Scope},
     tls::{identity, private},
     token_desk::{
-        MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, of_days, of_hours, replaced,
+        MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_days, of_hours, replaced,
     },
 };
 use crate::{

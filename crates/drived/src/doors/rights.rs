@@ -1,7 +1,11 @@
 //! Who asks, and what he may do.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::config::Group;
 
 /// Whoever a request comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,6 +15,52 @@ pub(crate) struct Caller {
     /// From where: `page 127.0.0.1`, `http 10.0.0.7`, `socket uid 1000`.
     pub(crate) origin: String,
     pub(crate) rights: Rights,
+    /// Which drives he may command; all of them where it is not said.
+    pub(crate) scope: Option<Scope>,
+}
+
+impl Caller {
+    /// Somebody who may do this with every drive.
+    pub(crate) fn new(name: impl Into<String>, origin: impl Into<String>, rights: Rights) -> Self {
+        Self { name: name.into(), origin: origin.into(), rights, scope: None }
+    }
+
+    /// Whether he may command this drive of a plant with these groups, as far as his rights go. Whoever may stop, may stop
+    /// every drive: this is not asked then.
+    pub(crate) fn may_command(&self, drive: &str, groups: &[Group]) -> bool {
+        self.scope.as_ref().is_none_or(|scope| scope.has(drive, groups))
+    }
+}
+
+/// The drives that a token is for, by their names and by those of their groups. It keeps nobody from a stop.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Scope {
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) drives: Vec<String>,
+    /// Whoever belongs to one of these groups at the time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) groups: Vec<String>,
+}
+
+impl Scope {
+    /// These drives and groups; `None`, which is every drive, where there are none.
+    pub(crate) fn of(drives: Vec<String>, groups: Vec<String>) -> Option<Self> {
+        (!drives.is_empty() || !groups.is_empty()).then_some(Self { drives, groups })
+    }
+
+    fn has(&self, drive: &str, groups: &[Group]) -> bool {
+        let is_in =
+            |group: &Group| self.groups.contains(&group.name) && group.drives.iter().any(|one| one == drive);
+        self.drives.iter().any(|one| one == drive) || groups.iter().any(is_in)
+    }
+}
+
+impl fmt::Display for Scope {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let groups = self.groups.iter().map(|group| format!("group {group}"));
+        f.write_str(&self.drives.iter().cloned().chain(groups).collect::<Vec<_>>().join(", "))
+    }
 }
 
 /// What a caller may do. A stop is a right of its own: it can be given where nothing else is.
@@ -78,5 +128,21 @@ mod tests {
         assert_eq!(rights[1], Rights { view: true, stop: true, ..Rights::NONE });
         assert_eq!(rights[2], Rights { engineer: false, ..Rights::ALL });
         assert_eq!(rights[3], Rights::ALL);
+    }
+
+    #[test]
+    fn a_scope_is_of_drives_and_of_whoever_is_in_a_group_now() {
+        let group = |drives: &[&str]| Group {
+            name: "hall".to_owned(),
+            drives: drives.iter().map(|drive| (*drive).to_owned()).collect(),
+        };
+        let scope = Scope::of(vec!["fan".to_owned()], vec!["hall".to_owned()]);
+        let panel = Caller { scope, ..Caller::new("panel", "test", Role::Operate.rights()) };
+        let may = |drive: &str, groups: &[Group]| panel.may_command(drive, groups);
+        assert!(may("fan", &[]) && may("pump 1", &[group(&["pump 1"])]));
+        assert!(!may("pump 1", &[group(&["pump 2"])]) && !may("hall", &[]) && !may("pump 1", &[]));
+        assert!(Caller { scope: None, ..panel.clone() }.may_command("pump 1", &[]));
+        assert_eq!(panel.scope.unwrap().to_string(), "fan, group hall");
+        assert_eq!(Scope::of(Vec::new(), Vec::new()), None);
     }
 }

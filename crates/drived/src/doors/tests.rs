@@ -104,7 +104,7 @@ impl Rig {
     }
 
     fn token(&self, name: &str, role: Role) -> String {
-        self.gate.tokens.as_ref().unwrap().add(name, role, None).unwrap()
+        self.gate.tokens.as_ref().unwrap().add(name, (role, None), None).unwrap()
     }
 
     /// Asks from an address.
@@ -366,6 +366,19 @@ async fn every_answer_tells_the_browser_to_keep_to_itself_and_no_other_site_is_a
 }
 
 #[tokio::test]
+async fn a_browser_comes_by_tls_from_then_on_where_it_has_come_by_it_once_and_nowhere_else() {
+    let rig = Rig::new("hsts");
+    let encrypted = Door { encrypted: true, ..rig.door.clone() };
+    for asked in [STATE, STOP, Asked { path: "/nowhere", ..STATE }] {
+        let peer = Peer::Address([127, 0, 0, 1].into());
+        let answer = rig.ask_as(&encrypted, peer, &asked).await;
+        assert_eq!(answer.headers["strict-transport-security"], "max-age=31536000", "{answer:?}");
+        // RFC 6797, 7.2: not over a transport that is not secure.
+        assert!(!rig.ask(&asked).await.headers.contains_key("strict-transport-security"));
+    }
+}
+
+#[tokio::test]
 async fn each_command_is_audited_with_what_became_of_it() {
     let rig = Rig::new("audited");
     rig.ask_on_socket(&START).await;
@@ -523,6 +536,37 @@ async fn an_event_stream_ends_when_its_token_is_removed_and_others_go_on() {
     assert_eq!(heard(&mut removed, 2).await, None);
     assert!(heard(&mut other, 10).await.is_some());
     assert!(heard(&mut free, 10).await.is_some());
+}
+
+/// Whoever comes by the old secret, himself or by a session, goes with it, also where the new one has been there all along.
+#[tokio::test(start_paused = true)]
+async fn streams_and_sessions_of_a_replaced_token_end_with_the_secret_that_they_came_by() {
+    let rig = Rig::new("rotated");
+    let tokens = Arc::clone(rig.gate.tokens.as_ref().unwrap());
+    let first = rig.token("scada", Role::Operate);
+    let (_, second) = tokens.rotate("scada", Duration::from_secs(3_600)).unwrap();
+    let mut sessions = Vec::new();
+    let mut streams = Vec::new();
+    for secret in [&first, &second] {
+        let login = format!("{{\"token\":\"{secret}\"}}");
+        let answer = rig.ask(&Asked { path: "/api/v1/login", body: &login, ..START }).await;
+        let set = answer.headers[header::SET_COOKIE].to_str().unwrap().to_owned();
+        sessions.push(set.split(';').next().unwrap().to_owned());
+        streams.push(rig.stream(&format!("Authorization: Bearer {secret}")).await);
+        streams.push(rig.stream(&format!("Cookie: {}", sessions.last().unwrap())).await);
+    }
+    // A third makes the first good for nothing, and the second good for an hour yet.
+    tokens.rotate("scada", Duration::from_secs(3_600)).unwrap();
+    let [of_first, in_first, of_second, in_second] = &mut streams[..] else { panic!("four") };
+    assert_eq!((heard(of_first, 2).await, heard(in_first, 2).await), (None, None));
+    assert!(heard(of_second, 10).await.is_some() && heard(in_second, 10).await.is_some());
+    for (session, caller) in [(&sessions[0], "anonymous"), (&sessions[1], "scada")] {
+        let who = rig.ask(&Asked { headers: &[("cookie", session)], ..STATE }).await.body;
+        assert!(who.starts_with(caller), "{who}");
+    }
+    // And one that is replaced at once is no more.
+    tokens.rotate("scada", Duration::ZERO).unwrap();
+    assert_eq!((heard(of_second, 2).await, heard(in_second, 2).await), (None, None));
 }
 
 #[tokio::test(start_paused = true)]

@@ -15,8 +15,8 @@ use tokio::task::spawn_blocking;
 use super::{
     audit::{Audit, Kind, Record},
     refusal::Refusal,
-    rights::{Caller, Role},
-    tokens::{TokenError, TokenView, Tokens},
+    rights::{Caller, Role, Scope},
+    tokens::{Token, TokenError, TokenView, Tokens},
 };
 use crate::json::line;
 
@@ -36,6 +36,9 @@ pub(crate) struct TokensView {
 pub(crate) struct NewToken {
     name: String,
     role: Role,
+    /// Which drives it is for; every drive where it is not said.
+    #[serde(default)]
+    scope: Option<Scope>,
     /// For how many days; for ever where it is not said.
     #[serde(default)]
     days: Option<u32>,
@@ -54,7 +57,17 @@ pub(crate) struct Rotation {
 pub(crate) struct MadeToken {
     pub(crate) name: String,
     pub(crate) role: Role,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scope: Option<Scope>,
     pub(crate) token: String,
+}
+
+impl MadeToken {
+    /// A token and its secret.
+    pub(crate) fn of(token: Token, secret: String) -> Self {
+        let Token { name, role, scope, .. } = token;
+        Self { name, role, scope, token: secret }
+    }
 }
 
 /// A token that is no more.
@@ -72,6 +85,12 @@ pub(crate) const fn of_days(days: u32) -> Duration {
 /// For so many hours.
 pub(crate) const fn of_hours(hours: u32) -> Duration {
     Duration::from_secs(hours as u64 * 3_600)
+}
+
+/// What the log of who did what says of a token that was made.
+pub(crate) fn added(name: &str, role: Role, scope: Option<&Scope>) -> String {
+    let scope = scope.map(|scope| format!(", for {scope}")).unwrap_or_default();
+    format!("token {name} added, role {}{scope}", role.name())
 }
 
 /// What the log of who did what says of a token that was replaced.
@@ -103,30 +122,30 @@ pub(super) async fn answer(
             Ok(told(&TokensView { file, tokens: tokens.views().map_err(refused)? }))
         }
         (&Method::POST, None) => {
-            let NewToken { name, role, days } = serde_json::from_slice(body).map_err(|error| {
+            let NewToken { name, role, scope, days } = serde_json::from_slice(body).map_err(|error| {
                 Refusal::new(
                     StatusCode::BAD_REQUEST,
                     format!("expected {{\"name\": …, \"role\": …}}: {error}"),
                 )
             })?;
-            let token =
-                changed(&tokens, name.clone(), move |tokens, name| tokens.add(name, role, days.map(of_days)))
-                    .await?;
-            let written = record(format!("token {name} added, role {}", role.name())).done().await;
+            let rights = (role, scope.clone());
+            let add = move |tokens: &Tokens, name: &str| tokens.add(name, rights, days.map(of_days));
+            let token = changed(&tokens, name.clone(), add).await?;
+            let written = record(added(&name, role, scope.as_ref())).done().await;
             if let Err(error) = written {
                 changed(&tokens, name, Tokens::remove).await?;
                 return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()));
             }
-            Ok(told(&MadeToken { name, role, token }))
+            Ok(told(&MadeToken { name, role, scope, token }))
         }
         (&Method::PUT, Some(name)) => {
             let Rotation { hours } = serde_json::from_slice(body).map_err(|error| {
                 Refusal::new(StatusCode::BAD_REQUEST, format!("expected {{\"hours\": …}}: {error}"))
             })?;
             let rotate = move |tokens: &Tokens, name: &str| tokens.rotate(name, of_hours(hours));
-            let (role, token) = changed(&tokens, name.to_owned(), rotate).await?;
+            let (token, secret) = changed(&tokens, name.to_owned(), rotate).await?;
             record(replaced(name, hours)).whenever();
-            Ok(told(&MadeToken { name: name.to_owned(), role, token }))
+            Ok(told(&MadeToken::of(token, secret)))
         }
         (&Method::DELETE, Some(name)) => {
             let name = name.to_owned();

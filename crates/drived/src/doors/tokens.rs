@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
-use super::rights::Role;
+use super::rights::{Role, Scope};
 use crate::kept::{Kept, Readers, Stamp};
 
 /// By which a token is known as one of ours, in a file or in a log where it should not be.
@@ -51,6 +51,9 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 pub(crate) struct Token {
     pub(crate) name: String,
     pub(crate) role: Role,
+    /// Which drives it is for; every drive where it is not said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scope: Option<Scope>,
     /// In hexadecimal digits.
     pub(super) sha256: String,
     /// When it was made, in seconds since 1970.
@@ -86,6 +89,9 @@ impl Token {
 pub(crate) struct TokenView {
     pub(crate) name: String,
     pub(crate) role: Role,
+    /// Which drives it is for; every drive where it is not said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scope: Option<Scope>,
     pub(crate) made_unix_s: u64,
     /// When it ends by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -169,9 +175,10 @@ impl Tokens {
 
     /// All of them, as they are told.
     pub(crate) fn views(&self) -> Result<Vec<TokenView>, TokenError> {
-        let view = |Token { name, role, made, expires, .. }: Token| TokenView {
+        let view = |Token { name, role, scope, made, expires, .. }: Token| TokenView {
             name,
             role,
+            scope,
             made_unix_s: made,
             expires_unix_s: expires,
         };
@@ -193,7 +200,12 @@ impl Tokens {
     }
 
     /// Adds a token, for so long or for ever, and gives its secret, which nobody can ever read again.
-    pub(crate) fn add(&self, name: &str, role: Role, lasts: Option<Duration>) -> Result<String, TokenError> {
+    pub(crate) fn add(
+        &self,
+        name: &str,
+        (role, scope): (Role, Option<Scope>),
+        lasts: Option<Duration>,
+    ) -> Result<String, TokenError> {
         let allowed = |character: char| character.is_ascii_alphanumeric() || matches!(character, '-' | '_');
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(allowed) {
             return Err(TokenError::Name(name.to_owned()));
@@ -209,26 +221,27 @@ impl Tokens {
         let secret = new_secret()?;
         let (sha256, made) = (sha256(secret.as_bytes()), now());
         let expires = lasts.map(|lasts| made.saturating_add(lasts.as_secs()));
-        tokens.push(Token { name: name.to_owned(), role, sha256, made, expires, before: None });
+        tokens.push(Token { name: name.to_owned(), role, scope, sha256, made, expires, before: None });
         self.write(tokens)?;
         Ok(secret)
     }
 
     /// Gives a token of this name another secret. That which it had is good for `overlap` yet, so that whoever uses it can be
     /// told the new one without being shut out; the times that it ends by itself stays.
-    pub(crate) fn rotate(&self, name: &str, overlap: Duration) -> Result<(Role, String), TokenError> {
+    pub(crate) fn rotate(&self, name: &str, overlap: Duration) -> Result<(Token, String), TokenError> {
         let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
         let mut tokens = self.all()?;
         let Some(token) = tokens.iter_mut().find(|token| token.name == name) else {
             let there = tokens.into_iter().map(|token| token.name).collect();
             return Err(TokenError::Unknown { name: name.to_owned(), there });
         };
-        let (secret, role) = (new_secret()?, token.role);
+        let secret = new_secret()?;
         let until = now().saturating_add(overlap.as_secs());
         let replaced = std::mem::replace(&mut token.sha256, sha256(secret.as_bytes()));
         token.before = Some(Before { sha256: replaced, until }).filter(|_| !overlap.is_zero());
+        let token = token.clone();
         self.write(tokens)?;
-        Ok((role, secret))
+        Ok((token, secret))
     }
 
     /// Removes a token; whoever uses it is refused from now on.
@@ -265,12 +278,15 @@ mod tests {
         let folder = crate::doors::tests::Folder::new("tokens");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         assert_eq!(tokens.find("drv_0"), Ok(None));
-        let secret = tokens.add("panel-1", Role::Operate, None).unwrap();
+        let secret = tokens.add("panel-1", (Role::Operate, None), None).unwrap();
         assert!(secret.starts_with("drv_") && secret.len() == 68, "256 bits");
         let found = tokens.find(&secret).unwrap().unwrap();
         assert_eq!((found.name.as_str(), found.role), ("panel-1", Role::Operate));
         assert_eq!(tokens.find(&secret[..67]), Ok(None));
-        assert_eq!(tokens.add("panel-1", Role::View, None), Err(TokenError::Taken("panel-1".to_owned())));
+        assert_eq!(
+            tokens.add("panel-1", (Role::View, None), None),
+            Err(TokenError::Taken("panel-1".to_owned()))
+        );
         let text = fs::read_to_string(folder.file("tokens")).unwrap();
         assert!(!text.contains(&secret[4..]), "{text}");
         // Another program removes it.
@@ -283,9 +299,9 @@ mod tests {
         let folder = crate::doors::tests::Folder::new("lasting");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         let hour = Duration::from_secs(3_600);
-        let first = tokens.add("scada", Role::Operate, Some(hour)).unwrap();
-        let (role, second) = tokens.rotate("scada", Duration::from_secs(60)).unwrap();
-        assert_eq!(role, Role::Operate);
+        let first = tokens.add("scada", (Role::Operate, None), Some(hour)).unwrap();
+        let (rotated, second) = tokens.rotate("scada", Duration::from_secs(60)).unwrap();
+        assert_eq!(rotated.role, Role::Operate);
         let token = tokens.find(&first).unwrap().expect("it is good for a while yet");
         assert_eq!(tokens.find(&second), Ok(Some(token.clone())));
         let [first, second] = [&first, &second].map(|secret| sha256(secret.as_bytes()));
@@ -299,7 +315,7 @@ mod tests {
         let folder = crate::doors::tests::Folder::new("token-names");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         for name in ["", "local", "anonymous", "a b", "päuse", "line\nbreak", &"x".repeat(65)] {
-            assert!(tokens.add(name, Role::View, None).is_err(), "{name:?}");
+            assert!(tokens.add(name, (Role::View, None), None).is_err(), "{name:?}");
         }
         assert!(matches!(tokens.remove("gone"), Err(TokenError::Unknown { .. })));
     }
@@ -315,7 +331,7 @@ mod tests {
         for name in ["tokens.new", ".tokens.new"] {
             symlink(&precious, folder.file(name)).unwrap();
         }
-        Tokens::open(&file).unwrap().add("panel", Role::View, None).unwrap();
+        Tokens::open(&file).unwrap().add("panel", (Role::View, None), None).unwrap();
         assert_eq!(fs::read_to_string(&precious).unwrap(), "precious");
         assert!(fs::symlink_metadata(&file).unwrap().is_file());
         fs::remove_file(&file).unwrap();
@@ -330,7 +346,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = crate::doors::tests::Folder::new("open-tokens");
         let file = folder.file("tokens");
-        Tokens::open(&file).unwrap().add("panel", Role::View, None).unwrap();
+        Tokens::open(&file).unwrap().add("panel", (Role::View, None), None).unwrap();
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
         fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
         assert_eq!(Tokens::open(&file).unwrap_err(), TokenError::Open(file));

@@ -122,11 +122,7 @@ impl Desk {
     }
 
     fn caller(&self, peer: IpAddr) -> Caller {
-        Caller {
-            name: self.config.name.clone(),
-            origin: format!("modbus {peer}"),
-            rights: self.config.rights,
-        }
+        Caller::new(self.config.name.clone(), format!("modbus {peer}"), self.config.rights)
     }
 
     /// What each word of a write asks, as far as that needs no exchange.

@@ -28,7 +28,7 @@ const DOCUMENT: &str = "METRICS.md";
 
 /// The doors' router of a plant, for somebody with these rights.
 fn router(plant: &TestPlant, rights: Rights) -> Router {
-    let caller = Caller { name: "scraper".to_owned(), origin: "page 10.0.0.7".to_owned(), rights };
+    let caller = Caller::new("scraper", "page 10.0.0.7", rights);
     let plant = plant.plant.clone();
     serve(api::router(plant.clone()), plant, Vec::new()).layer(Extension(caller))
 }

@@ -176,7 +176,7 @@ fn caller(face: &Face, asking: &Asking) -> Caller {
         true => asking.commander.is_none().then_some(Role::Operate),
         false => face.config.commanders.get(&name).copied(),
     };
-    Caller { name, origin: "mqtt".to_owned(), rights: role.map_or(Rights::NONE, Role::rights) }
+    Caller::new(name, "mqtt", role.map_or(Rights::NONE, Role::rights))
 }
 
 /// The drive or group of an id.

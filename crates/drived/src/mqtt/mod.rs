@@ -50,6 +50,8 @@ struct Face {
     config: MqttConfig,
     topics: Topics,
     broker: Broker,
+    /// The newest line of the audit log.
+    audited: watch::Receiver<Option<String>>,
     /// Rises when everything is to be told again.
     anew: watch::Sender<u64>,
 }
@@ -108,6 +110,7 @@ impl Mqtt {
         let Self { face, closed, task, .. } = self;
         closed.notify_one();
         let events = task.await;
+        telling::tell_head(&face);
         face.tell_for_good(face.topics.status(), "offline");
         face.broker.clone().end(Goodbye::Normal, CLOSED_WITHIN).await;
         drop(events);
@@ -177,7 +180,8 @@ impl Prepared {
         let topics = Topics::new(&config);
         let will = Will { message: Message::new(topics.status(), "offline").retained() };
         let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
-        let face = Arc::new(Face { plant, config, topics, broker, anew: watch::Sender::new(0) });
+        let audited = audit.head();
+        let face = Arc::new(Face { plant, config, topics, broker, audited, anew: watch::Sender::new(0) });
         let (closing, closes) = watch::channel(false);
         let commanding = Commanding::new(Arc::clone(&face), audit, closes);
         let closed = Arc::new(Notify::new());

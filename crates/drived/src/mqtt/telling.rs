@@ -154,6 +154,16 @@ pub(super) fn tell_event(face: &Face, event: &Event) {
     face.broker.publish(message, Kept::InOrder);
 }
 
+/// Tells the newest line of the audit log, if there is one. The broker keeps it, and whoever records what the broker says has
+/// one for each time, by which a log is known that was put back as it was earlier.
+pub(super) fn tell_head(face: &Face) {
+    let head = face.audited.borrow().clone();
+    if let Some(head) = head {
+        let told = json!({ "head": head, "time_unix_ms": unix(Instant::now()) });
+        face.tell_for_good(face.topics.audit(), told.to_string());
+    }
+}
+
 /// Takes back what was told of a drive that is here no more.
 pub(super) fn take_back(face: &Face, name: &str) {
     face.tell_for_good(face.topics.drive(name, "availability"), "offline");
@@ -166,6 +176,8 @@ pub(super) fn take_back(face: &Face, name: &str) {
 #[derive(Default)]
 pub(super) struct Daemon {
     told_at: Option<Instant>,
+    /// The newest line of the audit log that was told.
+    head: Option<String>,
     /// Whether the port of each line was there.
     links: BTreeMap<String, Value>,
     discovered: Discovered,
@@ -185,6 +197,11 @@ impl Daemon {
             face.tell_for_good(face.topics.line(gone), "");
         }
         self.told_at = Some(now);
+        let head = face.audited.borrow().clone();
+        if again || head != self.head {
+            tell_head(face);
+            self.head = head;
+        }
         self.links = links;
         for line in &lines {
             face.tell(face.topics.line(&line.name), told(line));

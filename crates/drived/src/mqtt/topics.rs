@@ -85,6 +85,11 @@ impl Topics {
         format!("{}/daemon", self.base)
     }
 
+    /// How the audit log ends.
+    pub(super) fn audit(&self) -> String {
+        format!("{}/audit", self.base)
+    }
+
     pub(super) fn line(&self, name: &str) -> String {
         format!("{}/line/{}", self.base, topic_id(name))
     }

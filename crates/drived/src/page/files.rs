@@ -85,5 +85,6 @@ files![
     "told.js",
     "trend.js",
     "trouble.js",
+    "vocabulary.js",
     "words.js",
 ];

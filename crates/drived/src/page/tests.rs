@@ -206,7 +206,7 @@ fn every_text_has_an_english_and_a_french_form() {
 
 #[test]
 fn what_troubles_a_drive_has_the_words_of_the_fleets_table_and_its_states_the_words_of_everybody() {
-    let (texts, words, french) = (module("texts.js"), module("words.js"), module("sentences_fr.js"));
+    let (texts, words, french) = (module("texts.js"), module("vocabulary.js"), module("sentences_fr.js"));
     for kind in drive_fleet::ConcernKind::ALL {
         let row = format!("  concern_{}: ['{}', '", kind.word(), kind.words());
         assert!(texts.contains(&row), "{row}");
@@ -246,8 +246,18 @@ fn every_command_of_the_page_has_an_id_and_a_stop_is_tried_as_by_the_monitor() {
     }
     let stop = include_str!("web/stop.js").replace('_', "");
     assert!(stop.contains("JSON.stringify({ id })"), "STOP ALL has one id, however often it is sent");
-    let [again, until] = [client::AGAIN, client::GIVEN_UP_AFTER].map(|time| time.as_millis());
-    for row in [format!("const AGAINMS = {again};"), format!("const GIVEUPMS = {until};")] {
+    // As often as the page looks after any command.
+    let looks = |text: &str| {
+        text.lines()
+            .find(|line| line.trim_start().starts_with("const LOOK_MS"))
+            .map(|line| line.trim().to_owned())
+    };
+    assert!(looks(module("follow.js")).is_some());
+    assert_eq!(looks(include_str!("web/stop.js")), looks(module("follow.js")));
+    let times =
+        [("ATTEMPT", client::ANSWERED_WITHIN), ("AGAIN", client::AGAIN), ("GIVEUP", client::GIVEN_UP_AFTER)];
+    for (name, time) in times {
+        let row = format!("const {name}MS = {};", time.as_millis());
         assert!(stop.contains(&row), "{row}");
     }
 }

@@ -106,11 +106,24 @@ impl Plant {
                 demo: self.0.demo,
                 rights: caller.rights,
                 caller: caller.name.clone(),
+                scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
             },
             lines: self.lines(),
             drives: self.drives(),
             groups: self.groups(),
         }
+    }
+
+    /// Whether somebody may command a drive, as far as his rights go.
+    pub(crate) fn may_command(&self, caller: &Caller, drive: &str) -> bool {
+        caller.may_command(drive, &self.groups())
+    }
+
+    /// The drives that somebody may command, as far as his rights go.
+    fn commanded_by(&self, caller: &Caller) -> Vec<String> {
+        let (groups, fleet) = (self.groups(), self.fleet());
+        let names = fleet.drives().into_iter().map(|drive| drive.name().to_string());
+        names.filter(|name| caller.may_command(name, &groups)).collect()
     }
 
     /// Tells what happened to the program itself.

@@ -57,7 +57,7 @@ impl Commanding {
     ) -> Self {
         let rights = config.commands.map_or(Rights::NONE, Role::rights);
         let origin = format!("sparkplug {}", config.name.group);
-        let caller = Caller { name: CALLER.to_owned(), origin, rights };
+        let caller = Caller::new(CALLER, origin, rights);
         Self { desk: Desk::open(plant, audit, closing), caller, lifetime: config.lifetime, outcomes }
     }
 

@@ -8,6 +8,7 @@ use serde_json::json;
 use tokio::time::{Instant, sleep, timeout};
 
 use super::*;
+use crate::{config::Group, doors::Scope};
 
 const RUN: &str = "/api/v1/drives/pump%201/start";
 const STOP: &str = "/api/v1/drives/pump%201/stop";
@@ -307,6 +308,44 @@ async fn what_is_not_allowed_is_refused_with_its_reason() {
         assert_eq!((told.as_u16(), &problem["reason"]), (status, &reason.into()), "{problem}");
         assert_eq!((&problem["status"], &problem["outcome"]), (&status.into(), &"refused".into()));
     }
+    assert!((0..3).all(|index| !is_running(&plant, index)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_token_for_one_group_moves_its_drives_alone_and_stops_them_all() {
+    let plant = TestPlant::with(3, DriveSettings::controlled).await;
+    let group = Group { name: "hall".to_owned(), drives: vec!["pump 1".to_owned(), "pump 2".to_owned()] };
+    plant.plant.set_groups(vec![group]);
+    let scope = Scope::of(vec!["pump 2".to_owned()], Vec::new());
+    let in_hall = Scope::of(Vec::new(), vec!["hall".to_owned()]);
+    let of = |scope: &Option<Scope>| {
+        let caller = Caller { scope: scope.clone(), ..Caller::new("panel", "test", ALL) };
+        super::router(plant.plant.clone()).layer(Extension(caller))
+    };
+    let at = json!({"setpoint": {"frequency_hz": 30.0}});
+    let start = |whom: &str| post(&format!("/api/v1/{whom}/start?wait=20s"), &at);
+    for (scope, whom) in [(&scope, "drives/pump%201"), (&scope, "groups/hall"), (&in_hall, "drives/pump%203")]
+    {
+        let (status, problem) = send(of(scope), start(whom)).await;
+        assert_eq!((status, &problem["reason"]), (StatusCode::FORBIDDEN, &"no_right".into()), "{problem}");
+        let detail = problem["detail"].as_str().unwrap();
+        assert!(detail.starts_with("the token panel is not for pump "), "{detail}");
+    }
+    assert!((0..3).all(|index| !is_running(&plant, index)));
+    for whom in ["parameters/ACC", "parameters/LAC"] {
+        let body = Body::from(json!({"value": 3.0}).to_string());
+        let put = Request::put(format!("/api/v1/drives/pump%201/{whom}"))
+            .header("content-type", "application/json");
+        let (status, problem) = send(of(&scope), put.body(body).unwrap()).await;
+        assert_eq!((status, &problem["reason"]), (StatusCode::FORBIDDEN, &"no_right".into()), "{problem}");
+    }
+    assert_eq!(send(of(&scope), start("drives/pump%202")).await.0, StatusCode::OK);
+    assert_eq!(send(of(&in_hall), start("drives/pump%201")).await.0, StatusCode::OK);
+    let (_, state) = send(of(&in_hall), Request::get("/api/v1/state").body(Body::empty()).unwrap()).await;
+    assert_eq!(state["daemon"]["scope"], json!(["pump 1", "pump 2"]));
+    // A stop is everybody's who may stop.
+    let stop = post("/api/v1/stop?wait=20s", &json!({}));
+    assert_eq!(send(of(&scope), stop).await.0, StatusCode::OK);
     assert!((0..3).all(|index| !is_running(&plant, index)));
 }
 

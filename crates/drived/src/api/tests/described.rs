@@ -146,7 +146,7 @@ async fn what_a_demonstration_has_is_described_and_there_only_in_a_demonstration
         lines: [("north".to_owned(), test.line.clone())].into(),
     };
     let demo = || {
-        let caller = Caller { name: "guest".to_owned(), origin: "test".to_owned(), rights: ALL };
+        let caller = Caller::new("guest", "test", ALL);
         crate::api::demo_router(test.plant.clone(), stage.clone()).layer(Extension(caller))
     };
     let trip = || post("/api/v1/demo/trip", &json!({"drive": "pump 1"}));

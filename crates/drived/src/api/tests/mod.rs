@@ -24,7 +24,7 @@ const ALL: Rights = Rights { view: true, stop: true, operate: true, engineer: tr
 
 /// The API as a caller of this name and with these rights meets it.
 fn api(plant: &Plant, name: &str, rights: Rights) -> Router {
-    let caller = Caller { name: name.to_owned(), origin: "test".to_owned(), rights };
+    let caller = Caller::new(name, "test", rights);
     router(plant.clone()).layer(Extension(caller))
 }
 

@@ -27,7 +27,7 @@ const LINE: &str = "line";
 /// Who stops on a line of its own, and what else he may do: look.
 fn caller() -> Caller {
     let rights = Rights { view: true, stop: true, ..Rights::NONE };
-    Caller { name: "monitor".to_owned(), origin: "this program".to_owned(), rights }
+    Caller::new("monitor", "this program", rights)
 }
 
 /// Where the API is. Cheap to clone.

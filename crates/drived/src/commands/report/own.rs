@@ -72,11 +72,7 @@ impl Own {
             told(&drive, begun + TOLD_WITHIN).await;
         }
         sleep_until(begun + time).await;
-        let reader = Caller {
-            name: "report".to_owned(),
-            origin: "this program".to_owned(),
-            rights: Rights { view: true, ..Rights::NONE },
-        };
+        let reader = Caller::new("report", "this program", Rights { view: true, ..Rights::NONE });
         Ok(Self { line, way: Way::here(api::router(plant).layer(Extension(reader))) })
     }
 

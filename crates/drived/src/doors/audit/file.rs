@@ -247,8 +247,7 @@ mod tests {
     };
 
     fn record(what: &str) -> Record {
-        let caller =
-            Caller { name: "panel".to_owned(), origin: "http 10.0.0.7".to_owned(), rights: Rights::ALL };
+        let caller = Caller::new("panel", "http 10.0.0.7", Rights::ALL);
         Record::new(Kind::Command, &caller, what)
     }
 

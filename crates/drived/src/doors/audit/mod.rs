@@ -114,7 +114,7 @@ impl Record {
     /// What the program itself has done.
     pub(crate) fn of_program(kind: Kind, what: impl Into<String>) -> Self {
         let origin = format!("process {}", std::process::id());
-        Self::new(kind, &Caller { name: "drived".to_owned(), origin, rights: Rights::ALL }, what)
+        Self::new(kind, &Caller::new("drived", origin, Rights::ALL), what)
     }
 }
 
@@ -148,6 +148,8 @@ pub(crate) struct Audit {
 #[derive(Debug, Default)]
 struct Shared {
     failing: watch::Sender<bool>,
+    /// The number of the newest line and its SHA-256.
+    head: watch::Sender<Option<String>>,
     /// What could not be written.
     gap: Mutex<Gap>,
 }
@@ -193,6 +195,11 @@ impl Audit {
     /// Whether it cannot be written now.
     pub(crate) fn failing(&self) -> watch::Receiver<bool> {
         self.shared.failing.subscribe()
+    }
+
+    /// The newest line, by its number and its SHA-256, for who keeps it where nobody reaches who has the file; `None` before the first.
+    pub(crate) fn head(&self) -> watch::Receiver<Option<String>> {
+        self.shared.head.subscribe()
     }
 
     /// Hands a record to the disk at once. What it gives need not be waited for.
@@ -257,7 +264,7 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
             }
             _ => continue,
         };
-        let caller = Caller { name: caller, origin: "fleet".to_owned(), rights: Rights::ALL };
+        let caller = Caller::new(caller, "fleet", Rights::ALL);
         let record = Record { outcome: Some(outcome), ..Record::new(Kind::Outcome, &caller, what) };
         // Where it cannot be written that is told by whoever writes.
         let _ = audit.record(record).done().await;
@@ -283,10 +290,11 @@ fn write_all(mut file: File, records: &Receiver<Waiting>, shared: &Shared) {
         if let Err(error) = &written {
             shared.lose(&record, error);
         }
+        let head = file.head();
+        shared.head.send_replace(Some(head.clone()).filter(|head| !head.is_empty()));
         let _ = done.send(written.map_err(|_| NotWritten));
         let is_due = |at: &SystemTime| at.elapsed().is_ok_and(|age| age >= HEAD_TOLD_EVERY);
         if record.kind == Kind::Daemon || told.as_ref().is_none_or(|(_, at)| is_due(at)) {
-            let head = file.head();
             if told.as_ref().is_none_or(|(last, _)| *last != head) {
                 tracing::info!("the audit log ends with {head}: drived audit verify --since {head}");
             }

@@ -9,7 +9,7 @@ let shown = '';
 
 /** Shows the buttons in a demonstration; `driveName` is the drive that is looked at, if one is. */
 export function writeDemo(place, driveName) {
-  place.hidden = !plant.daemon.demo;
+  place.hidden = !plant.daemon.demo || !plant.daemon.rights.operate;
   if (place.hidden) return;
   const lines = [...plant.lines.values()].map(line => [line.name, line.link === 'away']);
   const now = JSON.stringify([document.documentElement.lang, driveName, lines]);

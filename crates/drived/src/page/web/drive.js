@@ -10,16 +10,16 @@ import { age, plant, quality, takeDrive } from './plant.js';
 import { named, t } from './texts.js';
 import { trend } from './trend.js';
 import { trouble } from './trouble.js';
-import { setpointText, stateWord, word } from './words.js';
+import { word } from './vocabulary.js';
+import { currentText, frequencyText, setpointText, stateWord } from './words.js';
 
 /** Measurements are read seldom: what is older than this says so, though it is the latest that there is. */
 const DATED_FROM_MS = 3_000;
 
 const BIG = [
-  ['frequency', drive => quantity(drive.status?.output_frequency_hz, 1, 'Hz'), 'status'],
+  ['frequency', drive => frequencyText(drive.status), 'status'],
   ['setpoint', drive => setpointText(drive.setpoint), undefined],
-  ['current', drive => typeof drive.status?.current_a === 'number' ? quantity(drive.status.current_a, 1, 'A')
-    : quantity(drive.status?.current_percent, 0, '%'), 'status'],
+  ['current', drive => currentText(drive.status), 'status'],
   ['torque', drive => quantity(drive.measurements?.torque_percent, 0, '%'), 'measurements'],
   ['speed', drive => quantity(drive.measurements?.speed_rpm, 0, t('rpm')), 'measurements'],
   ['output_power', drive => typeof drive.measurements?.output_power_kw === 'number'

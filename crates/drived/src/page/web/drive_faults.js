@@ -5,7 +5,7 @@ import { el, table } from './dom.js';
 import { clock, MISSING, quantity } from './format.js';
 import { named, t } from './texts.js';
 import { faultMeaning, faultRemedy, told } from './told.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 const FRAME = [
   ['state', status => word(status.state)],

@@ -4,13 +4,14 @@ import { path } from './api.js';
 import { confirmed } from './ask.js';
 import { el, setAttribute, setClass, setText } from './dom.js';
 import { quantity } from './format.js';
+import { askToken } from './login.js';
 import { command, isDone, onOrder, orderText, ordersOf } from './orders.js';
-import { plant } from './plant.js';
+import { mayCommand, plant } from './plant.js';
 import { setpointControl } from './setpoint.js';
 import { t } from './texts.js';
 import { told } from './told.js';
 import { faultText } from './trouble.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
 const EXPIRES_MS = 5_000;
@@ -26,13 +27,14 @@ export function ordersPanel(name) {
   const stop = button('stop', () => order('stop', { mode: mode.value }), { 'data-order': 'stop' });
   const reset = button('reset', askReset, { 'data-order': 'reset' });
   const release = button('release', async () => await confirmed(t('confirm_release', { drive: name }), t('release')) && order('release'));
+  const moving = [setpoint.element, el('div.pair', {}, forward, reverse)];
+  const stopping = el('div.pair', {}, stop, mode);
+  const settling = el('div.pair', {}, reset, release);
+  const logIn = button('log_in', askToken);
   const why = el('p.hint.why');
   const latest = el('ul.latest');
   const element = el('section.panel.orders', { 'aria-label': t('orders') },
-    el('h2', {}, t('orders')), setpoint.element,
-    el('div.pair', {}, forward, reverse),
-    el('div.pair', {}, stop, mode),
-    el('div.pair', {}, reset, release), why,
+    el('h2', {}, t('orders')), ...moving, stopping, settling, why, logIn,
     el('h3', {}, t('latest_orders')), latest);
   const forget = onOrder(one => one.to === name && writeLatest());
   writeLatest();
@@ -41,12 +43,17 @@ export function ordersPanel(name) {
   function update(drive) {
     const tripped = drive.status?.state === 'fault' || Boolean(drive.fault);
     const readOnly = drive.control === false;
+    // What somebody may not do is not offered to him.
+    const may = mayCommand(drive);
+    for (const one of [...moving, settling]) one.hidden = !may;
+    stopping.hidden = !plant.daemon.rights.stop;
+    logIn.hidden = may || readOnly;
     setpoint.update(drive);
     for (const one of [forward, reverse]) one.disabled = readOnly || Boolean(drive.start_refused);
     reset.disabled = readOnly || !tripped;
     release.disabled = readOnly;
-    setText(why, readOnly ? t('only_read_long') : [drive.start_refused && t('start_refused', { why: told(drive.start_refused) }),
-      !tripped && t('reset_not_now')].filter(Boolean).join(' '));
+    setText(why, readOnly ? t('only_read_long') : [!may && t('may_not_command'), drive.start_refused && t('start_refused', { why: told(drive.start_refused) }),
+      may && !tripped && t('reset_not_now')].filter(Boolean).join(' '));
     setAttribute(stop, 'disabled', readOnly);
   }
 

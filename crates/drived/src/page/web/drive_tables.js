@@ -6,11 +6,11 @@ import { el, setText, table } from './dom.js';
 import { readHistory } from './drive_faults.js';
 import { duration, MISSING, old, quantity } from './format.js';
 import { carryOut } from './orders.js';
-import { age, plant, quality } from './plant.js';
+import { age, mayCommand, plant, quality } from './plant.js';
 import { bitName } from './status_bits.js';
-import { t } from './texts.js';
+import { named, t } from './texts.js';
 import { told } from './told.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 const MEASUREMENTS = [
   ['line_voltage', 'line_voltage_v', 0, 'V'], ['output_voltage', 'output_voltage_v', 0, 'V'], ['dc_bus_voltage', 'dc_bus_voltage_v', 0, 'V'],
@@ -79,7 +79,7 @@ function identity(drive) {
     [t('firmware'), is.firmware ?? MISSING],
     ...(is.codes?.length ? [[t('identity_codes'), is.codes.map(({ code, value }) => `${code} ${value}`).join(', ')]] : []),
     [t('checked'), word(is.check) || MISSING],
-    [t('watchdog'), [word(watchdog.check), told(watchdog.why)].filter(Boolean).join(': ') || MISSING],
+    [t('watchdog'), watchdog.why ? named(word(watchdog.check), told(watchdog.why)) : word(watchdog.check) || MISSING],
     ...(watchdog.time_ms !== undefined ? [[t('watchdog_time'), [duration(watchdog.time_ms), word(watchdog.reaction)].filter(Boolean).join(', ')]] : []),
     [t('starts_by_itself'), drive.starts_by_itself?.join(', ') || t('no')],
     [t('commanders'), drive.commanders?.join(', ') || t('anyone')],
@@ -120,7 +120,7 @@ function parameterRow(name, row) {
   const differs = row.factory && row.text !== undefined && row.text !== row.factory && String(row.value) !== row.factory;
   const line = el('tr', {}, el('th', { scope: 'row' }, `${row.mnemonic} ${row.address}`), el('td', {}, row.name, row.range ? el('small', {}, ` ${row.range}`) : null),
     value, el('td', {}, row.factory, differs ? el('b', {}, ` · ${t('differs')}`) : null), el('td', {}, word(row.access)));
-  if (!plant.daemon.rights.engineer || row.access === 'read') return line;
+  if (!plant.daemon.rights.engineer || !mayCommand(plant.drives.get(name) ?? { name }) || row.access === 'read') return line;
   const field = el('input.small', { value: row.value ?? '', 'aria-label': row.mnemonic });
   const write = async event => {
     event.preventDefault();

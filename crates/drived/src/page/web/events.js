@@ -3,9 +3,10 @@
 import { arrange, download, el, setText } from './dom.js';
 import { clock, duration } from './format.js';
 import { plant } from './plant.js';
-import { language, t } from './texts.js';
+import { language, named, t } from './texts.js';
 import { told } from './told.js';
-import { command, eventText, outcome, word } from './words.js';
+import { word } from './vocabulary.js';
+import { command, eventText, outcome } from './words.js';
 
 const SHOWN = 300;
 const COLUMNS = ['time', 'drive', 'kind', 'what', 'who', 'outcome', 'took'];
@@ -71,6 +72,6 @@ function cells(event) {
   const time = clock(event.time_unix_ms);
   if (event.kind !== 'command') return [time, event.drive ?? '', word(event.event), eventText(event), '', '', ''];
   return [time, event.drive ?? '', word('command'), command(event), [event.caller, event.origin].filter(Boolean).join(', '),
-    [outcome(event.outcome), event.text ? told(event.text) : ''].filter(Boolean).join(': '),
+    event.text ? named(outcome(event.outcome), told(event.text)) : outcome(event.outcome),
     event.outcome === 'pending' ? '' : duration(event.took_ms)];
 }

@@ -7,7 +7,7 @@ import { lastExchanges } from './line_last.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 /** Kinds that a slave's exchanges have, and those that only the line can tell. */
 const ERRORS = ['no_answer', 'damaged', 'late', 'mismatched', 'exception'];

@@ -4,7 +4,7 @@ import { path, read } from './api.js';
 import { el, setText } from './dom.js';
 import { clock, MISSING, quantity } from './format.js';
 import { t } from './texts.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 const COLUMNS = ['time', 'slave', 'request', 'answer', 'outcome', 'took'];
 

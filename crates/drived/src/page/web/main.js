@@ -11,7 +11,8 @@ import { overview } from './overview.js';
 import { onChange, plant, rest, start } from './plant.js';
 import { named, switchLanguage, t, writeTexts } from './texts.js';
 import { knowLanguage, told } from './told.js';
-import { eventText, word } from './words.js';
+import { word } from './vocabulary.js';
+import { eventText } from './words.js';
 
 /** The views by the first word of the address. */
 const VIEWS = {
@@ -79,12 +80,12 @@ function open() {
 
 function writeFrame() {
   const { connection, daemon } = plant;
-  const isOld = connection === 'silent' || connection === 'away';
+  const isOld = ['silent', 'away', 'resting'].includes(connection);
   setText(place('connection'), isKnown() ? `${t(connection)} · ${daemon.caller}` : t(connection));
   setAttribute(place('connection'), 'data-connection', connection);
   setClass(document.body, 'silent', isOld);
   const banner = place('banner');
-  banner.hidden = !isOld && connection !== 'refused';
+  banner.hidden = !['silent', 'away', 'refused'].includes(connection);
   setText(banner, connection === 'silent' ? t('banner_silent', { time: clock(plant.heardUnixMs) })
     : connection === 'away' ? t('banner_away') : connection === 'refused' ? t('refused') : '');
   setText(place('login'), t(isKnown() ? 'log_out' : 'log_in'));

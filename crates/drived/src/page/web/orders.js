@@ -8,7 +8,8 @@ import { askToken } from './login.js';
 import { daemonNow } from './plant.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
-import { command as commandText, outcome, word } from './words.js';
+import { word } from './vocabulary.js';
+import { command as commandText, outcome } from './words.js';
 
 const KEPT = 20;
 const SHOWN_MS = 12_000;

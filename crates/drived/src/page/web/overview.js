@@ -5,11 +5,12 @@ import { confirmed } from './ask.js';
 import { arrange, el, setAttribute, setClass, setText } from './dom.js';
 import { quantity } from './format.js';
 import { command } from './orders.js';
-import { plant } from './plant.js';
+import { mayCommand, plant } from './plant.js';
 import { COLUMNS, makeRow } from './row.js';
 import { named, t } from './texts.js';
 import { isTrouble, trouble } from './trouble.js';
-import { stateWord, word } from './words.js';
+import { word } from './vocabulary.js';
+import { stateWord } from './words.js';
 
 /** Rows that are shown at once, and how many more each frame: the worst are read while the rest is made. */
 const ROWS_AT_ONCE = 24;
@@ -36,9 +37,9 @@ export function overview(root) {
   const search = el('input', { type: 'search', value: asked.search, 'aria-label': t('search'),
     placeholder: named(t('search'), t('search_hint')), oninput: () => ask({ search: search.value }) });
   const group = el('select', { 'aria-label': t('group'), onchange: () => ask({ group: group.value }) });
-  const groupOrders = el('span.group-orders', { hidden: true },
-    el('button', { type: 'button', onclick: () => orderGroup('start') }, t('start_group')),
-    el('button', { type: 'button', onclick: () => orderGroup('stop') }, t('stop_group')));
+  const startGroup = el('button', { type: 'button', onclick: () => orderGroup('start') }, t('start_group'));
+  const stopGroup = el('button', { type: 'button', onclick: () => orderGroup('stop') }, t('stop_group'));
+  const groupOrders = el('span.group-orders', { hidden: true }, startGroup, stopGroup);
   const body = el('div.rows', { role: 'rowgroup' });
   const nothing = el('p.hint', { hidden: true }, t('nothing_found'));
 
@@ -89,6 +90,8 @@ export function overview(root) {
     if (room < ranked.length) setTimeout(more);
     nothing.hidden = shown.length > 0 || plant.drives.size === 0;
     groupOrders.hidden = !members;
+    startGroup.hidden = !inGroup.every(mayCommand);
+    stopGroup.hidden = !plant.daemon.rights.stop;
   }
 
   function more() {

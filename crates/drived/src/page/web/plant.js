@@ -8,7 +8,7 @@ const EVENTS_KEPT = 2_000;
 /** What the daemon has said; replaced and patched here alone. */
 export const plant = {
   daemon: { rights: {} }, drives: new Map(), lines: new Map(), groups: [], events: [],
-  /** `reading`, `live`, `interrupted` (for less than 12 s), `silent`, `away` or `refused`. */
+  /** `reading`, `live`, `interrupted` (for less than 12 s), `resting` (the stream is closed for a stop), `silent`, `away` or `refused`. */
   connection: 'reading',
   /** When the daemon was heard last, by its own clock and by ours. */
   heardUnixMs: 0,
@@ -59,11 +59,14 @@ export async function start() {
   });
 }
 
-/** Closes the page's stream: a stop needs its connection. `start` follows the events again. */
+/** Closes the page's stream: a stop needs its connection. Nothing is live until `start` follows the events again. */
 export function rest() {
   starts++;
   endStream?.();
   endStream = undefined;
+  if (plant.connection !== 'live' && plant.connection !== 'interrupted') return;
+  plant.connection = 'resting';
+  tell('state');
 }
 
 /** Now, by the daemon's clock. */
@@ -82,6 +85,12 @@ export function quality(values, drive) {
   if (!values || values.quality === 'missing') return 'missing';
   if (drive?.changedAt && drive.receivedAt - values.age_ms < drive.changedAt) return 'stale';
   return plant.connection === 'live' || plant.connection === 'interrupted' ? values.quality : 'stale';
+}
+
+/** Whether the asker may command a drive: by his rights, by the drives that his token is for, and by whom the drive takes commands of. */
+export function mayCommand({ name, commanders }) {
+  const { rights, scope, caller } = plant.daemon;
+  return Boolean(rights.operate) && (!scope || scope.includes(name)) && (!commanders || commanders.includes(caller));
 }
 
 /** A fresh `DRIVE` that came another way than by the events. */

@@ -1,11 +1,12 @@
 // One drive as a row of the overview: made once, then only what has changed in it.
 
 import { el, setAttribute, setClass, setText } from './dom.js';
-import { MISSING, old, quantity } from './format.js';
+import { MISSING, old } from './format.js';
 import { age, quality } from './plant.js';
 import { t } from './texts.js';
 import { isTrouble, trouble } from './trouble.js';
-import { setpointText, stateWord, word } from './words.js';
+import { word } from './vocabulary.js';
+import { currentText, frequencyText, setpointText, stateWord } from './words.js';
 
 const USUAL_HIGH_HZ = 50;
 const ARROWS = { forward: '▶', reverse: '◀' };
@@ -51,15 +52,13 @@ export function makeRow(drive) {
     setText(place, `${drive.line} · ${drive.slave} · ${drive.family}`);
     setText(state, stateWord(drive));
     setText(turns, status.direction && status.output_frequency_hz !== 0 ? `${ARROWS[status.direction] ?? ''} ${word(status.direction)}` : '');
-    setText(frequency, quantity(status.output_frequency_hz, 1, 'Hz'));
+    setText(frequency, frequencyText(status));
     setText(setpoint, drive.setpoint ? t('to_setpoint', { setpoint: setpointText(drive.setpoint) }) : '');
     const high = drive.limits?.high_hz ?? USUAL_HIGH_HZ;
     fill(frequencyBar, status.output_frequency_hz, high);
     placeMark(frequencyBar.lastChild, drive.setpoint?.frequency_hz, high);
-    const share = typeof status.current_percent === 'number';
-    setText(current, typeof status.current_a === 'number' || !share
-      ? quantity(status.current_a, 1, 'A') : quantity(status.current_percent, 0, '%'));
-    setClass(currentBar, 'unknown', !share);
+    setText(current, currentText(status));
+    setClass(currentBar, 'unknown', typeof status.current_percent !== 'number');
     fill(currentBar, status.current_percent, 100);
     setText(note, worst.text);
     note.title = worst.remedy;

@@ -223,12 +223,13 @@ export const SENTENCES_FR = {
   'n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again': 'n39 a été modifié et agit à la prochaine mise sous tension : couper et remettre le variateur, puis forget() le relit',
 };
 
-const WORDS_FR = {
-  'not ready': 'non prêt', disabled: 'verrouillé', ready: 'prêt', running: 'en marche', stopping: 'décélération', 'quick stop': 'arrêt rapide',
-  'fault reaction': 'réaction au défaut', fault: 'défaut', unknown: 'inconnu', forward: 'avant', reverse: 'arrière', warning: 'alarme',
-  'at reference': 'à la consigne', 'control: bus': 'commande : bus', 'control: terminals': 'commande : bornier', 'control: panel': 'commande : terminal',
-  'control: local': 'commande : locale', 'control: other bus': 'commande : autre bus',
-};
+/** The plain French word for a word of the API, from the page's own table of them. */
+let wordOf = name => name;
+
+/** Takes the words of states, directions and places of control from the page's table. */
+export function useWords(word) {
+  wordOf = word;
+}
 
 // Longer patterns stand before those that would take a part of them.
 const PATTERNS = [
@@ -274,6 +275,10 @@ const PATTERNS = [
   [/^(\d+) (\w+): (.+)$/, (code, mnemonic, meaning) => `${code} ${mnemonic} : ${FAULTS_FR[meaning] ?? meaning}`],
   [/^by its communication watchdog(?: after (.+) without a message)?(?:: (.+))?$/, (time, what) =>
     `par sa surveillance de communication${time ? ` après ${number(time)} sans message` : ''}${what ? ` : ${french(what)}` : ''}`],
+  [/^(.+ stop), sent (\d+) times?$/, (stop, times) => `${reaction(stop)}, envoyé ${times} fois`],
+  [/^(.+ stop) for (.+), (the drive is stopping|it is repeated)$/, (stop, time, how) =>
+    `${reaction(stop)} depuis ${number(time)}, ${how === 'it is repeated' ? 'il est répété' : 'le variateur s’arrête'}`],
+  [/^(\d+) times today$/, times => `${times} fois aujourd’hui`],
   [/^next probe in (.+)$/, time => `prochain essai dans ${number(time)}`],
   [/^by (bus|terminals|panel|local|other bus)$/, who => ({ bus: 'par le bus', terminals: 'par le bornier', panel: 'par le terminal', local: 'en local', 'other bus': 'par un autre bus' })[who]],
   [/^(present|gone)$/, how => (how === 'present' ? 'présente' : 'disparue')],
@@ -293,14 +298,21 @@ export function french(text) {
 }
 
 function state(text) {
-  return text.split(', ').map(part => WORDS_FR[part] ?? number(part)).join(', ');
+  return text.split(', ').map(part => (part.startsWith('control: ') ? `commande : ${inside(part.slice(9))}` : number(inside(part)))).join(', ');
 }
 
-/** A time and what the drive does after it. */
+/** A word as it stands inside a sentence. */
+function inside(name) {
+  const word = wordOf(name);
+  return word[0].toLowerCase() + word.slice(1);
+}
+
+/** What the drive does, also after a time. */
 function reaction(text) {
   const reactions = { nothing: 'rien', freewheel: 'roue libre', 'ramp stop': 'arrêt sur rampe', 'fast stop': 'arrêt rapide', 'DC injection': 'injection de courant continu',
+    'freewheel stop': 'arrêt roue libre', 'DC injection stop': 'arrêt par injection de courant continu',
     'trip (how the motor stops is not in the manual)': 'défaut (le manuel ne dit pas comment le moteur s’arrête)' };
-  return text.replace(/, then (.+)$/, (whole, then) => `, puis ${reactions[then] ?? then}`).replace(/^off/, 'coupée');
+  return reactions[text] ?? text.replace(/, then (.+)$/, (whole, then) => `, puis ${reactions[then] ?? then}`).replace(/^off/, 'coupée');
 }
 
 function number(text) {

@@ -21,8 +21,11 @@
   stop_busy: ['NOT TAKEN YET: {why}.', 'PAS ENCORE PRIS : {why}.'],
   stop_refused: ['STOP REFUSED: {why}.', 'ARRÊT REFUSÉ : {why}.'],
   stop_taken: ['Taken by the daemon at {time} for {count} drives', 'Pris par le service à {time} pour {count} variateurs'],
+  stop_taken_one: ['Taken by the daemon at {time} for one drive', 'Pris par le service à {time} pour un variateur'],
   stop_done: ['Taken by the daemon at {time}: all {count} drives have confirmed the stop', 'Pris par le service à {time} : les {count} variateurs ont confirmé l’arrêt'],
+  stop_done_one: ['Taken by the daemon at {time}: the one drive has confirmed the stop', 'Pris par le service à {time} : le variateur a confirmé l’arrêt'],
   stop_alarm: ['STOP NOT CONFIRMED by {count} drives: their motors may turn', 'ARRÊT NON CONFIRMÉ par {count} variateurs : leurs moteurs peuvent tourner'],
+  stop_alarm_one: ['STOP NOT CONFIRMED by one drive: its motor may turn', 'ARRÊT NON CONFIRMÉ par un variateur : son moteur peut tourner'],
   stop_lost_sight: ['Its account cannot be read now: look at the drives.', 'Son bilan est illisible pour l’instant : regardez les variateurs.'],
   stop_account_gone: ['The daemon has no account of it any more, it may have been restarted: look at the drives.', 'Le service n’en a plus le bilan, il a peut-être redémarré : regardez les variateurs.'],
   stop_next_emergency: ['Use the emergency stop.', 'Utilisez l’arrêt d’urgence.'],
@@ -34,6 +37,7 @@
   stop_not_reachable: ['not reachable', 'injoignables'],
   stop_refused_count: ['only read, not stopped', 'lecture seule, non arrêtés'],
   stop_failed: ['not confirmed', 'non confirmés'],
+  stop_named: ['{kind}: {names}', '{kind} : {names}'],
   stop_others: ['and {count} more', 'et {count} de plus'],
   stop_close: ['Close', 'Fermer'],
   };
@@ -117,16 +121,21 @@
 
   /** Reads the account for as long as something may become of it; what it said last stays when it cannot be read. */
   async function followUp(last, mine) {
-    const opening = setTimeout(() => later.openStream?.(), ATTEMPT_MS);
+    const open = () => setTimeout(() => later.openStream?.(), ATTEMPT_MS);
+    let opening = open();
     while (mine === presses && account.open) {
       await new Promise(over => setTimeout(over, LOOK_MS));
       if (mine !== presses || !account.open) break;
       const answer = await attempt(`commands/${encodeURIComponent(last.id)}?wait=0`, {});
       if (mine !== presses) break;
-      if (answer.document?.drives) take(answer.document);
-      else if (answer.document && answer.status === 404) show({ open: false, sight: 'stop_account_gone' });
+      if (answer.document?.drives) {
+        take(answer.document);
+        opening ??= open();
+      } else if (answer.document && answer.status === 404) show({ open: false, sight: 'stop_account_gone' });
       else if (account.open) {
-        // The stream may hold the last connection: the account is read first.
+        // The stream may hold the last connection: the account is read first, and the events are followed when it can be.
+        clearTimeout(opening);
+        opening = undefined;
         later.closeStream?.();
         show({ sight: 'stop_lost_sight' });
       }
@@ -182,9 +191,9 @@
     if (phase === 'refused') return t('stop_refused', told);
     if (phase !== 'taken') return why ? t('stop_busy', told) : status ? t('stop_unheard_via', told) : t('stop_unheard', told);
     const head = { count: answer.drives.length, time: clock(answer.time_unix_ms) };
-    if (account.sight) return `${t('stop_taken', head)}. ${t(account.sight)}`;
-    if (alarmed.length) return `${t('stop_alarm', { count: alarmed.length })}. ${t('stop_taken', head)}`;
-    return t(left().length ? 'stop_taken' : 'stop_done', head);
+    if (account.sight) return `${many('stop_taken', head)}. ${t(account.sight)}`;
+    if (alarmed.length) return `${many('stop_alarm', { count: alarmed.length })}. ${many('stop_taken', head)}`;
+    return many(left().length ? 'stop_taken' : 'stop_done', head);
   }
 
   /** What to do now. */
@@ -218,7 +227,7 @@
     const texts = kinds.map(kind => {
       const those = left().filter(one => one.counted === kind).map(one => one.drive);
       const rest = those.length > NAMED ? ` ${t('stop_others', { count: those.length - NAMED })}` : '';
-      return `${t(kind === 'refused' ? 'stop_refused_count' : `stop_${kind}`)}: ${those.slice(0, NAMED).join(', ')}${rest}`;
+      return t('stop_named', { kind: t(kind === 'refused' ? 'stop_refused_count' : `stop_${kind}`), names: those.slice(0, NAMED).join(', ') + rest });
     });
     return texts.length ? make('p', 'left', texts.join(' · ')) : null;
   }
@@ -247,6 +256,11 @@
 
   function t(name, values = {}) {
     return TABLE[name][root.lang === 'fr' ? 1 : 0].replace(/\{(\w+)\}/g, (whole, key) => values[key] ?? whole);
+  }
+
+  /** A text about so many drives. */
+  function many(name, values) {
+    return t(values.count === 1 ? `${name}_one` : name, values);
   }
 
   function clock(unixMs) {

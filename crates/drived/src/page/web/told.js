@@ -1,6 +1,7 @@
 // What the daemon says in words, in the language of the page.
 
 import { language } from './texts.js';
+import { word } from './vocabulary.js';
 
 /** The French of the daemon's sentences and of the manuals' meanings: asked for when somebody reads French. */
 let french;
@@ -9,6 +10,7 @@ let french;
 export async function knowLanguage() {
   if (language() !== 'fr' || french) return;
   const [sentences, faults] = await Promise.all([import('./sentences_fr.js'), import('./faults_fr.js')]);
+  sentences.useWords(word);
   french = { sentence: sentences.french, faults: faults.FAULTS_FR };
 }
 

@@ -1,8 +1,8 @@
 // What troubles a drive, as the daemon tells it: the worst, and its words in the language of the page.
 
-import { t } from './texts.js';
+import { named, t } from './texts.js';
 import { faultMeaning, told } from './told.js';
-import { word } from './words.js';
+import { word } from './vocabulary.js';
 
 /** How a drive stands that nothing troubles. */
 const NOTHING = { rank: Infinity, severity: 'none', text: '', remedy: '' };
@@ -11,8 +11,10 @@ const NOTHING = { rank: Infinity, severity: 'none', text: '', remedy: '' };
 export function trouble(drive) {
   const [worst] = drive.concerns ?? [];
   if (!worst) return drive.control === false ? { ...NOTHING, text: t('only_read') } : NOTHING;
-  const text = [t(`concern_${worst.kind}`), told(worst.detail)].filter(Boolean).join(': ');
-  return { rank: worst.rank, severity: worst.severity, text, remedy: told(worst.remedy) };
+  const what = t(`concern_${worst.kind}`);
+  // Who has taken control is told by one word of the API, and everything else by a sentence.
+  const detail = worst.kind === 'control_taken' ? word(worst.detail) : told(worst.detail);
+  return { rank: worst.rank, severity: worst.severity, text: detail ? named(what, detail) : what, remedy: told(worst.remedy) };
 }
 
 /** Whether somebody should see to it; a note is none. */

@@ -81,6 +81,8 @@ pub(crate) enum Action {
 pub(crate) enum Rejected {
     #[error("{caller} has no right to {right}")]
     NoRight { caller: String, right: &'static str },
+    #[error("the token {caller} is not for {drive}")]
+    OutOfScope { caller: String, drive: String },
     #[error("there is no drive {0:?}")]
     NoDrive(String),
     #[error("there is no group {0:?}")]
@@ -95,7 +97,7 @@ impl Rejected {
     /// The outcome and the reason by which every face tells it.
     pub(crate) const fn told(&self) -> (OutcomeWord, &'static str) {
         match self {
-            Self::NoRight { .. } => (OutcomeWord::Refused, "no_right"),
+            Self::NoRight { .. } | Self::OutOfScope { .. } => (OutcomeWord::Refused, "no_right"),
             Self::NoDrive(_) | Self::NoGroup(_) => (OutcomeWord::Refused, "not_found"),
             Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
             Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
@@ -195,12 +197,16 @@ impl Plant {
         }
         self.0.note_commander(&caller.name);
         let fleet = self.fleet();
-        let may_be_less =
-            matches!(request.action, Action::Stop(_)) && !matches!(request.target, Target::Drive(_));
+        let is_stop = matches!(request.action, Action::Stop(_));
+        let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
         let mut members = Vec::new();
         // A reload gives no name to another drive meanwhile.
         let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
         for name in self.named(&groups, &request.target)? {
+            // Whoever may stop, may stop them all.
+            if !is_stop && !caller.may_command(&name, &groups) {
+                return Err(Rejected::OutOfScope { caller: caller.name.clone(), drive: name });
+            }
             match fleet.drive(&name) {
                 Some(drive) => members.push(drive),
                 // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
@@ -278,7 +284,7 @@ mod tests {
         let held = plant.0.commands.hold();
         let starting = plant.clone();
         let started = spawn_blocking(move || {
-            let caller = Caller { name: "page".to_owned(), origin: "page".to_owned(), rights: Rights::ALL };
+            let caller = Caller::new("page", "page", Rights::ALL);
             let action =
                 Action::Start { direction: Direction::Forward, setpoint: None, until: Until::default() };
             let (target, arrived) = (Target::Drive("pump 1".to_owned()), Instant::now());
@@ -299,7 +305,7 @@ mod tests {
     async fn every_command_of_a_burst_is_on_its_way_when_it_was_taken_however_long_the_burst() {
         let plant = TestPlant::of(1).await.plant;
         let (mut events, pump) = (plant.fleet().events(), plant.fleet().drive("pump 1").unwrap());
-        let caller = Caller { name: "scada".to_owned(), origin: "mqtt".to_owned(), rights: Rights::ALL };
+        let caller = Caller::new("scada", "mqtt", Rights::ALL);
         let beside = pump.commanded_by("beside");
         let (messages, mut inbox) = mpsc::unbounded_channel();
         (0..1_000).for_each(|number| messages.send(number).unwrap());

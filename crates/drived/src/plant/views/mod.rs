@@ -50,4 +50,7 @@ pub(crate) struct DaemonView {
     pub(crate) rights: Rights,
     /// Who the asker is: the name of his token, `local` on the socket, or `anonymous`.
     pub(crate) caller: String,
+    /// The drives that the asker's token is for; absent where it is for all. He may stop the others, too, where he may stop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scope: Option<Vec<String>>,
 }

@@ -27,7 +27,7 @@ fn back<T: Serialize + DeserializeOwned>(view: &T) -> Value {
 }
 
 fn caller() -> Caller {
-    Caller { name: "hmi".to_owned(), origin: "test".to_owned(), rights: Rights::ALL }
+    Caller::new("hmi", "test", Rights::ALL)
 }
 
 fn begin(plant: &Plant, target: Target, action: Action) -> Told {

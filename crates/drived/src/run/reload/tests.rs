@@ -27,7 +27,7 @@ fn text(drives: &[(&str, u8, &str)]) -> String {
 /// The route answers what the document of the API says.
 async fn answers_as_described(reloader: Reloader) {
     let rights = Rights { engineer: true, ..Rights::NONE };
-    let caller = Caller { name: "chief".to_owned(), origin: "test".to_owned(), rights };
+    let caller = Caller::new("chief", "test", rights);
     let router = crate::api::reload_router(reloader).layer(axum::Extension(caller));
     let document = crate::api::described();
     for (path, status, kind) in [
