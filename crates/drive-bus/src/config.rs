@@ -145,6 +145,10 @@ pub struct LineConfig {
     /// The gateway between a connection and its drives: what it does that a line cannot see. `None`: one of which nothing is
     /// known on a connection and on Modbus TCP, and none on a serial port or a stream of RTU.
     pub gateway: Option<Gateway>,
+    /// How many connections this line may have to its far end at once. With two a stop takes the second while the first waits
+    /// for a drive that does not answer; it is open only then, and given up where the far end does not grant it. `None`: two on
+    /// Modbus TCP, where gateways serve several clients, and one on RTU over TCP, where few do.
+    pub connections: Option<u8>,
     /// Whether the far end takes the time that characters take on a line, so that what comes sooner than request and answer
     /// can is no answer. `None`: it follows from the kind of port, see [`Endpoint::far_end_paces`].
     pub far_end_paces: Option<bool>,
@@ -221,6 +225,7 @@ impl LineConfig {
             probe_backoff: (Duration::from_millis(500), Duration::from_secs(10)),
             unpaced: false,
             gateway: None,
+            connections: None,
             far_end_paces: None,
             double_window: DOUBLE,
             precise_timer: false,
@@ -266,6 +271,13 @@ impl LineConfig {
         let is_likely = self.endpoint.is_connection() || !self.protocol.is_paced();
         let gateway = self.gateway.or_else(|| is_likely.then(Gateway::default));
         gateway.filter(|gateway| gateway.wait != Some(Duration::ZERO))
+    }
+
+    /// Whether stops may take a second connection.
+    pub(crate) fn takes_second_connection(&self) -> bool {
+        let likely = self.endpoint.is_connection() && !self.protocol.is_paced();
+        let granted = self.connections.map_or(likely, |connections| connections > 1);
+        granted && self.far_end().is_some()
     }
 
     /// How long a gateway may be busy with one more exchange that is answered, on a line of which the settings are known.

@@ -152,6 +152,11 @@ impl<T> Schedule<T> {
         stops.map(|entry| entry.arrived).min()
     }
 
+    /// What has waited longest of what `which` names.
+    pub fn find(&mut self, which: impl Fn(&Entry<T>) -> bool) -> Option<&mut Entry<T>> {
+        self.queued.iter_mut().filter(|entry| which(entry)).min_by_key(|entry| entry.arrived)
+    }
+
     /// Queues a request. Gives its ticket and what it replaces: everything that waits for the same slave with the same
     /// key, except that nothing less urgent takes the place of a Stop or of any higher class.
     ///

@@ -311,6 +311,22 @@ pub struct FarEndStats {
     pub wait_is: WaitIs,
     /// Questions that were asked in vain.
     pub in_vain: u64,
+    /// Whether it serves a second connection, over which a stop goes past what the first waits for.
+    pub second: SecondConnection,
+    /// How many stops were answered over that.
+    pub stops_over_second: u64,
+}
+
+/// Whether a far end serves a second connection of this line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SecondConnection {
+    /// None was needed yet, or none is to be opened.
+    Unused,
+    /// It was answered over it.
+    Granted,
+    /// It is not granted, for this reason, and was given up.
+    GivenUp(&'static str),
 }
 
 /// How it is known how long a gateway waits.

@@ -4,7 +4,7 @@ use std::{
     future::poll_fn,
     io, mem,
     ops::Range,
-    pin::pin,
+    pin::{Pin, pin},
     sync::Arc,
     task::{Context, Poll, Waker},
     time::Duration,
@@ -12,14 +12,14 @@ use std::{
 
 use drive_clock::{Sleeps, Timer, Watch};
 use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
+    io::{AsyncReadExt, AsyncWrite, AsyncWriteExt},
     task::yield_now,
     time::{Instant, timeout},
 };
 
 use crate::{
     config::{Endpoint, LineConfig},
-    master::Outcome,
+    master::{Outcome, SecondPort},
     shared::{Caller, Shared},
     transport::{BoxedStream, Connector, OpenError, Opening, poll_read_now, reset_when_dropped},
 };
@@ -41,6 +41,8 @@ pub(crate) struct Task {
     endpoint: Endpoint,
     connector: Connector,
     port: Connection,
+    /// The connection that stops take while the first waits for a drive that does not answer.
+    second: Connection,
     timer: Timer,
     watch: Option<Watch>,
     sleeps: Sleeps,
@@ -50,6 +52,8 @@ pub(crate) struct Task {
     /// merely opens: some open and fail for ever.
     backoff: Duration,
     received: Vec<u8>,
+    /// The same of the second connection, with room once there is one.
+    received_second: Vec<u8>,
     ended: Vec<(Caller, Outcome)>,
 }
 
@@ -60,9 +64,17 @@ enum Connection {
     Gone,
 }
 
+/// What a port does.
+enum PortEvent {
+    Received(io::Result<usize>),
+    Opened(Result<BoxedStream, OpenError>),
+}
+
 enum Event {
     Received(io::Result<usize>),
     Opened(Result<BoxedStream, OpenError>),
+    /// Something of the second connection.
+    Second(PortEvent),
     /// A deadline, a new request, the end.
     Woken,
 }
@@ -89,12 +101,14 @@ impl Task {
             endpoint: config.endpoint.clone(),
             connector,
             port,
+            second: Connection::Gone,
             timer: if precise { Timer::precise() } else { Timer::tokio() },
             watch: (precise && config.stay_awake).then(Watch::new),
             sleeps: Sleeps::new(),
             awake: None,
             backoff: REOPEN_BACKOFF.0,
             received: vec![0; 512],
+            received_second: Vec::new(),
             ended: Vec::new(),
         }
     }
@@ -118,6 +132,7 @@ impl Task {
                     self.shared.master().handle_down(&error.to_string());
                     self.wait_to_open();
                 }
+                Event::Second(event) => self.take_second(event),
                 Event::Woken => {}
             }
         }
@@ -129,6 +144,7 @@ impl Task {
     async fn decide(&mut self) -> Option<Option<Instant>> {
         loop {
             self.read_rest().await;
+            self.serve_second();
             let (frame, deadline, finished, asked_at, mute) = {
                 let now = Instant::now();
                 let mut master = self.shared.master();
@@ -213,8 +229,65 @@ impl Task {
         self.shared.tap().take_if(|tap| !tap.received(now, bytes, complete));
     }
 
+    /// Opens, closes and writes the second connection as the master wants it. Nothing of it is waited for.
+    fn serve_second(&mut self) {
+        let now = Instant::now();
+        let wanted = {
+            let mut master = self.shared.master();
+            master.handle_timeout(now);
+            master.poll_second(now)
+        };
+        match wanted {
+            Some(SecondPort::Open) => {
+                self.second = self.connector.connect().map_or(Connection::Gone, Connection::Opening);
+                self.received_second.resize(self.received.len(), 0);
+            }
+            Some(SecondPort::Close) => {
+                if let Connection::Open(stream) = &self.second {
+                    reset_when_dropped(stream);
+                }
+                self.second = Connection::Gone;
+            }
+            None => {}
+        }
+        let Connection::Open(stream) = &mut self.second else { return };
+        let Some(frame) = self.shared.master().poll_second_transmit(now) else { return };
+        // Its buffer is empty: one that does not take a frame at once is as good as gone.
+        let mut context = Context::from_waker(Waker::noop());
+        match Pin::new(stream).poll_write(&mut context, &frame) {
+            Poll::Ready(Ok(len)) if len == frame.len() => {
+                let now = Instant::now();
+                self.shared.master().handle_second_sent(now);
+                self.shared.tap().take_if(|tap| !tap.sent(now, &frame));
+            }
+            _ => self.lose_second(),
+        }
+    }
+
+    fn take_second(&mut self, event: PortEvent) {
+        let now = Instant::now();
+        match event {
+            PortEvent::Opened(Ok(stream)) => {
+                self.shared.master().handle_second_up(now);
+                self.second = Connection::Open(stream);
+            }
+            PortEvent::Received(Ok(len @ 1..)) => {
+                let bytes = self.received_second.get(..len).unwrap_or_default();
+                self.shared.master().handle_second_bytes(now, bytes);
+                self.shared.tap().take_if(|tap| !tap.received(now, bytes, true));
+            }
+            PortEvent::Received(_) | PortEvent::Opened(Err(_)) => self.lose_second(),
+        }
+    }
+
+    fn lose_second(&mut self) {
+        self.second = Connection::Gone;
+        self.shared.master().handle_second_lost(Instant::now());
+    }
+
     async fn next_event(&mut self, deadline: Option<Instant>) -> Event {
-        let Self { shared, connector, port, timer, watch, awake, received, .. } = self;
+        let Self { shared, connector, port, second, timer, watch, awake, received, received_second, .. } =
+            self;
         if let Connection::Waiting(until) = port
             && *until <= Instant::now()
         {
@@ -226,7 +299,11 @@ impl Task {
         let watched = watched.filter(|start| wake_at.is_none_or(|wake_at| *start < wake_at));
         tokio::select! {
             biased;
-            event = port_event(port, received) => return event,
+            event = port_event(port, received) => return match event {
+                PortEvent::Received(read) => Event::Received(read),
+                PortEvent::Opened(opened) => Event::Opened(opened),
+            },
+            event = port_event(second, received_second) => return Event::Second(event),
             () = shared.wake.notified() => return Event::Woken,
             () = poll_fn(|context| match (watched, wake_at) {
                 (Some(start), _) => timer.poll_shortly_before(context, start),
@@ -342,10 +419,10 @@ async fn read_awake(
     }
 }
 
-async fn port_event(port: &mut Connection, received: &mut [u8]) -> Event {
+async fn port_event(port: &mut Connection, received: &mut [u8]) -> PortEvent {
     match port {
-        Connection::Open(stream) => Event::Received(stream.read(received).await),
-        Connection::Opening(opening) => Event::Opened(opening.await),
+        Connection::Open(stream) => PortEvent::Received(stream.read(received).await),
+        Connection::Opening(opening) => PortEvent::Opened(opening.await),
         Connection::Waiting(_) | Connection::Gone => std::future::pending().await,
     }
 }

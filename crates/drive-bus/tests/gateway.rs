@@ -5,11 +5,13 @@
 
 mod support;
 
-use std::time::Duration;
+use std::{future::ready, time::Duration};
 
-use drive_bus::{Line, LineConfig, Protocol};
+use drive_bus::{Line, LineConfig, Protocol, stats::SecondConnection as Told};
 use drive_core::{Class, SerialSettings, Terms};
-use drive_sim::{Gateway, GatewayInMemory, SimLine, SimSlave, Wiring, models::atv312::Atv312};
+use drive_sim::{
+    Gateway, GatewayInMemory, SecondConnection, SimLine, SimSlave, Wiring, models::atv312::Atv312,
+};
 use support::{MS, read, write};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
@@ -50,6 +52,17 @@ impl Plant {
         Line::over(
             self.gateway.connect(),
             LineConfig { gateway: Some(drive_bus::Gateway::default()), ..config },
+        )
+    }
+
+    /// A line that may take a second connection.
+    fn line_of_two(&self, gateway: drive_bus::Gateway) -> Line {
+        let protocol = if self.habits.rtu { Protocol::Rtu } else { Protocol::Tcp };
+        let config = LineConfig { protocol, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
+        let far = self.gateway.clone();
+        Line::over_reopened(
+            move || ready(Ok(far.connect())),
+            LineConfig { gateway: Some(gateway), connections: Some(2), ..config },
         )
     }
 
@@ -211,4 +224,135 @@ async fn drives_behind_a_gateway_whose_power_comes_back_are_read_again() {
         let (good, ()) = tokio::join!(polled(&line, &[], begin + 95 * SECOND, begin + 105 * SECOND), power);
         assert!(good >= 390, "{good} with {habits:?}");
     }
+}
+
+/// The waits of stops that are given at so many times after three drives have died, by a line that may take two connections.
+async fn waits_with_two(habits: Gateway) -> Vec<Duration> {
+    let mut waits = Vec::new();
+    for after in (1..40).map(|n| 211 * MS * n) {
+        let plant = plant(habits);
+        let line = plant.line_of_two(drive_bus::Gateway::default());
+        let died = Instant::now() + 2 * SECOND;
+        let stops = async {
+            sleep_until(died).await;
+            (1..=3).for_each(|address| plant.drive(address).mute());
+            sleep(after).await;
+            let (called, bound) = (Instant::now(), line.worst_case_stop());
+            let learned = line.stats().worst_case_stop;
+            let mut slave = line.slave(6).with_terms(Terms::of(Class::Stop));
+            assert!(write(&mut slave, CMD, 0).await.is_ok(), "{after:?} with {habits:?}");
+            let waited = plant.stopped(6).expect("it is confirmed") - called;
+            assert!(waited <= bound.min(learned), "{waited:?} of {bound:?}, {learned:?}, {after:?}");
+            waited
+        };
+        let polling = polled(&line, &[1, 2, 3], died, died + after + 8 * SECOND);
+        let (waited, _) = tokio::join!(stops, polling);
+        waits.push(waited);
+    }
+    waits
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_a_gateway_grants_two_connections_a_stop_waits_for_one_question_in_vain_whoever_has_died() {
+    for habits in kinds() {
+        let worst = waits_with_two(habits).await.into_iter().max().unwrap();
+        println!("{habits:?}: a stop waited for {worst:?}");
+        assert!(worst <= habits.wait * habits.attempts + SECOND / 2, "{worst:?} with {habits:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_two_connections_are_served_side_by_side_a_stop_waits_for_no_dead_drive() {
+    for habits in kinds() {
+        let habits = Gateway { one_line: false, ..habits };
+        let mut waits = waits_with_two(habits).await;
+        waits.sort();
+        println!("{habits:?}: a stop waited for {:?}", waits.last());
+        // Only one that is given in the half second in which the first drive's death is not known yet waits for that.
+        let longest = waits.last().unwrap();
+        assert!(*longest < SECOND, "{waits:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_connection_that_is_not_granted_is_given_up_and_told_and_the_living_are_read() {
+    let all = [
+        (SecondConnection::Refused, "the far end has ended it"),
+        (SecondConnection::NeverServed, "it gives no answer"),
+        (SecondConnection::EndsTheFirst, "the far end has ended the first for it"),
+        (SecondConnection::SilencesTheFirst, "with it the first gave no answer any more"),
+    ];
+    for (second, why) in all {
+        for habits in kinds() {
+            let habits = Gateway { second, ..habits };
+            let plant = plant(habits);
+            let line = plant.line_of_two(drive_bus::Gateway::default());
+            let died = Instant::now() + 3 * SECOND;
+            let until = died + 60 * SECOND;
+            let stops = async {
+                sleep_until(died).await;
+                plant.drive(3).mute();
+                let mut slave = line.slave(4).with_terms(Terms::of(Class::Stop));
+                while Instant::now() + 5 * SECOND < until {
+                    let called = Instant::now();
+                    let confirmed = write(&mut slave, CMD, 0).await;
+                    let at = died.elapsed();
+                    assert!(
+                        confirmed.is_ok(),
+                        "{confirmed:?} after {:?}, {at:?} with {habits:?}",
+                        called.elapsed()
+                    );
+                    assert!(called.elapsed() <= line.worst_case_stop(), "{:?} {habits:?}", called.elapsed());
+                    sleep(1_700 * MS).await;
+                }
+            };
+            let (good, ()) = tokio::join!(polled(&line, &[3], died, until), stops);
+            let stats = line.stats();
+            println!("{second:?}, rtu {}: {good} values, opened {}", habits.rtu, stats.opened);
+            assert_eq!(stats.far_end.unwrap().second, Told::GivenUp(why), "{habits:?}");
+            assert!(stats.opened <= 3, "{} with {habits:?}", stats.opened);
+            assert!(good >= 1_000, "{good} with {habits:?}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_overtakes_a_run_word_is_confirmed_only_by_the_stop_behind_that_word() {
+    // What is configured is not so: it serves one request of each connection at a time.
+    let habits = Gateway { one_line: false, ..Gateway::default() };
+    let gateway = drive_bus::Gateway { at_once: Some(2), ..drive_bus::Gateway::default() };
+    let plant = plant(habits);
+    let line = plant.line_of_two(gateway);
+    for address in 1..=DRIVES {
+        read(&mut line.slave(address), ETA, 1).await.unwrap();
+    }
+    plant.drive(3).mute();
+    let dead = Terms::of(Class::Status).within(20 * MS);
+    assert!(read(&mut line.slave(3).with_terms(dead), ETA, 1).await.is_err());
+    // It waits behind the dead drive, and nobody knows what becomes of it.
+    let mut run = line.slave(4).with_terms(Terms::of(Class::Command).within(400 * MS));
+    assert!(write(&mut run, CMD, 15).await.is_err());
+    let words = || -> Vec<u8> {
+        let received = plant.drive(4).received();
+        let words = received.iter().filter(|request| request.pdu[..3] == [6, 0x21, 0x35]);
+        words.map(|request| request.pdu[4]).collect()
+    };
+    assert_eq!(words(), [0; 0]);
+    let called = Instant::now();
+    let confirmed = write(&mut line.slave(4).with_terms(Terms::of(Class::Stop)), CMD, 0).await;
+    println!("{confirmed:?} after {:?}: {:?}", called.elapsed(), words());
+    assert!(confirmed.is_ok());
+    assert_eq!(words(), [0, 15, 0], "a stop at once, the run word, and the stop that counts");
+    let first = plant.stopped(4).unwrap() - called;
+    assert!(first < 100 * MS, "{first:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_whose_drives_answer_opens_no_second_connection() {
+    let plant = plant(Gateway { second: SecondConnection::EndsTheFirst, ..Gateway::default() });
+    let line = plant.line_of_two(drive_bus::Gateway::default());
+    let begin = Instant::now();
+    polled(&line, &[], begin, begin + 20 * SECOND).await;
+    let stats = line.stats();
+    assert_eq!((stats.opened, stats.far_end.unwrap().second), (1, Told::Unused));
 }

@@ -34,7 +34,7 @@ pub use motor::{Motor, Nameplate, Ramp, Ramps};
 pub use pdu::identification;
 pub use playback::{Playback, Played, Says};
 pub use record::{Breach, LineStats, Violation};
-pub use serve::{Gateway, GatewayInMemory, Serving};
+pub use serve::{Gateway, GatewayInMemory, SecondConnection, Serving};
 pub use slave::Received;
 pub use watchdog::Watchdog;
 pub use wire::Delivery;

@@ -16,13 +16,14 @@ use drive_core::{
 use drive_families::Options;
 
 use self::far_end::FarEndError;
-pub(crate) use self::far_end::{FarEndSpec, proposal};
+pub(crate) use self::far_end::{FarEndSpec, MOST_CONNECTIONS, proposal};
 use crate::drive_spec::DriveName;
 
 /// What a line is, for the help of `--line`.
 pub(crate) const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT; \
      PROTOCOL is rtu, ascii or unitelway, such as unitelway,header=simplified,link-timeout=200ms; behind each may stand gateway=none, \
-     or gateway=3x1s for a gateway that asks a dead drive three times for a second, and far-end-paces=no for an adapter or a program \
+     or gateway=3x1s for a gateway that asks a dead drive three times for a second, connections=2 for a far end that grants a stop a second connection (1 where \
+     it must not have one), and far-end-paces=no for an adapter or a program \
      that is faster than the line's speed";
 
 /// The same for a port that is only listened to.
@@ -379,6 +380,7 @@ mod tests {
             "tcp://plant:502",
             "tcp://plant:502,gateway=none",
             "tcp://plant:502,gateway=3s/4",
+            "rtu+tcp://plant:4001,19200,8E1,gateway=3s,connections=2",
             "rtu+tcp://plant:4001,9600,8N1,gateway=unknown,far-end-paces=yes",
             "COM3,9600,8N1,far-end-paces=no",
             "COM3,19200,8O1,unitelway,header=simplified,link-timeout=200ms,far-end-paces=no",
@@ -393,6 +395,8 @@ mod tests {
         assert_eq!((line.far_end_paces, line.serial.to_string().as_str()), (Some(false), "19200 8E1"));
         let none = config("tcp://plant:502,gateway=none", &["atv312@1"]).unwrap();
         assert_eq!(none.far_end(), None);
+        let error = config("COM3,9600,8N1,connections=2", &["atv312@1"]).unwrap_err().to_string();
+        assert!(error.contains("a serial port has no connections"), "{error}");
         let error = config("tcp://plant:502,far-end-paces=no", &["atv312@1"]).unwrap_err().to_string();
         assert!(error.contains("Modbus TCP has no speed"), "{error}");
     }
@@ -439,6 +443,8 @@ mod tests {
             ("tcp://plant:502,9600", "Modbus TCP has no speed"),
             ("tcp://plant:502,gateway=often", "\"often\": expected none, unknown, or how long"),
             ("tcp://plant:502,gateway=none,gateway=1s", "gateway is said twice"),
+            ("tcp://plant:502,connections=3", "expected 1, or 2"),
+            ("tcp://plant:502,connections=1,connections=1", "connections is said twice"),
             ("COM3,9600,8N1,far-end-paces=maybe", "expected yes or no"),
         ] {
             let error = line.parse::<LineSpec>().unwrap_err().to_string();

@@ -16,7 +16,7 @@ use tokio::time::Instant;
 use crate::{
     gateway::Gateway,
     shape::Shape,
-    stats::{FarEndStats, WaitIs},
+    stats::{FarEndStats, SecondConnection, WaitIs},
 };
 
 /// Of so many questions in vain one asks again whether a far end that does one thing at a time still does.
@@ -24,6 +24,9 @@ const ASK_AGAIN: u32 = 8;
 
 /// What is owed at the most: one question of each of the drives of a long line.
 const MOST: usize = 32;
+
+/// A gateway is still at what it was asked so short a time ago, unless it waits for less than twice that.
+const SOON: Duration = Duration::from_secs(1);
 
 /// How often what is waited for may double while nothing proves that the far end is done.
 const DOUBLINGS: u32 = 2;
@@ -112,7 +115,7 @@ impl FarEnd {
         self.owed.len()
     }
 
-    pub(super) fn stats(&self) -> Option<FarEndStats> {
+    pub(super) fn stats(&self, second: SecondConnection, stops_over_second: u64) -> Option<FarEndStats> {
         let gateway = self.gateway?;
         let wait_is = match (self.seen, gateway.wait) {
             (Some(_), _) => WaitIs::Seen,
@@ -126,6 +129,8 @@ impl FarEnd {
             wait: self.wait(),
             wait_is,
             in_vain: u64::from(self.in_vain),
+            second,
+            stops_over_second,
         })
     }
 
@@ -177,14 +182,19 @@ impl FarEnd {
             return Vec::new();
         }
         if at_once {
-            if self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
+            // Later it may be done with what was asked, though nobody was told; with what a lost connection has asked, at once.
+            let soon = SOON.min(self.wait() / 2);
+            let is_recent = |owed: &Owed| now.saturating_duration_since(owed.asked) < soon;
+            let is_busy = self.owed.iter().all(|owed| is_recent(owed) && !owed.over_a_lost_port);
+            if is_busy && self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
                 self.serves = behind + 1;
                 self.exactly = false;
             }
             return Vec::new();
         }
         if self.gateway_may_change() {
-            self.serves = behind.max(1);
+            // Behind two it may have waited for one after the other.
+            self.serves = self.serves.min(behind);
             self.exactly = true;
         }
         self.done_with_all(now)
@@ -257,7 +267,8 @@ impl FarEnd {
     }
 
     fn done_with_all(&mut self, now: Instant) -> Vec<u8> {
-        if let Some(first) = self.owed.first().map(|owed| owed.asked) {
+        // What is served side by side shows nothing of how long each is waited for.
+        if let Some(first) = self.owed.first().filter(|_| self.serves < 2).map(|owed| owed.asked) {
             self.saw(now, first, self.owed.len());
         }
         let slaves = self.owed.drain(..).map(|owed| owed.slave).collect();
@@ -315,6 +326,28 @@ mod tests {
         far.owe(asked(3, 2, now));
         assert!(far.gate(false).is_some(), "of three at once nothing is known");
         assert_eq!(far.gate(true), None);
+    }
+
+    #[test]
+    fn an_answer_at_once_when_the_far_end_may_be_done_says_nothing_of_how_much_it_does_at_once() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        // A stop, sent when the gateway had given up without a word.
+        assert!(far.answered(now + 3_200 * MS, 1, true).is_empty());
+        assert!(far.holds_others_up());
+        assert_eq!(far.stop_waits(), 2 * Gateway::ASSUMED_WAIT);
+    }
+
+    #[test]
+    fn an_answer_behind_two_questions_in_vain_does_not_show_that_two_are_served_at_once() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        far.owe(asked(2, 2, now));
+        assert_eq!(far.answered(now + 6 * SECOND, 2, false), [1, 2]);
+        assert!(far.holds_others_up());
+        assert_eq!((far.wait(), far.stop_waits()), (3 * SECOND, 3 * SECOND));
     }
 
     #[test]

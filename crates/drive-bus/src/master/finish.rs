@@ -154,6 +154,7 @@ impl<C> Master<C> {
 
     /// The far end may still be at it.
     pub(super) fn owe(&mut self, flight: &Flight<C>) {
+        self.unsettle(self.exchange_end, flight);
         if let Some(asked) = flight.asked() {
             self.far_end.owe(asked);
         }
@@ -170,6 +171,7 @@ impl<C> Master<C> {
         let at_once = flight.sent.is_none_or(|sent| now <= sent.usually_by);
         let given_up = self.far_end.answered(now, flight.behind, at_once);
         self.nobody_answered(now, given_up);
+        self.second.settled(now, flight.slave, flight.asked_at);
         let station = self.station(flight.slave);
         station.answered_at = Some(flight.asked_at);
         // What has waited behind what was owed says nothing of its slave.
@@ -234,7 +236,10 @@ impl<C> Master<C> {
                 }
                 return;
             }
-            Failure::Mismatch(_) => station.stats.outcomes.mismatches += 1,
+            Failure::Mismatch(_) => {
+                station.stats.outcomes.mismatches += 1;
+                self.unsettle(now, flight);
+            }
             Failure::Timeout => station.stats.outcomes.timeouts += 1,
             // Its gateway has waited for it.
             Failure::Nobody => {
@@ -249,6 +254,9 @@ impl<C> Master<C> {
             self.owe(flight);
             if self.stations.get(&flight.slave).is_some_and(|station| station.timeout.is_learned()) {
                 self.fresh.in_vain(now);
+                if self.blame_second(flight) {
+                    self.fresh.is_mute = true;
+                }
             }
         }
         if goes_offline {
@@ -363,6 +371,9 @@ impl<C> Master<C> {
         self.exchange.abandon();
         self.record.ended(now, flight.slave, flight.started, Ending::Unanswered);
         self.stats.broadcasts += u64::from(flight.slave == 0);
+        if flight.behind > 0 {
+            self.unsettle(now, &flight);
+        }
         self.stats.busy += now.saturating_duration_since(flight.started);
         let Purpose::Call(Some(entry)) = flight.purpose else { return };
         let confirmation = answer::confirmation(&flight.request)
@@ -371,8 +382,8 @@ impl<C> Master<C> {
         self.outcomes.push_back((entry.work.caller, confirmation));
     }
 
-    /// The port is lost with exchanges under way. A read waits for the next port; a write has an unknown outcome and
-    /// is never sent again.
+    /// The port is lost with exchanges under way. A read waits for the next port, and so does a stop; any other write has an
+    /// unknown outcome and is never sent again.
     pub(super) fn fail_flight(&mut self, now: Instant, reason: &str) {
         self.to_send = None;
         if let Some(flight) = &self.flight {
@@ -381,6 +392,7 @@ impl<C> Master<C> {
         let aside = std::mem::take(&mut self.aside).into_values().map(|aside| aside.flight);
         let flights: Vec<_> = self.flight.take().into_iter().chain(aside).collect();
         for flight in flights {
+            self.unsettle(now, &flight);
             self.fear_late_answer(now, &flight);
             self.fail_call(now, flight.purpose, reason);
         }
@@ -389,7 +401,15 @@ impl<C> Master<C> {
     fn fail_call(&mut self, now: Instant, purpose: Purpose<C>, reason: &str) {
         let Purpose::Call(Some(mut entry)) = purpose else { return };
         if entry.work.is_write {
-            self.outcomes.push_back((entry.work.caller, Err(PortError::OutcomeUnknown("the line was lost"))));
+            let unknown = PortError::OutcomeUnknown("the line was lost");
+            // A stop is sent again, as soon as there is a port.
+            if entry.terms.class == Class::Stop && self.may_retry(now, &entry) {
+                entry.work.attempts += 1;
+                entry.work.last = Some(unknown);
+                self.schedule.queue_again(entry);
+            } else {
+                self.outcomes.push_back((entry.work.caller, Err(unknown)));
+            }
         } else if self.may_retry(now, &entry) {
             entry.work.attempts += 1;
             entry.work.last = Some(PortError::LineDown(reason.to_owned()));

@@ -44,6 +44,10 @@ pub(super) struct Fresh {
     in_vain: Option<Instant>,
     /// How often in a row the port was opened again for that.
     reopened: u32,
+    /// The port is known to be mute.
+    pub(super) is_mute: bool,
+    /// It was left for that, and not ended by its far end.
+    pub(super) was_left: bool,
 }
 
 /// A port that was opened again.
@@ -79,6 +83,11 @@ impl Fresh {
         self.heard = Some(now);
         self.in_vain = None;
         self.reopened = 0;
+    }
+
+    /// When anything was heard last, or the port was opened.
+    pub(super) const fn last_heard(&self) -> Option<Instant> {
+        self.heard
     }
 
     /// A question to somebody who has answered before was in vain.
@@ -146,9 +155,11 @@ impl<C> Master<C> {
     /// Why the port is to be closed and opened again, if it is.
     pub fn poll_mute(&mut self, now: Instant) -> Option<String> {
         let mute = now.saturating_duration_since(self.fresh.heard?);
-        if self.mute_at().is_none_or(|at| at > now) {
+        if !std::mem::take(&mut self.fresh.is_mute) && self.mute_at().is_none_or(|at| at > now) {
             return None;
         }
+        self.fresh.was_left = true;
+        self.mute_beside_second(now);
         self.fresh.heard = Some(now);
         self.fresh.in_vain = None;
         self.fresh.reopened = self.fresh.reopened.saturating_add(1);
@@ -170,7 +181,9 @@ impl<C> Master<C> {
             .iter()
             .filter(|(slave, station)| **slave != 0 && asked(station))
             .all(|(slave, _)| !answers(slave) || self.offline.contains(*slave));
-        all_failed.then(|| heard + self.mute_for())
+        // Or its far end is there, and answers over another connection.
+        let is_elsewhere = self.second.heard.is_some_and(|at| at > heard);
+        (all_failed || is_elsewhere).then(|| heard + self.mute_for())
     }
 
     /// How long all are mute before the port is opened again.

@@ -11,6 +11,7 @@ mod fresh;
 mod offline;
 mod port;
 mod probing;
+mod second;
 mod send;
 mod station;
 mod waits;
@@ -45,6 +46,8 @@ use fresh::Fresh;
 use offline::Offline;
 use port::PortState;
 use probing::{Probing, Question};
+use second::Second;
+pub use second::SecondPort;
 use station::Station;
 
 /// How a call ends.
@@ -72,6 +75,8 @@ pub struct Master<C> {
     fresh: Fresh,
     /// What the gateway still owes, if there is one.
     far_end: FarEnd,
+    /// The connection that stops take besides.
+    second: Second,
     flight: Option<Flight<C>>,
     /// Exchanges whose slaves are not ready yet.
     aside: BTreeMap<u8, Aside<C>>,
@@ -118,6 +123,8 @@ struct Asked<C> {
     echo_was_read: bool,
     /// The slave refuses to read more along.
     asked_longer: bool,
+    /// It went over the second connection too.
+    went_second: bool,
     /// What became of the last attempt.
     last: Option<PortError>,
 }
@@ -128,6 +135,8 @@ struct Flight<C> {
     slave: u8,
     request: Arc<Request<'static>>,
     shape: Shape,
+    /// Somebody's stop, whether he still waits for it or not.
+    is_stop: bool,
     /// By how many words the read was lengthened.
     more: u8,
     /// An answer of this shape may be that to an earlier request.
@@ -199,6 +208,7 @@ impl<C> Master<C> {
             again: None,
             fresh: Fresh::default(),
             far_end: FarEnd::new(config.far_end()),
+            second: Second::new(&config),
             flight: None,
             aside: BTreeMap::new(),
             resumed: false,
@@ -274,6 +284,7 @@ impl<C> Master<C> {
             attempts: 0,
             echo_was_read: false,
             asked_longer: false,
+            went_second: false,
             last: None,
         };
         let (ticket, replaced) = self
@@ -349,6 +360,9 @@ impl<C> Master<C> {
         self.record.ended(now, flight.slave, flight.started, Ending::GivenUp);
         self.fear_late_answer(now, flight);
         self.owe(flight);
+        if !matches!(flight.purpose, Purpose::Probe) {
+            self.fresh.in_vain(now);
+        }
         self.quiet_from = self.quiet_from.max(now);
         self.exchange_end = self.quiet_from;
     }
@@ -440,6 +454,7 @@ impl<C> Master<C> {
         let given_up = self.far_end.expired(now);
         self.nobody_answered(now, given_up);
         self.let_stops_through(now);
+        self.second_timeout(now);
         let unanswered =
             self.flight.as_ref().and_then(|flight| flight.sent).and_then(|sent| sent.unanswered_until);
         if unanswered.is_some_and(|until| now >= until) {
@@ -467,7 +482,8 @@ impl<C> Master<C> {
         let unanswered =
             self.flight.as_ref().and_then(|flight| flight.sent).and_then(|sent| sent.unanswered_until);
         let exchange = if unanswered.is_some() { unanswered } else { self.exchange.deadline() };
-        [exchange, self.choose_at, self.gives_way_at(), self.mute_at(), self.schedule.next_expiry()]
+        let second = self.second.deadline();
+        [exchange, second, self.choose_at, self.gives_way_at(), self.mute_at(), self.schedule.next_expiry()]
             .into_iter()
             .flatten()
             .min()
@@ -620,7 +636,7 @@ impl<C> Master<C> {
         stats.queued = self.schedule.len();
         stats.echoing = self.exchange.echoes();
         stats.worst_case_stop = self.learned_worst_case_stop();
-        stats.far_end = self.far_end.stats();
+        stats.far_end = self.far_end.stats(self.second.told(), self.second.stops);
         stats.away = self.port.away().map(str::to_owned);
         stats.slaves = self
             .stations

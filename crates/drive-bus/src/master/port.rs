@@ -51,6 +51,7 @@ impl<C> Master<C> {
         self.exchange.reset();
         let asked = self.flight.as_ref().and_then(Flight::asked);
         self.far_end.lost(asked);
+        self.end_second(now);
         self.fail_flight(now, reason);
         self.sending = None;
     }

@@ -49,8 +49,8 @@ impl<C> Master<C> {
             return None;
         }
         let free_at = self.free_at();
-        let Self { exchange, stations, aside: waiting, offline, far_end, .. } = &*self;
-        let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline, far_end };
+        let Self { exchange, stations, aside: waiting, offline, far_end, second, .. } = &*self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline, far_end, second };
         let stop_since = self.schedule.first_stop(|entry| waits.until(now, entry).is_none());
         let stop_at = stop_since.map(|since| self.stop_free_at(since));
         let probe = self.next_probe(now).filter(|_| stop_at.is_none() && !self.closing);
@@ -96,8 +96,10 @@ impl<C> Master<C> {
     }
 
     fn choose(&mut self, now: Instant, free_at: Instant, stop_at: Option<Instant>) -> Chosen<Asked<C>> {
-        let Self { schedule, stations, aside, config, last_slave, exchange, offline, far_end, .. } = self;
-        let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline, far_end };
+        let Self {
+            schedule, stations, aside, config, last_slave, exchange, offline, far_end, second, ..
+        } = self;
+        let waits = Waits { exchange: exchange.as_ref(), stations, aside, offline, far_end, second };
         schedule.choose(now, |entry| {
             let stop = entry.terms.class == Class::Stop;
             let mut at = stop_at.filter(|_| stop).unwrap_or(free_at);
@@ -229,7 +231,9 @@ impl<C> Master<C> {
         let answer = answer::likely_len(&request);
         self.longest = (self.longest.0.max(pdu.len()), self.longest.1.max(answer));
         let (patience, question) = self.patience(now, slave, &purpose);
+        let is_stop = matches!(&purpose, Purpose::Call(Some(entry)) if entry.terms.class == Class::Stop);
         self.flight = Some(Flight {
+            is_stop,
             purpose,
             slave,
             request,

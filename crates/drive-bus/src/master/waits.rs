@@ -6,6 +6,7 @@
 //! - no **answer that may still come** could be taken for its own, nor for that of the read which asks the adapter for its
 //!   echo on its behalf. The write of a stop waits for neither;
 //! - the **far end** is done with what it owes, or can do more meanwhile. The write of a stop waits for nothing of that;
+//! - the stop of its slave that is under way over the **second connection** is over, where it is another write;
 //! - the stop of a slave that is off-line, once it was sent in vain, for **its share of the line**.
 //!
 //! A stop that waits for none of them **holds the line**: nothing less urgent starts, not in its slave's pause either. One
@@ -17,7 +18,9 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Asked, Purpose, aside::Aside, far_end::FarEnd, offline::Offline, station::Station};
+use super::{
+    Asked, Purpose, aside::Aside, far_end::FarEnd, offline::Offline, second::Second, station::Station,
+};
 use crate::{answer, exchange::Machine, pdu, schedule::Entry, shape::Shape};
 
 /// How long what may not overtake an exchange that was put aside waits until it is looked at again: less than a poll of
@@ -31,6 +34,7 @@ pub(super) struct Waits<'a, C> {
     pub(super) aside: &'a BTreeMap<u8, Aside<C>>,
     pub(super) offline: &'a Offline,
     pub(super) far_end: &'a FarEnd,
+    pub(super) second: &'a Second,
 }
 
 impl<C> Waits<'_, C> {
@@ -48,7 +52,8 @@ impl<C> Waits<'_, C> {
         });
         let share = self.offline.stop_at(entry.slave).filter(|_| is_stop);
         let gate = self.far_end.gate(self.proves_something(entry)).filter(|_| !goes_at_once);
-        aside.max(doubt).max(share).max(gate).filter(|until| *until > now)
+        let second = self.second.holds(entry.slave).filter(|_| entry.work.is_write && !is_stop);
+        aside.max(doubt).max(share).max(gate).max(second).filter(|until| *until > now)
     }
 }
 

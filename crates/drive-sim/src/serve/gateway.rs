@@ -1,7 +1,16 @@
 //! A gateway with a stranger's habits: a box between a network and the line, which serves one request after another and
 //! waits for drives that do not answer.
 
-use std::{collections::VecDeque, io, pin::pin, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeSet, VecDeque},
+    io,
+    pin::pin,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use crc::{CRC_16_MODBUS, Crc};
 use tokio::{
@@ -46,6 +55,24 @@ pub struct Gateway {
     pub doubles_after: Option<Duration>,
     /// A connection gives nothing any more when it is so old; the next one does.
     pub mute_after: Option<Duration>,
+    /// What it does with a second connection.
+    pub second: SecondConnection,
+}
+
+/// What a gateway does when somebody connects while another connection is open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SecondConnection {
+    /// It serves both, as gateways for several clients do.
+    #[default]
+    Granted,
+    /// It ends the new one at once.
+    Refused,
+    /// The system takes the new one, and nobody serves it until the first is gone: a server that knows one client.
+    NeverServed,
+    /// It ends the first: the newest client is the right one.
+    EndsTheFirst,
+    /// It answers on the newest alone, and leaves the first open.
+    SilencesTheFirst,
 }
 
 impl Default for Gateway {
@@ -60,6 +87,7 @@ impl Default for Gateway {
             replays_when_asked: false,
             doubles_after: None,
             mute_after: None,
+            second: SecondConnection::Granted,
         }
     }
 }
@@ -74,6 +102,44 @@ struct Behind {
     cut: watch::Sender<()>,
     /// Its last answers, as they went out.
     last: std::sync::Mutex<VecDeque<Vec<u8>>>,
+    /// The connections that are open, by their number, the oldest first.
+    open: std::sync::Mutex<BTreeSet<u64>>,
+    /// How many there have been.
+    connected: AtomicU64,
+}
+
+/// A connection that is counted for as long as it is open.
+struct Counted<'a> {
+    behind: &'a Behind,
+    number: u64,
+}
+
+impl<'a> Counted<'a> {
+    fn new(behind: &'a Behind) -> Self {
+        let number = behind.connected.fetch_add(1, Ordering::Relaxed);
+        behind.open().insert(number);
+        Self { behind, number }
+    }
+
+    /// Whether another connection is open that was so before.
+    fn is_second(&self) -> bool {
+        self.behind.open().first().is_some_and(|first| *first != self.number)
+    }
+
+    /// Whether it is to be served now.
+    fn is_served(&self) -> bool {
+        match self.behind.habits.second {
+            SecondConnection::NeverServed => !self.is_second(),
+            SecondConnection::SilencesTheFirst => self.behind.open().last() == Some(&self.number),
+            _ => true,
+        }
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.behind.open().remove(&self.number);
+    }
 }
 
 /// A gateway in memory: connections to it are made one after another, or several at once.
@@ -118,13 +184,14 @@ impl SimLine {
     }
 
     fn behind_it(&self, habits: Gateway) -> Arc<Behind> {
-        let last = std::sync::Mutex::default();
         Arc::new(Behind {
             line: self.clone(),
             habits,
             turn: Mutex::new(()),
             cut: watch::Sender::new(()),
-            last,
+            last: std::sync::Mutex::default(),
+            open: std::sync::Mutex::default(),
+            connected: AtomicU64::new(0),
         })
     }
 }
@@ -149,15 +216,25 @@ async fn accept(behind: Arc<Behind>, listener: TcpListener) -> io::Result<()> {
 
 /// One connection, until it is cut.
 async fn connection(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) -> io::Result<()> {
+    let counted = Counted::new(&behind);
+    match behind.habits.second {
+        SecondConnection::Refused if counted.is_second() => return Ok(()),
+        SecondConnection::EndsTheFirst if counted.is_second() => _ = behind.cut.send_replace(()),
+        _ => {}
+    }
     let mut cut = behind.cut.subscribe();
     tokio::select! {
-        served = serve(behind, stream) => served,
+        served = serve(&behind, &counted, stream) => served,
         _ = cut.changed() => Ok(()),
     }
 }
 
 /// Its requests are served in their order, each when the one before it is over.
-async fn serve(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) -> io::Result<()> {
+async fn serve(
+    behind: &Behind,
+    counted: &Counted<'_>,
+    stream: impl AsyncRead + AsyncWrite + Send,
+) -> io::Result<()> {
     let (mut from, mut to) = tokio::io::split(stream);
     let habits = behind.habits;
     let begun = Instant::now();
@@ -182,7 +259,7 @@ async fn serve(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + Send) 
             }
             give_again(&mut again, &mut to).await?;
         };
-        if habits.mute_after.is_some_and(|age| begun.elapsed() >= age) {
+        if habits.mute_after.is_some_and(|age| begun.elapsed() >= age) || !counted.is_served() {
             continue;
         }
         to.write_all(&std::mem::take(&mut replayed)).await?;
@@ -221,6 +298,10 @@ async fn give_again(
 }
 
 impl Behind {
+    fn open(&self) -> std::sync::MutexGuard<'_, BTreeSet<u64>> {
+        self.open.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
     /// The answer to a request as it goes out to the connection.
     async fn serve(&self, request: &Asked) -> Option<Vec<u8>> {
         let _turn = if self.habits.one_line { Some(self.turn.lock().await) } else { None };

@@ -15,7 +15,7 @@ use tokio_serial::{DataBits, FlowControl, SerialPortBuilderExt, StopBits};
 
 use crate::{line::SimLine, wire::Master};
 
-pub use gateway::{Gateway, GatewayInMemory};
+pub use gateway::{Gateway, GatewayInMemory, SecondConnection};
 
 /// Characters that an endpoint in memory keeps for a master that does not read, about as many as a pty keeps.
 const MEMORY: usize = 4_096;

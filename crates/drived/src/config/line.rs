@@ -17,7 +17,7 @@ use super::{
 use crate::{
     drive_spec::DriveName,
     duration::Time,
-    line_spec::{self, FarEndSpec, LineSpec},
+    line_spec::{self, FarEndSpec, LineSpec, MOST_CONNECTIONS},
 };
 
 /// How long an answer may take unless the file says otherwise: the slowest family needs 50 ms.
@@ -64,6 +64,9 @@ settings! {
     /// drive that does not answer, as `"3x1s"` for three attempts of a second, with `/N` behind it where it serves N requests at
     /// once. A stop waits for that; also `gateway=3x1s` behind the port
     gateway: Parsed<Gateway> = "unknown over TCP: 3 s are assumed, and a stop may wait twice; none on a serial port";
+    /// how many connections the far end grants this line at once, 1 or 2: a stop takes the second while the first waits for a drive
+    /// that does not answer; also `connections=2` behind the port
+    connections: u8 = "2 on Modbus TCP, where it is given up if it is not granted; 1 elsewhere";
     /// `false`: the adapter, or the program behind the port, is faster than the line's speed; also `far-end-paces=no` behind the
     /// port
     far_end_paces: bool = "`true` on a serial port, `false` elsewhere";
@@ -78,6 +81,14 @@ impl LineEntry {
     ) -> Result<&Spanned<Parsed<LineSpec>>, ConfigError> {
         let missing = "expected port = \"PORT\", such as \"/dev/ttyUSB0,19200,8E1\" or \"tcp://HOST:502\"";
         self.port.as_ref().ok_or_else(|| source.error(name, missing))
+    }
+}
+
+impl LineEntry {
+    fn connections(&self, source: Source<'_>) -> Result<Option<u8>, ConfigError> {
+        let Some(said) = &self.connections else { return Ok(None) };
+        let number = within(*said.get_ref(), 1..=MOST_CONNECTIONS, ": a line has use for two at the most");
+        number.map(Some).map_err(|error| source.error(said.span(), error))
     }
 }
 
@@ -157,6 +168,7 @@ pub(super) fn line_part(
     let port = entry.port(source, span.clone())?;
     let far_end = FarEndSpec {
         gateway: file::of(&entry.gateway).map(|gateway| gateway.0),
+        connections: entry.connections(source)?,
         paces: file::of(&entry.far_end_paces).copied(),
     };
     let config = port.get_ref().0.with_far_end(far_end).config(&names);

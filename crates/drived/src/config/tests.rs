@@ -72,6 +72,8 @@ fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
     assert_eq!(told("gateway = \"none\""), Ok(None));
     assert!(told("gateway = \"often\"").unwrap_err().contains("expected none, unknown, or how long"));
     assert!(told("far_end_paces = false").unwrap_err().contains("Modbus TCP has no speed"));
+    assert!(told("connections = 2").is_ok());
+    assert!(told("connections = 3").unwrap_err().contains("expected 1 to 2"));
     let serial = FULL.replace("19200,8N1\"", "19200,8N1\"\nfar_end_paces = false");
     assert_eq!(read(&serial).unwrap().lines[0].config.far_end_paces, Some(false));
 }

@@ -1,16 +1,22 @@
 //! What is at the far end of a line's port, as the text of a line and the keys of a file say it.
 
-use drive_bus::{Gateway, GatewayError, LineConfig, Stats, stats::WaitIs};
+use drive_bus::{Endpoint, Gateway, GatewayError, LineConfig, Stats, stats::WaitIs};
 
 /// The settings of it, as they stand anywhere behind the port.
 const GATEWAY: &str = "gateway=";
+const CONNECTIONS: &str = "connections=";
 const PACES: &str = "far-end-paces=";
+
+/// More connections than two are of no use to a line.
+pub(crate) const MOST_CONNECTIONS: u8 = 2;
 
 /// What was said of the far end; the rest follows from the kind of port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FarEndSpec {
     /// The gateway between the port and the drives.
     pub(crate) gateway: Option<Gateway>,
+    /// How many connections it grants us at once.
+    pub(crate) connections: Option<u8>,
     /// Whether it takes the time that characters take on a line.
     pub(crate) paces: Option<bool>,
 }
@@ -20,6 +26,10 @@ pub(crate) struct FarEndSpec {
 pub(crate) enum FarEndError {
     #[error("gateway={0}")]
     Gateway(#[from] GatewayError),
+    #[error("connections={0:?}: expected 1, or 2 where a stop may take a second connection")]
+    Connections(String),
+    #[error("a serial port has no connections: expected no {CONNECTIONS}")]
+    NoConnections,
     #[error("far-end-paces={0:?}: expected yes or no")]
     Paces(String),
     #[error("{0} is said twice")]
@@ -37,6 +47,12 @@ impl FarEndSpec {
             if let Some(gateway) = part.strip_prefix(GATEWAY) {
                 if said.gateway.replace(gateway.parse()?).is_some() {
                     return Err(FarEndError::Twice("gateway"));
+                }
+            } else if let Some(connections) = part.strip_prefix(CONNECTIONS) {
+                let number = connections.parse().ok().filter(|number| (1..=MOST_CONNECTIONS).contains(number));
+                let number = number.ok_or_else(|| FarEndError::Connections(connections.to_owned()))?;
+                if said.connections.replace(number).is_some() {
+                    return Err(FarEndError::Twice("connections"));
                 }
             } else if let Some(paces) = part.strip_prefix(PACES) {
                 let paces = match paces {
@@ -56,7 +72,11 @@ impl FarEndSpec {
 
     /// What is said here, and of what is not said the other.
     pub(crate) fn or(self, other: Self) -> Self {
-        Self { gateway: self.gateway.or(other.gateway), paces: self.paces.or(other.paces) }
+        Self {
+            gateway: self.gateway.or(other.gateway),
+            connections: self.connections.or(other.connections),
+            paces: self.paces.or(other.paces),
+        }
     }
 
     /// The line with this far end.
@@ -64,19 +84,24 @@ impl FarEndSpec {
         if self.paces.is_some() && !config.protocol.is_paced() {
             return Err(FarEndError::NoSpeed);
         }
-        Ok(LineConfig { gateway: self.gateway, far_end_paces: self.paces, ..config })
+        if self.connections.is_some() && !matches!(config.endpoint, Endpoint::Tcp(_)) {
+            return Err(FarEndError::NoConnections);
+        }
+        let Self { gateway, connections, paces } = self;
+        Ok(LineConfig { gateway, connections, far_end_paces: paces, ..config })
     }
 
     /// What a configuration says of it.
     pub(super) fn of(config: &LineConfig) -> Self {
-        Self { gateway: config.gateway, paces: config.far_end_paces }
+        Self { gateway: config.gateway, connections: config.connections, paces: config.far_end_paces }
     }
 
     /// As it stands behind the port.
     pub(super) fn written(self) -> String {
         let gateway = self.gateway.map(|gateway| format!(",{GATEWAY}{gateway}"));
+        let connections = self.connections.map(|connections| format!(",{CONNECTIONS}{connections}"));
         let paces = self.paces.map(|paces| format!(",{PACES}{}", if paces { "yes" } else { "no" }));
-        [gateway, paces].into_iter().flatten().collect()
+        [gateway, connections, paces].into_iter().flatten().collect()
     }
 }
 

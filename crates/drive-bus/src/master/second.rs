@@ -1,0 +1,406 @@
+//! A second connection to what is at the far end, for stops.
+//!
+//! A gateway that waits for a dead drive serves what else its connection has asked only afterwards. Most have several clients,
+//! and serve them in turn: what comes over another connection waits for one question in vain at the most, and where the
+//! drives are on several lines for none. So while something is owed a second connection is open, and a stop that waits, or is
+//! on its way behind what is owed, goes over it **as well**: never instead, so that it is later for nothing.
+//!
+//! Two connections can overtake each other. So the answer over the second one counts only where no other write to that drive
+//! may still be under way over the first; otherwise the stop behind it there is the one that counts. And nothing is written to
+//! a drive over the first while its stop is under way over the second.
+//!
+//! Some far ends grant one connection only: a second one that is ended, that gives no answer, or with which the first goes
+//! mute, is given up at once.
+
+use std::{sync::Arc, time::Duration};
+
+use bytes::Bytes;
+use drive_core::Class;
+use tokio::time::Instant;
+use tokio_modbus::Request;
+
+use super::{Asked, Flight, Master, Purpose, port::PortState, probing};
+use crate::{
+    answer,
+    config::LineConfig,
+    exchange::{self, Answer, Machine, Step},
+    pdu,
+    schedule::{Entry, Ticket},
+    stats::SecondConnection,
+};
+
+/// How long a write of which nothing is known may still be carried out, though nothing was heard of it: longer than any
+/// gateway was seen to keep a question.
+const UNSETTLED: Duration = Duration::from_secs(60);
+
+/// How long one that was ended, or gave no answer, is not opened again.
+const GIVEN_UP: Duration = Duration::from_secs(600);
+
+/// How long one that has served, and was lost, is not opened again.
+const REOPENED: Duration = Duration::from_secs(1);
+
+/// Why one is given up with which the first goes mute.
+const SILENCED: &str = "with it the first gave no answer any more";
+
+/// Who has answered so long ago is there.
+const JUST: Duration = Duration::from_millis(100);
+
+/// What the task is to do with the second connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SecondPort {
+    /// Open it.
+    Open,
+    /// Close it, with a reset.
+    Close,
+}
+
+/// The second connection of a line.
+pub(super) struct Second {
+    allowed: bool,
+    state: State,
+    /// It is to be closed.
+    close: bool,
+    machine: Option<Box<dyn Machine>>,
+    flight: Option<Over>,
+    /// When it is asked next, where a silence is to be kept before.
+    free_at: Option<Instant>,
+    /// Who answered over the first last, and when.
+    answered: Option<(u8, Instant)>,
+    /// When it has answered last.
+    pub(super) heard: Option<Instant>,
+    /// Writes over the first connection that may still be carried out: whose, and when they were given up.
+    unsettled: Vec<(u8, Instant)>,
+    /// How many stops were answered over it.
+    pub(super) stops: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// It is not open, and may be from then on.
+    Closed(Option<Instant>),
+    Opening,
+    Open {
+        since: Instant,
+        /// Something was answered over it.
+        serves: bool,
+    },
+    /// It is not granted, and may be tried again then, if ever.
+    GivenUp(&'static str, Option<Instant>),
+}
+
+/// What is under way over it.
+struct Over {
+    /// The stop; `None`: the question whether it is served.
+    stop: Option<Ticket>,
+    slave: u8,
+    request: Arc<Request<'static>>,
+    started: Instant,
+    answer_by: Option<Instant>,
+}
+
+impl Second {
+    pub(super) fn new(config: &LineConfig) -> Self {
+        Self {
+            allowed: config.takes_second_connection(),
+            state: State::Closed(None),
+            close: false,
+            machine: None,
+            flight: None,
+            free_at: None,
+            answered: None,
+            heard: None,
+            unsettled: Vec::new(),
+            stops: 0,
+        }
+    }
+
+    /// What is known of it, for whoever asks.
+    pub(super) const fn told(&self) -> SecondConnection {
+        match self.state {
+            State::GivenUp(why, _) => SecondConnection::GivenUp(why),
+            State::Open { serves: true, .. } => SecondConnection::Granted,
+            _ if self.stops > 0 => SecondConnection::Granted,
+            _ => SecondConnection::Unused,
+        }
+    }
+
+    fn set(&mut self, state: State) {
+        self.close = matches!(self.state, State::Open { .. } | State::Opening);
+        self.state = state;
+        self.machine = None;
+        self.flight = None;
+    }
+
+    fn give_up(&mut self, why: &'static str, until: Option<Instant>) {
+        tracing::debug!(why, "second connection given up");
+        self.set(State::GivenUp(why, until));
+    }
+
+    /// When it was opened, if it is open.
+    const fn open_since(&self) -> Option<Instant> {
+        match self.state {
+            State::Open { since, .. } => Some(since),
+            _ => None,
+        }
+    }
+
+    /// Until when a write to this slave waits, because its stop is under way.
+    pub(super) fn holds(&self, slave: u8) -> Option<Instant> {
+        let over = self.flight.as_ref().filter(|over| over.stop.is_some())?;
+        if slave == 0 || over.slave == slave { over.answer_by } else { None }
+    }
+
+    /// A write over the first connection was given up, and may still be carried out.
+    pub(super) fn unsettled(&mut self, now: Instant, slave: u8) {
+        if !self.allowed {
+            return;
+        }
+        self.unsettled.retain(|(other, _)| *other != slave);
+        self.unsettled.push((slave, now));
+    }
+
+    /// A slave has answered over the first connection what it was asked at `asked`: what was asked there before is over.
+    pub(super) fn settled(&mut self, now: Instant, slave: u8, asked: Instant) {
+        if !self.allowed {
+            return;
+        }
+        self.answered = Some((slave, now));
+        self.unsettled.retain(|(other, at)| *at > asked || *other != slave && *other != 0);
+    }
+
+    fn is_settled(&self, now: Instant, slave: u8) -> bool {
+        !self.unsettled.iter().any(|(other, at)| (*other == slave || *other == 0) && now < *at + UNSETTLED)
+    }
+
+    /// Whom to ask whether it is served: who has just answered over the first, so that the question takes no time.
+    fn asks(&self, now: Instant) -> Option<u8> {
+        self.answered.filter(|(slave, at)| *slave != 0 && now < *at + JUST).map(|(slave, _)| slave)
+    }
+
+    /// When something is to be done.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        let exchange = self.machine.as_ref().and_then(|machine| machine.deadline());
+        exchange.or(self.free_at.filter(|_| matches!(self.state, State::Open { .. })))
+    }
+}
+
+impl<C> Master<C> {
+    /// What is to be done with the second connection.
+    pub fn poll_second(&mut self, now: Instant) -> Option<SecondPort> {
+        if std::mem::take(&mut self.second.close) {
+            return Some(SecondPort::Close);
+        }
+        let may_open = match self.second.state {
+            State::Closed(from) | State::GivenUp(_, from @ Some(_)) => from.is_none_or(|from| from <= now),
+            _ => false,
+        };
+        let is_wanted = self.second.allowed && self.far_end.owes() > 0 && !self.closing;
+        if !(may_open && is_wanted && matches!(self.port, PortState::Open)) {
+            return None;
+        }
+        self.second.state = State::Opening;
+        Some(SecondPort::Open)
+    }
+
+    /// The second connection is open.
+    pub fn handle_second_up(&mut self, now: Instant) {
+        if self.second.state != State::Opening {
+            self.second.close = true;
+            return;
+        }
+        self.second.state = State::Open { since: now, serves: false };
+        self.second.machine = Some(exchange::of(&self.config));
+        self.second.free_at = None;
+    }
+
+    /// The second connection was ended, or was not made.
+    pub fn handle_second_lost(&mut self, now: Instant) {
+        match self.second.state {
+            State::Open { serves: true, .. } => self.second.set(State::Closed(Some(now + REOPENED))),
+            State::Open { .. } | State::Opening => {
+                self.second.give_up("the far end has ended it", Some(now + GIVEN_UP));
+            }
+            State::Closed(_) | State::GivenUp(..) => {}
+        }
+        self.second.close = false;
+    }
+
+    /// The first connection is lost: the next two are others. One that was left because it was mute leaves the second one to
+    /// the stops.
+    pub(super) fn end_second(&mut self, now: Instant) {
+        if std::mem::take(&mut self.fresh.was_left) {
+            return;
+        }
+        if let Some(since) = self.second.open_since()
+            && !self.was_heard_since(since)
+        {
+            self.second.give_up("the far end has ended the first for it", None);
+        } else if !matches!(self.second.state, State::GivenUp(..)) {
+            self.second.set(State::Closed(Some(now + REOPENED)));
+        }
+    }
+
+    /// Somebody who answers did not, over the first connection and behind nothing. True: the second one has made it mute.
+    pub(super) fn blame_second(&mut self, flight: &Flight<C>) -> bool {
+        let is_mute = self.second.open_since().is_some_and(|since| {
+            !self.was_heard_since(since) && flight.behind == 0 && flight.started >= since
+        });
+        if is_mute {
+            self.second.give_up(SILENCED, None);
+        }
+        is_mute
+    }
+
+    /// The first is mute and is opened again: where nothing came over it since the second one is open, that may be why. A gateway
+    /// that is busy with two dead drives looks the same, so that it is tried again.
+    pub(super) fn mute_beside_second(&mut self, now: Instant) {
+        if self
+            .second
+            .open_since()
+            .is_some_and(|since| !self.was_heard_since(since) || self.second.heard > self.fresh.last_heard())
+        {
+            self.second.give_up(SILENCED, Some(now + GIVEN_UP));
+        }
+    }
+
+    /// What is to be written to the second connection now. [`handle_second_sent`](Self::handle_second_sent) **must** follow.
+    pub fn poll_second_transmit(&mut self, now: Instant) -> Option<Bytes> {
+        let State::Open { serves, .. } = self.second.state else { return None };
+        if self.second.flight.is_some() || self.second.free_at.is_some_and(|at| now < at) {
+            return None;
+        }
+        self.second.free_at = None;
+        let (stop, slave, request) = match self.stop_for_second(now) {
+            Some((ticket, slave, request)) => (Some(ticket), slave, request),
+            None if serves => return None,
+            None => {
+                let slave = self.second.asks(now).filter(|_| self.far_end.owes() == 0)?;
+                (None, slave, probing::shortest(self.station(slave).harmless_read()))
+            }
+        };
+        let pdu = pdu::encode(&request).ok()?;
+        let machine = self.second.machine.as_mut()?;
+        let bytes = machine.start(slave, Arc::clone(&request), &pdu);
+        self.second.flight = Some(Over { stop, slave, request, started: now, answer_by: None });
+        Some(bytes)
+    }
+
+    /// The next stop that was not sent over it yet, and is not over without it at once.
+    fn stop_for_second(&mut self, now: Instant) -> Option<(Ticket, u8, Arc<Request<'static>>)> {
+        let Self { second, flight, schedule, far_end, offline, exchange, .. } = self;
+        let confuses = exchange.confuses_late_answers();
+        // A read shows what is so now: where a write may still follow it shows nothing, and without a number a late answer
+        // could be taken for it.
+        let goes = |entry: &Entry<Asked<C>>| {
+            entry.terms.class == Class::Stop
+                && !entry.work.went_second
+                && entry.slave != 0
+                && !offline.contains(entry.slave)
+                && (entry.work.is_write || !confuses && second.is_settled(now, entry.slave))
+        };
+        let under_way =
+            flight.as_mut().filter(|flight| flight.behind > 0).and_then(|flight| match &mut flight.purpose {
+                Purpose::Call(Some(entry)) => Some(entry),
+                _ => None,
+            });
+        let entry = match under_way.filter(|entry| goes(entry)) {
+            Some(entry) => entry,
+            None if far_end.owes() > 0 => schedule.find(goes)?,
+            None => return None,
+        };
+        entry.work.went_second = true;
+        Some((entry.ticket, entry.slave, Arc::clone(&entry.work.request)))
+    }
+
+    /// What [`poll_second_transmit`](Self::poll_second_transmit) gave has been handed over.
+    pub fn handle_second_sent(&mut self, now: Instant) {
+        let Some((slave, request)) =
+            self.second.flight.as_ref().map(|over| (over.slave, Arc::clone(&over.request)))
+        else {
+            return;
+        };
+        let lens = (pdu::encode(&request).map_or(0, |pdu| pdu.len()), answer::likely_len(&request));
+        let end = now + self.config.characters(self.config.request_len(lens.0));
+        let timeout = self.station(slave).timeout.current();
+        let held = if self.far_end.owes() > 0 { self.far_end.wait() * 5 / 4 } else { Duration::ZERO };
+        let answer_by = end + self.config.characters(self.config.answer_len(lens.1)) + timeout + held;
+        if let Some(over) = &mut self.second.flight {
+            over.answer_by = Some(answer_by);
+        }
+        if let Some(machine) = &mut self.second.machine {
+            machine.handle_sent(end, answer_by);
+        }
+    }
+
+    /// Bytes came in over the second connection.
+    pub fn handle_second_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        let Some(machine) = &mut self.second.machine else { return };
+        if let Step::Done(Ok(answer)) = machine.handle_bytes(now, bytes) {
+            self.second_answered(now, answer);
+        }
+        if let Some(machine) = &mut self.second.machine {
+            machine.take_strays();
+        }
+    }
+
+    /// The time of what is under way over it may be over.
+    pub(super) fn second_timeout(&mut self, now: Instant) {
+        let Some(machine) = &mut self.second.machine else { return };
+        let Step::Done(result) = machine.handle_timeout(now) else { return };
+        match (result, self.second.state) {
+            (Ok(answer), _) => self.second_answered(now, answer),
+            (Err(_), State::Open { serves: true, .. }) => {
+                self.second.set(State::Closed(Some(now + REOPENED)));
+            }
+            (Err(_), _) => self.second.give_up("it gives no answer", Some(now + GIVEN_UP)),
+        }
+    }
+
+    fn second_answered(&mut self, now: Instant, answer: Answer) {
+        let Some(over) = self.second.flight.take() else { return };
+        if let State::Open { serves, .. } = &mut self.second.state {
+            *serves = true;
+        }
+        self.second.heard = Some(now);
+        self.second.free_at = Some(now + self.config.silence()).filter(|at| *at > now);
+        let Some(ticket) = over.stop else { return };
+        self.second.stops += 1;
+        // What a gateway or a drive refuses is told by the stop over the first connection.
+        let Ok(response) = answer else { return };
+        if self.writes_to(over.slave) || !self.second.is_settled(now, over.slave) {
+            return;
+        }
+        let under_way = self.flight.as_mut().and_then(|flight| match &mut flight.purpose {
+            Purpose::Call(call) => call.take_if(|entry| entry.ticket == ticket),
+            _ => None,
+        });
+        let Some(entry) = under_way.or_else(|| self.schedule.withdraw(ticket)) else { return };
+        self.note_alive(now, over.slave);
+        let station = self.station(over.slave);
+        station.answered_at = Some(over.started);
+        station.stats.outcomes.answered += 1;
+        // Whoever is told of several at once is told of the oldest.
+        self.asked_at = if self.outcomes.is_empty() { over.started } else { self.asked_at.min(over.started) };
+        self.outcomes.push_back((entry.work.caller, Ok(Ok(response))));
+    }
+
+    /// Whether a write to this slave is under way over the first connection that is no stop.
+    fn writes_to(&self, slave: u8) -> bool {
+        self.flight.as_ref().is_some_and(|flight| {
+            (flight.slave == slave || flight.slave == 0)
+                && !flight.is_stop
+                && self.exchange.is_write(&flight.request)
+        })
+    }
+
+    /// What was under way over the first connection was given up: as a write it may still be carried out. A stop does no harm.
+    pub(super) fn unsettle(&mut self, now: Instant, flight: &Flight<C>) {
+        if flight.sent.is_some() && !flight.is_stop && self.exchange.is_write(&flight.request) {
+            self.second.unsettled(now, flight.slave);
+        }
+    }
+
+    fn was_heard_since(&self, since: Instant) -> bool {
+        self.heard.is_some_and(|(_, until)| until > since)
+    }
+}
