@@ -49,7 +49,8 @@ impl FarEndSpec {
                     return Err(FarEndError::Twice("gateway"));
                 }
             } else if let Some(connections) = part.strip_prefix(CONNECTIONS) {
-                let number = connections.parse().ok().filter(|number| (1..=MOST_CONNECTIONS).contains(number));
+                let number =
+                    connections.parse().ok().filter(|number| (1..=MOST_CONNECTIONS).contains(number));
                 let number = number.ok_or_else(|| FarEndError::Connections(connections.to_owned()))?;
                 if said.connections.replace(number).is_some() {
                     return Err(FarEndError::Twice("connections"));
