@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, error::ErrorKind};
+use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
 use crate::{
@@ -35,27 +35,6 @@ unitelway. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as atv31
 Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input or a plan that cannot work.
 
 Environment: DRIVED_LOG says how much is logged, such as debug or drive_bus=trace,warn; NO_COLOR=1 switches colours off.";
-
-/// The exit codes and what they mean.
-pub(crate) const EXIT_CODES: [(&str, &str); 3] = [
-    ("0", "done and confirmed"),
-    ("1", "a drive did not answer or did not do it"),
-    ("2", "bad input or a plan that cannot work"),
-];
-
-/// The variables of the environment that are looked at.
-pub(crate) const ENVIRONMENT: [(&str, &str); 3] = [
-    (
-        "DRIVED_LOG",
-        "how much is logged on stderr: off, error, warn, info, debug or trace; or for parts of the program, such as \
-         drive_bus=trace,warn",
-    ),
-    ("NO_COLOR", "where it has a value nothing is coloured; colours are for terminals in any case"),
-    (
-        "RUNTIME_DIRECTORY, XDG_RUNTIME_DIR",
-        "the folders in which the control socket of the daemon is looked for, before /run/drived",
-    ),
-];
 
 /// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones
 #[derive(Debug, Parser)]
@@ -137,8 +116,8 @@ impl Command {
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
             Self::Report(args) => report::run(args).await,
-            Self::Export(args) => export::run(&args),
-            Self::Completions(args) => completions::run(args).await,
+            Self::Export(args) => export::run(&args, Cli::command()),
+            Self::Completions(args) => completions::run(args, Cli::command()).await,
             Self::Watch(args) => watch::run(args).await,
             Self::Monitor(args) => monitor::run(args).await,
             Self::Reload(args) => reload::run(args).await,
@@ -197,9 +176,8 @@ fn one_line(message: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
+    use crate::{commands::export::ENVIRONMENT, failure::EXIT_CODES};
 
     #[test]
     fn the_command_line_is_well_formed() {

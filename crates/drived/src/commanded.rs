@@ -11,7 +11,7 @@ use drive_fleet::{
 };
 use tokio::time::{Instant, interval_at, timeout};
 
-use crate::{drive_spec::DriveName, failure::Failure, one_drive, output, signals::Ending};
+use crate::{drive_spec::DriveName, failure::Failure, output, own_line, signals::Ending};
 
 /// What whoever waits for a stop has to know.
 pub(crate) const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
@@ -88,7 +88,7 @@ impl Commanded {
         command: impl AsyncFn(DriveHandle) -> Outcome,
     ) -> Result<Outcome, Failure> {
         self.connected().await?;
-        one_drive::told(self.name, &mut self.ending, undisturbed(&self.handle, command)).await
+        own_line::told(self.name, &mut self.ending, undisturbed(&self.handle, command)).await
     }
 
     /// The same for a start: whoever asks the program to end before it is confirmed wants a motor that stands.
@@ -208,7 +208,7 @@ impl Commanded {
             return Ok(());
         }
         Err(Failure::Drive(match &snapshot.error {
-            Some(error) => one_drive::words(self.name, &self.config, error),
+            Some(error) => own_line::words(self.name, &self.config, error),
             None => format!("{} does not answer", self.name),
         }))
     }
@@ -217,9 +217,9 @@ impl Commanded {
     pub(crate) fn failure(&self, outcome: &Outcome) -> Failure {
         let (name, config) = (self.name, &self.config);
         Failure::Drive(match outcome {
-            Outcome::Refused(Refused::Drive(error)) => one_drive::words(name, config, error),
+            Outcome::Refused(Refused::Drive(error)) => own_line::words(name, config, error),
             Outcome::OutcomeUnknown(Unknown { error: Some(error), last, .. }) => {
-                format!("{}{}", one_drive::words(name, config, error), seen(last.as_ref()))
+                format!("{}{}", own_line::words(name, config, error), seen(last.as_ref()))
             }
             outcome => format!("{name}: {outcome}"),
         })
@@ -227,7 +227,7 @@ impl Commanded {
 
     /// Closes the port, if it lets itself be closed.
     pub(crate) async fn close(self) {
-        one_drive::close(&self.line).await;
+        own_line::close(&self.line).await;
     }
 }
 

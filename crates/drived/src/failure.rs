@@ -2,6 +2,13 @@
 
 use std::{io, process::ExitCode};
 
+/// The exit codes and what they mean.
+pub(crate) const EXIT_CODES: [(&str, &str); 3] = [
+    ("0", "done and confirmed"),
+    ("1", "a drive did not answer or did not do it"),
+    ("2", "bad input or a plan that cannot work"),
+];
+
 /// Why the program ends without success: one line for a person, which says what to do.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Failure {

@@ -1,34 +1,21 @@
 //! The one drive on which a subcommand acts.
 
-use std::time::Duration;
-
-use drive_bus::{Endpoint, Line, LineConfig, OpenError};
-use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError, Status};
+use drive_bus::{Endpoint, Line, LineConfig};
+use drive_core::{Drive, Error, Status};
 use drive_families::Options;
 use drive_fleet::{Order, Started};
 use serde_json::json;
-use tokio::time::timeout;
 
 use crate::{
     client::{self, Daemon, DaemonArgs, Target, Told},
     commanded::Commanded,
-    drive_options::{self, OptionArgs},
+    drive_options::OptionArgs,
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
     output,
-    signals::Ending,
+    own_line::{close, open_drive, open_line_of, wait_at_most, words},
 };
-
-/// How long a request may wait until the line is quiet enough for it.
-const QUIET_WITHIN: Duration = Duration::from_secs(5);
-
-/// What is said of a line on which nothing can be sent.
-pub(crate) const NEVER_QUIET: &str = "the line is never quiet, something else is sending: see whether speed, format and \
-    protocol are those of the drives, and whether a second master is on it";
-
-/// How long a port has to let itself be closed.
-const CLOSED_WITHIN: Duration = Duration::from_secs(1);
 
 /// Which drive a subcommand acts on: one on a line, by `--line` and `--drive`, or what the running daemon knows by name.
 #[derive(Debug, clap::Args)]
@@ -172,95 +159,12 @@ fn parts(
     Ok((name, options, LineConfig { offline_after: 0, ..config }))
 }
 
-/// Lets no request to a drive wait without end for a line that is never quiet.
-pub(crate) fn wait_at_most(drive: &mut dyn Drive) {
-    let all = Some(QUIET_WITHIN);
-    *drive.lifetimes_mut() =
-        Lifetimes { stop: None, command: all, keep_alive: all, status: all, background: all };
-}
-
-/// Closes a port, if it lets itself be closed.
-pub(crate) async fn close(line: &Line) {
-    // The program ends, and with it the port.
-    let _ = timeout(CLOSED_WITHIN, line.clone().close()).await;
-}
-
-/// What a person reads when a drive did not do it.
-pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> String {
-    match (error, error.kind()) {
-        (Error::Port { problem: PortError::Expired, .. }, _) => {
-            format!("{name} could not be asked: {NEVER_QUIET}")
-        }
-        (Error::Port { problem: PortError::Damaged(_) | PortError::Mismatch(_), .. }, _) => format!(
-            "{name} cannot be understood ({error}): something else is sending, two slaves have this address, or speed, \
-             format or protocol are others"
-        ),
-        (_, ErrorKind::NoAnswer) => format!(
-            "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}",
-            name.slave, config.serial
-        ),
-        (_, ErrorKind::OutcomeUnknown) => {
-            format!("{name}: {error}: nobody knows whether it was carried out, read the status")
-        }
-        (_, ErrorKind::Unsupported) => format!("{name}: {error}{}", drive_options::hint(name.family)),
-        _ => format!("{name}: {error}"),
-    }
-}
-
-/// Whether a parameter that could not be written, or not be read back, may hold the new value.
-pub(crate) fn may_have_written(error: &Error) -> bool {
-    match (error, error.kind()) {
-        (_, ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed) => true,
-        (Error::Port { exchange, .. }, ErrorKind::NoAnswer) => matches!(exchange.function, 0x06 | 0x10),
-        (Error::Answer { exchange, .. }, _) => matches!(exchange.function, 0x06 | 0x10),
-        _ => false,
-    }
-}
-
-/// Opens a line; a port that is missing or in use is the caller's input.
-pub(crate) async fn open_line(config: LineConfig) -> Result<Line, Failure> {
-    open_line_of(None, config).await
-}
-
-/// The same, for a drive that is to be spoken to.
-async fn open_line_of(drive: Option<DriveName>, config: LineConfig) -> Result<Line, Failure> {
-    match Line::open(config).await {
-        Ok(line) => Ok(line),
-        Err(OpenError::InUse { path }) => {
-            let told = client::explain(&path, drive).await;
-            Err(Failure::Input(told.unwrap_or_else(|| OpenError::InUse { path }.to_string())))
-        }
-        Err(error) => Err(Failure::Input(error.to_string())),
-    }
-}
-
 /// Nobody has said which drive.
 pub(crate) fn unnamed() -> Failure {
     Failure::Input(
         "say which drive: by its name in the running daemon (drived status lists them), or by --line and --drive"
             .to_owned(),
     )
-}
-
-/// A drive on an open line, with those of the options that are its family's. Nothing is sent by it.
-pub(crate) fn open_drive(line: &Line, name: DriveName, options: &Options) -> Box<dyn Drive> {
-    name.family.open_with(line.slave(name.slave.number()), name.slave, options)
-}
-
-/// Waits for what became of something that a drive was told. Whoever asks the program to end meanwhile has to know that
-/// it may have been sent.
-pub(crate) async fn told<T>(
-    name: DriveName,
-    ending: &mut Ending,
-    command: impl Future<Output = T>,
-) -> Result<T, Failure> {
-    tokio::select! {
-        biased;
-        outcome = command => Ok(outcome),
-        () = ending.asked() => Err(Failure::Drive(format!(
-            "{name}: asked to end before it was confirmed: nobody knows whether it was carried out, read it back"
-        ))),
-    }
 }
 
 /// A drive and its open line.

@@ -22,20 +22,19 @@ use axum::{
     extract::DefaultBodyLimit,
     http::header::{CACHE_CONTROL, CONTENT_TYPE},
     middleware::from_fn,
-    response::{IntoResponse as _, Response},
     routing::{any, get},
 };
 
 pub(crate) use self::{
     ask::Viewer,
-    reload::{Changes, reload_router},
+    reload::{Changes, Reload, reload_router},
 };
 use self::{
     demo::Stage,
     problem::Problem,
     routes::{Route, demo_routes, door_routes, reload_routes, routes},
 };
-use crate::{doors::Caller, plant::Plant};
+use crate::plant::Plant;
 
 /// The largest body that is read.
 const LARGEST_BODY: usize = 64 << 10;
@@ -53,11 +52,6 @@ pub(crate) fn demo_router(plant: Plant, stage: Stage) -> Router {
     let mut all = routes();
     all.extend(demo_routes());
     of(all, plant).layer(Extension(stage))
-}
-
-/// What is answered to somebody who lacks a right.
-pub(crate) fn lacks_right(caller: &Caller, right: &str) -> Response {
-    Problem::lacks_right(caller, right).into_response()
 }
 
 /// The description of a daemon's API.

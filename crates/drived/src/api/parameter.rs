@@ -20,7 +20,7 @@ use super::{
     read::{fresh, no_drive},
 };
 use crate::{
-    one_drive::may_have_written,
+    own_line::may_have_written,
     plant::{Plant, parameters::WrittenView},
     registers::wanted,
 };

@@ -14,11 +14,12 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use crate::{
-    doors::Caller,
+    doors::lacking,
     plant::{
         commands::{OutcomeWord, Rejected, Unclear},
         views::CommandView,
     },
+    rights::Caller,
 };
 
 /// The kind of a command that was refused.
@@ -117,12 +118,7 @@ impl Problem {
 
     /// A caller lacks a right: somebody who has not said who he is may say so, and others may not do it.
     pub(super) fn lacks_right(caller: &Caller, right: &str) -> Self {
-        let (status, detail) = match caller.name.as_str() {
-            "anonymous" => {
-                (StatusCode::UNAUTHORIZED, format!("this needs a token with the right to {right}"))
-            }
-            name => (StatusCode::FORBIDDEN, format!("{name} has no right to {right}")),
-        };
+        let (status, detail) = lacking(caller, right);
         let why = Refused { outcome: OutcomeWord::Refused, reason: "no_right" };
         Self { why: Some(Why::Refused(why)), ..Self::new(status, detail) }
     }

@@ -10,7 +10,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ask::By, problem::Problem};
-use crate::{failure::Failure, run::reload::Reloader};
+use crate::failure::Failure;
+
+/// Reads the configuration again.
+pub(crate) trait Reload: Clone + Send + Sync + 'static {
+    /// Does what has changed in it, or with `dry_run` only says what that would be: one sentence each.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. Others say what holds.
+    fn reload(&self, dry_run: bool) -> impl Future<Output = Result<Vec<String>, Failure>> + Send;
+}
 
 #[derive(Debug, Deserialize)]
 struct Asked {
@@ -31,12 +40,12 @@ pub(crate) struct Changes {
 pub(super) const PATH: &str = "/api/v1/reload";
 
 /// The [route](PATH) for a program that has a configuration.
-pub(crate) fn reload_router(reloader: Reloader) -> Router {
-    Router::new().route(PATH, post(reload)).with_state(reloader)
+pub(crate) fn reload_router<R: Reload>(reloader: R) -> Router {
+    Router::new().route(PATH, post(reload::<R>)).with_state(reloader)
 }
 
-async fn reload(
-    State(reloader): State<Reloader>,
+async fn reload<R: Reload>(
+    State(reloader): State<R>,
     By(caller): By,
     asked: Result<Query<Asked>, QueryRejection>,
 ) -> Result<Json<Changes>, Problem> {

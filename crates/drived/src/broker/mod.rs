@@ -6,6 +6,7 @@
 //! is new (clean start, session expiry 0): a broker keeps no commands for a daemon that is away, and who publishes state
 //! publishes it again after each [`Event::Connected`].
 
+pub(crate) mod config;
 mod message;
 mod queue;
 mod session;

@@ -8,7 +8,7 @@ use tokio_rustls::rustls::{
     pki_types::{CertificateDer, pem::PemObject as _},
 };
 
-use crate::{config::TlsFiles, doors};
+use crate::doors::{self, config::TlsFiles};
 
 /// Whom to believe, and who we are.
 #[derive(Clone)]

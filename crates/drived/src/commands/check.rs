@@ -10,10 +10,13 @@ use drive_sparkplug::NodeName;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    config::{Config, DrivePart, GatewayConfig, LinePart, MqttConfig, SparkplugConfig, Units, drive_keys},
+    broker::config::{MqttConfig, SparkplugConfig},
+    config::{DrivePart, LinePart, drive_keys},
+    config_file::Config,
     doors::{Rights, Role},
     drive_spec::{self, DriveName},
     failure::Failure,
+    gateway::config::{GatewayConfig, Units},
     line_spec,
     mqtt::Mqtt,
     output::{self, JsonArgs, Table},

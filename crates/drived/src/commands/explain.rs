@@ -10,7 +10,7 @@ use tokio::time::{Instant, sleep};
 use super::frames::Frames;
 use crate::{
     client::DaemonArgs,
-    config::Config,
+    config_file::Config,
     drive_spec::{DriveName, DriveSpec, on_one_line},
     explain::{Counts, Explained, Explainer, Known},
     failure::Failure,

@@ -6,7 +6,8 @@ use serde_json::json;
 
 use crate::{
     client::Daemon,
-    config::{Config, DoorsConfig},
+    config_file::Config,
+    doors::config::DoorsConfig,
     doors::{
         Caller, MadeToken, RemovedToken, Rights, Role, Scope, TOKENS, TokensView, added,
         audit::{self, Kind, Record},

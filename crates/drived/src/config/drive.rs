@@ -26,7 +26,7 @@ use crate::{
 };
 
 /// The settings of a drive while they are read.
-pub(super) struct Draft {
+pub(crate) struct Draft {
     settings: DriveSettings,
     /// How the policies stop.
     stop_mode: StopMode,

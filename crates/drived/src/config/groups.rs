@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::place::{ConfigError, Source};
 
 /// The section as it is written: the names of the drives by the name of their group.
-pub(super) type Entries = BTreeMap<Spanned<String>, Vec<Spanned<String>>>;
+pub(crate) type Entries = BTreeMap<Spanned<String>, Vec<Spanned<String>>>;
 
 /// Drives that are commanded together, in the order in which they start.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -19,7 +19,7 @@ pub(crate) struct Group {
 }
 
 /// The groups of a file whose drives are these.
-pub(super) fn groups<'a>(
+pub(crate) fn groups<'a>(
     source: Source<'_>,
     entries: Option<&Entries>,
     drives: impl Iterator<Item = &'a str> + Clone,

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::{
     ConfigError, DrivePart, LinePart, SaidOptions,
     drive::{self, DriveEntry},
-    file::{self, File},
+    of,
     place::Source,
     table::{Entry as _, settings, within},
     values::Parsed,
@@ -26,12 +26,15 @@ const SHORTEST_TIMEOUT: Duration = Duration::from_millis(10);
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The part of a line that polls of unnamed periods may take, in millionths; the rest is for commands.
-pub(super) const ROOM_PPM: u64 = 800_000;
+pub(crate) const ROOM_PPM: u64 = 800_000;
 /// Periods of more than half a minute are nobody's wish.
 const LONGEST_STRETCH: u32 = 60;
 
+/// The lines as they are written, by their names.
+pub(crate) type LineEntries = BTreeMap<Spanned<String>, LineEntry>;
+
 /// The settings of a line while they are read.
-pub(super) struct Draft {
+pub(crate) struct Draft {
     config: LineConfig,
     response: Option<Duration>,
     segments: u8,
@@ -93,7 +96,7 @@ impl LineEntry {
 }
 
 /// The drives of the file, by line.
-pub(super) struct Members(BTreeMap<String, Vec<Member>>);
+pub(crate) struct Members(BTreeMap<String, Vec<Member>>);
 
 /// One drive of a line.
 pub(super) struct Member {
@@ -105,15 +108,21 @@ pub(super) struct Member {
 }
 
 impl Members {
-    pub(super) fn of(source: Source<'_>, raw: &File) -> Result<Self, ConfigError> {
+    /// The drives that a file says, with the lines and the defaults that it says.
+    pub(crate) fn of(
+        source: Source<'_>,
+        lines: &LineEntries,
+        drives: &[Spanned<DriveEntry>],
+        defaults: Option<&DriveEntry>,
+    ) -> Result<Self, ConfigError> {
         let none = DriveEntry::default();
-        let defaults = file::of(&raw.defaults).unwrap_or(&none);
+        let defaults = defaults.unwrap_or(&none);
         if let Some(span) = ["line", "drive", "name"].into_iter().find_map(|key| defaults.place(key)) {
             return Err(source.error(span, "a default names no line and no drive: expected in [[drives]]"));
         }
-        let Some(drives) = file::of(&raw.drives).filter(|drives| !drives.is_empty()) else {
+        if drives.is_empty() {
             return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
-        };
+        }
         let mut groups: BTreeMap<String, Vec<Member>> = BTreeMap::new();
         let mut names = BTreeMap::new();
         for entry in drives {
@@ -121,8 +130,7 @@ impl Members {
             let Some(line) = &entry.line else {
                 return Err(source.error(span, "expected line = \"NAME\" of one of the lines"));
             };
-            let on = raw.lines().find(|(name, _)| name.get_ref() == line.get_ref());
-            let Some((named, on)) = on else {
+            let Some((named, on)) = lines.get_key_value(line) else {
                 let problem = format_args!("there is no line {:?}: expected a [lines.NAME]", line.get_ref());
                 return Err(source.error(line.span(), problem));
             };
@@ -154,7 +162,7 @@ impl Members {
 }
 
 /// A line with its drives, and whether it can work.
-pub(super) fn line_part(
+pub(crate) fn line_part(
     source: Source<'_>,
     name: &str,
     span: Range<usize>,
@@ -167,9 +175,9 @@ pub(super) fn line_part(
     let names: Vec<DriveName> = group.iter().map(|member| member.drive).collect();
     let port = entry.port(source, span.clone())?;
     let far_end = FarEndSpec {
-        gateway: file::of(&entry.gateway).map(|gateway| gateway.0),
+        gateway: of(&entry.gateway).map(|gateway| gateway.0),
         connections: entry.connections(source)?,
-        paces: file::of(&entry.far_end_paces).copied(),
+        paces: of(&entry.far_end_paces).copied(),
     };
     let config = port.get_ref().0.with_far_end(far_end).config(&names);
     let config = config.map_err(|error| source.error(port.span(), error))?;

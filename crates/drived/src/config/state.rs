@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::place::Source;
-use crate::doors::tokens::sha256;
+use crate::kept::sha256;
 
 /// What each watchdog was before it was armed.
 const WATCHDOGS: &str = "watchdogs.json";
@@ -34,23 +34,23 @@ pub(crate) struct State {
 
 /// What the file says of it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Said {
-    pub(super) state: Option<PathBuf>,
-    pub(super) watchdogs: Option<PathBuf>,
-    pub(super) tokens: Option<PathBuf>,
-    pub(super) audit: Option<PathBuf>,
+pub(crate) struct Said {
+    pub(crate) state: Option<PathBuf>,
+    pub(crate) watchdogs: Option<PathBuf>,
+    pub(crate) tokens: Option<PathBuf>,
+    pub(crate) audit: Option<PathBuf>,
 }
 
 /// What the environment says of it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Environment {
+pub(crate) struct Environment {
     state_directory: Option<OsString>,
     xdg_state_home: Option<OsString>,
     home: Option<OsString>,
 }
 
 impl Environment {
-    pub(super) fn of_process() -> Self {
+    pub(crate) fn of_process() -> Self {
         let [state_directory, xdg_state_home, home] =
             ["STATE_DIRECTORY", "XDG_STATE_HOME", "HOME"].map(std::env::var_os);
         Self { state_directory, xdg_state_home, home }
@@ -79,7 +79,7 @@ impl Environment {
 }
 
 impl State {
-    pub(super) fn of(source: Source<'_>, said: &Said, environment: &Environment) -> Self {
+    pub(crate) fn of(source: Source<'_>, said: &Said, environment: &Environment) -> Self {
         let beside = |path: &PathBuf| source.file.parent().unwrap_or(Path::new("")).join(path);
         let of_service = said.state.as_ref().map(beside).or_else(|| environment.of_service());
         let is_said = of_service.is_some();
@@ -97,7 +97,7 @@ impl State {
     }
 
     /// The file of the number that joins deaths to births.
-    pub(super) fn bd_seq(&self, source: Source<'_>, said: Option<&Path>) -> Option<PathBuf> {
+    pub(crate) fn bd_seq(&self, source: Source<'_>, said: Option<&Path>) -> Option<PathBuf> {
         match said {
             Some(said) => Some(source.file.parent().unwrap_or(Path::new("")).join(said)),
             None => self.folder.as_ref().map(|folder| folder.join(BD_SEQ)),

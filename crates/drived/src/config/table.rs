@@ -12,9 +12,9 @@ pub(crate) struct Key {
     /// As the documents write it.
     pub(crate) name: &'static str,
     /// What it means, in lines of Markdown.
-    pub(super) meaning: &'static [&'static str],
+    pub(crate) meaning: &'static [&'static str],
     /// What holds without it.
-    pub(super) default: &'static str,
+    pub(crate) default: &'static str,
     /// Whether something is done to a drive by it, so that it needs one under control.
     pub(crate) acts: bool,
     /// What it comes to for a drive.
@@ -53,15 +53,15 @@ impl Key {
 }
 
 /// A key that is written in the file.
-pub(super) struct Said {
-    pub(super) key: &'static str,
-    pub(super) at: Range<usize>,
+pub(crate) struct Said {
+    pub(crate) key: &'static str,
+    pub(crate) at: Range<usize>,
     /// Whether something is done to a drive by what it says.
-    pub(super) acts: bool,
+    pub(crate) acts: bool,
 }
 
 /// A table as it is written.
-pub(super) trait Entry {
+pub(crate) trait Entry {
     /// What its keys set, one after the other.
     type Draft;
     /// Every key that it takes.
@@ -103,23 +103,23 @@ macro_rules! settings {
         $(#[doc = $about])+
         #[derive(Debug, Default, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
-        pub(super) struct $entry {
-            $($(#[doc = $meaning])+ pub(super) $key: Option<toml::Spanned<$value>>,)+
+        pub(crate) struct $entry {
+            $($(#[doc = $meaning])+ pub(crate) $key: Option<toml::Spanned<$value>>,)+
         }
 
-        impl $crate::config::table::Entry for $entry {
+        impl $crate::config::Entry for $entry {
             type Draft = $draft;
 
-            const KEYS: &'static [$crate::config::table::Key] = &[$($crate::config::table::Key {
-                name: $crate::config::table::shown(&[$($shown,)? stringify!($key)]),
+            const KEYS: &'static [$crate::config::Key] = &[$($crate::config::Key {
+                name: $crate::config::shown(&[$($shown,)? stringify!($key)]),
                 meaning: &[$($meaning),+],
                 default: $default,
                 acts: !<[&str]>::is_empty(&[$(stringify!($acts))?]),
-                tells: &[$($crate::config::table::Tells { label: $label, text: $text })?],
+                tells: &[$($crate::config::Tells { label: $label, text: $text })?],
             }),+];
 
-            fn said(&self) -> Vec<$crate::config::table::Said> {
-                let keys = [$(self.$key.as_ref().map(|said| $crate::config::table::Said {
+            fn said(&self) -> Vec<$crate::config::Said> {
+                let keys = [$(self.$key.as_ref().map(|said| $crate::config::Said {
                     key: stringify!($key),
                     at: said.span(),
                     acts: [$(matches!(said.get_ref(), $acts))?].contains(&true),
@@ -129,7 +129,7 @@ macro_rules! settings {
 
             fn set(
                 &self,
-                source: $crate::config::place::Source<'_>,
+                source: $crate::config::Source<'_>,
                 draft: &mut $draft,
             ) -> Result<(), $crate::config::ConfigError> {
                 $($(
@@ -147,10 +147,10 @@ macro_rules! settings {
     };
 }
 
-pub(super) use settings;
+pub(crate) use settings;
 
 /// The name that a key has in documents, or else in the file.
-pub(super) const fn shown(names: &[&'static str]) -> &'static str {
+pub(crate) const fn shown(names: &[&'static str]) -> &'static str {
     match names {
         [shown, ..] => shown,
         [] => "",
@@ -158,7 +158,7 @@ pub(super) const fn shown(names: &[&'static str]) -> &'static str {
 }
 
 /// A value within its range; else the error says which that is, and `why`.
-pub(super) fn within<T: Copy + PartialOrd + fmt::Debug>(
+pub(crate) fn within<T: Copy + PartialOrd + fmt::Debug>(
     value: T,
     range: RangeInclusive<T>,
     why: &str,

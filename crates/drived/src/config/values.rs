@@ -12,7 +12,7 @@ use crate::duration::Time;
 
 /// A value that is written as a text and read by its own rules, whose error says what was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Parsed<T>(pub(super) T);
+pub(crate) struct Parsed<T>(pub(crate) T);
 
 impl<'de, T> Deserialize<'de> for Parsed<T>
 where
@@ -32,29 +32,29 @@ where
 /// A text that is none of a few words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected one of {}", .0.join(", "))]
-pub(super) struct NotAmong(pub(super) &'static [&'static str]);
+pub(crate) struct NotAmong(pub(crate) &'static [&'static str]);
 
 /// Declares a value that is one of a few words.
 macro_rules! words {
     ($(#[$meta:meta])* $name:ident($inner:ty): $($word:literal => $value:expr),+) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub(super) struct $name(pub(super) $inner);
+        pub(crate) struct $name(pub(crate) $inner);
 
         impl std::str::FromStr for $name {
-            type Err = $crate::config::values::NotAmong;
+            type Err = $crate::config::NotAmong;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($word => Ok(Self($value)),)+
-                    _ => Err($crate::config::values::NotAmong(&[$($word),+])),
+                    _ => Err($crate::config::NotAmong(&[$($word),+])),
                 }
             }
         }
     };
 }
 
-pub(super) use words;
+pub(crate) use words;
 
 words! {
     /// What a watchdog does.
@@ -121,7 +121,7 @@ words! {
 
 /// The value of a drive's option: a text or a whole number, read by the option itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct OptionValue(pub(super) String);
+pub(crate) struct OptionValue(pub(super) String);
 
 impl<'de> Deserialize<'de> for OptionValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -163,7 +163,7 @@ fn decimal<'de, D: Deserializer<'de>>(deserializer: D, decimals: u8) -> Result<u
 
 /// A frequency in hertz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct FrequencyValue(pub(super) Frequency);
+pub(crate) struct FrequencyValue(pub(super) Frequency);
 
 impl<'de> Deserialize<'de> for FrequencyValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -173,7 +173,7 @@ impl<'de> Deserialize<'de> for FrequencyValue {
 
 /// A current in amperes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct CurrentValue(pub(super) Current);
+pub(crate) struct CurrentValue(pub(super) Current);
 
 impl<'de> Deserialize<'de> for CurrentValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -183,7 +183,7 @@ impl<'de> Deserialize<'de> for CurrentValue {
 
 /// A share in percent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct PercentValue(pub(super) Percent);
+pub(crate) struct PercentValue(pub(super) Percent);
 
 impl<'de> Deserialize<'de> for PercentValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -195,7 +195,7 @@ impl<'de> Deserialize<'de> for PercentValue {
 
 /// A band of frequencies, `[LOW, HIGH]` in hertz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct BandValue(pub(super) Band);
+pub(crate) struct BandValue(pub(super) Band);
 
 impl<'de> Deserialize<'de> for BandValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -213,7 +213,7 @@ impl<'de> Deserialize<'de> for BandValue {
 /// `watchdog`.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct WatchdogEntry {
+pub(crate) struct WatchdogEntry {
     pub(super) time: Parsed<Time>,
     pub(super) reaction: Parsed<ReactionValue>,
 }
@@ -221,7 +221,7 @@ pub(super) struct WatchdogEntry {
 /// `frequency`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct FrequencyEntry {
+pub(crate) struct FrequencyEntry {
     low: Option<FrequencyValue>,
     high: Option<FrequencyValue>,
     #[serde(default)]
@@ -243,7 +243,7 @@ impl FrequencyEntry {
 /// `alarms`.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct AlarmsEntry {
+pub(crate) struct AlarmsEntry {
     current: Option<CurrentValue>,
     drive_thermal: Option<PercentValue>,
     motor_thermal: Option<PercentValue>,

@@ -7,7 +7,8 @@ use tokio::{
     time::{MissedTickBehavior, interval},
 };
 
-use super::{gate::Gate, rights::Role};
+use super::gate::Gate;
+use crate::rights::Role;
 
 /// From one look to the next, beside those that a change in this program brings: another program changes the file of tokens.
 const LOOKED_AT_EVERY: Duration = Duration::from_secs(1);

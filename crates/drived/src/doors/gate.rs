@@ -34,13 +34,17 @@ use super::{
     failures::Failures,
     host::{self, Hosts},
     kept::Kept,
+    network::Network,
     refusal::Refusal,
-    rights::{Caller, Rights, Role},
     sessions::{self, Sessions},
     token_desk,
     tokens::{self, Token, TokenError, Tokens},
 };
-use crate::{api::lacks_right, config::Network, json::line};
+use crate::{
+    json::line,
+    kept::sha256,
+    rights::{Caller, Rights, Role},
+};
 
 /// The most that a request may say.
 const BODY: usize = 64 * 1024;
@@ -261,7 +265,7 @@ impl Gate {
         let Rights { stop, operate, engineer, .. } = caller.rights;
         if !(operate || engineer || stops && stop) {
             self.note_refused(&caller, &parts);
-            return Ok(lacks_right(&caller, if stops { "stop" } else { "operate" }));
+            return Ok(Refusal::lacks_right(&caller, if stops { "stop" } else { "operate" }).into_response());
         }
         let body = read(BODY).await?;
         let record = |kind| {
@@ -397,7 +401,7 @@ impl Gate {
         match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
             Some(token) => {
                 // By that which was brought: it may end before the one that has replaced it.
-                let sha256 = tokens::sha256(secret.unwrap_or_default().as_bytes());
+                let sha256 = sha256(secret.unwrap_or_default().as_bytes());
                 let authority = Authority::Token { sha256, role: token.role };
                 Ok(Some((token, authority)))
             }
@@ -418,7 +422,7 @@ impl Gate {
             return Err(self.failed(peer, &caller));
         };
         let session = tokens::new_secret().map_err(unreadable)?;
-        lock(&self.sessions).begin(&session, &tokens::sha256(secret.as_bytes()), Instant::now());
+        lock(&self.sessions).begin(&session, &sha256(secret.as_bytes()), Instant::now());
         let caller = of_token(&token, caller);
         self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
         Ok(told(&caller, Some(&session), door.encrypted))

@@ -5,15 +5,16 @@
 
 pub(crate) mod audit;
 mod authority;
+pub(crate) mod config;
 mod connection;
 pub(crate) mod crowd;
 mod failures;
 mod gate;
 mod host;
 mod kept;
+mod network;
 mod patient;
 mod refusal;
-mod rights;
 mod sessions;
 #[cfg(unix)]
 mod socket;
@@ -44,6 +45,7 @@ use self::socket::Unbound;
 pub(crate) use self::socket::usual_places;
 use self::{
     audit::{Audit, Kind, Record},
+    config::{DoorsConfig, HttpConfig, SocketConfig},
     connection::DRAINED_WITHIN,
     crowd::{Crowd, Limits, Place},
     gate::{Door, Gate, Peer},
@@ -52,16 +54,15 @@ use self::{
     tokens::Tokens,
 };
 pub(crate) use self::{
-    rights::{Caller, Rights, Role, Scope},
+    network::Network,
+    refusal::lacking,
     tls::{identity, private},
     token_desk::{
         MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_days, of_hours, replaced,
     },
 };
-use crate::{
-    config::{DoorsConfig, HttpConfig, SocketConfig},
-    failure::Failure,
-};
+use crate::failure::Failure;
+pub(crate) use crate::rights::{Caller, Rights, Role, Scope};
 
 /// A system without such sockets.
 #[cfg(not(unix))]

@@ -8,6 +8,8 @@ use axum::{
     response::Response,
 };
 
+use crate::rights::Caller;
+
 /// Why a request is not taken.
 #[derive(Debug)]
 pub(super) struct Refusal {
@@ -15,15 +17,30 @@ pub(super) struct Refusal {
     why: String,
     /// When it can be tried again.
     after: Option<Duration>,
+    /// Whether whoever asks lacks a right.
+    no_right: bool,
+}
+
+/// What is answered to a caller who lacks a right: somebody who has not said who he is may say so, and others may not do it.
+pub(crate) fn lacking(caller: &Caller, right: &str) -> (StatusCode, String) {
+    match caller.name.as_str() {
+        "anonymous" => (StatusCode::UNAUTHORIZED, format!("this needs a token with the right to {right}")),
+        name => (StatusCode::FORBIDDEN, format!("{name} has no right to {right}")),
+    }
 }
 
 impl Refusal {
     pub(super) fn new(status: StatusCode, why: impl Into<String>) -> Self {
-        Self { status, why: why.into(), after: None }
+        Self { status, why: why.into(), after: None, no_right: false }
     }
 
     pub(super) fn unauthorized(why: &str) -> Self {
         Self::new(StatusCode::UNAUTHORIZED, why)
+    }
+
+    pub(super) fn lacks_right(caller: &Caller, right: &str) -> Self {
+        let (status, why) = lacking(caller, right);
+        Self { no_right: true, ..Self::new(status, why) }
     }
 
     pub(super) fn after(self, time: Duration) -> Self {
@@ -31,11 +48,15 @@ impl Refusal {
     }
 
     pub(super) fn into_response(self) -> Response {
-        let Self { status, why, after } = self;
+        let Self { status, why, after, no_right } = self;
         let title = status.canonical_reason().unwrap_or("Refused");
-        let problem = serde_json::json!({
+        let mut problem = serde_json::json!({
             "type": "about:blank", "title": title, "status": status.as_u16(), "detail": why,
         });
+        if no_right {
+            problem["outcome"] = "refused".into();
+            problem["reason"] = "no_right".into();
+        }
         let mut answer = Response::new(Body::from(problem.to_string()));
         *answer.status_mut() = status;
         let headers = answer.headers_mut();

@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, time::Duration};
 use axum::http::{HeaderMap, header};
 use tokio::time::Instant;
 
-use super::tokens::sha256;
+use crate::kept::sha256;
 
 /// The name of the cookie.
 const COOKIE: &str = "drived_session";

@@ -16,8 +16,8 @@ use tokio::{
     sync::watch,
 };
 
+use super::config::DoorsConfig;
 use super::{gate::Peer, *};
-use crate::config::DoorsConfig;
 
 /// A folder of one test; removed when dropped.
 pub(crate) struct Folder(PathBuf);
@@ -642,7 +642,7 @@ async fn a_proxy_that_hides_whom_it_speaks_for_makes_nobody_local() {
         ("plain = true", Rights::NONE),
     ] {
         fs::write(folder.file("drives.toml"), format!("[http]\n{http}\n{rest}")).unwrap();
-        let config = crate::config::Config::load(&folder.file("drives.toml")).unwrap();
+        let config = crate::config_file::Config::load(&folder.file("drives.toml")).unwrap();
         assert_eq!(config.doors.http.unwrap().freely(false), freely, "{http}");
     }
     let rig = Rig::new("hidden-proxy");

@@ -13,7 +13,7 @@ use tokio_rustls::{
     server::TlsStream,
 };
 
-use crate::config::TlsFiles;
+use super::config::TlsFiles;
 
 /// How long the two sides may take to agree.
 const AGREED_WITHIN: Duration = Duration::from_secs(5);

@@ -15,10 +15,12 @@ use tokio::task::spawn_blocking;
 use super::{
     audit::{Audit, Kind, Record},
     refusal::Refusal,
-    rights::{Caller, Role, Scope},
     tokens::{Token, TokenError, TokenView, Tokens},
 };
-use crate::json::line;
+use crate::{
+    json::line,
+    rights::{Caller, Role, Scope},
+};
 
 /// Where tokens are made, listed and, with the name of one behind it, removed.
 pub(crate) const TOKENS: &str = "/api/v1/tokens";

@@ -9,11 +9,12 @@ use std::{
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
-use super::rights::{Role, Scope};
-use crate::kept::{Kept, Readers, Stamp};
+use crate::{
+    kept::{Kept, Readers, Stamp, digits, sha256},
+    rights::{Role, Scope},
+};
 
 /// By which a token is known as one of ours, in a file or in a log where it should not be.
 const PREFIX: &str = "drv_";
@@ -27,22 +28,12 @@ const LONGEST_NAME: usize = 64;
 pub(crate) fn new_secret() -> Result<String, TokenError> {
     let mut bits = [0; 32];
     getrandom::fill(&mut bits).map_err(|error| TokenError::Random(error.to_string()))?;
-    Ok(format!("{PREFIX}{}", hex(&bits)))
-}
-
-/// The SHA-256 of something, in hexadecimal digits.
-pub(crate) fn sha256(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
+    Ok(format!("{PREFIX}{}", digits(&bits)))
 }
 
 /// Now, in seconds since 1970.
 fn now() -> u64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs()
-}
-
-/// In hexadecimal digits.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// One token.

@@ -30,8 +30,8 @@ use super::{
     writes::Stop,
 };
 use crate::{
-    config::{GatewayConfig, Units},
     doors::audit::Audit,
+    gateway::config::{GatewayConfig, Units},
     plant::Plant,
 };
 

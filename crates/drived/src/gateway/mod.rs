@@ -5,6 +5,7 @@
 
 mod client;
 mod clients;
+pub(crate) mod config;
 pub(crate) mod counters;
 mod desk;
 mod framing;
@@ -25,11 +26,12 @@ use tokio::{
 };
 
 use self::{
+    config::GatewayConfig,
     counters::{Counted, Ended},
     desk::Desk,
 };
 use crate::{
-    config::{Config, GatewayConfig},
+    config::LinePart,
     doors::{
         TRIED_AGAIN,
         audit::Audit,
@@ -48,14 +50,14 @@ pub(crate) struct Gateways {
 
 impl Gateways {
     /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
-    pub(crate) fn open(config: &Config, plant: &Plant, audit: &Audit) -> Self {
+    pub(crate) fn open(gateways: &[GatewayConfig], lines: &[LinePart], plant: &Plant, audit: &Audit) -> Self {
         let (end, ended) = watch::channel(());
-        let drives = config.lines.iter().flat_map(|line| &line.drives);
+        let drives = lines.iter().flat_map(|line| &line.drives);
         let options: HashMap<_, _> =
             drives.map(|drive| (drive.settings.name.clone(), drive.options.values)).collect();
         let desk =
             |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), options.clone());
-        let desks: Vec<_> = config.gateways.iter().map(desk).collect();
+        let desks: Vec<_> = gateways.iter().map(desk).collect();
         for desk in desks.iter().cloned() {
             let mut ended = ended.clone();
             if desk.config.virtual_unit.is_some() {

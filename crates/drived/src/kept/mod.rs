@@ -5,6 +5,7 @@
 //! to, as root's `drived token add` would in the folder of the service. So the folder is opened first ([`folder`]), and what is
 //! in it by its name alone.
 
+mod digest;
 mod folder;
 
 use std::{
@@ -26,6 +27,8 @@ use rustix::{
     io::Errno,
     process::geteuid,
 };
+
+pub(crate) use self::digest::{digits, sha256};
 
 /// Who may read what is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

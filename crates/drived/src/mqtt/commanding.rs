@@ -11,10 +11,10 @@ use tokio::{sync::watch, time::Instant};
 
 use super::{
     Face,
-    topics::{Asking, Meant, Verb, topic_id},
+    topics::{Asking, Meant, Verb},
 };
 use crate::{
-    broker::{Arrived, Kept, Message, Qos},
+    broker::{Arrived, Kept, Message, Qos, config::topic_id},
     desk::{self, Answer, Answers, Desk, Refusal, follow::SETTLES_FOR},
     doors::{Caller, Rights, Role, audit::Audit},
     plant::commands::{Action, LIFETIME, OutcomeWord, Said, Target, Unclear, is_id},

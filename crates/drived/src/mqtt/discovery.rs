@@ -15,10 +15,10 @@ use serde_json::{Map, Value, json};
 
 use super::{
     Face,
-    topics::{Meant, Verb, topic_id},
+    topics::{Meant, Verb},
 };
 use crate::{
-    config::Discovery,
+    broker::config::{Discovery, topic_id},
     doors::{Rights, Role},
     plant::views::LineView,
 };

@@ -20,13 +20,12 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-pub(crate) use self::topics::topic_id;
 use self::{commanding::Commanding, discovery::Discovered, telling::Teller, topics::Topics};
 use crate::{
     broker::{
         Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,
+        config::{Address, Discovery, MqttConfig},
     },
-    config::{Discovery, MqttConfig},
     doors::{audit::Audit, private},
     failure::Failure,
     metrics::Source,
@@ -131,7 +130,7 @@ pub(crate) fn options(config: &MqttConfig) -> Result<Options, Failure> {
     let secured = || Secured::open(config.authorities.as_deref(), config.identity.as_ref());
     let secured =
         encrypted.then(secured).transpose().map_err(|error| Failure::Input(format!("mqtt: {error}")))?;
-    let server = |address: &crate::config::Address| Server {
+    let server = |address: &Address| Server {
         host: address.host.clone(),
         port: address.port,
         tls: secured.clone().filter(|_| address.tls),

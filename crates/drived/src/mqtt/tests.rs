@@ -8,8 +8,8 @@ use tokio::time::sleep;
 
 use super::*;
 use crate::{
+    broker::config::Address,
     broker::testing::{Conduct, TestBroker, publish},
-    config::Address,
     desk::testing::{NO_OBJECTS, REFUSED, STOPS},
     doors::Role,
     plant::testing::TestPlant,

@@ -1,6 +1,6 @@
 //! The topics: `<base>/status`, `<base>/line/<id>`, `<base>/drive/<id>/…`, `<base>/group/<id>/…`, `<base>/all/…`.
 
-use crate::config::MqttConfig;
+use crate::broker::config::{MqttConfig, topic_id};
 
 /// What asks for something: the last levels before the commander.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -179,10 +179,4 @@ impl Topics {
 /// Whether a message to this topic is taken also in a flood: a stop, whatever it says, and what the daemon says to itself.
 pub(super) fn is_urgent(topic: &str) -> bool {
     topic.rsplit('/').take(2).any(|level| level == "stop") || topic.ends_with("/echo")
-}
-
-/// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.
-pub(crate) fn topic_id(name: &str) -> String {
-    let allowed = |character: char| character.is_ascii_alphanumeric() || character == '-' || character == '_';
-    name.chars().map(|character| if allowed(character) { character } else { '_' }).collect()
 }

@@ -36,7 +36,7 @@ use self::{
     tally::Tally,
     usage::Usage,
 };
-use crate::{config::Group, doors::Caller, json::unix};
+use crate::{config::Group, json::unix, rights::Caller};
 
 /// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
 const EXCHANGES: usize = 100;

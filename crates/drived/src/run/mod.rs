@@ -27,8 +27,10 @@ use self::{
     report::{Form, Report},
 };
 use crate::{
-    api,
-    config::{Config, Http, LinePart},
+    api::{self, Reload as _},
+    config::LinePart,
+    config_file::Config,
+    doors::config::Http,
     doors::{
         Doors,
         audit::{Audit, Kind, Record},
@@ -38,7 +40,7 @@ use crate::{
     gateway::Gateways,
     journal, logging, metrics,
     mqtt::Mqtt,
-    one_drive, page,
+    own_line, page,
     plant::Plant,
     screen::Screen,
     signals::{Ending, Wish, Wishes},
@@ -75,7 +77,10 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
-    let sparkplug = Sparkplug::prepared(&config)?;
+    let sparkplug = match (&config.mqtt, &config.sparkplug) {
+        (Some(mqtt), Some(sparkplug)) => Some(Sparkplug::prepared(mqtt, sparkplug)?),
+        _ => None,
+    };
     let mqtt = config.mqtt.clone().map(Mqtt::prepare).transpose()?;
     let mut ending = Ending::listen()?;
     let notify = Notify::start();
@@ -107,7 +112,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
-    let gateways = Gateways::open(&config, &plant, &doors.audit());
+    let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit());
     let shutdown = config.shutdown;
     let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
@@ -176,7 +181,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let told = OptionFuture::from(mqtt.map(Mqtt::close));
     tokio::join!(told, OptionFuture::from(sparkplug.map(Sparkplug::close)));
     for (_, line) in fleet.lines() {
-        one_drive::close(&line).await;
+        own_line::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
 }

@@ -16,11 +16,13 @@ use tokio::{sync::Mutex, time::Instant};
 use self::changes::{Change, changes};
 use super::notify::Notify;
 use crate::{
-    config::{Config, DrivePart, LinePart},
+    api::Reload,
+    config::{DrivePart, LinePart},
+    config_file::Config,
     failure::Failure,
     json::unix,
     metrics::{Id, Samples, Source},
-    one_drive,
+    own_line,
     plant::{Plant, views::NoticeView},
 };
 
@@ -44,6 +46,51 @@ impl Reloader {
         Self(Arc::new(Inner { plant, notify, file, config: Mutex::new(config), last }))
     }
 
+    /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
+    async fn carry_out(&self, config: &mut Config, mut new: Config) -> Result<Done, Failure> {
+        let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+        let (plant, changes) = (&self.0.plant, changes(config, &new));
+        let fleet = plant.fleet();
+        // What can fail without anything being done comes first.
+        let mut lines = Vec::new();
+        for part in new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name))) {
+            let line = Line::start(part.config.clone()).map_err(|error| input(&error))?;
+            lines.push((part.name.clone(), part.budget, line));
+        }
+        let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
+        let actions = fleet.remove(&leaving, config.shutdown).await;
+        let turning = actions.iter().filter(|(_, action)| action.is_alarm());
+        let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
+        for name in changes.iter().filter_map(Change::closed_line) {
+            if let Some(line) = fleet.remove_line(name) {
+                own_line::close(&line).await;
+            }
+        }
+        for line in &mut config.lines {
+            line.drives.retain(|drive| !leaving.contains(&&*drive.settings.name));
+        }
+        config.lines.retain(|line| !changes.iter().any(|change| change.closed_line() == Some(&line.name)));
+        // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
+        config.groups = std::mem::take(&mut new.groups);
+        plant.set_groups(config.groups.clone());
+        let made =
+            add_all(&fleet, &changes, &new, &lines).map(|()| settle(&fleet, config, &mut new, &changes));
+        if !changes.is_empty() {
+            plant.revisions().begin_anew();
+        }
+        let made = made.map_err(|error| (error.to_string(), halves(&changes)));
+        match made.and_then(|refused| refused.map_or(Ok(()), Err)) {
+            Ok(()) => Ok(Done { changes, turning }),
+            Err((why, half)) => {
+                let told = format!("ONLY IN PART ({why}): {}", half.join("; "));
+                let parts = (!turning.is_empty()).then(|| may_turn(&turning)).into_iter().chain([told]);
+                Err(Failure::Drive(parts.collect::<Vec<_>>().join("; ")))
+            }
+        }
+    }
+}
+
+impl Reload for Reloader {
     /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
     /// whole file is read and checked first.
     ///
@@ -53,7 +100,7 @@ impl Reloader {
     /// # Errors
     /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
     /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
-    pub(crate) async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+    async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
         let mut config = self.0.config.lock().await;
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
@@ -95,49 +142,6 @@ impl Reloader {
         match turning.is_empty() {
             true => Ok(changes.iter().map(ToString::to_string).collect()),
             false => Err(Failure::Drive(may_turn(&turning))),
-        }
-    }
-
-    /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
-    async fn carry_out(&self, config: &mut Config, mut new: Config) -> Result<Done, Failure> {
-        let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
-        let (plant, changes) = (&self.0.plant, changes(config, &new));
-        let fleet = plant.fleet();
-        // What can fail without anything being done comes first.
-        let mut lines = Vec::new();
-        for part in new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name))) {
-            let line = Line::start(part.config.clone()).map_err(|error| input(&error))?;
-            lines.push((part.name.clone(), part.budget, line));
-        }
-        let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
-        let actions = fleet.remove(&leaving, config.shutdown).await;
-        let turning = actions.iter().filter(|(_, action)| action.is_alarm());
-        let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
-        for name in changes.iter().filter_map(Change::closed_line) {
-            if let Some(line) = fleet.remove_line(name) {
-                one_drive::close(&line).await;
-            }
-        }
-        for line in &mut config.lines {
-            line.drives.retain(|drive| !leaving.contains(&&*drive.settings.name));
-        }
-        config.lines.retain(|line| !changes.iter().any(|change| change.closed_line() == Some(&line.name)));
-        // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
-        config.groups = std::mem::take(&mut new.groups);
-        plant.set_groups(config.groups.clone());
-        let made =
-            add_all(&fleet, &changes, &new, &lines).map(|()| settle(&fleet, config, &mut new, &changes));
-        if !changes.is_empty() {
-            plant.revisions().begin_anew();
-        }
-        let made = made.map_err(|error| (error.to_string(), halves(&changes)));
-        match made.and_then(|refused| refused.map_or(Ok(()), Err)) {
-            Ok(()) => Ok(Done { changes, turning }),
-            Err((why, half)) => {
-                let told = format!("ONLY IN PART ({why}): {}", half.join("; "));
-                let parts = (!turning.is_empty()).then(|| may_turn(&turning)).into_iter().chain([told]);
-                Err(Failure::Drive(parts.collect::<Vec<_>>().join("; ")))
-            }
         }
     }
 }

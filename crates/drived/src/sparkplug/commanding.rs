@@ -17,7 +17,7 @@ use tokio::{
 use super::metrics::{COMMAND, SETPOINT, SPEED_SETPOINT};
 use crate::{
     broker::Arrived,
-    config::SparkplugConfig,
+    broker::config::SparkplugConfig,
     desk::{Answer, Answers, Desk, Message, Refusal},
     doors::{Caller, Rights, Role, audit::Audit},
     json::unix,

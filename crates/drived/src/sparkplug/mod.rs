@@ -26,8 +26,8 @@ use tokio::{
 
 use self::{bd_seq::Kept as KeptBdSeq, commanding::Commanding};
 use crate::{
+    broker::config::{MqttConfig, SparkplugConfig},
     broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Will},
-    config::{Config, SparkplugConfig},
     doors::audit::Audit,
     failure::Failure,
     json::unix,
@@ -86,12 +86,11 @@ impl Sparkplug {
     ///
     /// # Errors
     /// One of them cannot be read, or is none of this.
-    pub(crate) fn prepared(config: &Config) -> Result<Option<Prepared>, Failure> {
-        let (Some(mqtt), Some(sparkplug)) = (&config.mqtt, &config.sparkplug) else { return Ok(None) };
+    pub(crate) fn prepared(mqtt: &MqttConfig, sparkplug: &SparkplugConfig) -> Result<Prepared, Failure> {
         let options = mqtt::options(mqtt)?;
         let client_id = format!("{}-sparkplug", options.client_id);
         let options = Options { client_id, is_urgent: |topic| topic.contains("/DCMD/"), ..options };
-        Self::prepare(sparkplug.clone(), options, mqtt.interval).map(Some)
+        Self::prepare(sparkplug.clone(), options, mqtt.interval)
     }
 
     /// The same with options of a broker, and the time between two looks at the drives.

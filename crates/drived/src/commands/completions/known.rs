@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use super::place::Place;
 use crate::{
     client::Daemon,
-    config::Config,
+    config_file::Config,
     plant::views::{DriveView, StateView},
 };
 

@@ -9,15 +9,13 @@ mod place;
 mod ports;
 mod words;
 
-use clap::CommandFactory as _;
-
 use self::{
     known::Known,
     offers::{Offer, Offers},
     place::Place,
     words::{Word, quoted},
 };
-use crate::{cli::Cli, failure::Failure, output};
+use crate::{failure::Failure, output};
 
 // The text has brackets that a doc comment would take for links.
 const ABOUT: &str = "\
@@ -49,7 +47,8 @@ enum Shell {
     Fish,
 }
 
-pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+/// Offers what fits of a program.
+pub(crate) async fn run(args: Args, mut program: clap::Command) -> Result<(), Failure> {
     let Args { shell, words } = args;
     if words.is_empty() {
         let script = match shell {
@@ -60,9 +59,8 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         return output::say_as_it_is(script.trim_end());
     }
     let typed = Typed::of(shell, words);
-    let mut root = Cli::command();
-    root.build();
-    let place = Place::find(&root, &typed.words);
+    program.build();
+    let place = Place::find(&program, &typed.words);
     let offers = offers::at(&place, &Known::at(&place).await);
     output::say_as_it_is(if offers.files { "files" } else { "words" })?;
     typed.written(&offers).into_iter().try_for_each(output::say_as_it_is)

@@ -21,8 +21,8 @@ use tracing::Level;
 use self::plant::Plant;
 use crate::{
     api,
-    config::{DoorsConfig, Http},
     doors::Doors,
+    doors::config::{DoorsConfig, Http},
     failure::Failure,
     metrics,
     output::{self, Table},

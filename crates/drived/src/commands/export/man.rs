@@ -2,21 +2,34 @@
 
 use std::{fs, io, path::Path};
 
-use clap::{Arg, Command, CommandFactory as _};
+use clap::{Arg, Command};
 use roff::{Inline, Roff, bold, italic, roman};
 
 use crate::{
-    cli::{Cli, ENVIRONMENT, EXIT_CODES},
-    config,
-    failure::Failure,
+    config_file,
+    failure::{EXIT_CODES, Failure},
     output,
 };
 
+/// The variables of the environment that are looked at.
+pub(crate) const ENVIRONMENT: [(&str, &str); 3] = [
+    (
+        "DRIVED_LOG",
+        "how much is logged on stderr: off, error, warn, info, debug or trace; or for parts of the program, such as \
+         drive_bus=trace,warn",
+    ),
+    ("NO_COLOR", "where it has a value nothing is coloured; colours are for terminals in any case"),
+    (
+        "RUNTIME_DIRECTORY, XDG_RUNTIME_DIR",
+        "the folders in which the control socket of the daemon is looked for, before /run/drived",
+    ),
+];
+
 /// Writes the pages into a folder, which is made where it is not there.
-pub(super) fn write(folder: &Path) -> Result<(), Failure> {
+pub(super) fn write(program: Command, folder: &Path) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::Input(format!("{}: {error}", folder.display()));
     fs::create_dir_all(folder).map_err(failed)?;
-    let pages = pages();
+    let pages = pages(program);
     for (name, page) in &pages {
         fs::write(folder.join(format!("{name}.1")), page).map_err(failed)?;
     }
@@ -25,8 +38,8 @@ pub(super) fn write(folder: &Path) -> Result<(), Failure> {
 }
 
 /// Each page by its name.
-fn pages() -> Vec<(String, String)> {
-    let mut root = Cli::command().disable_help_subcommand(true);
+fn pages(program: Command) -> Vec<(String, String)> {
+    let mut root = program.disable_help_subcommand(true);
     root.build();
     let mut pages = Vec::new();
     of(&mut root, None, &mut pages);
@@ -60,7 +73,7 @@ fn of(command: &mut Command, parent: Option<&str>, pages: &mut Vec<(String, Stri
     let mut notes = notes.split("\n\n");
     let map = notes.next().unwrap_or_default().lines().filter_map(|line| line.split_once(':'));
     if name == "drived-check" {
-        for (table, keys) in config::tables() {
+        for (table, keys) in config_file::tables() {
             let keys = keys.iter().map(|key| (vec![bold(key.name)], plain(&key.sentence())));
             list(&mut page, &plain(table).to_uppercase(), keys);
         }

@@ -4,7 +4,9 @@ mod man;
 
 use std::path::PathBuf;
 
-use crate::{config::Config, failure::Failure, gateway::virtual_unit, metrics, output};
+#[cfg(test)]
+pub(crate) use self::man::ENVIRONMENT;
+use crate::{config_file::Config, failure::Failure, gateway::virtual_unit, metrics, output};
 
 /// Print the alert rules for Prometheus, the board for Grafana, or the map of a gateway's virtual unit; write the man pages
 ///
@@ -33,9 +35,9 @@ enum What {
     Man,
 }
 
-pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args, program: clap::Command) -> Result<(), Failure> {
     match (args.what, &args.to) {
-        (What::Man, Some(folder)) => man::write(folder),
+        (What::Man, Some(folder)) => man::write(program, folder),
         (What::Man, None) => Err(Failure::Input("expected --to FOLDER for the man pages".to_owned())),
         (_, Some(_)) => Err(Failure::Input("--to is for the man pages: this is printed".to_owned())),
         (What::Alerts, None) => output::say_as_it_is(metrics::ALERTS.trim_end()),

@@ -14,7 +14,7 @@ use crate::{
     doors::{Caller, Rights},
     drive_spec::{self, DriveName},
     failure::Failure,
-    one_drive,
+    own_line,
     plant::Plant,
 };
 
@@ -59,7 +59,7 @@ impl Source {
         let names = drive_spec::on_one_line(&args.drives).map_err(|error| input(&error))?;
         let options = args.options.of(&names)?;
         let config = line.config(&names).map_err(|error| input(&error))?;
-        Self::over(one_drive::open_line(config).await?, &names, &options)
+        Self::over(own_line::open_line(config).await?, &names, &options)
     }
 
     /// Drives on an open line.
@@ -109,7 +109,7 @@ impl Source {
         if let Some(Own { fleet, line }) = self.own {
             // Whoever stopped a motor has been told what came of it.
             let _ = fleet.shutdown(STOPPED_WITHIN).await;
-            one_drive::close(&line).await;
+            own_line::close(&line).await;
         }
     }
 }

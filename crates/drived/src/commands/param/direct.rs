@@ -7,8 +7,9 @@ use super::shown::{find, value_cells, value_table};
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
-    one_drive::{OneDrive, OneDriveArgs, told},
+    one_drive::{OneDrive, OneDriveArgs},
     output,
+    own_line::told,
     plant::parameters::{ParameterView, WrittenView},
     registers::wanted,
     signals::Ending,

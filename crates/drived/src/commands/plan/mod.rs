@@ -16,7 +16,8 @@ use self::{
     sheet::Sheet,
 };
 use crate::{
-    config::{Config, LinePart},
+    config::LinePart,
+    config_file::Config,
     drive_spec::{self, DriveName, DriveSpec},
     duration::Time,
     failure::Failure,

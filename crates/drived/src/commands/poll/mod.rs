@@ -22,7 +22,7 @@ use crate::{
     failure::Failure,
     findings,
     line_spec::{self, LineSpec},
-    one_drive, output,
+    output, own_line,
     signals::Ending,
 };
 
@@ -72,12 +72,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let options = args.options.of(&names)?;
     let config = args.line.config(&names).map_err(|error| Failure::Input(error.to_string()))?;
     let mut ending = Ending::listen()?;
-    let line = one_drive::open_line(config.clone()).await?;
+    let line = own_line::open_line(config.clone()).await?;
 
     let (readings, mut incoming) = mpsc::channel(WAITING);
     let mut polls = JoinSet::new();
     for &name in &names {
-        let drive = one_drive::open_drive(&line, name, &options);
+        let drive = own_line::open_drive(&line, name, &options);
         polls.spawn(poll(name, drive, args.period.0, readings.clone()));
     }
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
@@ -109,7 +109,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     polls.shutdown().await;
     link::read_counters(&line, &names, &config).await;
     let stats = line.stats();
-    one_drive::close(&line).await;
+    own_line::close(&line).await;
     let summary = Summary::new(&names, &book.answered, &stats, &config);
     if args.json {
         output::say_as_it_is(json::summary(&summary))?;
@@ -258,7 +258,7 @@ mod tests {
             let config = LineConfig { protocol, ..LineConfig::stream(settings) };
             let line = Line::over(simulated.in_memory(), config);
             let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
-            let mut drive = one_drive::open_drive(&line, name, &Options::default());
+            let mut drive = own_line::open_drive(&line, name, &Options::default());
             // What the bus cannot set is as it is.
             let _ = drive.arm_watchdog(Duration::from_secs(2), Reaction::Trip).await;
             let (readings, mut incoming) = mpsc::channel(WAITING);

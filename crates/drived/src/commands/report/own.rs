@@ -16,7 +16,7 @@ use crate::{
     drive_spec::DriveName,
     failure::Failure,
     line_spec::LineSpec,
-    one_drive,
+    own_line,
     plant::Plant,
     run::reload,
 };
@@ -52,7 +52,7 @@ impl Own {
         let options = options.of(names)?;
         let config = line.config(names).map_err(|error| Failure::Input(error.to_string()))?;
         let part = LinePart::watched(LINE, config, names, &options, PERIODS);
-        let line = one_drive::open_line(part.config.clone()).await?;
+        let line = own_line::open_line(part.config.clone()).await?;
         Self::over(line, &part, time).await
     }
 
@@ -78,7 +78,7 @@ impl Own {
 
     /// Lets the line go.
     pub(super) async fn close(self) {
-        one_drive::close(&self.line).await;
+        own_line::close(&self.line).await;
     }
 }
 

@@ -12,7 +12,7 @@ use drive_families::Family;
 use tokio::time::Instant;
 
 use super::answer::{Answer, Likeness};
-use crate::{failure::Failure, one_drive};
+use crate::{failure::Failure, own_line};
 
 /// Exceptions of a gateway: no path to the slave, and no answer from it (Modbus Application Protocol V1.1b3, section 7).
 const GATEWAY: [u8; 2] = [0x0A, 0x0B];
@@ -70,7 +70,7 @@ async fn ask_once(line: &Line, slave: SlaveAddress) -> Result<Option<Heard>, Fai
         Asked::Refused(Error::Exception { code, .. }) if GATEWAY.contains(&code) => Some(Heard::Nothing),
         Asked::Refused(Error::Port { problem: PortError::Timeout { .. }, .. }) => Some(Heard::Nothing),
         Asked::Refused(Error::Port { problem: PortError::Expired, .. }) => {
-            return Err(Failure::Drive(one_drive::NEVER_QUIET.to_owned()));
+            return Err(Failure::Drive(own_line::NEVER_QUIET.to_owned()));
         }
         Asked::Refused(Error::Port { problem, .. }) => return Err(Failure::Input(problem.to_string())),
         Asked::Told(()) | Asked::Refused(_) => None,
@@ -192,7 +192,7 @@ pub(super) async fn feed(line: &Line, family: Option<Family>, slave: SlaveAddres
 
 fn open(line: &Line, family: Family, slave: SlaveAddress) -> Box<dyn Drive> {
     let mut drive = family.open(line.slave(slave.number()), slave);
-    one_drive::wait_at_most(&mut *drive);
+    own_line::wait_at_most(&mut *drive);
     drive
 }
 

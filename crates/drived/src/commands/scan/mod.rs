@@ -29,8 +29,8 @@ use crate::{
     duration::Time,
     failure::Failure,
     line_spec::{self, LineSpec},
-    one_drive,
     output::{self, Progress},
+    own_line,
     signals::Ending,
 };
 
@@ -105,9 +105,9 @@ pub(crate) async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Resu
     let mut ending = Ending::listen()?;
     // A port that is not there is told before anything is said of it.
     let began = Instant::now();
-    one_drive::close(&one_drive::open_line(line.clone()).await?).await;
+    own_line::close(&own_line::open_line(line.clone()).await?).await;
     let plan = plan.switching_in(began.elapsed());
-    let mut sweep = Sweep::new(&plan, line.clone(), what.wait.0, one_drive::open_line);
+    let mut sweep = Sweep::new(&plan, line.clone(), what.wait.0, own_line::open_line);
     what.announce(&line, &plan, is_json)?;
     tokio::select! {
         () = listen_first(&line) => {}

@@ -13,7 +13,7 @@ use super::{
     answer::{Answer, Likeness, described},
     found::Finds,
 };
-use crate::{config::Config, failure::Failure, logging::escaped};
+use crate::{config_file::Config, failure::Failure, logging::escaped};
 
 /// Where a configuration is written to.
 #[derive(Debug)]

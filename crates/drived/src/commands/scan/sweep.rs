@@ -12,7 +12,7 @@ use super::{
     look::{self, Heard, Looks},
     plan::{Found, Plan, Step},
 };
-use crate::{drive_spec::DriveName, failure::Failure, line_spec, one_drive};
+use crate::{drive_spec::DriveName, failure::Failure, line_spec, own_line};
 
 /// How long one look at a slave takes at the slowest settings: some watchdogs are not much longer.
 const LOOK: Duration = Duration::from_millis(600);
@@ -115,7 +115,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// Lets the port go.
     pub(super) async fn close(&mut self) {
         if let Some((_, line)) = self.at.take() {
-            one_drive::close(&line).await;
+            own_line::close(&line).await;
         }
     }
 

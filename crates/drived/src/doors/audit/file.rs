@@ -10,10 +10,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{Line, Record, seal::Key, unix_ms};
-use crate::{
-    doors::tokens::sha256,
-    kept::{Kept, is_at},
-};
+use crate::kept::{Kept, is_at, sha256};
 
 /// A file of this size is put aside.
 const LARGEST: u64 = 8 * 1024 * 1024;
@@ -240,10 +237,12 @@ mod tests {
     use std::{fs::OpenOptions, path::PathBuf};
 
     use super::*;
-    use crate::doors::{
-        audit::{Kind, Verdict, verify, verify::verify_since},
+    use crate::{
+        doors::{
+            audit::{Kind, Verdict, verify, verify::verify_since},
+            tests::Folder,
+        },
         rights::{Caller, Rights},
-        tests::Folder,
     };
 
     fn record(what: &str) -> Record {

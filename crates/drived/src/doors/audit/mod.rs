@@ -32,8 +32,8 @@ pub(crate) use self::{
     show::{Filter, Found, shown},
     verify::{Verdict, verify_since},
 };
-use super::rights::{Caller, Rights};
 use crate::kept::Kept;
+use crate::rights::{Caller, Rights};
 
 /// Records that wait for the disk.
 const WAITING: usize = 256;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::doors::tokens::sha256;
+use crate::kept::sha256;
 
 /// A body that is longer is kept by its length and its SHA-256.
 const WHOLE: usize = 512;

@@ -5,10 +5,7 @@ use std::io;
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
-use crate::{
-    doors::tokens::hex,
-    kept::{Kept, Readers},
-};
+use crate::kept::{Kept, Readers, digits};
 
 /// What stands behind the name of the log in that of the file of its key.
 const KEY: &str = ".key";
@@ -43,7 +40,7 @@ impl Key {
         }
         let mut bits = [0; 32];
         getrandom::fill(&mut bits).map_err(|error| io::Error::other(error.to_string()))?;
-        let text = hex(&bits);
+        let text = digits(&bits);
         log.beside(KEY).replace(text.as_bytes(), Readers::Owner)?;
         Ok(Self::from_text(text.as_bytes()))
     }
@@ -64,7 +61,7 @@ impl Key {
     fn hmac(&self, text: &[u8]) -> String {
         let with = |pad: u8| self.0.map(|byte| byte ^ pad);
         let inner = Sha256::new().chain_update(with(0x36)).chain_update(text).finalize();
-        hex(&Sha256::new().chain_update(with(0x5C)).chain_update(inner).finalize())
+        digits(&Sha256::new().chain_update(with(0x5C)).chain_update(inner).finalize())
     }
 
     /// A line with its seal, of an object in JSON.

@@ -11,7 +11,7 @@ use super::{
     file::{FIRST, Head, KEPT, aside},
     seal::Key,
 };
-use crate::{doors::tokens::sha256, kept::Kept};
+use crate::kept::{Kept, sha256};
 
 /// What a log says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -19,12 +19,12 @@ use tokio::{
 
 use super::{client, desk::Desk};
 use crate::{
-    config::{GatewayConfig, Units},
     doors::{
         Role,
         audit::Audit,
         crowd::{Crowd, Limits, Place},
     },
+    gateway::config::{GatewayConfig, Units},
     plant::testing::TestPlant,
 };
 

@@ -7,8 +7,8 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::{ETA, Peer, plant, read};
 use crate::{
-    config::GatewayConfig,
     doors::{Caller, Rights, Role},
+    gateway::config::GatewayConfig,
     gateway::desk::Desk,
     plant::{
         commands::{Action, Request, Target},

@@ -24,12 +24,12 @@ use super::{
     settle::settled,
 };
 use crate::{
-    doors::Caller,
     json::{milliseconds, unix},
     plant::{
         Plant,
         views::{CommandView, SeveralView, Shown},
     },
+    rights::Caller,
 };
 
 /// Outcomes of several drives that come within this time are told together.

@@ -9,7 +9,7 @@ use std::{
 use tokio::{sync::watch, time::Instant};
 
 use super::{Action, Rejected, Request, Target};
-use crate::{doors::Caller, plant::views::CommandView};
+use crate::{plant::views::CommandView, rights::Caller};
 
 /// How many commands are remembered, and for how long.
 const KEPT: usize = 1_000;

@@ -31,7 +31,7 @@ pub(crate) use self::{
 };
 use self::{carry::Work, log::Found};
 use super::{Plant, views::CommandView};
-use crate::{config::Group, doors::Caller};
+use crate::{config::Group, rights::Caller};
 
 /// How long a command may wait until it is sent, unless it says so itself, and at the longest.
 pub(crate) const LIFETIME: Duration = Duration::from_secs(1);
@@ -276,7 +276,7 @@ mod tests {
     use tokio::{sync::mpsc, task::spawn_blocking};
 
     use super::*;
-    use crate::{doors::Rights, plant::testing::TestPlant};
+    use crate::{plant::testing::TestPlant, rights::Rights};
 
     #[tokio::test(start_paused = true)]
     async fn a_start_that_may_be_given_is_on_its_way_before_a_stop_is_taken() {

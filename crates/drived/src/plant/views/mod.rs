@@ -24,7 +24,7 @@ pub(crate) use self::{
     measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
     notice::{HappenedView, NoticeView},
 };
-use crate::{config::Group, doors::Rights};
+use crate::{config::Group, rights::Rights};
 
 /// Everything at one moment.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]

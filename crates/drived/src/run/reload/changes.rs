@@ -5,7 +5,10 @@ use std::{collections::BTreeMap, fmt};
 use drive_bus::LineConfig;
 use drive_fleet::{DriveSettings, Fleet};
 
-use crate::config::{Config, DrivePart, LinePart};
+use crate::{
+    config::{DrivePart, LinePart},
+    config_file::Config,
+};
 
 /// What a reload does, in the order in which it is told.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -22,7 +22,7 @@ use super::{
 use crate::{
     commands::doctor::observations::{Asked, Observations},
     failure::Failure,
-    one_drive,
+    own_line,
 };
 
 /// Rounds of questions at the least: three questions to each slave in a round.
@@ -204,7 +204,7 @@ impl Asking {
         // An exception is an answer too, so that any family's shortest question does.
         let family = named.map_or(Family::Atv312, |name| name.family);
         let mut drive = family.open_with(self.line.slave(slave.number()), slave, &Options::default());
-        one_drive::wait_at_most(&mut *drive);
+        own_line::wait_at_most(&mut *drive);
         let is_named = named.is_some();
         let fed_every = (!is_named).then_some(FED_EVERY);
         Asker {

@@ -16,7 +16,7 @@ use tokio::time::{self, Instant};
 
 use self::asking::Asking;
 use super::observations::{Adapter, Listened, Observations};
-use crate::{drive_spec::DriveName, failure::Failure, one_drive};
+use crate::{drive_spec::DriveName, failure::Failure, own_line};
 
 /// How long the line is listened to before anything is asked: a panel or a PLC asks once a second or more often.
 pub(super) const LISTENING: Duration = Duration::from_secs(3);
@@ -102,7 +102,7 @@ pub(super) async fn observe(
         ended = asking.all(task, &mut progress) => ended,
         () = &mut end => Err(Failure::Drive("it was asked to end".to_owned())),
     };
-    one_drive::close(&asking.line).await;
+    own_line::close(&asking.line).await;
     if let Err(failure) = ended {
         if asking.asked.is_empty() {
             return Err(failure);

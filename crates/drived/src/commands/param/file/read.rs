@@ -8,7 +8,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Backup, Entry, Head, is_kept};
-use crate::{config::Place, failure::Failure};
+use crate::{config::Source as Place, failure::Failure};
 
 /// A family has a few hundred registers, and a line for each.
 const LARGEST: u64 = 1 << 20;

@@ -7,7 +7,7 @@ use super::{Source, Unread, Unwritten};
 use crate::{
     client::path_of,
     failure::Failure,
-    one_drive::may_have_written,
+    own_line::may_have_written,
     plant::{commands::OutcomeWord, parameters::ParameterView},
 };
 

@@ -2,26 +2,20 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fmt,
     net::{IpAddr, Ipv4Addr, SocketAddr},
     ops::Range,
-    str::FromStr,
     time::Duration,
 };
 
 use drive_core::Class;
 use toml::Spanned;
 
-use super::{
-    LinePart, file,
-    place::{ConfigError, Source},
-    table::{Entry as _, settings, within},
-    values::{Parsed, words},
-};
+use super::virtual_unit::MOST_DRIVES;
 use crate::{
-    doors::{Rights, Role},
+    config::{ConfigError, Entry as _, LinePart, Parsed, Source, of, settings, within, words},
+    doors::Network,
     duration::Time,
-    gateway::virtual_unit::MOST_DRIVES,
+    rights::{Rights, Role},
 };
 
 /// A gateway.
@@ -72,47 +66,6 @@ pub(crate) enum Units {
     OfLine(String),
     /// Drives by their names.
     Table(BTreeMap<u8, String>),
-}
-
-/// Addresses that begin alike.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Network {
-    address: IpAddr,
-    bits: u32,
-}
-
-impl Network {
-    /// Whether an address is one of it.
-    pub(crate) fn has(&self, address: IpAddr) -> bool {
-        let begin = |address: u128, of: u32| address.checked_shr(of - self.bits.min(of)).unwrap_or(0);
-        match (self.address, address.to_canonical()) {
-            (IpAddr::V4(own), IpAddr::V4(other)) => {
-                begin(u32::from(own).into(), 32) == begin(u32::from(other).into(), 32)
-            }
-            (IpAddr::V6(own), IpAddr::V6(other)) => begin(own.into(), 128) == begin(other.into(), 128),
-            _ => false,
-        }
-    }
-}
-
-impl fmt::Display for Network {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.address, self.bits)
-    }
-}
-
-impl FromStr for Network {
-    type Err = &'static str;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        const EXPECTED: &str = "expected an address or a network, such as 10.0.0.7 or 10.0.0.0/24";
-        let (address, bits) =
-            text.split_once('/').map_or((text, None), |(address, bits)| (address, Some(bits)));
-        let address: IpAddr = address.parse().map_err(|_| EXPECTED)?;
-        let most = if address.is_ipv4() { 32 } else { 128 };
-        let bits = bits.map_or(Ok(most), str::parse).map_err(|_| EXPECTED)?;
-        if bits > most { Err(EXPECTED) } else { Ok(Self { address, bits }) }
-    }
 }
 
 words! {
@@ -216,7 +169,7 @@ const SECOND: Duration = Duration::from_secs(1);
 const DAY: Duration = Duration::from_secs(86_400);
 
 /// The gateways of a file with these lines.
-pub(super) fn gateways(
+pub(crate) fn gateways(
     source: Source<'_>,
     entries: &[Spanned<GatewayEntry>],
     lines: &[LinePart],
@@ -255,7 +208,7 @@ impl GatewayEntry {
             return Err(source.error(self.place_of_name(whole), problem));
         }
         let listen = self.listen.as_ref().map_or(LISTEN, |listen| *listen.get_ref());
-        if !listen.ip().is_loopback() && !file::of(&self.plain).is_some_and(|plain| *plain) {
+        if !listen.ip().is_loopback() && !of(&self.plain).is_some_and(|plain| *plain) {
             let place = self.listen.as_ref().map_or(whole, Spanned::span);
             let problem = format_args!(
                 "{listen}: others than this machine can reach it, and Modbus TCP has neither login nor encryption: \
@@ -337,7 +290,7 @@ impl GatewayEntry {
         lines: &[LinePart],
     ) -> Result<Units, ConfigError> {
         let refuse = |span, problem: String| Err(source.error(span, problem));
-        let entries = match (&self.line, file::of(&self.units), lines) {
+        let entries = match (&self.line, of(&self.units), lines) {
             (None, Some(units), _) => units,
             (Some(line), None, _) => {
                 let name = line.get_ref();

@@ -6,12 +6,12 @@ use drive_sparkplug::{Id, NodeName};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{
-    place::{ConfigError, Source},
-    state::State,
-    values::{Parsed, words},
+use crate::{
+    config::{ConfigError, Parsed, Source, State, words},
+    duration::Time,
+    plant::commands::LONGEST_LIFETIME,
+    rights::Role,
 };
-use crate::{doors::Role, duration::Time, plant::commands::LONGEST_LIFETIME};
 
 /// How old a command may be, by the clock of the host that has sent it, unless it says so itself.
 const LIFETIME: Duration = Duration::from_secs(1);
@@ -44,7 +44,7 @@ words! {
 /// `[mqtt.sparkplug]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SparkplugEntry {
+pub(crate) struct SparkplugEntry {
     group: Spanned<String>,
     edge_node: Option<Spanned<String>>,
     primary_host: Option<Spanned<String>>,
@@ -56,7 +56,7 @@ pub(super) struct SparkplugEntry {
 
 impl SparkplugConfig {
     /// The section of a file with these drives and lines.
-    pub(super) fn read<'a>(
+    pub(crate) fn read<'a>(
         source: Source<'_>,
         entry: &SparkplugEntry,
         drives: impl Iterator<Item = &'a str>,

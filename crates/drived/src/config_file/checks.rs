@@ -10,7 +10,8 @@ use std::{
 
 use drive_bus::Endpoint;
 
-use super::{ConfigError, LinePart, file, place::Source, table::Entry as _};
+use super::file;
+use crate::config::{ConfigError, Entry as _, LinePart, Source};
 
 /// A configuration that is longer is no configuration.
 const LONGEST_FILE: u64 = 1 << 20;

@@ -10,15 +10,11 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{
-    gateway::Network,
-    place::{ConfigError, Source},
-    state::State,
-    values::Parsed,
-};
+use super::network::Network;
 use crate::{
-    doors::{Rights, Role},
+    config::{ConfigError, Parsed, Source, State},
     failure::Failure,
+    rights::{Rights, Role},
 };
 
 /// The doors of a daemon.
@@ -153,7 +149,7 @@ impl FromStr for Http {
 
 /// File permissions as chmod has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Mode(u32);
+pub(crate) struct Mode(u32);
 
 impl FromStr for Mode {
     type Err = &'static str;
@@ -167,7 +163,7 @@ impl FromStr for Mode {
 /// `[http]`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct HttpEntry {
+pub(crate) struct HttpEntry {
     listen: Option<Spanned<Parsed<Http>>>,
     tls: Option<TlsFiles>,
     #[serde(default)]
@@ -182,7 +178,7 @@ pub(super) struct HttpEntry {
 /// `[socket]`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SocketEntry {
+pub(crate) struct SocketEntry {
     path: Option<PathBuf>,
     mode: Option<Parsed<Mode>>,
 }
@@ -204,7 +200,7 @@ impl HttpConfig {
 
 impl DoorsConfig {
     /// The doors that a file describes. Files that it names stand beside it, where their paths are not whole.
-    pub(super) fn read(
+    pub(crate) fn read(
         source: Source<'_>,
         http: Option<&HttpEntry>,
         socket: Option<&SocketEntry>,

@@ -12,13 +12,13 @@ use std::{
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{
-    doors::TlsFiles,
-    place::{ConfigError, Source},
-    sparkplug::SparkplugEntry,
-    values::Parsed,
+use super::sparkplug::SparkplugEntry;
+use crate::{
+    config::{ConfigError, Parsed, Source},
+    doors::config::TlsFiles,
+    duration::Time,
+    rights::Role,
 };
-use crate::{doors::Role, duration::Time, mqtt::topic_id};
 
 /// How often everything is told again unless the file says otherwise, and how often at the most.
 const HEARTBEAT: Duration = Duration::from_secs(30);
@@ -135,7 +135,7 @@ impl Address {
 /// `[mqtt]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct MqttEntry {
+pub(crate) struct MqttEntry {
     servers: Spanned<Vec<Spanned<Parsed<Address>>>>,
     #[serde(default)]
     plain: bool,
@@ -153,13 +153,13 @@ pub(super) struct MqttEntry {
     commanders: BTreeMap<Spanned<String>, Role>,
     discovery: Option<Parsed<Discovery>>,
     discovery_prefix: Option<Spanned<String>>,
-    pub(super) sparkplug: Option<SparkplugEntry>,
+    pub(crate) sparkplug: Option<SparkplugEntry>,
 }
 
 impl MqttConfig {
     /// The section of a file with these lines, drives and groups. Files that it names stand beside the file, where their paths are
     /// not whole.
-    pub(super) fn read(
+    pub(crate) fn read(
         source: Source<'_>,
         entry: &MqttEntry,
         names: [(&str, Vec<&str>); 3],
@@ -255,4 +255,10 @@ fn levels(source: Source<'_>, said: Option<&Spanned<String>>, usually: &str) -> 
 /// Whether a text has nothing but characters that are seen.
 fn is_plain(text: &str) -> bool {
     !text.chars().any(|character| character.is_control() || character.is_whitespace())
+}
+
+/// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.
+pub(crate) fn topic_id(name: &str) -> String {
+    let allowed = |character: char| character.is_ascii_alphanumeric() || character == '-' || character == '_';
+    name.chars().map(|character| if allowed(character) { character } else { '_' }).collect()
 }

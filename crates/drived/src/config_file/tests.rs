@@ -5,8 +5,14 @@ use std::path::Path;
 use drive_core::{Frequency, Reaction, StopMode};
 use drive_fleet::{Commanders, OnControlTaken, OnExit, OnFault, Periods, WatchdogContract, plan};
 
-use super::{line::ROOM_PPM, *};
-use crate::doors::Role;
+use super::*;
+use crate::{
+    broker::config::{Address, Discovery},
+    config::{DrivePart, ROOM_PPM, SaidOptions, drive_keys},
+    doors::Network,
+    gateway::config::Units,
+    rights::Role,
+};
 
 const FULL: &str = r#"
 snapshots = "1s"
@@ -414,11 +420,11 @@ fn a_network_has_the_addresses_that_begin_as_it_does() {
         ("10.0.0.0/24", "::ffff:10.0.0.9", "fd00::1"),
         ("fd00::/8", "fdff::1", "fe00::1"),
     ] {
-        let network: gateway::Network = network.parse().unwrap();
+        let network: Network = network.parse().unwrap();
         assert!(network.has(inside.parse().unwrap()), "{network:?} {inside}");
         assert!(!network.has(outside.parse().unwrap()), "{network:?} {outside}");
     }
-    let all: gateway::Network = "0.0.0.0/0".parse().unwrap();
+    let all: Network = "0.0.0.0/0".parse().unwrap();
     assert!(all.has("192.168.1.1".parse().unwrap()));
 }
 

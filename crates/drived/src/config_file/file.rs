@@ -1,36 +1,31 @@
 //! The whole file, and what the daemon itself is told there.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{path::PathBuf, time::Duration};
 
 use toml::Spanned;
 
-use super::{
-    doors::{HttpEntry, SocketEntry},
-    drive::DriveEntry,
-    gateway::GatewayEntry,
-    groups,
-    line::LineEntry,
-    mqtt::MqttEntry,
-    state,
-    table::settings,
-    values::Parsed,
+use crate::{
+    broker::config::MqttEntry,
+    config::{DriveEntry, GroupEntries, LineEntries, LineEntry, Parsed, SaidState, of, settings},
+    doors::config::{HttpEntry, SocketEntry},
+    duration::Time,
+    gateway::config::GatewayEntry,
 };
-use crate::duration::Time;
 
 /// Snapshots come at most so often: each is a line for every drive.
 const SNAPSHOTS_APART: Duration = Duration::from_millis(100);
 
 /// The daemon's own settings while they are read.
-pub(super) struct Draft {
+pub(crate) struct Draft {
     pub(super) snapshots: Duration,
     pub(super) shutdown: Duration,
-    pub(super) kept: state::Said,
+    pub(super) kept: SaidState,
 }
 
 impl Default for Draft {
     fn default() -> Self {
         let (snapshots, shutdown) = (Duration::from_secs(5), Duration::from_secs(60));
-        Self { snapshots, shutdown, kept: state::Said::default() }
+        Self { snapshots, shutdown, kept: SaidState::default() }
     }
 }
 
@@ -56,13 +51,13 @@ settings! {
     watchdogs: PathBuf = "`watchdogs.json` in the state folder",
         |to, said| to.kept.watchdogs = Some(said.clone());
     /// the lines, each with a name
-    lines as "[lines.NAME]": BTreeMap<Spanned<String>, LineEntry> = "one must be given";
+    lines as "[lines.NAME]": LineEntries = "one must be given";
     /// the drives
     drives as "[[drives]]": Vec<Spanned<DriveEntry>> = "one must be given";
     /// any key of `[[drives]]` but `line`, `drive`, `name`: for every drive that does not say otherwise
     defaults as "[defaults]": DriveEntry = "none";
     /// `NAME = ["pump 1", "pump 2"]`: drives that are commanded together by one name
-    groups as "[groups]": groups::Entries = "none";
+    groups as "[groups]": GroupEntries = "none";
     /// the [HTTP server](#http-server)
     http as "[http]": HttpEntry = "`127.0.0.1:7580`";
     /// `path` and `mode` of the [control socket](#commands-through-the-daemon)
@@ -78,11 +73,6 @@ fn snapshots(time: Duration) -> Result<Duration, String> {
         true => Ok(time),
         false => Err(format!("{time:?}: expected \"0\" for never, or {SNAPSHOTS_APART:?} or more")),
     }
-}
-
-/// What a table of the file has, if there is one.
-pub(super) fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
-    said.as_ref().map(Spanned::get_ref)
 }
 
 impl File {
