@@ -103,7 +103,7 @@ async fn what_takes_the_run_command_its_output_or_its_reference_is_told_within_a
         let mut cases = vec![
             ("panel takes".to_owned(), None, Lack::Command),
             ("motor-supply off".to_owned(), None, Lack::Output),
-            (format!("trip {}", drives::a_trip_name(family)), None, Lack::Output),
+            (format!("trip {}", drives::a_trip(family)), None, Lack::Output),
             ("another reference".to_owned(), Some((lfr, 480)), Lack::Reference),
             ("another sign".to_owned(), Some((lfr, 0xFF38)), Lack::Reference),
             ("another stop".to_owned(), Some((cmd, stop)), Lack::Command),
@@ -311,6 +311,26 @@ async fn no_stop_is_told_at_rest_before_the_shaft_stands() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_fast_stop_that_another_masters_stop_turns_into_a_freewheel_is_not_told_at_rest_while_the_motor_coasts()
+ {
+    // Bit 12 stops in the way of Stt (p. 12, 40), which lets the motor coast here.
+    let mut bench = Bench::running(Family::Atv312).await;
+    bench.happens("set Stt 2");
+    bench.drive().stop(StopMode::Fast).await.unwrap();
+    for _ in 0..3 {
+        bench.status().await;
+        sleep(Duration::from_millis(20)).await;
+    }
+    bench.written(registers(Family::Atv312).cmd, 0x100F).await;
+    for _ in 0..10 {
+        let status = bench.status().await;
+        let shaft = bench.rig.machine.observe().shaft_frequency;
+        assert!(!status.is_standstill() || shaft == 0, "{} at {shaft}", status.motion);
+        sleep(Duration::from_millis(100)).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn limits_that_are_lowered_at_the_keypad_are_found_in_their_turn_and_hold_for_setpoints_within_ten_seconds()
  {
     for family in ALTIVARS {
@@ -364,7 +384,7 @@ async fn no_reset_starts_a_motor_whose_terminals_ask_for_a_run() {
                 // The bus has had command.
                 bench.drive().stop(StopMode::Ramp).await.unwrap();
             }
-            bench.happens(&format!("trip {}", drives::a_trip_name(family)));
+            bench.happens(&format!("trip {}", drives::a_trip(family)));
             deeds.iter().for_each(|deed| bench.happens(deed));
             let before = bench.wrote();
             let error = bench.drive().reset_faults().await.unwrap_err();

@@ -55,7 +55,9 @@ impl<P: Port> Drive3g3ev<P> {
         }
         let word = Command::run(direction) | self.inputs();
         self.watch.run.give(Lease::new(direction, word.bits()));
-        match self.write_command(word).await {
+        let sent = self.write_command(word).await;
+        self.registers.owe_judgement();
+        match sent {
             Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out.
             Err(error @ Error::Exception { .. }) => {
@@ -145,6 +147,7 @@ impl<P: Port> Drive3g3ev<P> {
             (asked != mode).then_some("the bus has one stop: the drive stops in the way that it is set to");
         // What became of it, the reading tells.
         self.write_stop().await?.ok();
+        self.registers.owe_judgement();
         let (mut confirming, mut settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let mut first = None;
         let (status, because, sent) = loop {

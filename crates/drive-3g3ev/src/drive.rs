@@ -63,6 +63,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// motor that turned the other way is on its way as soon as its output goes down: the status then tells the old
     /// direction.
     async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
         self.start_motor(direction).await
     }
 
@@ -89,6 +90,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// [`Unsupported`](drive_core::Error::Unsupported) in hertz where n39 counts in percent (2, 3), of a frequency for which the
     /// manual names no register, and in percent where it counts in hertz.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
         self.give_setpoint(setpoint).await
     }
 
@@ -101,6 +103,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// [`with_fault_reset_function`](Self::with_fault_reset_function), or none of n06 to n08 holds it. The manual's
     /// only reset that needs no input goes to all drives of the line: [`broadcast::fault_reset`].
     async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         self.pulse_fault_reset().await
     }
 

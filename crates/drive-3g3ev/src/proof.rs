@@ -5,8 +5,6 @@
 //! every tenth status, which is a twentieth more. 0001h and 0002h are looked at within 20 statuses, and 0001h at once where the
 //! drive runs, turns or is commanded otherwise; n39 and n40 within 80, n02 too.
 
-use std::time::Duration;
-
 use drive_core::{Class, Evidence, Frequency, Ground, Output, Port, Refusal, Status, Told, Verdict};
 use tokio::time::Instant;
 
@@ -44,7 +42,6 @@ pub(crate) struct Proof {
     agreed: Option<u16>,
     /// 0001h and 0002h are to be looked at at once.
     urgent: bool,
-    descent: Descent,
 }
 
 impl Proof {
@@ -66,33 +63,6 @@ impl Proof {
     /// Nothing is known of the reference any more.
     pub(crate) const fn disagree(&mut self) {
         (self.agreed, self.reference) = (None, None);
-    }
-}
-
-/// How fast the output comes down: one that goes at once was cut.
-#[derive(Debug, Clone, Copy, Default)]
-struct Descent {
-    last: Option<(Instant, u16)>,
-    /// Counts in a time.
-    rate: Option<(u16, Duration)>,
-}
-
-impl Descent {
-    fn see(&mut self, now: Instant, output: u16) {
-        if let Some((then, before)) = self.last
-            && output < before
-            && now > then
-        {
-            self.rate = Some((before - output, now - then));
-        }
-        self.last = Some((now, output));
-    }
-
-    /// Whether an output that is 0 at `now` cannot have come down so fast by its ramp.
-    fn is_cut(&self, now: Instant) -> bool {
-        let (Some((then, output)), Some((counts, time))) = (self.last, self.rate) else { return false };
-        let needed = time * u32::from(output) / u32::from(counts.max(1));
-        now.saturating_duration_since(then) * 2 < needed
     }
 }
 
@@ -118,18 +88,14 @@ impl<P: Port> Drive3g3ev<P> {
         let counts = status.raw(address::OUTPUT_FREQUENCY);
         // In percent too: what counts is whether it is 0.
         let output = counts.map(|counts| Frequency::from_centihertz(counts.into()));
-        let shown = output.map_or(Output::NotKnown, |output| self.output(now, status, output));
+        let shown = output.map_or(Output::NotKnown, |output| self.output(status, output));
         status.motion = self.watch.shaft.see(now, shown, output);
-        match (shown, counts) {
-            (Output::Braking(_), Some(counts)) => self.proof.descent.see(now, counts),
-            _ => self.proof.descent = Descent::default(),
-        }
         status.verdict = self.verdict(status);
     }
 
     /// What these words say of the output. The bus does not tell how the drive stops, and bit 8 of 002Ch is on at rest as
     /// well: an output that is gone was cut unless it was seen to come down by an order.
-    fn output(&self, now: Instant, status: &Status, output: Frequency) -> Output {
+    fn output(&self, status: &Status, output: Frequency) -> Output {
         let state = state_word(status);
         let runs = is_run(status);
         let at_zero = status.raw(address::REFERENCE_SEEN) == Some(0) && output == Frequency::ZERO;
@@ -145,8 +111,7 @@ impl<P: Port> Drive3g3ev<P> {
         if !off && output != Frequency::ZERO {
             return Output::Braking(output);
         }
-        let came_down = self.watch.shaft.was_braked() && !self.proof.descent.is_cut(now);
-        if came_down { Output::None } else { Output::Cut }
+        if self.watch.shaft.was_braked() { Output::None } else { Output::Cut }
     }
 
     /// The verdict that a status carries, as far as is known without more exchanges.

@@ -47,6 +47,7 @@ impl<P: Port> Drive3g3ev<P> {
     /// Clears the bit, and reads until no fault shows.
     async fn see_reset(&mut self, pulse: Result<()>, clear: Command) -> Result<Status> {
         self.write_command(clear).await?;
+        self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
         loop {
             let shown = self.read_status(Class::Command).await?;

@@ -64,6 +64,7 @@ impl<P: Port> Drive3g3ev<P> {
         let mut calls = self.registers.at(Class::Command).replacing(REFERENCE.address());
         self.proof.disagree();
         calls.write(REFERENCE, word).await?;
+        self.registers.owe_judgement();
         self.see_reference(word, order).await.map_err(Error::after_write)
     }
 

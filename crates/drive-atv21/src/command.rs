@@ -41,11 +41,13 @@ impl<P: Port> Atv21<P> {
     /// Those of [`set_setpoint`](drive_core::Drive::set_setpoint) and [`start`](drive_core::Drive::start).
     pub async fn start_at(&mut self, direction: Direction, frequency: Frequency) -> Result<Status> {
         let setpoint = Setpoint::Frequency(frequency);
+        self.registers.begin_order();
         let reference = self.reference(setpoint).await?;
         let slots = self.write_slots().await?;
         let block = slots.filter(|slots| command_and_reference(*slots, 0, 0).is_some());
         let Some(slots) = block else {
             self.write_setpoint(setpoint).await?;
+            self.registers.begin_order();
             return self.start_motor(direction, None).await;
         };
         self.clear_other_reference(reference.0).await?;
@@ -72,6 +74,7 @@ impl<P: Port> Atv21<P> {
             Some(words) => calls.write_words(WRITE_BLOCK, &words).await,
             None => calls.write(map::COMMAND_WORD, word.bits()).await,
         };
+        self.registers.owe_judgement();
         match sent {
             Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out, and a block in doubt is read back.
@@ -253,6 +256,7 @@ impl<P: Port> Atv21<P> {
         let mut taken_from = self.commander().filter(|_| !self.holds_priority());
         // What became of it, the reading tells.
         self.write_stop(word).await?.ok();
+        self.registers.owe_judgement();
         let (mut confirming, mut settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let (mut first, mut force) = (None, None);
         let (status, because, sent) = loop {

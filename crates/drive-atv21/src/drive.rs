@@ -75,6 +75,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// what FA01 holds. A motor that turned the other way is on its way as soon as its output goes down: the status then
     /// tells the old direction.
     async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
         self.start_motor(direction, None).await
     }
 
@@ -97,6 +98,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// The other one of the two is set to 0 first. A setpoint that something else overrides is refused: FE46 must name the
     /// bus, or come to do so by the next start, and FE02 must be what was written.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
         self.write_setpoint(setpoint).await
     }
 
@@ -107,6 +109,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// 2 s later. The reset also clears FA00 and with it the priorities, so it is refused where an input that is on would
     /// start the motor then.
     async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         self.reset_trip().await
     }
 

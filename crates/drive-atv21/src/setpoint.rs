@@ -29,6 +29,7 @@ impl<P: Port> Atv21<P> {
         self.clear_other_reference(register).await?;
         let mut calls = self.registers.at(Class::Command).replacing(register.address());
         calls.write(register, word).await?;
+        self.registers.owe_judgement();
         self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
     }
 

@@ -64,6 +64,7 @@ impl<P: Port> Atv21<P> {
         // The edge is cleared whether or not the drive is already starting up again and hears nothing: then it clears
         // the word by itself.
         let cleared = self.write_command_word(clear).await;
+        self.registers.owe_judgement();
         if cleared.is_ok() {
             self.watch.run.end();
         }

@@ -86,6 +86,10 @@ impl<P: Port> Drivecom for Atv28<P> {
         &mut self.proof.watch.run
     }
 
+    fn owes_judgement(&mut self) {
+        self.registers.owe_judgement();
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         self.fast_status(class).await
     }

@@ -94,6 +94,7 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
         drivecom::start(self, direction, ControlWord::run(direction).bits()).await
     }
 
@@ -108,10 +109,12 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
         self.give_setpoint(setpoint).await
     }
 
     async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         drivecom::reset_fault(self).await
     }
 

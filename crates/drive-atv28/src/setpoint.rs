@@ -35,6 +35,7 @@ impl<P: Port> Atv28<P> {
         let is_lfr = register.address() == LFR.address();
         self.proof.gives(register.address(), word, is_lfr);
         let frequency = is_lfr.then(|| count(word));
+        self.registers.owe_judgement();
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
     }
 

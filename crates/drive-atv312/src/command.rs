@@ -167,6 +167,10 @@ impl<P: Port> Drivecom for Atv312<P> {
         &mut self.proof.watch.run
     }
 
+    fn owes_judgement(&mut self) {
+        self.registers.owe_judgement();
+    }
+
     fn as_written(&self, word: u16) -> u16 {
         word | self.known.settings.kept(self.high_bits)
     }

@@ -57,6 +57,7 @@ impl<P: Port> Drive for Atv312<P> {
     }
 
     async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
         drivecom::start(self, direction, ControlWord::run(direction).bits()).await
     }
 
@@ -75,6 +76,7 @@ impl<P: Port> Drive for Atv312<P> {
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
         self.give_setpoint(setpoint).await
     }
 
@@ -82,6 +84,7 @@ impl<P: Port> Drive for Atv312<P> {
     /// bus do not tell what they ask for. At L1 and L2 it is refused where somebody else commands, since the word would take
     /// command from him.
     async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         drivecom::reset_fault(self).await
     }
 

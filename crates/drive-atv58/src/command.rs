@@ -90,6 +90,10 @@ impl<P: Port> Drivecom for Atv58<P> {
         &mut self.proof.watch.run
     }
 
+    fn owes_judgement(&mut self) {
+        self.registers.owe_judgement();
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let status = self.fast_status(class).await?;
         let verdict = self.evidence(&status).and_then(|evidence| self.proof.watch.run.verdict(&evidence));

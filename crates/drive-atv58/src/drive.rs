@@ -75,6 +75,7 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
         let word = self.run_word(direction)?;
         drivecom::start(self, direction, word).await
     }
@@ -92,11 +93,13 @@ impl<P: Port> Drive for Atv58<P> {
     }
 
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
         self.give_setpoint(setpoint).await
     }
 
     /// Refused while local control is forced, or the map names no bit that tells: the inputs of the terminals are no words.
     async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         drivecom::reset_fault(self).await
     }
 

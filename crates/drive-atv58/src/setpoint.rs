@@ -34,6 +34,7 @@ impl<P: Port> Atv58<P> {
         let mut calls = self.registers.at(Class::Command).replacing(W401.address());
         calls.write(W401, count.cast_unsigned()).await?;
         self.proof.gives(W401.address(), count.cast_unsigned(), true);
+        self.registers.owe_judgement();
         self.see_setpoint(setpoint).await.map_err(Error::after_write)
     }
 

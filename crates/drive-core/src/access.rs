@@ -8,7 +8,7 @@ use tokio_modbus::{Request, Response, Slave, prelude::ReadCode};
 
 use crate::{
     capabilities::Capabilities,
-    confirm::Confirming,
+    confirm::{CONFIRMED_WITHIN, Confirming},
     error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result, SlaveAddress},
     identity::Identity,
     kept_readings::KeptReadings,
@@ -24,6 +24,10 @@ use crate::{
 /// How long a drive that answers that it is busy is asked again by a call without a lifetime, and how long one that has
 /// accepted a write and takes long for it is read back.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// How long what judges a written order waits for its turn on the line: it has to show within [`CONFIRMED_WITHIN`], and a reading that
+/// was lost costs the line another wait.
+const JUDGED_WITHIN: Duration = CONFIRMED_WITHIN.saturating_mul(2);
 
 /// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +81,8 @@ pub struct Registers<P> {
     elsewhere: Option<SlaveAddress>,
     /// When the oldest answer since [`begin_snapshot`](Self::begin_snapshot) ended on the line.
     oldest: Option<Instant>,
+    /// Until then what is read as a command judges an order that was written.
+    judged_until: Option<Instant>,
     /// How long calls may wait.
     pub lifetimes: Lifetimes,
     /// What long jobs have read that were cut.
@@ -98,7 +104,17 @@ impl<P: Port> Registers<P> {
             port.set_slave(Slave(slave.number()));
         }
         let (lifetimes, kept) = (Lifetimes::default(), KeptReadings::default());
-        Self { port, slave, capabilities, meaning, elsewhere, oldest: None, lifetimes, kept }
+        Self {
+            port,
+            slave,
+            capabilities,
+            meaning,
+            elsewhere,
+            oldest: None,
+            judged_until: None,
+            lifetimes,
+            kept,
+        }
     }
 
     /// The slave.
@@ -117,6 +133,25 @@ impl<P: Port> Registers<P> {
     pub const fn at(&mut self, class: Class) -> Calls<'_, P> {
         let terms = Terms { lifetime: self.lifetimes.of(class), ..Terms::of(class) };
         Calls { registers: self, terms }
+    }
+
+    /// An order begins: what is read for it dies with it, until it is written.
+    pub const fn begin_order(&mut self) {
+        self.judged_until = None;
+    }
+
+    /// The order is written, or may be, and its judgement is owed: **what judges it does not die of the order's lifetime**. What is
+    /// read in the class of commands waits for its turn, until the next order begins or the time is over in which this one has to
+    /// show.
+    pub fn owe_judgement(&mut self) {
+        self.judged_until = Some(Instant::now() + JUDGED_WITHIN);
+    }
+
+    /// How long a reading of this class may wait that would wait for so long else.
+    fn patience(&self, terms: Terms) -> Terms {
+        let judges =
+            terms.class == Class::Command && self.judged_until.is_some_and(|until| Instant::now() < until);
+        if judges { Terms { lifetime: None, ..terms } } else { terms }
     }
 
     /// What is read from here on makes one picture of the drive, which is as old as its oldest answer.
@@ -171,6 +206,7 @@ macro_rules! told_by {
         }
 
         fn lifetimes_mut(&mut self) -> &mut $crate::Lifetimes {
+            self.$registers.begin_order();
             &mut self.$registers.lifetimes
         }
 
@@ -233,6 +269,7 @@ impl<P: Port> Calls<'_, P> {
             return Ok(words);
         }
         let terms = self.terms.sparing(self.registers.capabilities.spare_words(first, count));
+        let terms = self.registers.patience(terms);
         let response =
             self.request_under(terms, Request::ReadHoldingRegisters(first, count), exchange).await?;
         let Response::ReadHoldingRegisters(words) = response else {
@@ -280,6 +317,8 @@ impl<P: Port> Calls<'_, P> {
     /// has said that it takes long.
     async fn read_back(&mut self, address: u16, value: u16, error: &Error) -> Result<u16> {
         let takes_long = matches!(error, Error::Exception { .. });
+        // The write has gone: whoever reads it back does not die of the order's lifetime.
+        self.terms.lifetime = None;
         let mut confirming = Confirming::within(PATIENCE);
         loop {
             let held = self.read_word(address).await?;

@@ -93,11 +93,39 @@ enum Past {
     Coasts(Instant),
 }
 
+/// How fast an output comes down that is braked.
+#[derive(Debug, Clone, Copy, Default)]
+struct Descent {
+    last: Option<(Instant, u32)>,
+    /// Hundredths of a hertz in a time.
+    rate: Option<(u32, Duration)>,
+}
+
+impl Descent {
+    fn see(&mut self, now: Instant, output: u32) {
+        if let Some((then, before)) = self.last
+            && output < before
+            && now > then
+        {
+            self.rate = Some((before - output, now - then));
+        }
+        self.last = Some((now, output));
+    }
+
+    /// Whether an output that is gone at `now` cannot have come down so fast: it was cut.
+    fn is_cut(&self, now: Instant) -> bool {
+        let (Some((then, output)), Some((counts, time))) = (self.last, self.rate) else { return false };
+        let needed = time * output / counts.max(1);
+        now.saturating_duration_since(then) * 2 < needed
+    }
+}
+
 /// The shaft behind the output, from status to status. Pure: time is an argument. It is not forgotten when a line is lost: a
 /// motor that turned then may coast when the line is back.
 #[derive(Debug, Clone, Copy)]
 pub struct Shaft {
     past: Past,
+    descent: Descent,
     /// Since when direct current flows into a motor that may turn.
     injected_since: Option<Instant>,
     /// How long the motor coasts at the most, where its owner says so.
@@ -118,8 +146,14 @@ impl Shaft {
     /// A shaft that was never seen to turn.
     #[must_use]
     pub const fn new() -> Self {
-        let (coast_time, injection_time) = (None, None);
-        Self { past: Past::Unseen, injected_since: None, coast_time, injection_time, was_lost: false }
+        Self {
+            past: Past::Unseen,
+            descent: Descent { last: None, rate: None },
+            injected_since: None,
+            coast_time: None,
+            injection_time: None,
+            was_lost: false,
+        }
     }
 
     /// How long it coasts at the most, as its owner says; `None`: nobody knows.
@@ -155,7 +189,9 @@ impl Shaft {
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
         let was_lost = std::mem::take(&mut self.was_lost);
-        let shown = if was_lost && shown == Output::None { Output::Cut } else { shown };
+        let descent = std::mem::take(&mut self.descent);
+        let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
+        let shown = if is_cut && shown == Output::None { Output::Cut } else { shown };
         if shown != Output::NotKnown && shown != Output::Injection {
             self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
         }
@@ -169,6 +205,8 @@ impl Shaft {
             }
             Output::Braking(output) => {
                 self.past = Past::Braked { still: output == Frequency::ZERO };
+                self.descent = descent;
+                self.descent.see(at, output.centihertz());
                 Motion::Braking
             }
             Output::Injection if self.past == Past::AtRest => Motion::Held,
@@ -248,6 +286,23 @@ mod tests {
         let (mut shaft, now) = (Shaft::new(), Instant::now());
         assert_eq!(shaft.see(now, Output::Braking(Frequency::from_hertz(3)), None), Motion::Braking);
         assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_output_that_is_gone_sooner_than_its_ramp_brings_it_down_was_cut() {
+        for (last, motion) in [(200, Motion::Coasting), (1_500, Motion::AtRest)] {
+            let (mut shaft, begun) = (Shaft::new(), Instant::now());
+            let after = |milliseconds| begun + Duration::from_millis(milliseconds);
+            for (at, hertz) in [(0, 20), (100, 19), (200, 18)] {
+                shaft.see(
+                    after(at),
+                    Output::Braking(Frequency::from_hertz(hertz)),
+                    Some(Frequency::from_hertz(hertz)),
+                );
+            }
+            // 18 Hz at 10 Hz/s take 1.8 s.
+            assert_eq!(shaft.see(after(200 + last), Output::None, Some(Frequency::ZERO)), motion, "{last}");
+        }
     }
 
     #[tokio::test(start_paused = true)]

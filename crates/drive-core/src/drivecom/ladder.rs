@@ -84,6 +84,9 @@ pub trait Drivecom: Send {
     /// Writes the control word in this class.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()>;
 
+    /// A word that commands the motor was written, or may be: see [`Registers::owe_judgement`](crate::Registers::owe_judgement).
+    fn owes_judgement(&mut self);
+
     /// Why this drive is not to be started, from a fresh status: local control, a forbidden direction, settings. That
     /// it has not tripped, is in a known state and shows no output in a quick stop is checked apart. May read more of the
     /// drive.
@@ -188,6 +191,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                 let written = drive.write_control(Class::Command, step, Effect::Level).await;
                 if run {
                     keep_lease(drive.own_run(), &written);
+                    drive.owes_judgement();
                 }
                 match written {
                     Err(error) if exception(&error) == Some(BUSY) => {
@@ -275,6 +279,7 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
     let stop = drive.stop_word(mode);
     let before = drive.last_control().filter(|&control| control != Control::Bus);
     let mut written = write_stop(drive, &stop).await?;
+    drive.owes_judgement();
     let mut corrected = false;
     let mut confirming = Confirming::begin();
     let mut reads = 0;
@@ -348,6 +353,7 @@ pub async fn withdraw<D: Drivecom>(drive: &mut D) -> Result<Withdrawn> {
     let unsupported = |reason| Error::Unsupported { what: "withdrawal of the run command", reason };
     let word = drive.withdrawal(held, &status).map_err(unsupported)?;
     drive.write_withdrawal(word).await?;
+    drive.owes_judgement();
     let held = drive.read_control().await.map_err(Error::after_write)?;
     let status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
     if drive.is_run(held) {
@@ -388,6 +394,7 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
         return Err(error);
     }
     drive.write_control(Class::Command, DISABLE_VOLTAGE, Effect::Level).await.map_err(Error::after_write)?;
+    drive.owes_judgement();
     let mut confirming = Confirming::begin();
     loop {
         status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
@@ -491,6 +498,8 @@ mod tests {
         fn own_run(&mut self) -> &mut OwnRun {
             &mut self.own
         }
+
+        fn owes_judgement(&mut self) {}
 
         async fn read_status(&mut self, class: Class) -> Result<Status> {
             self.classes.push(class);

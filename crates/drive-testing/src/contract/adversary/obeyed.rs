@@ -44,12 +44,14 @@ impl Contract {
         stage.expect("measurements", |heard| heard.class() <= Class::Status && !heard.writes());
         let _ = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
         let timely = |heard: &Heard| heard.class() == Class::Command && heard.terms.lifetime.is_some();
+        stage.expect_owed("a setpoint");
         stage.expect("the write of a setpoint", |heard| !heard.writes() || timely(heard));
         let _ = stage.rig.drive.start(Direction::Forward).await;
         let heard = stage.witness.heard();
         if heard.first().is_none_or(Heard::writes) {
             stage.blame(format!("a start reads a fresh status before it writes: it {}", told(&heard)));
         }
+        stage.expect_owed("a start");
         stage.expect("the write of a start", |heard| !heard.writes() || timely(heard));
         let _ = stage.rig.drive.stop(StopMode::Ramp).await;
         stage.expect("the write of a stop", |heard| !heard.writes() || heard.class() == Class::Stop);
@@ -187,6 +189,23 @@ impl Stage {
             self.blame(format!("{what}: it {}", told(&heard)));
         }
         self.witness.from_now_on(Habit::Obeys);
+    }
+
+    /// What is read for an order dies with it, so that none is written late, and what judges it once it is written does not.
+    fn expect_owed(&mut self, what: &str) {
+        let heard = self.witness.heard();
+        let Some(first) = heard.iter().position(Heard::writes) else { return };
+        let last = heard.iter().rposition(Heard::writes).unwrap_or(first);
+        let dies = |heard: &Heard| heard.terms.lifetime.is_some();
+        if !heard[..first].iter().all(dies) {
+            self.blame(format!(
+                "{what} is read for without an end before it is written: it {}",
+                told(&heard)
+            ));
+        }
+        if heard[last..].iter().any(|heard| !heard.writes() && dies(heard)) {
+            self.blame(format!("what judges {what} dies of the lifetime of the order: it {}", told(&heard)));
+        }
     }
 
     /// The registers that are read by a status, a setpoint and a start, in order. What only takes its turn is not among them.
