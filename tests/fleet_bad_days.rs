@@ -191,7 +191,7 @@ async fn another_trip_that_came_while_the_line_was_away_is_not_reset_as_the_watc
     for family in [Family::Atv21, Family::Atv312, Family::Omron3g3ev] {
         let mut plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);
         plant.run_at(30).await;
-        plant.happens(&format!("trip {}", drives::a_trip_name(family)));
+        plant.happens(&format!("trip {}", drives::a_trip(family)));
         plant.machine().mute();
         plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
         sleep(20 * SECOND).await;

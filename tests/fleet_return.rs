@@ -146,7 +146,7 @@ async fn a_trip_that_somebody_resets_at_the_drive_starts_nothing() {
             plant.happens("reading after-reset runs");
         }
         plant.run_at(30).await;
-        plant.happens(&format!("trip {}", drives::a_trip_name(family)));
+        plant.happens(&format!("trip {}", drives::a_trip(family)));
         let command =
             |kind: &EventKind| matches!(kind, EventKind::Command { command: Command::Withdraw, .. });
         let withdrawn = plant.event("the withdrawal", command).await;

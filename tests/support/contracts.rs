@@ -9,7 +9,7 @@ use drive_testing::{
     contract::{ControlWord, StatusWord},
 };
 
-use crate::drives;
+use crate::{configurations::Around, drives};
 
 /// The contract of a family.
 #[must_use]
@@ -24,6 +24,7 @@ pub fn contract(family: Family) -> Contract {
         exceptions: exceptions(family),
         // The card of the Altivar 58 says it over UNI-TELWAY only.
         identifies_elsewhere: family == Family::Atv58,
+        around: Some(Box::new(Around(family))),
         ..Contract::new(
             family.capabilities(),
             move |port, slave| drives::drive(family, port, slave),

@@ -1,8 +1,7 @@
 //! What the families' tests need to know of each family: its machine, its set-up, one of its trips.
 
-use drive_3g3ev::Drive3g3ev;
 use drive_core::{Drive, ErrorKind, Port, SlaveAddress};
-use drive_families::Family;
+use drive_families::{Family, Options};
 use drive_sim::{Model, models};
 
 /// The number of "fault reset" in n06 to n08 of these 3G3EV; the manual gives none, so its owner must.
@@ -22,15 +21,19 @@ pub fn machine(family: Family) -> Box<dyn Model> {
     }
 }
 
+/// What the owner of a drive of these tests says of it.
+#[must_use]
+pub fn options(family: Family) -> Options {
+    match family {
+        Family::Omron3g3ev => Options { fault_reset_function: Some(RESET_FUNCTION), ..Options::default() },
+        _ => Options::default(),
+    }
+}
+
 /// A drive of a family as a plant would set it up.
 #[must_use]
 pub fn drive(family: Family, port: impl Port + 'static, slave: SlaveAddress) -> Box<dyn Drive> {
-    match family {
-        Family::Omron3g3ev => {
-            Box::new(Drive3g3ev::new(port, slave).with_fault_reset_function(RESET_FUNCTION))
-        }
-        _ => family.open(port, slave),
-    }
+    family.open_with(port, slave, &options(family))
 }
 
 /// A trip that a reset clears, in the family's own code.
@@ -42,12 +45,6 @@ pub const fn a_trip(family: Family) -> u16 {
         Family::Atv58 => 2,
         Family::Omron3g3ev => 9,
     }
-}
-
-/// The number of [`a_trip`] as the simulator's lines name it.
-#[must_use]
-pub fn a_trip_name(family: Family) -> String {
-    a_trip(family).to_string()
 }
 
 /// What the drive reports as present after its watchdog has tripped it.

@@ -5,7 +5,5 @@ pub mod configurations;
 pub mod contracts;
 pub mod drives;
 pub mod interrupted;
-pub mod judged;
 pub mod peers;
 pub mod plant;
-pub mod scene;

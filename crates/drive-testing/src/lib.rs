@@ -7,6 +7,7 @@
 //! - [`bench`](mod@bench), [`rig`]: one simulated drive on a line in virtual time.
 //! - [`truth`]: what a status says, against the machine.
 //! - [`referee`]: who may move a motor and what stops it, by the manuals alone.
+//! - [`worlds`]: everything around a drive that may decide over its motor, and who judges what is said of it then.
 //! - [`Contract`]: what every family promises of itself, for a family from anywhere to run on itself.
 //!
 //! This crate is for tests: its functions panic when what they check is not so.
@@ -23,6 +24,7 @@ pub mod referee;
 pub mod rig;
 pub mod truth;
 pub mod words;
+pub mod worlds;
 
 pub use contract::Contract;
 

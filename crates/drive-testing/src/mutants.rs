@@ -4,9 +4,13 @@
 mod drive;
 mod port;
 
-use drive_core::{Drive, Port, SlaveAddress};
+use drive_core::{Drive, Port, SlaveAddress, registers::Row};
+use drive_sim::{SimSlave, Surroundings};
 
-use crate::contract::Contract;
+use crate::{
+    contract::{Contract, Open},
+    worlds::{Configuration, Event, Judge, Surrounded, Values},
+};
 
 /// A way in which a family breaks its contract.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -73,12 +77,55 @@ impl Mutant {
     /// The family of a contract with this fault in it.
     #[must_use]
     pub fn of(self, contract: Contract) -> Contract {
-        let Contract { open, control, .. } = contract;
+        let Contract { open, control, around, .. } = contract;
         let register = control.map(|control| control.register);
-        let open = move |port: Box<dyn Port>, slave: SlaveAddress| -> Box<dyn Drive> {
+        let around =
+            around.map(|around| Box::new(Broken { mutant: self, register, around }) as Box<dyn Surrounded>);
+        Contract { open: self.breaks(register, open), around, ..contract }
+    }
+
+    /// What makes a drive, with this fault in it.
+    fn breaks(self, register: Option<u16>, open: Box<Open>) -> Box<Open> {
+        Box::new(move |port: Box<dyn Port>, slave: SlaveAddress| -> Box<dyn Drive> {
             let (port, tap) = port::Faulty::before(self, port, register);
             Box::new(drive::Faulty::new(self, open(Box::new(port), slave), tap))
+        })
+    }
+}
+
+/// The worlds of a family, with the fault in its drives.
+struct Broken {
+    mutant: Mutant,
+    register: Option<u16>,
+    around: Box<dyn Surrounded>,
+}
+
+impl Surrounded for Broken {
+    fn configurations(&self) -> Vec<Configuration> {
+        let broken = |configuration: Configuration| Configuration {
+            open: self.mutant.breaks(self.register, configuration.open),
+            ..configuration
         };
-        Contract { open: Box::new(open), ..contract }
+        self.around.configurations().into_iter().map(broken).collect()
+    }
+
+    fn events(&self, around: &Surroundings) -> Vec<Event> {
+        self.around.events(around)
+    }
+
+    fn other_masters(&self) -> Vec<Event> {
+        self.around.other_masters()
+    }
+
+    fn judge(&self, machine: &SimSlave) -> Option<Box<dyn Judge>> {
+        self.around.judge(machine)
+    }
+
+    fn parameter(&self) -> Option<(&'static str, u16)> {
+        self.around.parameter()
+    }
+
+    fn values_of(&self, row: &Row) -> Option<Values> {
+        self.around.values_of(row)
     }
 }

@@ -9,7 +9,13 @@ use drive_bus::Protocol;
 use drive_core::{Capabilities, Drive, ExceptionMeaning, Port, SerialSettings, SlaveAddress};
 use drive_sim::Model;
 
-use crate::rig::Rig;
+use crate::{
+    rig::Rig,
+    worlds::{Share, Surrounded},
+};
+
+/// How many of its worlds a family is checked in.
+const CHECKED: Share = Share::one_in(61);
 
 /// A family, and what its [`Capabilities`] do not say of it. Whatever the drive says, nothing panics and nothing is sent that
 /// the family does not have; what is claimed is done, and what is not claimed is `Unsupported`; it starts, reverses, stops,
@@ -53,6 +59,8 @@ pub struct Contract {
     pub exceptions: &'static [(u8, ExceptionMeaning)],
     /// It says what it is on another line than one of Modbus RTU only.
     pub identifies_elsewhere: bool,
+    /// How its drives are commanded and what may happen around them; `None`: it lives in no world.
+    pub around: Option<Box<dyn Surrounded>>,
 }
 
 /// Makes the drive of this address behind a port.
@@ -101,6 +109,7 @@ impl Contract {
             status: None,
             exceptions: &[],
             identifies_elsewhere: false,
+            around: None,
         }
     }
 
@@ -115,6 +124,8 @@ impl Contract {
         self.has_the_history_that_it_claims().await;
         self.takes_the_exchanges_that_it_claims().await;
         self.lives_the_story().await;
+        self.withstands_the_adversary().await;
+        self.is_true_in_worlds(CHECKED).await;
     }
 
     /// Its drive and its machine on a line with its factory settings.
@@ -134,7 +145,7 @@ impl Contract {
         (self.open)(Box::new(port), crate::bench::address(1))
     }
 
-    fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         self.capabilities.name
     }
 }

@@ -4,12 +4,12 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, SlaveSettings};
-use drive_core::{Direction, Drive, Frequency, SlaveAddress, StopMode, registers::Row};
-use drive_families::{Family, Options};
-use drive_sim::{Model, Observation, Panel, SimLine, SimSlave, Wiring};
+use drive_core::{Capabilities, Direction, Drive, Frequency, StopMode, registers::Row};
+use drive_sim::{Observation, Panel, SimLine, SimSlave, Wiring};
 use tokio::time::{Instant, sleep};
 
-use crate::drives;
+use super::Configuration;
+use crate::{bench::address, truth::contradiction};
 
 /// Where the drive is.
 const ADDRESS: u8 = 1;
@@ -25,14 +25,12 @@ pub struct Scene {
     /// The line that the drive is on.
     pub line: Line,
     simulated: SimLine,
-    family: Family,
     twin: Twin,
 }
 
 /// What is around a drive and its twin.
 pub struct Around {
     both: [(SimLine, String); 2],
-    family: Family,
 }
 
 impl Around {
@@ -43,7 +41,7 @@ impl Around {
     pub fn happens(&self, deed: &str) {
         for (line, machine) in &self.both {
             let told = line.control(&format!("{machine} {deed}"));
-            told.unwrap_or_else(|error| panic!("{} {deed}: {error}", self.family));
+            told.unwrap_or_else(|error| panic!("{machine} {deed}: {error}"));
         }
     }
 }
@@ -56,16 +54,18 @@ struct Twin {
 }
 
 impl Scene {
-    /// A machine and its twin, each made by `model`, in a quiet world.
+    /// A machine and its twin, each set up as this configuration says, in a quiet world.
     ///
     /// # Panics
-    /// Only when the scene itself is wrong.
+    /// When the scene itself is wrong, or the simulator does not know a setting.
     #[must_use]
-    pub fn new(family: Family, model: fn() -> Box<dyn Model>, options: &Options) -> Self {
-        let (simulated, machine, line, drive) = stage(family, model(), options);
-        let (twin_line, twin_machine, _, twin_drive) = stage(family, model(), options);
+    pub fn new(capabilities: &Capabilities, configuration: &Configuration) -> Self {
+        let (simulated, machine, line, drive) = stage(capabilities, configuration);
+        let (twin_line, twin_machine, _, twin_drive) = stage(capabilities, configuration);
         let twin = Twin { machine: twin_machine, simulated: twin_line, drive: twin_drive };
-        Self { drive, machine, line, simulated, family, twin }
+        let scene = Self { drive, machine, line, simulated, twin };
+        configuration.settings.iter().for_each(|setting| scene.happens(setting));
+        scene
     }
 
     /// Has something happen around the drive, and around its twin: a line of the simulator's text without the drive's
@@ -81,7 +81,7 @@ impl Scene {
     #[must_use]
     pub fn around(&self) -> Around {
         let both = [(&self.simulated, &self.machine), (&self.twin.simulated, &self.twin.machine)];
-        Around { both: both.map(|(line, machine)| (line.clone(), machine.name())), family: self.family }
+        Around { both: both.map(|(line, machine)| (line.clone(), machine.name())) }
     }
 
     /// Sets a setting at the drive and at its twin. False: it does not take the value.
@@ -109,21 +109,24 @@ impl Scene {
         self.twin.drive.release().await.is_ok()
     }
 
-    /// Lets time pass with the drive asked all the while, as a plant does.
-    pub async fn live(&mut self, time: Duration) {
+    /// Lets time pass with the drive asked all the while, as a plant does. Whether it was said at last that its run command is in
+    /// force.
+    ///
+    /// # Errors
+    /// What a status says that the machine contradicts.
+    pub async fn live(&mut self, time: Duration) -> Result<bool, String> {
         let end = Instant::now() + time;
+        let mut in_force = false;
         while Instant::now() < end {
-            // What it says is nobody's concern here, nor whether it says anything.
-            let _ = self.drive.status().await;
+            // Whether it says anything is nobody's concern here.
+            if let Ok(status) = self.drive.status().await {
+                contradiction(&status, &self.seen()).map_or(Ok(()), Err)?;
+                in_force = status.verdict.is_some_and(|verdict| verdict.is_in_force());
+            }
             let _ = self.twin.drive.status().await;
             sleep(POLL).await;
         }
-    }
-
-    /// The family.
-    #[must_use]
-    pub const fn family(&self) -> Family {
-        self.family
+        Ok(in_force)
     }
 
     /// What the machine does.
@@ -146,28 +149,14 @@ impl Scene {
 }
 
 fn stage(
-    family: Family,
-    model: Box<dyn Model>,
-    options: &Options,
+    capabilities: &Capabilities,
+    configuration: &Configuration,
 ) -> (SimLine, SimSlave, Line, Box<dyn Drive>) {
-    let capabilities = family.capabilities();
     let simulated = SimLine::new(Wiring::rtu(capabilities.factory));
-    let machine = simulated.add_boxed(ADDRESS, model).expect("the address is free");
+    let machine = simulated.add_boxed(ADDRESS, (configuration.machine)()).expect("the address is free");
     let pause = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
     let config = LineConfig::stream(capabilities.factory).slave(ADDRESS, pause);
     let line = Line::over(simulated.in_memory(), config);
-    let slave = SlaveAddress::try_from(ADDRESS).expect("it is an address");
-    let drive = family.open_with(line.slave(ADDRESS), slave, options);
+    let drive = (configuration.open)(Box::new(line.slave(ADDRESS)), address(ADDRESS));
     (simulated, machine, line, drive)
-}
-
-/// What the owner of every 3G3EV of these tests says of it.
-#[must_use]
-pub fn options(family: Family) -> Options {
-    match family {
-        Family::Omron3g3ev => {
-            Options { fault_reset_function: Some(drives::RESET_FUNCTION), ..Options::default() }
-        }
-        _ => Options::default(),
-    }
 }

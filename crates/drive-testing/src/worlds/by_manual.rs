@@ -5,17 +5,19 @@ use drive_core::{
     drivecom::ChartState,
     registers::{Row, Storage},
 };
-use drive_families::Family;
 use drive_sim::{Observation, SimSlave};
-use drive_testing::{
-    referee::{self, Answer, Change, Key, Motion, Order, State, Verdict, Who, World},
-    truth::TOLERANCE,
-};
 use tokio::time::Instant;
 
-/// The manual's world of one machine.
-pub struct Judge {
+use super::Judge;
+use crate::{
+    referee::{self, Answer, Change, Family, Key, Motion, Order, State, Verdict, Who, World},
+    truth::TOLERANCE,
+};
+
+/// The manual's world of one machine of a family of the [`referee`].
+pub struct ByManual {
     family: Family,
+    rows: &'static [Row],
     machine: SimSlave,
     world: World,
     /// What happened and was not told to the manual yet.
@@ -27,26 +29,17 @@ pub struct Judge {
     another: bool,
 }
 
-const fn manual(family: Family) -> referee::Family {
-    match family {
-        Family::Atv21 => referee::Family::Atv21,
-        Family::Atv28 => referee::Family::Atv28,
-        Family::Atv58 => referee::Family::Atv58,
-        Family::Atv312 => referee::Family::Atv312,
-        Family::Omron3g3ev => referee::Family::Omron3g3ev,
-    }
-}
-
-impl Judge {
-    /// A machine as it is set up now, at rest, before anything is written to it.
+impl ByManual {
+    /// A machine with these registers as it is set up now, at rest, before anything is written to it.
     #[must_use]
-    pub fn of(family: Family, machine: SimSlave) -> Self {
+    pub fn new(family: Family, rows: &'static [Row], machine: SimSlave) -> Self {
         let is_setting = |row: &&Row| row.access.is_writable() && row.storage != Storage::Volatile;
-        let settings = family.capabilities().rows.iter().filter(is_setting);
+        let settings = rows.iter().filter(is_setting);
         let words = settings.filter_map(|row| Some((row.address, machine.peek(row.address)?))).collect();
-        let world = World::switched_on(manual(family), words);
+        let world = World::switched_on(family, words);
         let mut judge = Self {
             family,
+            rows,
             machine,
             world,
             happened: Vec::new(),
@@ -63,20 +56,6 @@ impl Judge {
             judge.world.state = state;
         }
         judge
-    }
-
-    /// Something happens around the machine, in the simulator's text.
-    pub fn happens(&mut self, deed: &str) {
-        self.happened_at(Instant::now(), deed);
-    }
-
-    /// The same, which has happened at this moment.
-    pub fn happened_at(&mut self, at: Instant, deed: &str) {
-        self.another |= deed.starts_with("master");
-        match self.changes(deed) {
-            Some(changes) => self.happened.push((at, changes)),
-            None => self.lost = true,
-        }
     }
 
     fn changes(&self, deed: &str) -> Option<Vec<Change>> {
@@ -115,7 +94,7 @@ impl Judge {
             ["power", level] => vec![Change::Mains(level == "on")],
             ["trip", code] => vec![Change::Trip(code.parse().ok()?), Change::CauseGone],
             ["master", code, value] => {
-                let row = Row::find(self.family.capabilities().rows, code)?;
+                let row = Row::find(self.rows, code)?;
                 let value = row.read(value)?;
                 vec![Change::Write { address: row.address, value }]
             }
@@ -123,64 +102,6 @@ impl Judge {
             ["panel", "takes" | "releases" | "reference", ..] => Vec::new(),
             _ => return None,
         })
-    }
-
-    /// Tells the manual what was written to the machine since.
-    pub fn follow(&mut self) {
-        let since = self.heard_until;
-        let written = self.machine.received().into_iter().filter(|request| request.at > since);
-        for request in written {
-            self.heard_until = request.at;
-            self.happened.push((request.at, writes(&request.pdu)));
-        }
-        self.happened.sort_by_key(|(at, _)| *at);
-        for (_, changes) in std::mem::take(&mut self.happened) {
-            for change in changes {
-                self.world = referee::next(&self.world, &change);
-            }
-        }
-        let seen = self.machine.observe();
-        self.world.turning = seen.running || seen.shaft_frequency.abs() > TOLERANCE;
-    }
-
-    /// What the manual has against the motor as it is seen, and against what is said of our run command: `held`, a run command of
-    /// this side stands; `in_force`, it is said to act.
-    #[must_use]
-    pub fn objects(&mut self, held: bool, in_force: bool) -> Option<String> {
-        self.follow();
-        let cmd = if self.family == Family::Atv312 { 8501 } else { 400 };
-        // Of two words at the same moment the wire does not tell which was the later.
-        let is_told = self.world.command.is_none_or(|command| self.machine.peek(cmd) == Some(command));
-        if self.lost || !is_told {
-            return None;
-        }
-        self.correct();
-        let seen = self.machine.observe();
-        let ruling = referee::ruling(&self.world, motion(&seen));
-        if ruling.verdict == Verdict::MustNot {
-            return Some(format!("{} ({}): {seen:?}", ruling.because, ruling.source));
-        }
-        match referee::order(&self.world) {
-            Answer::Says(Order::Drive { by: Who::Bus, .. }, rule)
-                if !held && !self.another && seen.running =>
-            {
-                Some(format!(
-                    "it turns by a command of the bus ({}), and no lease stands: {seen:?}",
-                    rule.source
-                ))
-            }
-            Answer::Says(Order::Drive { by: Who::Bus, .. }, _) => None,
-            Answer::Says(order, rule) if in_force => {
-                Some(format!("told in force, and the manual says {order:?} ({}): {seen:?}", rule.source))
-            }
-            _ => None,
-        }
-    }
-
-    /// Whether the manual decides anything here.
-    #[must_use]
-    pub fn decides(&self) -> bool {
-        !self.lost && !referee::order(&self.world).is_silent()
     }
 
     /// What the drive's own words show stands for what the manual leaves open: forced local, and of a family without channels on
@@ -247,6 +168,68 @@ impl Judge {
             ChartState::Fault | ChartState::FaultReactionActive => State::Fault,
             ChartState::NotReadyToSwitchOn => return None,
         })
+    }
+}
+
+impl Judge for ByManual {
+    fn happened_at(&mut self, at: Instant, deed: &str) {
+        self.another |= deed.starts_with("master");
+        match self.changes(deed) {
+            Some(changes) => self.happened.push((at, changes)),
+            None => self.lost = true,
+        }
+    }
+
+    fn follow(&mut self) {
+        let since = self.heard_until;
+        let written = self.machine.received().into_iter().filter(|request| request.at > since);
+        for request in written {
+            self.heard_until = request.at;
+            self.happened.push((request.at, writes(&request.pdu)));
+        }
+        self.happened.sort_by_key(|(at, _)| *at);
+        for (_, changes) in std::mem::take(&mut self.happened) {
+            for change in changes {
+                self.world = referee::next(&self.world, &change);
+            }
+        }
+        let seen = self.machine.observe();
+        self.world.turning = seen.running || seen.shaft_frequency.abs() > TOLERANCE;
+    }
+
+    fn objects(&mut self, held: bool, in_force: bool) -> Option<String> {
+        self.follow();
+        let cmd = if self.family == Family::Atv312 { 8501 } else { 400 };
+        // Of two words at the same moment the wire does not tell which was the later.
+        let is_told = self.world.command.is_none_or(|command| self.machine.peek(cmd) == Some(command));
+        if self.lost || !is_told {
+            return None;
+        }
+        self.correct();
+        let seen = self.machine.observe();
+        let ruling = referee::ruling(&self.world, motion(&seen));
+        if ruling.verdict == Verdict::MustNot {
+            return Some(format!("{} ({}): {seen:?}", ruling.because, ruling.source));
+        }
+        match referee::order(&self.world) {
+            Answer::Says(Order::Drive { by: Who::Bus, .. }, rule)
+                if !held && !self.another && seen.running =>
+            {
+                Some(format!(
+                    "it turns by a command of the bus ({}), and no lease stands: {seen:?}",
+                    rule.source
+                ))
+            }
+            Answer::Says(Order::Drive { by: Who::Bus, .. }, _) => None,
+            Answer::Says(order, rule) if in_force => {
+                Some(format!("told in force, and the manual says {order:?} ({}): {seen:?}", rule.source))
+            }
+            _ => None,
+        }
+    }
+
+    fn decides(&self) -> bool {
+        !self.lost && !referee::order(&self.world).is_silent()
     }
 }
 
