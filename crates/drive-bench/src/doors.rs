@@ -213,7 +213,11 @@ impl Plant {
     fn start() -> Result<Self, Error> {
         let program = env::current_exe()?.with_file_name("drived");
         if !program.exists() {
-            return Err(format!("{} is not there: cargo build --release -p drived", program.display()).into());
+            return Err(format!(
+                "{} is not there: cargo build --profile dist --bin drived",
+                program.display()
+            )
+            .into());
         }
         let folder = Folder::new()?;
         let (link, socket) = (folder.0.join("line"), folder.0.join("drived.sock"));
