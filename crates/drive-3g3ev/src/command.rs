@@ -9,29 +9,10 @@ use tokio::time::Instant;
 use crate::{
     Drive3g3ev,
     proof::withheld,
+    refusals::{LOCAL_REFERENCE, OTHER_COMMAND, OTHER_REFERENCE, OTHER_WORD, OUTPUT_OFF},
     registers::address,
-    words::{Command, DriveState, Signals},
-};
-
-pub(crate) const OTHER_COMMAND: Refusal = Refusal::Overridden {
-    by: "the panel or the terminals (run command, bit A of 002Ch)",
-    remedy: "give the command back at the panel, or set n02 = 5, save it, and switch the drive off and on",
-};
-pub(crate) const LOCAL_REFERENCE: Refusal = Refusal::Overridden {
-    by: "the panel or the terminals (reference, bit 9 of 002Ch)",
-    remedy: "give the reference back at the panel, or set n02 = 5, save it, and switch the drive off and on",
-};
-pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
-    by: "another reference than that of 0002h (0023h shows it)",
-    remedy: "give the setpoint again, and see to the inputs that choose a speed (n06 to n08)",
-};
-const OTHER_WORD: Refusal = Refusal::Overridden {
-    by: "another command word in 0001h than was written",
-    remedy: "see who else writes to this drive",
-};
-pub(crate) const OUTPUT_OFF: Refusal = Refusal::Overridden {
-    by: "something that keeps the output off (bit 8 of 002Ch)",
-    remedy: "see to the inputs (n06 to n08) and to the panel's STOP key",
+    status::{is_run, state_word},
+    words::{Command, DriveState},
 };
 
 impl<P: Port> Drive3g3ev<P> {
@@ -268,14 +249,4 @@ pub(crate) fn commanded_by_other(status: &Status) -> Option<Refusal> {
         return Some(OTHER_COMMAND);
     }
     state.contains(DriveState::LOCAL_REFERENCE).then_some(LOCAL_REFERENCE)
-}
-
-pub(crate) fn state_word(status: &Status) -> DriveState {
-    DriveState::from_bits_retain(status.raw(address::STATE).unwrap_or(0))
-}
-
-/// Whether the drive shows RUN in either of its words.
-pub(crate) fn is_run(status: &Status) -> bool {
-    let signals = Signals::from_bits_retain(status.raw(address::SIGNALS).unwrap_or(0));
-    signals.contains(Signals::RUN) || state_word(status).contains(DriveState::RUN)
 }

@@ -7,8 +7,8 @@ use drive_core::{
 
 use crate::{
     Drive3g3ev,
-    command::is_run,
     registers::{COMMAND, ENTER, INPUT_TERMINALS, N02, N06, N07, N08, OUTPUT_FREQUENCY, REFERENCE},
+    status::is_run,
     words::Command,
 };
 

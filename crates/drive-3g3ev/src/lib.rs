@@ -11,6 +11,7 @@ mod frequency;
 mod intent;
 mod proof;
 mod reading;
+mod refusals;
 pub mod registers;
 mod reset;
 mod restoring;

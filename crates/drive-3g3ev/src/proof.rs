@@ -10,8 +10,9 @@ use tokio::time::Instant;
 
 use crate::{
     Drive3g3ev,
-    command::{LOCAL_REFERENCE, OTHER_COMMAND, OTHER_REFERENCE, OUTPUT_OFF, is_run, state_word},
+    refusals::{LOCAL_REFERENCE, OTHER_COMMAND, OTHER_REFERENCE, OUTPUT_OFF},
     registers::address,
+    status::{is_run, state_word},
     words::{Command, DriveState},
 };
 

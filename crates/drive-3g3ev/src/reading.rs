@@ -5,13 +5,12 @@ use drive_core::{Class, Faults, Measurements, Port, Result, State, Status, Volta
 use crate::{
     Drive3g3ev,
     blocks::{FAST, OUTPUT, Run, TERMINALS, Words},
-    command::is_run,
     faults::{present, warnings},
     registers::{
         COMMAND, DC_BUS, ERRORS, INPUT_TERMINALS, LINK_ERROR, OUTPUT_CONTACTS, OUTPUT_VOLTAGE,
         REFERENCE_SEEN, SIGNALS, STATE,
     },
-    status::FastWords,
+    status::{FastWords, is_run},
     words::Errors,
 };
 

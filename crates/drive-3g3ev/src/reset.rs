@@ -4,7 +4,8 @@ use drive_core::{Class, Command as Order, Confirming, Error, Port, Result, Statu
 
 use crate::{
     Drive3g3ev,
-    command::{OTHER_COMMAND, commanded_by_other},
+    command::commanded_by_other,
+    refusals::OTHER_COMMAND,
     registers::{COMMAND, N06},
     words::Command,
 };

@@ -8,8 +8,9 @@ use tokio::time::Instant;
 
 use crate::{
     Drive3g3ev,
-    command::{LOCAL_REFERENCE, OTHER_REFERENCE, is_run, state_word},
+    refusals::{LOCAL_REFERENCE, OTHER_REFERENCE},
     registers::{REFERENCE, REFERENCE_SEEN, STATE},
+    status::{is_run, state_word},
     words::DriveState,
 };
 

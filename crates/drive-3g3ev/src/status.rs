@@ -5,7 +5,7 @@ use drive_core::{Control, Current, Direction, Motion, RawWord, State, Status};
 use crate::{
     blocks::Words,
     frequency::FrequencyUnit,
-    registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, REFERENCE_SEEN, SIGNALS, STATE},
+    registers::{CURRENT, ERRORS, OUTPUT_FREQUENCY, REFERENCE_SEEN, SIGNALS, STATE, address},
     words::{Command, DriveState, Errors, Signals},
 };
 
@@ -100,4 +100,14 @@ impl FastWords {
 /// The number of the lowest bit that is set: the first of the present faults.
 const fn lowest_bit(errors: Errors) -> u16 {
     errors.bits().trailing_zeros() as u16
+}
+
+pub(crate) fn state_word(status: &Status) -> DriveState {
+    DriveState::from_bits_retain(status.raw(address::STATE).unwrap_or(0))
+}
+
+/// Whether the drive shows RUN in either of its words.
+pub(crate) fn is_run(status: &Status) -> bool {
+    let signals = Signals::from_bits_retain(status.raw(address::SIGNALS).unwrap_or(0));
+    signals.contains(Signals::RUN) || state_word(status).contains(DriveState::RUN)
 }

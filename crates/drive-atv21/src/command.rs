@@ -10,26 +10,14 @@ use crate::{
     Atv21, Authority,
     blocks::{WRITE_BLOCK, WriteSlot, command_and_reference},
     control::{
-        BY_SERIAL_LINK, REFERENCE_BY_SERIAL_LINK, commanded_by_other, is_falling, other_reference, source,
-        status_word, who,
+        BY_SERIAL_LINK, REFERENCE_BY_SERIAL_LINK, commanded_by_other, is_falling, not_in_force,
+        other_reference, source, status_word, who,
     },
     proof::withheld,
+    refusals::{OTHER_REFERENCE, OTHER_WORD, ST_OFF},
     registers as map,
     setpoint::is_same,
-    words::{CommandSource, CommandWord, ReferenceSource, StatusWord},
-};
-
-pub(crate) const ST_OFF: Refusal = Refusal::Overridden {
-    by: "a freewheel stop that the bus has not ordered (ST = OFF, FD01 bit 11)",
-    remedy: "see to the input or the setting that holds it",
-};
-pub(crate) const OTHER_WORD: Refusal = Refusal::Overridden {
-    by: "another command word in FA00 than was written",
-    remedy: "see who else writes to this drive",
-};
-pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
-    by: "another reference than the one that was given (FE02 shows it)",
-    remedy: "give the setpoint again, and see to the drive's lower limit",
+    words::{CommandSource, CommandWord, StatusWord},
 };
 
 impl<P: Port> Atv21<P> {
@@ -373,10 +361,4 @@ impl<P: Port> Atv21<P> {
     fn commander(&self) -> Option<Control> {
         self.shown.map(|(word, source)| who(word, source)).filter(|who| *who != Control::Bus)
     }
-}
-
-/// What gives the reference instead of what this word asks for: a preset speed where it chooses one, else the bus.
-pub(crate) fn not_in_force(word: CommandWord, active: ReferenceSource) -> Option<Refusal> {
-    let preset = active == ReferenceSource::PresetSpeed && word.preset_speed() != 0;
-    if preset { None } else { other_reference(active) }
 }

@@ -280,6 +280,12 @@ const CHOSEN_OR_ORDERED: StatusWord = StatusWord::MOTOR_2
     .union(StatusWord::RUN)
     .union(StatusWord::LOCAL);
 
+/// What gives the reference instead of what this word asks for: a preset speed where it chooses one, else the bus.
+pub(crate) fn not_in_force(word: CommandWord, active: ReferenceSource) -> Option<Refusal> {
+    let preset = active == ReferenceSource::PresetSpeed && word.preset_speed() != 0;
+    if preset { None } else { other_reference(active) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -28,6 +28,7 @@ mod intent;
 mod model;
 mod proof;
 mod reading;
+mod refusals;
 pub mod registers;
 mod release;
 mod restoring;

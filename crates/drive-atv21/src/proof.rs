@@ -16,9 +16,9 @@ use tokio::time::Instant;
 
 use crate::{
     Atv21,
-    command::{OTHER_REFERENCE, ST_OFF, not_in_force},
-    control::{DECIDE, commanded_by_other, source, status_word},
+    control::{DECIDE, commanded_by_other, not_in_force, source, status_word},
     in_effect::ReadBlock,
+    refusals::{OTHER_REFERENCE, ST_OFF},
     registers as map,
     setpoint::{Reference, is_same},
     words::{CommandSource, CommandWord, ReferenceSource, StatusWord},

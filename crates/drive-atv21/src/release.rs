@@ -7,8 +7,8 @@ use drive_core::{
 
 use crate::{
     Atv21,
-    command::OTHER_WORD,
     control::{BY_SERIAL_LINK, commanded_by_other},
+    refusals::OTHER_WORD,
     registers as map,
     words::CommandWord,
 };

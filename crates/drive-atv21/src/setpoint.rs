@@ -9,8 +9,8 @@ use tokio::time::Instant;
 
 use crate::{
     Atv21, Authority,
-    command::OTHER_REFERENCE,
     control::{other_reference, status_word},
+    refusals::OTHER_REFERENCE,
     registers as map,
     words::{CommandWord, ReferenceSource, StatusWord},
 };

@@ -11,16 +11,11 @@ use drive_core::{
 
 use crate::{
     Atv312,
+    facts::OTHER_REFERENCE,
     reading::{FIRST, FastWords, raw_command},
     registers::{CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
     settings::{Controls, Known},
     words::{AccessLevel, ControlWord, ExtendedControl, StatusWord},
-};
-
-/// What decides the reference where the drive follows another one than the bus and does not tell which.
-pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
-    by: "another reference (FrH is not the reference of the bus)",
-    remedy: "see which inputs and channels are in use (Fr1, Fr2, rFC, SA2, SA3, PS2 to PS16, JOG, PIF)",
 };
 
 impl<P: Port> Atv312<P> {

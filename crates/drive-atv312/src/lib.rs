@@ -5,6 +5,7 @@ mod channels;
 mod command;
 mod diagnosis;
 mod drive;
+mod facts;
 mod faults;
 mod intent;
 mod parameters;
@@ -24,13 +25,10 @@ use drive_core::{
     serial::CharacterFormat,
 };
 
+use crate::{facts::Facts, proof::Look, settings::Known};
 pub use crate::{
     faults::{FAULTS, PastFault, WARNINGS},
     registers::ROWS,
-};
-use crate::{
-    proof::{Facts, Look},
-    settings::Known,
 };
 
 /// What an Altivar 312 can do.

@@ -8,9 +8,8 @@ use drive_core::{
 
 use crate::{
     Atv312,
-    command::OTHER_REFERENCE,
+    facts::{ANALOG_INPUTS, Facts, OTHER_REFERENCE},
     reading::{FastWords, Resolution},
-    reference::ANALOG_INPUTS,
     registers::{ADC, AI1C, CMI, FRH, IOLR, LFR, LFRD, LRS3, RFR, SLL, TTO},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
 };
@@ -37,17 +36,6 @@ pub(crate) enum Look {
     Setting,
     /// What has its turn.
     Turn(usize),
-}
-
-/// What decides a reference beside the settings.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Facts {
-    /// The logic inputs.
-    pub(crate) inputs: Option<u16>,
-    /// Whether the second reference is selected.
-    pub(crate) second: Option<bool>,
-    /// The analog inputs.
-    pub(crate) analog: Option<[u16; 3]>,
 }
 
 impl<P: Port> Atv312<P> {

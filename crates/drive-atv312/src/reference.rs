@@ -7,16 +7,11 @@ use drive_core::{
 
 use crate::{
     Atv312,
-    proof::Facts,
+    facts::{ANALOG_INPUTS, Facts},
     reading::FastWords,
     registers::{AI1C, IOLR, LFRD, LRS3},
     words::{AccessLevel, ExtendedStatus3},
 };
-
-/// An analog input below this does not change a reference by a count: 20 mV of 10 V, and 20 µA of 20 mA.
-pub(crate) const SILENT: u16 = 20;
-/// `SA2`, `SA3`: AI1 to AI3.
-pub(crate) const ANALOG_INPUTS: core::ops::RangeInclusive<u16> = 1..=3;
 
 impl<P: Port> Atv312<P> {
     /// Whether the drive follows the frequency of the bus, `LFr`, between the limits.

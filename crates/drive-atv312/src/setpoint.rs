@@ -8,7 +8,7 @@ use drive_core::{
 
 use crate::{
     Atv312,
-    command::OTHER_REFERENCE,
+    facts::OTHER_REFERENCE,
     reading::{FastWords, Resolution},
     registers::{LFR, LFRD},
     settings::Controls,

@@ -11,9 +11,8 @@ use drive_core::{
 
 use crate::{
     Atv312,
-    proof::Facts,
+    facts::{ANALOG_INPUTS, Facts, SILENT},
     reading::Resolution,
-    reference::{ANALOG_INPUTS, SILENT},
     registers::{
         ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, NST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
     },
