@@ -10,8 +10,8 @@ use crate::{
     Atv21, Authority,
     blocks::{WRITE_BLOCK, WriteSlot, command_and_reference},
     control::{
-        BY_SERIAL_LINK, REFERENCE_BY_SERIAL_LINK, commanded_by_other, is_falling, not_in_force,
-        other_reference, source, status_word, who,
+        BY_SERIAL_LINK, REFERENCE_BY_SERIAL_LINK, commanded_by_other, is_falling, not_in_force, source,
+        status_word, who,
     },
     proof::withheld,
     refusals::{OTHER_REFERENCE, OTHER_WORD, ST_OFF},

@@ -29,10 +29,12 @@ pub use defects::{Defects, Interference, Noise, Rest, SecondMaster};
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use habits::{HeaderForm, LinkHabits, Unacknowledged};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};
-pub use model::{Block, Cast, Damage, Dialect, Exception, Model, Observation, Panel, Protocol, Rules, UniTe};
+pub use model::{
+    Block, Cast, Damage, Dialect, Exception, Model, Observation, Panel, Played, Protocol, Rules, Says, UniTe,
+};
 pub use motor::{Motor, Nameplate, Ramp, Ramps};
 pub use pdu::identification;
-pub use playback::{Playback, Played, Says};
+pub use playback::Playback;
 pub use record::{Breach, LineStats, Violation};
 pub use serve::{Gateway, GatewayInMemory, SecondConnection, Serving};
 pub use slave::Received;

@@ -4,10 +4,27 @@ use std::time::Duration;
 
 use drive_core::{Frequency, SerialSettings};
 
-use crate::{
-    playback::Played,
-    world::{Act, Surroundings},
-};
+use crate::world::{Act, Surroundings};
+
+/// What a slave has said to a request, once.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Played {
+    /// From the end of the request to the first character. For UNI-TELWAY: until the reply was ready.
+    pub after: Duration,
+    /// What it said.
+    pub says: Says,
+}
+
+/// What was said.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Says {
+    /// The PDU of an answer, exceptions included, or a UNI-TE reply.
+    Message(Vec<u8>),
+    /// Characters that make no frame, as they are.
+    Characters(Vec<u8>),
+    /// Nothing.
+    Nothing,
+}
 
 /// An exception code, as a slave answers it after the function code with its highest bit set.
 ///

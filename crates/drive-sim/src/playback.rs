@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use crate::model::{Cast, Exception, Model, Observation, Panel, Rules, UniTe};
+use crate::model::{Cast, Exception, Model, Observation, Panel, Played, Rules, Says, UniTe};
 
 /// A slave nobody has recorded a rule of: it has its recording alone.
 const RULES: Rules = Rules {
@@ -15,26 +15,6 @@ const RULES: Rules = Rules {
     broadcast: &[],
     turnaround: Duration::ZERO,
 };
-
-/// What a slave has said to a request, once.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Played {
-    /// From the end of the request to the first character. For UNI-TELWAY: until the reply was ready.
-    pub after: Duration,
-    /// What it said.
-    pub says: Says,
-}
-
-/// What was said.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Says {
-    /// The PDU of an answer, exceptions included, or a UNI-TE reply.
-    Message(Vec<u8>),
-    /// Characters that make no frame, as they are.
-    Characters(Vec<u8>),
-    /// Nothing.
-    Nothing,
-}
 
 /// A slave that plays back what was recorded of a real one: to the same request, byte for byte, the same answers in the
 /// same order with the times that they took, and behind the last of them the first again. To a request that was never

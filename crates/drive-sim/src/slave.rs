@@ -10,9 +10,8 @@ use tokio::time::Instant;
 
 use crate::{
     habits::LinkHabits,
-    model::{Cast, Damage, Dialect, Exception, Model, Observation},
+    model::{Cast, Damage, Dialect, Exception, Model, Observation, Played, Says},
     pdu::{self, DIAGNOSTICS, EVENT_COUNTER, EXCEPTION},
-    playback::{Played, Says},
     record::Breach,
     speech::{Content, Speech},
     unite::{self, LinkCounters},

@@ -75,6 +75,7 @@
 
 #![forbid(unsafe_code)]
 
+mod failure;
 mod frame;
 mod known;
 mod link;
@@ -92,8 +93,9 @@ mod values;
 struct Readme;
 
 pub use self::{
+    failure::{Answer, Failure},
     frame::{Heard, Receiver, data as data_frame, len as frame_len, poll},
-    link::{Answer, Failure, Step, Stray, UniTelway},
+    link::{Step, Stray, UniTelway},
     network::{NetworkHeader, unite_of},
     request::{Refusal, Reply, Request, RequestError, code},
     settings::{UniTelwaySettings, longest, reply_len, request_len},

@@ -10,16 +10,14 @@ use std::{
 use bytes::Bytes;
 
 use crate::{
+    failure::{Answer, Failure},
     frame::{self, MAX_FRAME, Receiver},
     known::Known,
     network::MAX_MESSAGE,
-    request::{Refusal, Reply, Request, RequestError},
+    request::{Request, RequestError},
     settings::{Speed, UniTelwaySettings, reply_len},
     stage::{Current, Next, Stage},
 };
-
-/// What a slave said: its reply, or that it refuses.
-pub type Answer = Result<Reply, Refusal>;
 
 /// What an exchange wants next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,21 +30,6 @@ pub enum Step {
     Wait(Instant),
     /// Nothing: it is over.
     Done(Result<Answer, Failure>),
-}
-
-/// Why an exchange brought no answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Failure {
-    /// No answer came in time. It may still come.
-    Timeout,
-    /// What came looks like the answer and is not whole.
-    Damaged(&'static str),
-    /// No answer came in time, but an intact frame of the slave that does not fit the request.
-    Mismatch(String),
-    /// The slave has refused the frame for [`UniTelwaySettings::busy_timeout`]: nothing of it was carried out.
-    Refused(&'static str),
-    /// An answer came that may belong to an earlier request.
-    Doubted(&'static str),
 }
 
 /// What came in and was no part of the exchange.

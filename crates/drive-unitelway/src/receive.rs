@@ -5,8 +5,9 @@ use std::time::Instant;
 use bytes::Bytes;
 
 use crate::{
+    failure::Failure,
     frame::{self, ACK, EOT, Heard, NAK, poll},
-    link::{Failure, Step, Stray, UniTelway},
+    link::{Step, Stray, UniTelway},
     network::unite_of,
     request::REFUSED,
     settings::{LEFTOVERS, POLL_LEN},

@@ -5,8 +5,9 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use crate::{
+    failure::{Answer, Failure},
     frame::{self, poll},
-    link::{Answer, Failure, Step, Stray, UniTelway},
+    link::{Step, Stray, UniTelway},
     request::{MARK, code},
     stage::{Current, Mark, Next, Stage, Then, Wanted},
 };

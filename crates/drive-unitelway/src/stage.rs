@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use crate::{
-    link::{Answer, Failure},
+    failure::{Answer, Failure},
     request::Request,
 };
 
