@@ -9,6 +9,7 @@ mod dead;
 mod doors;
 mod far_end;
 mod faults;
+mod first_look;
 mod growth;
 mod ledger;
 mod lines;
@@ -53,6 +54,8 @@ enum Section {
     Strangers,
     /// The wait of a stop at each door of the daemon while somebody attacks another; wants `drived` built beside this program.
     Doors,
+    /// When the page's stop is usable and its first value there, near and far; wants `drived` built beside this program, and Chromium.
+    FirstLook,
 }
 
 const EVERYTHING: [Section; 8] = [
@@ -146,6 +149,7 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
         Section::Lines => lines::measure(report, time, arguments.lines),
         Section::Growth => growth::measure(report, time, arguments.most_lines, arguments.plot.as_deref()),
         Section::Doors => doors::measure(report),
+        Section::FirstLook => first_look::measure(report),
         Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
         Section::Strangers => strangers::measure(report),
     }

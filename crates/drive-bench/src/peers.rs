@@ -33,6 +33,7 @@ impl Python {
     }
 }
 
-fn interpreter() -> PathBuf {
+/// The Python of whatever others wrote.
+pub(crate) fn interpreter() -> PathBuf {
     env::var_os("DRIVED_PYTHON").map_or_else(|| "python3".into(), PathBuf::from)
 }

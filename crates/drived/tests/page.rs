@@ -96,6 +96,11 @@ fn while_the_account_of_a_stop_cannot_be_read_nothing_is_called_live() {
 }
 
 #[test]
+fn a_daemon_that_was_started_anew_knows_nothing_of_a_stop_and_that_is_said() {
+    look_at_three_pumps("restarted");
+}
+
+#[test]
 fn a_stop_of_a_dead_line_is_told_as_not_confirmed_of_every_drive() {
     look_at_three_pumps("dead");
 }
@@ -136,7 +141,7 @@ fn look_at_three_pumps(scene: &str) {
     let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-3"]);
     let state = path(&format!("page-{scene}-state"));
     let text = format!(
-        "state = {:?}\n[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
+        "state = {:?}\n[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\nslow = \"60min\"\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
         state.to_str().expect("the path is text"),
         pumps.link()
     );

@@ -278,6 +278,12 @@ const PATTERNS = [
   [/^(.+ stop), sent (\d+) times?$/, (stop, times) => `${reaction(stop)}, envoyé ${times} fois`],
   [/^(.+ stop) for (.+), (the drive is stopping|it is repeated)$/, (stop, time, how) =>
     `${reaction(stop)} depuis ${number(time)}, ${how === 'it is repeated' ? 'il est répété' : 'le variateur s’arrête'}`],
+  [/^((?:current|thermal state) [^,]+ of [^,]+, .+)$/, all => all.split(', ').map(french).join(', ')],
+  [/^current (.+) of (.+)$/, (is, limit) => `courant ${number(is)} pour ${number(limit)}`],
+  [/^thermal state of the (drive|motor) (.+) of (.+)$/, (whose, is, limit) =>
+    `état thermique ${whose === 'drive' ? 'du variateur' : 'du moteur'} ${number(is)} pour ${number(limit)}`],
+  [/^(.*) instead of (.*)$/, (found, remembered) => `${found} au lieu de ${remembered}`],
+  [/^it is an? (.+): (.+)$/, (what, family) => `c’est un ${what} : ${family}`],
   [/^(\d+) times today$/, times => `${times} fois aujourd’hui`],
   [/^next probe in (.+)$/, time => `prochain essai dans ${number(time)}`],
   [/^by (bus|terminals|panel|local|other bus)$/, who => ({ bus: 'par le bus', terminals: 'par le bornier', panel: 'par le terminal', local: 'en local', 'other bus': 'par un autre bus' })[who]],

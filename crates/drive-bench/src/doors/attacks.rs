@@ -1,0 +1,106 @@
+//! Who does what at which door, for as long as it is wanted.
+
+#![expect(clippy::disallowed_methods, reason = "there is no runtime here: each attacker is a thread")]
+
+use std::{
+    io::{Read as _, Write as _},
+    net::{IpAddr, Ipv4Addr, SocketAddr, TcpStream},
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::Duration,
+};
+
+use socket2::{Domain, Socket, Type};
+
+use super::{PATIENCE, plant::Plant};
+
+/// Attackers come from another address than whoever stops: limits are by address.
+const ATTACKER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
+
+/// What it is, and whoever does it until it is over.
+pub(super) type Attack = (&'static str, fn(&Plant, &AtomicBool));
+
+pub(super) const ATTACKS: [Attack; 8] = [
+    ("nobody does anything", |_, over| wait(over)),
+    ("512 connections that say nothing", |plant, over| hold(plant.http, 512, b"", over)),
+    ("512 half-sent heads", |plant, over| {
+        hold(plant.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over);
+    }),
+    ("64 slow bodies of logins", |plant, over| {
+        hold(plant.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over);
+    }),
+    ("8 who try tokens on stops", |plant, over| {
+        flood(
+            plant.http,
+            8,
+            "POST /api/v1/stop?wait=0 HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer drv_wrong\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}",
+            over,
+        );
+    }),
+    ("8 who send 64 KiB that they may not", |plant, over| {
+        let body = " ".repeat(65_000);
+        let start = format!(
+            "POST /api/v1/drives/pump%201/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        );
+        flood(plant.http, 8, &start, over);
+    }),
+    ("256 event streams that nobody reads", |plant, over| {
+        hold(plant.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over);
+    }),
+    ("256 silent clients of the gateway", |plant, over| hold(plant.gateway, 256, b"", over)),
+];
+
+/// Opens connections, says the same on each and keeps them; those that are closed are opened again.
+fn hold(to: SocketAddr, count: usize, head: &[u8], over: &AtomicBool) {
+    let mut held: Vec<Option<TcpStream>> = (0..count).map(|_| None).collect();
+    while !over.load(Ordering::Relaxed) {
+        for place in &mut held {
+            let is_open = place.as_ref().is_some_and(|stream| {
+                !matches!(stream.peek(&mut [0]), Ok(0))
+                    && stream.take_error().is_ok_and(|error| error.is_none())
+            });
+            if !is_open {
+                *place = connect(to).ok().and_then(|mut stream| {
+                    stream.write_all(head).ok()?;
+                    stream.set_nonblocking(true).ok().map(|()| stream)
+                });
+            }
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Asks the same again and again on some connections at once, as fast as it is answered.
+fn flood(to: SocketAddr, count: usize, request: &str, over: &AtomicBool) {
+    thread::scope(|scope| {
+        for _ in 0..count {
+            scope.spawn(|| {
+                let mut stream = None;
+                let mut answer = [0; 4_096];
+                while !over.load(Ordering::Relaxed) {
+                    let Ok(mut open) = stream.take().map_or_else(|| connect(to), Ok) else {
+                        thread::yield_now();
+                        continue;
+                    };
+                    let answered = open.write_all(request.as_bytes()).and_then(|()| open.read(&mut answer));
+                    stream = answered.is_ok_and(|read| read > 0).then_some(open);
+                }
+            });
+        }
+    });
+}
+
+fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
+    let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
+    socket.bind(&SocketAddr::new(ATTACKER, 0).into())?;
+    socket.connect_timeout(&to.into(), PATIENCE)?;
+    socket.set_read_timeout(Some(PATIENCE))?;
+    Ok(socket.into())
+}
+
+fn wait(over: &AtomicBool) {
+    while !over.load(Ordering::Relaxed) {
+        thread::sleep(Duration::from_millis(10));
+    }
+}

@@ -1,0 +1,135 @@
+//! A daemon with all its doors, to be attacked.
+
+#![expect(clippy::disallowed_methods, reason = "there is no runtime here")]
+
+use std::{
+    env, fs,
+    net::{SocketAddr, TcpListener, TcpStream},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::atomic::{AtomicU32, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::Error;
+
+/// A daemon with four simulated drives and all its doors, in a folder of its own.
+pub(super) struct Plant {
+    _folder: Folder,
+    pub(super) http: SocketAddr,
+    pub(super) gateway: SocketAddr,
+    pub(super) socket: PathBuf,
+    /// `None` where there is no mosquitto.
+    pub(super) broker: Option<SocketAddr>,
+    _running: Vec<Running>,
+}
+
+impl Plant {
+    pub(super) fn start() -> Result<Self, Error> {
+        let (program, folder) = (program()?, Folder::new()?);
+        let (link, socket) = (folder.0.join("line"), folder.0.join("drived.sock"));
+        let (http, gateway, broker) = (free()?, free()?, free()?);
+        let mosquitto = mosquitto(&folder.0.join("mosquitto.conf"), broker)?;
+        let mqtt = match mosquitto {
+            Some(_) => format!("[mqtt]\nservers = [\"mqtt://{broker}\"]\ncommands = true\n"),
+            None => String::new(),
+        };
+        let config = folder.0.join("drives.toml");
+        fs::write(
+            &config,
+            format!(
+                "[http]\nlisten = \"{http}\"\n[socket]\npath = {socket:?}\n{mqtt}[lines.bench]\nport = {link:?}\n\
+                 [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-4\"\nname = \"pump {{}}\"\ncontrol = true\n\
+                 [[gateways]]\nlisten = \"{gateway}\"\nline = \"bench\"\nwrites = \"stop\"\n"
+            ),
+        )?;
+        let run = |arguments: &[&str]| Running::start(&program, arguments);
+        let drives = run(&["sim", "--drive", "atv312@1-4", "--pty", text(&link)?])?;
+        until(|| link.exists())?;
+        let daemon = run(&["run", "--config", text(&config)?])?;
+        until(|| socket.exists() && TcpStream::connect(http).is_ok() && TcpStream::connect(gateway).is_ok())?;
+        let broker = mosquitto.is_some().then_some(broker);
+        let running = [drives, daemon].into_iter().chain(mosquitto).collect();
+        Ok(Self { _folder: folder, http, gateway, socket, broker, _running: running })
+    }
+}
+
+/// The program, beside this one.
+pub(crate) fn program() -> Result<PathBuf, Error> {
+    let program = env::current_exe()?.with_file_name("drived");
+    match program.exists() {
+        true => Ok(program),
+        false => {
+            Err(format!("{} is not there: cargo build --profile dist --bin drived", program.display()).into())
+        }
+    }
+}
+
+/// A broker, where there is one on this machine.
+fn mosquitto(config: &Path, at: SocketAddr) -> Result<Option<Running>, Error> {
+    fs::write(config, format!("listener {} {}\nallow_anonymous true\n", at.port(), at.ip()))?;
+    let program =
+        ["/usr/sbin/mosquitto", "/usr/bin/mosquitto"].into_iter().find(|program| Path::new(program).exists());
+    let Some(program) = program else { return Ok(None) };
+    let running = Running::start(Path::new(program), &["-c", text(config)?])?;
+    until(|| TcpStream::connect(at).is_ok())?;
+    Ok(Some(running))
+}
+
+/// A program that ends with the measurement.
+pub(crate) struct Running(Child);
+
+impl Running {
+    pub(crate) fn start(program: &Path, arguments: &[&str]) -> Result<Self, Error> {
+        let mut command = Command::new(program);
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+        Ok(Self(command.spawn()?))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A folder that is gone afterwards.
+pub(crate) struct Folder(pub(crate) PathBuf);
+
+impl Folder {
+    pub(crate) fn new() -> Result<Self, Error> {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let folder = env::temp_dir().join(format!("drive-bench-doors-{}-{number}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        Ok(Self(folder))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+pub(crate) fn free() -> Result<SocketAddr, Error> {
+    Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?)
+}
+
+pub(crate) fn text(path: &Path) -> Result<&str, Error> {
+    path.to_str().ok_or_else(|| "the path is no text".into())
+}
+
+/// Waits until something is so.
+pub(crate) fn until(mut is_so: impl FnMut() -> bool) -> Result<(), Error> {
+    let begun = Instant::now();
+    while !is_so() {
+        if begun.elapsed() > Duration::from_secs(30) {
+            return Err("the daemon does not begin".into());
+        }
+        thread::sleep(Duration::from_millis(50));
+    }
+    Ok(())
+}
