@@ -6,7 +6,7 @@ use drive_bus::Line;
 use drive_core::{Direction, Frequency, SerialSettings, StopMode};
 use drive_families::Family;
 use drive_fleet::{
-    DriveSettings, EventKind, ExitAction, FleetError, Link, Outcome, Periods, Received, Refused,
+    DriveSettings, EventKind, ExitAction, FleetError, Left, Link, OnExit, Outcome, Periods, Received, Refused,
 };
 use support::{
     drives,
@@ -169,4 +169,37 @@ async fn a_line_is_exchanged_under_a_reader_of_events_who_notices_nothing_of_it(
     while !matches!(plant.events.recv().await, Received::End) {}
     let late = plant.fleet.extend(|fleet| fleet);
     assert_eq!(late, Err(FleetError::ShutDown));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_is_left_turning_is_ours_again_where_what_was_left_of_it_is_taken_along() {
+    for takes_along in [true, false] {
+        let settings = DriveSettings { on_exit: OnExit::Leave, ..DriveSettings::controlled("1") };
+        let site = Site::new(SerialSettings::MODBUS_DEFAULT, vec![(FAMILY, 1, settings)]);
+        let mut plant = Plant::open(vec![site]).expect("it works");
+        started(&plant, "1").await;
+        let handle = plant.drive("1");
+        assert_eq!(handle.left(), Left::default(), "it has not left");
+        let actions = plant.fleet.remove(&["1"], 60 * SECOND).await;
+        assert_eq!(actions, [("1".into(), ExitAction::Left)]);
+        let line = plant.fleet.remove_line("line 0").expect("it has no drives");
+        let left = handle.left();
+        assert!(left.run.is_some() && left.identity.is_some(), "{left:?}");
+        plant.events_so_far().await;
+        let settings = DriveSettings::controlled("under another name");
+        let settings = if takes_along { settings.after(left) } else { settings };
+        let added = plant.fleet.extend(|fleet| {
+            let fleet = fleet.line("another line", line.clone());
+            fleet.drive("another line", 1, settings, |port, slave| drives::drive(FAMILY, port, slave))
+        });
+        assert_eq!(added, Ok(()));
+        let drive = plant.drive("under another name");
+        drive.ready(PATIENCE).await.expect("it gets ready");
+        sleep(5 * SECOND).await;
+        assert_eq!(drive.snapshot().started_here(), takes_along);
+        let told = plant.events_so_far().await;
+        assert_eq!(told.iter().any(|kind| matches!(kind, EventKind::RunAdopted(_))), takes_along, "{told:?}");
+        let _ = plant.fleet.shutdown(60 * SECOND).await;
+        assert_eq!(runs(&plant, 1), !takes_along, "at the exit a run of ours is stopped, and no other");
+    }
 }

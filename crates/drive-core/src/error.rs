@@ -515,6 +515,13 @@ impl Error {
             Self::NotConfirmed { .. } => ErrorKind::NotConfirmed,
         }
     }
+
+    /// Whether a family, or a drive, has nothing to say of what it is: an answer, and none of the identity.
+    #[must_use]
+    pub fn is_speechless(&self) -> bool {
+        self.kind() == ErrorKind::Unsupported
+            || matches!(self, Self::Exception { meaning: ExceptionMeaning::NoSuchFunction, .. })
+    }
 }
 
 #[cfg(test)]

@@ -68,6 +68,22 @@ pub struct InVain {
     pub contract: WatchdogContract,
 }
 
+impl EepromLedger {
+    /// The EEPROM was written once more, now, or may have been: for who writes to it beside a fleet.
+    pub fn count(&mut self) {
+        let now = Instant::now();
+        let mut ledger = Ledger::new(now, Some(self.clone()));
+        ledger.write(now);
+        *self = ledger.kept;
+    }
+
+    /// Whether it was written so often in the day of the last write that this is an alarm.
+    #[must_use]
+    pub const fn is_worn(&self) -> bool {
+        self.today >= EEPROM_WRITES_A_DAY
+    }
+}
+
 impl fmt::Display for EepromLedger {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} writes today, {} in all", self.today, self.writes)

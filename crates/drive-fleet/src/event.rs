@@ -18,7 +18,7 @@ use tokio::{
 
 use crate::{
     cause::{Cause, ChangedWord},
-    eeprom::{EEPROM_WRITES_A_DAY, EepromLedger, EepromUse},
+    eeprom::{EepromLedger, EepromUse},
     outcome::{Outcome, Tenths},
     runs::RunKept,
     settings::WatchdogBefore,
@@ -198,7 +198,7 @@ pub enum EventKind {
         why: &'static str,
     },
     /// Its EEPROM was written, or may have been: **an alarm** where that is more often than it lasts
-    /// ([`EEPROM_WRITES_A_DAY`]).
+    /// ([`EEPROM_WRITES_A_DAY`](crate::EEPROM_WRITES_A_DAY)).
     EepromWritten {
         /// By what.
         by: EepromUse,
@@ -319,7 +319,7 @@ impl EventKind {
     pub const fn is_alarm(&self) -> bool {
         match self {
             Self::Exit(action) | Self::Removed(action) => action.is_alarm(),
-            Self::EepromWritten { ledger, .. } => ledger.today >= EEPROM_WRITES_A_DAY,
+            Self::EepromWritten { ledger, .. } => ledger.is_worn(),
             other => other.is_always_alarm(),
         }
     }

@@ -238,7 +238,7 @@ fn tell(entries: &[Arc<Entry>], message: impl Fn() -> Urgent) {
 async fn exit_action(entry: &Entry) -> ExitAction {
     let mut exit = entry.exit.clone();
     match exit.wait_for(Option::is_some).await {
-        Ok(action) => action.clone().unwrap_or(ExitAction::TimeOver),
+        Ok(ended) => ended.as_ref().map_or(ExitAction::TimeOver, |(action, _)| action.clone()),
         Err(_) => ExitAction::TimeOver,
     }
 }

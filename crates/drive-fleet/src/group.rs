@@ -27,6 +27,7 @@ use crate::{
     handle::{DriveHandle, Entry},
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     snapshot::{Link, Snapshot, has_reached},
+    stop_order::{StopOrder, strength},
     supervisor::Leave,
 };
 
@@ -62,8 +63,8 @@ impl Fleet {
     }
 
     /// Stops every drive: see [`Group::stop`].
-    pub fn stop_all(&self, mode: StopMode) -> GroupStop {
-        self.all().stop(mode)
+    pub fn stop_all(&self, order: impl Into<StopOrder>) -> GroupStop {
+        self.all().stop(order)
     }
 }
 
@@ -194,13 +195,14 @@ impl Group {
     /// one broadcast goes out first. Nobody confirms it, so each drive is then stopped by itself, which also verifies it.
     /// It is finished when every drive stands or its time is over; a drive that does not answer is named after the time
     /// that its line's plan gives. Stops that are not confirmed go on being repeated, by each drive's own task.
-    pub fn stop(&self, mode: StopMode) -> GroupStop {
-        self.in_one_act().stop_each(mode, false)
+    ///
+    /// No broadcast comes over the stop of a drive that is harder, nor once every drive of the line is being stopped so.
+    pub fn stop(&self, order: impl Into<StopOrder>) -> GroupStop {
+        self.in_one_act().stop_each(order.into(), true)
     }
 
-    /// Stops every drive of the group; `anyhow`: a stop in another mode that is under way does as well, and no broadcast
-    /// comes over it.
-    fn stop_each(&self, mode: StopMode, anyhow: bool) -> GroupStop {
+    /// Stops every drive of the group, by a broadcast first where there can be one and it is wanted.
+    fn stop_each(&self, order: StopOrder, by_broadcast: bool) -> GroupStop {
         let (members, read_only): (Vec<&DriveHandle>, Vec<&DriveHandle>) =
             self.members.iter().partition(|member| member.entry.settings().control);
         let standing = self.fleet.members();
@@ -208,7 +210,7 @@ impl Group {
         let mut patience = Vec::new();
         for line in &standing.lines {
             // It is first on the line, and no start of before can come behind the stops of each.
-            if let Some(write) = self.common_write(&standing, line, mode).filter(|_| !anyhow) {
+            if let Some(write) = self.common_write(&standing, line, order.mode).filter(|_| by_broadcast) {
                 broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
             let on_line = members.iter().filter(|member| Arc::ptr_eq(&member.entry.line, line));
@@ -218,7 +220,7 @@ impl Group {
         }
         let stop = |member: &&DriveHandle| {
             let of_line = patience.iter().find(|(line, _)| Arc::ptr_eq(&member.entry.line, line));
-            let stop = member.stop_within(mode, anyhow, of_line.map(|(_, patience)| *patience));
+            let stop = member.stop_within(order, of_line.map(|(_, patience)| *patience));
             (Arc::clone(member.name()), stop)
         };
         let each = members.iter().map(stop).collect();
@@ -257,7 +259,12 @@ impl Group {
             write.filter(|_| allowed)
         };
         let first = write(on_line.next()?)?;
-        on_line.all(|entry| write(entry) == Some(first)).then_some(first)
+        let is_common = on_line.all(|entry| write(entry) == Some(first));
+        let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
+        let (all, any) = standing.on(line).map(under_way).fold((true, false), |(all, any), stop| {
+            (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
+        });
+        (is_common && !all && !any).then_some(first)
     }
 
     /// Starts every drive of the group, or none: first all are asked whether they would start, then they start, as close
@@ -372,7 +379,7 @@ impl Group {
         }
         // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
         // perhaps by its freewheel, is not slowed down by this.
-        let stopped = self.stop_each(StopMode::Ramp, true).finished().await;
+        let stopped = self.stop_each(StopMode::Ramp.into(), false).finished().await;
         Err(GroupFailure::Failed { outcomes, stopped })
     }
 }

@@ -26,8 +26,9 @@ use crate::{
     fleet::LineEntry,
     outcome::{Order, Refused, Until},
     plan::Demand,
-    settings::DriveSettings,
+    settings::{DriveSettings, Left},
     snapshot::{Snapshot, WatchdogCheck},
+    stop_order::StopOrder,
     supervisor::{CallId, Leave, Question, Told},
     task::{Message, Urgent},
     ticket::{Progress, StopTicket, Ticket, refused},
@@ -49,7 +50,7 @@ pub(crate) struct Entry {
     /// The number of the last call.
     pub(crate) calls: AtomicU64,
     pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
-    pub(crate) exit: watch::Receiver<Option<ExitAction>>,
+    pub(crate) exit: watch::Receiver<Option<(ExitAction, Left)>>,
 }
 
 impl Entry {
@@ -253,15 +254,18 @@ impl DriveHandle {
     ///
     /// It is in force when the drive shows that no run command is, and finished at standstill, or when the time of the
     /// settings is over: it goes on being repeated then.
-    pub fn stop(&self, mode: StopMode) -> StopTicket {
-        self.stop_within(mode, false, None)
+    ///
+    /// A stop under way that is as hard takes a later one in, which is confirmed by what the drive shows after it; one that is
+    /// harder takes its place: freewheel, then fast, then injection of direct current, then the ramp.
+    pub fn stop(&self, order: impl Into<StopOrder>) -> StopTicket {
+        self.stop_within(order.into(), None)
     }
 
-    pub(crate) fn stop_within(&self, mode: StopMode, anyhow: bool, patience: Option<Duration>) -> StopTicket {
+    pub(crate) fn stop_within(&self, order: StopOrder, patience: Option<Duration>) -> StopTicket {
         let (reply, hearer) = watch::channel(Progress::default());
         let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
         // One that cannot be given any more is refused by the end of its reply.
-        let _ = self.entry.urgent.send(Urgent::Stop { id, mode, anyhow, act, patience, reply });
+        let _ = self.entry.urgent.send(Urgent::Stop { id, order, act, patience, reply });
         StopTicket::new(hearer)
     }
 
@@ -285,6 +289,12 @@ impl DriveHandle {
     /// ([`Counters::saves`](crate::Counters::saves)).
     pub fn persist(&self) -> Ticket {
         self.order(Order::Persist)
+    }
+
+    /// What is left of it once it has [left the fleet](crate::Fleet::remove), for whoever goes on with it; before that, nothing.
+    #[must_use]
+    pub fn left(&self) -> Left {
+        self.entry.exit.borrow().as_ref().map(|(_, left)| left.clone()).unwrap_or_default()
     }
 
     /// Gives an order.

@@ -61,6 +61,7 @@ mod runs;
 mod settings;
 mod shows;
 mod snapshot;
+mod stop_order;
 mod supervisor;
 mod task;
 #[cfg(test)]
@@ -85,12 +86,13 @@ pub use outcome::{
 pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
 pub use runs::RunKept;
 pub use settings::{
-    Alarms, Commanders, DriveSettings, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
+    Alarms, Commanders, DriveSettings, Left, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
     OnLoss, Periods, RunRecord, Times, WatchdogBefore, WatchdogContract,
 };
 pub use shows::Shows;
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,
 };
+pub use stop_order::StopOrder;
 pub use supervisor::checks::FEED_PART;
 pub use ticket::{StopTicket, Ticket};

@@ -4,7 +4,7 @@ use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
 use drive_core::{Command, Direction, Error, Frequency, Refusal, Setpoint, Status, StopMode};
 
-use crate::limits::LimitProblem;
+use crate::{limits::LimitProblem, stop_order::StopOrder};
 
 /// When a start or a setpoint counts as done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -146,6 +146,7 @@ impl Outcome {
         match self {
             Self::Stopped(stop) => Some(*stop),
             Self::NotConfirmed(Unconfirmed::TimeOver { stop, .. }) => *stop,
+            Self::NotConfirmed(Unconfirmed::StopDenied { stop, .. }) => Some(*stop),
             Self::OutcomeUnknown(Unknown { stop, .. }) => *stop,
             _ => None,
         }
@@ -211,7 +212,7 @@ impl fmt::Display for Outcome {
         f.write_str(self.kind())?;
         match self {
             Self::Started(started) => write!(f, ": {started}"),
-            Self::Stopped(stop) if stop.is_replaced() => write!(f, ": {stop}"),
+            Self::Stopped(stop) if stop.is_told() => write!(f, ": {stop}"),
             Self::Confirmed | Self::Stopped(_) | Self::Expired => Ok(()),
             Self::NotConfirmed(why) => write!(f, ": {why}"),
             Self::OutcomeUnknown(unknown) => write!(f, ": {unknown}"),
@@ -261,6 +262,10 @@ pub struct StopModes {
     pub used: Option<StopMode>,
     /// Why it is another, where the drive or its driver tells.
     pub why: Option<&'static str>,
+    /// For how long direct current was to be held, where it was asked for and somebody has said so.
+    pub injection_asked: Option<Duration>,
+    /// For how long it is held, where it is injected.
+    pub injection_used: Option<Duration>,
 }
 
 impl StopModes {
@@ -269,16 +274,34 @@ impl StopModes {
     pub fn is_replaced(&self) -> bool {
         self.used.is_some_and(|used| used != self.asked)
     }
+
+    /// Whether there is more to be told of it than that the drive stops as it was asked for.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        self.is_replaced() || self.injection_used.is_some()
+    }
+
+    /// How it was asked for.
+    const fn order(&self) -> StopOrder {
+        StopOrder { mode: self.asked, injection: self.injection_asked }
+    }
 }
 
 impl fmt::Display for StopModes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { asked, used, why } = self;
+        let Self { asked, used, why, injection_asked, injection_used } = self;
+        let order = self.order();
         match used {
-            None => write!(f, "asked for a {asked} stop, and the drive has shown none"),
-            Some(used) if used == asked => write!(f, "{asked} stop"),
+            None => write!(f, "asked for a {order}, and the drive has shown none"),
+            Some(used) if used == asked => match (injection_asked, injection_used) {
+                (Some(asked), Some(used)) if asked != used => {
+                    write!(f, "asked for a {order}, it is held for {used:?}")
+                }
+                (_, Some(used)) => write!(f, "{asked} stop held for {used:?}"),
+                _ => write!(f, "{asked} stop"),
+            },
             Some(used) => {
-                write!(f, "asked for a {asked} stop, the drive did a {used} stop")?;
+                write!(f, "asked for a {order}, the drive did a {used} stop")?;
                 why.map_or(Ok(()), |why| write!(f, " because {why}"))
             }
         }
@@ -337,7 +360,7 @@ impl fmt::Display for Unknown {
 
 /// The part of a sentence that tells of another mode than was asked for.
 fn replaced(f: &mut fmt::Formatter<'_>, stop: Option<StopModes>) -> fmt::Result {
-    match stop.filter(StopModes::is_replaced) {
+    match stop.filter(StopModes::is_told) {
         Some(stop) => write!(f, "; {stop}"),
         None => Ok(()),
     }
@@ -359,6 +382,13 @@ pub enum Unconfirmed {
     },
     /// The drive's words deny it.
     Denied(Error),
+    /// The drive refuses each attempt of a stop by an exception.
+    StopDenied {
+        /// The last.
+        error: Error,
+        /// How it was asked for, and how the drive stops.
+        stop: StopModes,
+    },
     /// A later command took its place.
     Superseded,
     /// A stop came.
@@ -379,7 +409,7 @@ impl Unconfirmed {
             Self::TimeOver { because: Some(because), .. }
             | Self::Denied(Error::NotConfirmed { because: Some(because), .. }) => because.word(),
             Self::TimeOver { .. } => "time_over",
-            Self::Denied(_) => "denied",
+            Self::Denied(_) | Self::StopDenied { .. } => "denied",
             Self::Superseded => "later_command",
             Self::Stopped => "stop",
             Self::Withdrawn => "withdrawn",
@@ -406,6 +436,10 @@ impl fmt::Display for Unconfirmed {
                 because.map_or(Ok(()), |because| write!(f, "; {because}"))
             }
             Self::Denied(error) => error.fmt(f),
+            Self::StopDenied { error, stop } => {
+                error.fmt(f)?;
+                replaced(f, Some(*stop))
+            }
             Self::Superseded => f.write_str("a later command took its place"),
             Self::Stopped => f.write_str("a stop came"),
             Self::Withdrawn => f.write_str("it was withdrawn"),

@@ -44,12 +44,17 @@ pub(crate) struct Keeper {
 }
 
 impl Keeper {
-    pub(crate) const fn new(
+    pub(crate) fn new(
         drive: Arc<str>,
         keeps: Option<mpsc::UnboundedSender<RunKept>>,
         kept: Option<RunRecord>,
     ) -> Self {
-        Self { drive, keeps, told: kept }
+        let mut keeper = Self { drive, keeps, told: None };
+        if kept.is_some() {
+            // Who keeps it may have had it under another name.
+            keeper.tell(kept, None);
+        }
+        keeper
     }
 
     /// The run command of this side as it stands now. The identity counts that the drive had when it was given.

@@ -120,7 +120,34 @@ settings! {
     }
 }
 
+/// What one run has left of a drive to whoever goes on with it, such as a fleet that takes it up again on another line
+/// ([`DriveHandle::left`](crate::DriveHandle::left)).
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Left {
+    /// What the drive said it was.
+    pub identity: Option<Identity>,
+    /// The watchdog that was found, where it was armed and not put back.
+    pub watchdog: Option<WatchdogBefore>,
+    /// The run command that may still stand in the drive.
+    pub run: Option<RunRecord>,
+    /// What was written to its EEPROM.
+    pub eeprom: Option<EepromLedger>,
+}
+
 impl DriveSettings {
+    /// These settings, for a drive of which a run before has left this. What the settings say themselves of its identity counts.
+    #[must_use]
+    pub fn after(self, left: Left) -> Self {
+        let Left { identity, watchdog, run, eeprom } = left;
+        Self {
+            identity: self.identity.clone().or(identity),
+            watchdog_before: watchdog,
+            run_before: run,
+            eeprom_before: eeprom,
+            ..self
+        }
+    }
+
     /// Settings of a drive that is also commanded.
     #[must_use]
     pub fn controlled(name: impl Into<String>) -> Self {

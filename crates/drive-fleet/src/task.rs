@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_bus::Slave;
-use drive_core::{Drive, Error, Lease, Lifetimes, Setpoint, StopMode};
+use drive_core::{Drive, Error, Lease, Lifetimes, Setpoint};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -19,8 +19,9 @@ use crate::{
     event::{ExitAction, Teller},
     outcome::{Order, Refused},
     runs::Keeper,
-    settings::{DriveSettings, RunRecord},
+    settings::{DriveSettings, Left, RunRecord},
     snapshot::Snapshot,
+    stop_order::StopOrder,
     supervisor::{Asker, CallId, Job, Leave, Output, Question, Reply, Step, Supervisor, Told, Turn},
     ticket::Report,
 };
@@ -50,9 +51,7 @@ pub(crate) enum Urgent {
     /// A stop.
     Stop {
         id: CallId,
-        mode: StopMode,
-        /// A stop in another mode that is under way does as well.
-        anyhow: bool,
+        order: StopOrder,
         act: Arc<Act>,
         /// Until its lack of confirmation is an alarm; `None`: as the settings say.
         patience: Option<Duration>,
@@ -94,8 +93,8 @@ impl Task {
                 let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
                 drive.accept_self_restart(&accepted);
                 drive.set_coast_time(settings.coast);
-                drive.set_injection_time(settings.injection);
             }
+            drive.set_injection_time(desk.supervisor.injection());
             if let Some(lease) = desk.supervisor.take_adoption() {
                 drive.adopt(lease);
             }
@@ -230,7 +229,7 @@ pub(crate) struct Desk {
     pub(crate) supervisor: Supervisor,
     pub(crate) events: Teller,
     pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
-    pub(crate) exit: watch::Sender<Option<ExitAction>>,
+    pub(crate) exit: watch::Sender<Option<(ExitAction, Left)>>,
     pub(crate) callers: BTreeMap<CallId, Report>,
     pub(crate) askers: BTreeMap<CallId, oneshot::Sender<Result<Told, Refused>>>,
     /// What the drive itself is to know of its settings from its next call on.
@@ -269,13 +268,13 @@ impl Desk {
     fn handle_urgent(&mut self, message: Urgent) -> bool {
         let now = Instant::now();
         match message {
-            Urgent::Stop { id, mode, anyhow, act, patience, reply } => {
+            Urgent::Stop { id, order, act, patience, reply } => {
                 // A stop may be pending for hours; only those who still wait for it are kept.
                 self.callers.retain(|_, caller| !caller.is_closed());
                 let callers = &self.callers;
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
                 let asker = self.caller(id, act, reply);
-                self.supervisor.handle_stop(now, asker, mode, anyhow, patience)
+                self.supervisor.handle_stop(now, asker, order, patience)
             }
             Urgent::Withdraw(id) => self.supervisor.handle_withdrawal(now, id),
             Urgent::Settings(settings) => {
@@ -326,7 +325,7 @@ impl Desk {
             }
         }
         if let Some(action) = self.supervisor.exit_action() {
-            self.exit.send_replace(Some(action.clone()));
+            self.exit.send_replace(Some((action.clone(), self.supervisor.left())));
         }
     }
 }
@@ -423,7 +422,7 @@ async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> R
 
 #[cfg(test)]
 mod tests {
-    use drive_core::Direction;
+    use drive_core::{Direction, StopMode};
 
     use super::*;
 

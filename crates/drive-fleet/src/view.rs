@@ -567,11 +567,11 @@ impl From<&Outcome> for OutcomeView {
     fn from(outcome: &Outcome) -> Self {
         let (text, error, last) = match outcome {
             Outcome::Started(started) => (Some(started.to_string()), None, None),
-            Outcome::Stopped(stop) if stop.is_replaced() => (Some(stop.to_string()), None, None),
+            Outcome::Stopped(stop) if stop.is_told() => (Some(stop.to_string()), None, None),
             Outcome::Confirmed | Outcome::Stopped(_) | Outcome::Expired => (None, None, None),
             Outcome::NotConfirmed(why) => {
                 let (error, last) = match why {
-                    Unconfirmed::Denied(error) => (Some(error), None),
+                    Unconfirmed::Denied(error) | Unconfirmed::StopDenied { error, .. } => (Some(error), None),
                     Unconfirmed::TimeOver { last, .. } => (None, last.as_ref()),
                     _ => (None, None),
                 };
@@ -612,11 +612,23 @@ pub struct StopModesView {
     /// Why it is another.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<String>,
+    /// For how long direct current was to be held, in milliseconds, where somebody has said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub injection_asked_ms: Option<u64>,
+    /// For how long it is held, in milliseconds, where it is injected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub injection_used_ms: Option<u64>,
 }
 
 impl From<StopModes> for StopModesView {
     fn from(stop: StopModes) -> Self {
-        Self { asked: stop.asked, used: stop.used, why: stop.why.map(str::to_owned) }
+        Self {
+            asked: stop.asked,
+            used: stop.used,
+            why: stop.why.map(str::to_owned),
+            injection_asked_ms: stop.injection_asked.map(whole_ms),
+            injection_used_ms: stop.injection_used.map(whole_ms),
+        }
     }
 }
 

@@ -156,7 +156,7 @@ async fn through_a_stop_that_is_not_confirmed_every_face_tells_the_same_at_every
     let stop = Asked {
         id: None,
         target: plant::commands::Target::All,
-        action: Action::Stop(StopMode::Ramp),
+        action: Action::Stop(StopMode::Ramp.into()),
         lifetime: LIFETIME,
         arrived: Instant::now(),
     };

@@ -7,7 +7,7 @@ use drive_core::{Error, ErrorKind, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
     DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
-    Refused, Started, Times, Unknown,
+    Refused, Started, StopModes, StopOrder, Times, Unknown,
 };
 use tokio::time::{Instant, interval_at, timeout};
 
@@ -108,7 +108,7 @@ impl Commanded {
             Some(outcome) => format!("the start is {outcome}"),
             None => "asked to end before the start was confirmed".to_owned(),
         };
-        let stopped = self.stop(StopMode::Ramp).await.map_err(|failure| {
+        let (_, stopped) = self.stop(StopMode::Ramp).await.map_err(|failure| {
             Failure::Drive(format!("{failure}; it was to be stopped again, because {why}"))
         })?;
         Err(Failure::Drive(format!(
@@ -117,12 +117,12 @@ impl Commanded {
         )))
     }
 
-    /// Stops the motor and tells how that goes. Gives the status at standstill.
+    /// Stops the motor and tells how that goes. Gives how it was stopped, and the status at standstill.
     ///
     /// A verdict comes in its time, whatever line and port do.
-    pub(crate) async fn stop(&mut self, mode: StopMode) -> Result<Status, Failure> {
+    pub(crate) async fn stop(&mut self, order: impl Into<StopOrder>) -> Result<(StopModes, Status), Failure> {
         let name = self.name;
-        let stop = self.handle.stop(mode);
+        let stop = self.handle.stop(order);
         let mut watch = self.handle.watch();
         let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
         let (mut waited, mut taken) = (0, false);
@@ -164,12 +164,17 @@ impl Commanded {
         };
         self.tell_what_it_took().await;
         match outcome {
-            outcome if outcome.is_confirmed() => Ok(self.status()),
+            Outcome::Stopped(modes) => Ok((modes, self.status())),
             outcome @ Outcome::NotConfirmed(_) if taken => {
                 Err(Failure::Drive(format!("{name} has taken the stop and does not stand: {outcome}")))
             }
             outcome => Err(Failure::Drive(format!("{UNCONFIRMED}. {}", self.failure(&outcome)))),
         }
+    }
+
+    /// Whether nothing can be sent.
+    pub(crate) fn is_unsent(&self) -> bool {
+        self.handle.snapshot().error.as_ref().is_some_and(|error| error.kind() == ErrorKind::NotSent)
     }
 
     /// Tells what a stop has taken besides: another mode's place, or the command from somebody else.

@@ -1,9 +1,9 @@
 //! The one drive on which a subcommand acts.
 
 use drive_bus::{Endpoint, Line, LineConfig};
-use drive_core::{Drive, Error, Status};
+use drive_core::{Drive, Error, Recognised, Row, Status, Written};
 use drive_families::Options;
-use drive_fleet::{Order, Started};
+use drive_fleet::{Order, Refused, Started, StopModes, view::StopModesView};
 use serde_json::json;
 
 use crate::{
@@ -12,9 +12,10 @@ use crate::{
     drive_options::OptionArgs,
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
+    ledger::{Ledger, LedgerArgs},
     line_spec::{self, LineSpec},
     output,
-    own_line::{close, open_drive, open_line_of, wait_at_most, words},
+    own_line::{close, may_have_written, open_drive, open_line_of, wait_at_most, words},
 };
 
 /// Which drive a subcommand acts on: one on a line, by `--line` and `--drive`, or what the running daemon knows by name.
@@ -74,6 +75,14 @@ impl OneDriveArgs {
         OneDrive::open(line, &self.options, self.name()?).await
     }
 
+    /// The same for what writes, once the drive is known to be none of another family.
+    pub(crate) async fn open_to_write(&self, ledger: &LedgerArgs) -> Result<OneDrive, Failure> {
+        let mut one = self.open().await?;
+        one.is_meant().await?;
+        one.ledger = Some(ledger.of(one.name, &one.config));
+        Ok(one)
+    }
+
     /// Opens the line, for a command: see [`Commanded::over`].
     pub(crate) async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
@@ -120,6 +129,25 @@ impl OneDriveArgs {
             "status": status,
         });
         self.daemon.say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")))
+    }
+
+    /// The same for a stop, with how it was asked for and how the drive has stopped.
+    pub(crate) fn say_stopped(
+        &self,
+        one: &Commanded,
+        stop: StopModes,
+        status: &Status,
+    ) -> Result<(), Failure> {
+        let name = one.name;
+        let by = if stop.is_told() { format!(", {stop}") } else { String::new() };
+        let mut body = json!({
+            "drive": name.to_string(), "action": "stop", "outcome": "confirmed", "stop": StopModesView::from(stop), "status": status,
+        });
+        if stop.is_told() {
+            body["text"] = json!(stop.to_string());
+        }
+        self.daemon
+            .say(&body, || output::say(format_args!("{name} stands still{by}: the drive shows {status}")))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.
@@ -173,6 +201,8 @@ pub(crate) struct OneDrive {
     pub(crate) drive: Box<dyn Drive>,
     config: LineConfig,
     line: Line,
+    /// Where the writes to its EEPROM are counted, where any are to be.
+    pub(crate) ledger: Option<Ledger>,
 }
 
 impl OneDrive {
@@ -191,7 +221,7 @@ impl OneDrive {
     pub(crate) fn over(name: DriveName, line: Line, config: LineConfig, options: &Options) -> Self {
         let mut drive = open_drive(&line, name, options);
         wait_at_most(&mut *drive);
-        Self { name, drive, config, line }
+        Self { name, drive, config, line, ledger: None }
     }
 
     /// How the line is set.
@@ -202,6 +232,43 @@ impl OneDrive {
     /// What a person reads when the drive did not do it.
     pub(crate) fn failure(&self, error: &Error) -> Failure {
         Failure::Drive(words(self.name, &self.config, error))
+    }
+
+    /// That it is none of another family, before anything is written to it: as a fleet judges it.
+    pub(crate) async fn is_meant(&mut self) -> Result<(), Failure> {
+        let identity = match self.drive.identify().await {
+            Ok(identity) => identity,
+            Err(error) if error.is_speechless() => return Ok(()),
+            Err(error) => return Err(self.failure(&error)),
+        };
+        match self.drive.recognise(&identity) {
+            Recognised::NotMine { it_is } => Err(Failure::Drive(format!(
+                "{}: nothing was written: {}",
+                self.name,
+                Refused::OtherFamily(it_is.into())
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Counts what a write of this row has done to the EEPROM, or may have.
+    pub(crate) fn count_of(&mut self, row: &Row, written: &Result<Written, Error>) {
+        let is_written = match written {
+            Ok(written) => written.changed,
+            Err(error) => may_have_written(error),
+        };
+        self.count(is_written && row.storage.may_wear());
+    }
+
+    /// Counts a save to the EEPROM, or what may have been one.
+    pub(crate) fn count_save(&mut self, saves: &Result<u32, Error>) {
+        self.count(saves.as_ref().err().is_none_or(may_have_written));
+    }
+
+    fn count(&mut self, is_written: bool) {
+        if let Some(ledger) = self.ledger.as_mut().filter(|_| is_written) {
+            ledger.count(1);
+        }
     }
 
     /// Closes the port.

@@ -104,3 +104,26 @@ fn a_run_without_a_record_is_somebody_elses_and_the_exit_leaves_it_and_says_so()
     assert!(last.contains(r#""action":"left_turning""#), "{last}");
     assert!(plant.shown().contains("running"), "{}", plant.shown());
 }
+
+#[test]
+fn a_reload_that_gives_a_turning_drive_and_its_line_another_name_leaves_its_run_ours() {
+    let plant = Plant::new("kept-renamed");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    let left = format!("{text}on_exit = \"leave\"\n");
+    fs::write(plant.file.path(), &left).expect("it can be written");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["start", "pump", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
+    let renamed = text.replace("bench", "hall").replace("\"pump\"", "\"fan\"");
+    fs::write(plant.file.path(), &renamed).expect("it can be written");
+    daemon.signal("-HUP");
+    let adopted = daemon.wait_for(r#""event":"run_adopted""#);
+    assert!(adopted.contains("\"fan\""), "{adopted}");
+    let record = fs::read_to_string(plant.record()).expect("it is kept");
+    assert!(record.contains("\"fan\""), "a kill would be outlived, too: {record}");
+    let shown = run(&["status", "fan", "--socket", &plant.socket]);
+    assert!(shown.out.contains("running"), "it was not touched: {}", shown.out);
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(!plant.shown().contains("running"), "our run is stopped at the exit: {rest}");
+}

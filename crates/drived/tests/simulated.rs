@@ -3,7 +3,7 @@
 
 mod support;
 
-use support::{Running, Sim, run};
+use support::{File, Running, Sim, path, run};
 
 #[test]
 fn a_drive_is_started_watched_and_stopped_by_the_words_that_it_confirms() {
@@ -207,8 +207,16 @@ fn a_3g3ev_is_reset_once_its_owner_says_which_input_function_resets_faults() {
 fn parameters_are_saved_to_eeprom_only_when_that_is_asked_for_and_also_when_they_were_written_before() {
     let sim = Sim::serve_with("save", &["atv312@1", "3g3ev@2"], &["--baud", "19200", "--format", "8E1"]);
     let line = format!("{},19200,8E1", sim.link());
+    let state = path("save-state");
+    let drive = |(spec, name): (&str, &str)| {
+        format!("[[drives]]\nline = \"bench\"\ndrive = \"{spec}\"\nname = \"{name}\"\n")
+    };
+    let drives: String = [("atv312@1", "pump"), ("3g3ev@2", "fan")].map(drive).concat();
+    let head = format!("state = \"{}\"\n[lines.bench]\nport = \"{line}\"\n", state.display());
+    let config = File::new("save", &(head + &drives));
     let on = |drive: &str, command: &[&str]| {
-        run(&[&["param"], command, &["--line", &line, "--drive", drive]].concat())
+        let named = ["--line", &line, "--drive", drive, "--config", config.path()];
+        run(&[&["param"], command, &named].concat())
     };
     for (drive, register, value, by) in
         [("atv312@1", "ACC", "45", "CMI bit 1"), ("3g3ev@2", "n20", "4.5", "ENTER, a write to 0900h")]
@@ -228,6 +236,17 @@ fn parameters_are_saved_to_eeprom_only_when_that_is_asked_for_and_also_when_they
     }
     let counted = on("3g3ev@2", &["save", "--option", "saves=120"]);
     assert!(counted.assert_done().ends_with("; saves counted: 121\n"), "{counted:?}");
+    // In the ledger of the daemon that has these drives: what was saved, and nothing of what was kept in RAM.
+    let ledger = std::fs::read_to_string(state.join("eeprom.json")).expect("it is kept");
+    let ledger: serde_json::Value = serde_json::from_str(&ledger).expect("it is JSON");
+    assert_eq!((&ledger["pump"]["writes"], &ledger["fan"]["writes"]), (&2.into(), &3.into()), "{ledger}");
+    std::fs::remove_dir_all(state).expect("it was kept there");
+    let nowhere =
+        run(&["param", "save", "--line", &line, "--drive", "atv312@1", "--config", "/nowhere.toml"]);
+    assert!(
+        nowhere.err.contains("the writes to the drive's EEPROM are counted nowhere: /nowhere.toml: "),
+        "{nowhere:?}"
+    );
     on("atv312@1", &["set", "LFr", "30", "--save"]).assert_refused(2, "LFr (8502) is kept in RAM only");
     on("atv58@3", &["set", "ACC", "4.5", "--save"]).assert_refused(2, "no command that saves its parameters");
     on("atv28@3", &["save"]).assert_refused(2, "no command that saves its parameters");

@@ -17,6 +17,14 @@ pub enum Storage {
     Unknown,
 }
 
+impl Storage {
+    /// Whether each write wears an EEPROM, or is to be taken for that.
+    #[must_use]
+    pub const fn may_wear(self) -> bool {
+        matches!(self, Self::Eeprom | Self::Unknown)
+    }
+}
+
 impl fmt::Display for Storage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {

@@ -53,6 +53,8 @@ pub struct LinePlan {
     /// The share of the line with which every status comes before the next is due and is fresh until then, in
     /// millionths.
     fresh_ppm: u64,
+    /// The share of the line that the frames take which the watchdogs get between two polls, in millionths.
+    fed_ppm: u64,
 }
 
 impl LinePlan {
@@ -68,12 +70,12 @@ impl LinePlan {
         WHOLE_PPM.saturating_sub(self.utilisation_ppm)
     }
 
-    /// How long the commands of a group leave a line to the rest after one that took this time. So the polls keep the
-    /// share with which none is missed, and on a line with watchdogs one half at least; the commands keep a
+    /// How long the commands of a group leave a line to the rest after one that took this time. So the polls and the frames for
+    /// the watchdogs keep the share with which none is missed, and on a line with watchdogs one half at least; the commands keep a
     /// tenth at least, or they would never come to an end.
     pub(crate) fn rest_after(&self, command: Duration) -> Duration {
         let fed = if self.feed_gap.is_some() { WHOLE_PPM / 2 } else { 0 };
-        let rest = self.fresh_ppm.max(fed).min(WHOLE_PPM - COMMANDS_PPM);
+        let rest = self.fresh_ppm.saturating_add(self.fed_ppm).max(fed).min(WHOLE_PPM - COMMANDS_PPM);
         stretched(command, WHOLE_PPM - rest).saturating_sub(command)
     }
 
@@ -202,6 +204,7 @@ pub fn forecast(budget: LineBudget, drives: &[Demand], dead: usize) -> Forecast 
         slow_sweep: living.iter().map(|(_, load)| load.slow).sum(),
         slow_ppm,
         fresh_ppm: 0,
+        fed_ppm: sum(|load| load.fed_ppm) - probes,
     };
     let patience = living.iter().map(|(demand, _)| demand.patience()).min();
     let fresh_ppm = patience.map_or(0, |patience| share(plan.status_wait(), patience));
@@ -264,6 +267,8 @@ struct Load {
     slow: Duration,
     /// The share of the statuses and of the frames for the watchdog, in millionths.
     status_ppm: u64,
+    /// That of the frames alone.
+    fed_ppm: u64,
     /// The share of the slow set, in millionths.
     slow_ppm: u64,
 }
@@ -273,13 +278,14 @@ impl Load {
         let pause = if alone { budget.idle_pause(demand.capabilities) } else { Duration::ZERO };
         let read = budget.read_slot() + pause;
         let status = read * u32::from(demand.capabilities.status_exchanges.max(1));
-        let fast = |period: Duration| {
-            // A watchdog that wants to hear more often than it is polled gets frames of its own between two polls.
+        // A watchdog that wants to hear more often than it is polled gets frames of its own between two polls.
+        let fed = |period: Duration| {
             let fed = demand.watchdog_timeout().map(|timeout| timeout / FEED_PART);
             let frames = fed.and_then(|fed| period.as_nanos().div_ceil(fed.as_nanos().max(1)).checked_sub(1));
             let frames = frames.and_then(|frames| u32::try_from(frames).ok()).unwrap_or_default();
-            share(status.saturating_add(read.saturating_mul(frames)), period)
+            read.saturating_mul(frames)
         };
+        let fast = |period: Duration| share(status.saturating_add(fed(period)), period);
         let slow = match demand.periods.slow.is_zero() {
             true => Duration::ZERO,
             false => read * u32::from(demand.capabilities.measurement_exchanges.max(1)),
@@ -288,6 +294,11 @@ impl Load {
             status,
             slow,
             status_ppm: fast(demand.periods.running).max(fast(demand.periods.rest)),
+            fed_ppm: [demand.periods.running, demand.periods.rest]
+                .map(|at| share(fed(at), at))
+                .into_iter()
+                .max()
+                .unwrap_or(0),
             slow_ppm: if slow.is_zero() { 0 } else { share(slow, demand.periods.slow) },
         }
     }

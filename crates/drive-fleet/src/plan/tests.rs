@@ -146,3 +146,17 @@ fn more_drives_than_a_family_allows_on_a_segment_are_refused_unless_there_are_re
     let tcp = LineBudget::of(&LineConfig::modbus_tcp("gateway:502"));
     assert!(plan(tcp, &every).is_ok(), "behind a gateway there is a segment that nobody here knows");
 }
+
+#[test]
+fn behind_a_groups_command_the_line_is_left_to_the_polls_and_to_the_frames_for_the_watchdogs() {
+    // Each of 25 drives is polled every 4 s and wants to hear something every 2 s: one frame of its own between two polls.
+    let mut every = without_measurements(drives(25, 4_000 * MS, Some(4_000 * MS)));
+    every.iter_mut().for_each(|demand| demand.periods = Periods { rest: 4_000 * MS, ..demand.periods });
+    every.iter_mut().for_each(|demand| demand.periods.max_age = 5_000 * MS);
+    let plan = forecast(budget(), &every, 0).plan;
+    // A status of each within the second that it may be late, and a frame of each within its 4 s.
+    let (polls, frames) = (25.0 * READ.as_secs_f64() / 1.0, 25.0 * READ.as_secs_f64() / 4.0);
+    let rest = plan.rest_after(1_000 * MS).as_secs_f64();
+    let wanted = 1.0 / (1.0 - polls - frames) - 1.0;
+    assert!((rest - wanted).abs() < 0.01, "{rest} s behind a command of 1 s, and {wanted} s are wanted");
+}

@@ -52,6 +52,15 @@ impl Supervisor {
         self.checks.says()
     }
 
+    /// The record of an earlier run of which it is not known yet whether it is ours.
+    pub(super) fn unadopted(&self) -> Option<RunRecord> {
+        match &self.adoption {
+            Adoption::Kept(record) => Some(record.clone()),
+            Adoption::Due(lease) => Some(RunRecord { identity: self.says_what_it_is(), lease: *lease }),
+            Adoption::Decided | Adoption::Asked => None,
+        }
+    }
+
     /// The run command that the family is to take for ours, once.
     pub(crate) fn take_adoption(&mut self) -> Option<Lease> {
         match std::mem::replace(&mut self.adoption, Adoption::Decided) {

@@ -228,6 +228,24 @@ impl Checks {
         }
     }
 
+    /// The watchdog is as it was found again.
+    pub(crate) fn put_back(&mut self) {
+        (self.written, self.inherited) = (false, None);
+    }
+
+    /// What the drive said it was, last.
+    pub(crate) fn remembered(&self) -> Option<Identity> {
+        self.remembered.as_deref().cloned()
+    }
+
+    /// What whoever goes on with the drive is to put back, where nobody has.
+    pub(crate) fn left(&self) -> Option<WatchdogBefore> {
+        match &self.watchdog {
+            WatchdogCheck::Verified(set) => self.to_keep(*set).map(|before| WatchdogBefore::clone(&before)),
+            _ => self.inherited.clone(),
+        }
+    }
+
     /// The same for who keeps it beyond the life of this program, of a drive that says which it is.
     fn to_keep(&self, set: Watchdog) -> Option<Arc<WatchdogBefore>> {
         let IdentityCheck::Same(identity) = &self.identity else { return None };
@@ -338,7 +356,7 @@ impl Checks {
                 return Some(EventKind::OtherFamily { it_is, found });
             }
             Ok((identity, _)) => Arc::new(identity),
-            Err(error) if cannot_say(&error) => {
+            Err(error) if error.is_speechless() => {
                 self.identity = IdentityCheck::CannotSay;
                 self.known();
                 return None;
@@ -485,12 +503,6 @@ impl Checks {
             self.feed_again = Some(now + at.saturating_duration_since(heard) / FEED_PART);
         }
     }
-}
-
-/// Whether a family or a drive has nothing to say of what it is.
-fn cannot_say(error: &Error) -> bool {
-    error.kind() == ErrorKind::Unsupported
-        || matches!(error, Error::Exception { meaning: ExceptionMeaning::NoSuchFunction, .. })
 }
 
 fn describe(watchdog: Watchdog, contract: WatchdogContract) -> String {

@@ -8,7 +8,7 @@ use crate::{
     cause::{Cause, Policy},
     event::{EventKind, ExitAction},
     outcome::{Order, Outcome},
-    settings::{OnExit, OnExitAdopted, OnExitWatchdog},
+    settings::{Left, OnExit, OnExitAdopted, OnExitWatchdog, RunRecord},
     snapshot::Link,
 };
 
@@ -89,6 +89,20 @@ impl Supervisor {
         }
     }
 
+    /// What is left of the drive to whoever goes on with it.
+    pub(crate) fn left(&self) -> Left {
+        let is_another = self.checks.is_another();
+        let lease = self.lease.filter(|_| !is_another);
+        Left {
+            identity: self.checks.remembered(),
+            watchdog: self.checks.left(),
+            run: lease
+                .map(|lease| RunRecord { identity: self.says_what_it_is(), lease })
+                .or_else(|| self.unadopted()),
+            eeprom: (self.ledger.kept.writes > 0).then(|| self.ledger.kept.clone()),
+        }
+    }
+
     pub(super) fn is_exiting(&self) -> bool {
         self.exit != Exit::No
     }
@@ -144,6 +158,7 @@ impl Supervisor {
         let why = match result {
             Ok(watchdog) if watchdog.timeout == found.timeout => {
                 let action = action.clone();
+                self.checks.put_back();
                 self.emit_by(EventKind::WatchdogRestored(watchdog), Cause::policy(self.exits_by));
                 return self.exit_done(action);
             }

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, mem};
 
-use drive_core::{Faults, Result, Row, Written, registers::Storage};
+use drive_core::{Faults, Result, Row, Written};
 use tokio::time::Instant;
 
 use super::{CallId, Job, Output, Supervisor, may_have_written, permission::QUEUE};
@@ -81,7 +81,7 @@ impl Supervisor {
                 Ok(Told::Written(written)) => written.changed,
                 told => may_have_written(told),
             };
-            if matches!(question, Question::Write(row, _) if row.storage == Storage::Eeprom) && is_written {
+            if matches!(question, Question::Write(row, _) if row.storage.may_wear()) && is_written {
                 self.note_eeprom(now, EepromUse::Parameter, Cause::Command(act));
             }
             self.outputs.push_back(Output::Told(id, told.map_err(Refused::from)));

@@ -70,7 +70,7 @@ impl Supervisor {
             && self.stopping.is_none()
         {
             let by = Asker::Policy(Policy::ValueWithdrawn);
-            self.begin_stop(now, by, mode, self.settings.times.stop_alarm);
+            self.stop_by_policy(now, by, mode);
         }
     }
 }

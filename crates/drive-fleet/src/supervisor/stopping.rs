@@ -3,17 +3,17 @@
 use std::time::Duration;
 
 use drive_core::{
-    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Result, Setpoint, Status, StopMode,
-    Stopped,
+    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Result, Setpoint, StopMode, Stopped,
 };
 use tokio::time::Instant;
 
-use super::{Asker, CallId, Job, Output, Supervisor};
+use super::{Asker, CallId, Job, Output, Supervisor, verdict::status_of};
 use crate::{
     cause::Cause,
     event::EventKind,
     outcome::{Outcome, Refused, StopModes, Unconfirmed, Unknown},
     snapshot::{Link, PendingStop},
+    stop_order::{StopOrder, strength},
 };
 
 /// The shortest and the longest pause between two attempts of a stop.
@@ -28,13 +28,21 @@ const EXIT: Duration = Duration::from_secs(86_400);
 /// A stop under way.
 #[derive(Debug)]
 pub(super) struct Stopping {
+    /// The hardest mode that was asked for.
+    asked: StopMode,
     /// The mode that is sent.
     mode: StopMode,
     /// The mode by which the drive says that it stops; that which is sent until it has said so.
     used: StopMode,
     /// By which the drive has said that it stops, and why by another than was asked for.
     shown: Option<(StopMode, Option<&'static str>)>,
+    /// For how long direct current is to be held, where somebody has said so.
+    injection: Option<Duration>,
+    /// For how long the drive's driver has said that it is.
+    injects_for: Option<Duration>,
     since: Instant,
+    /// When it was asked for last: a status that was read before says nothing of that.
+    asked_at: Instant,
     /// Attempts that have ended.
     attempts: u32,
     /// Attempts that have begun.
@@ -59,16 +67,22 @@ pub(super) struct Stopping {
 #[derive(Debug)]
 struct Waiter {
     asker: Asker,
-    asked: StopMode,
+    asked: StopOrder,
+    /// When.
+    asked_at: Instant,
     until: Instant,
+    /// It has heard that no run command is in force any more.
+    is_told: bool,
 }
 
 impl Stopping {
     /// How a stop was asked for, and how the drive stops.
-    fn modes(&self, asked: StopMode) -> StopModes {
+    fn modes(&self, order: StopOrder) -> StopModes {
+        let asked = order.mode;
         let used = self.shown.map(|(used, _)| used);
         let why = self.shown.and_then(|(_, why)| why).filter(|_| used != Some(asked));
-        StopModes { asked, used, why }
+        let (injection_asked, injection_used) = (order.injects_for(), self.injects_for);
+        StopModes { asked, used, why, injection_asked, injection_used }
     }
 
     pub(super) const fn pending(&self) -> PendingStop {
@@ -114,42 +128,45 @@ impl Stopping {
 }
 
 impl Supervisor {
-    /// Somebody wants the drive stopped, `anyhow` if a stop in another mode that is under way does as well. Gives whether
-    /// the job in flight has to be dropped for it.
+    /// Somebody wants the drive stopped. A stop under way that is as hard takes it in. Gives whether the job in flight has to be
+    /// dropped for it.
     pub(crate) fn handle_stop(
         &mut self,
         now: Instant,
         asker: Asker,
-        mode: StopMode,
-        anyhow: bool,
+        order: StopOrder,
         patience: Option<Duration>,
     ) -> bool {
         if !self.settings.control {
-            self.conclude(asker, Command::Stop(mode), None, Outcome::Refused(Refused::ReadOnly));
+            self.conclude(asker, Command::Stop(order.mode), None, Outcome::Refused(Refused::ReadOnly));
             return false;
         }
-        let mode = self.stopping.as_ref().filter(|_| anyhow).map_or(mode, |stopping| stopping.mode);
-        self.begin_stop(now, asker, mode, patience.unwrap_or(self.settings.times.stop_alarm));
+        self.begin_stop(now, asker, order, patience.unwrap_or(self.settings.times.stop_alarm));
         self.drops_for_stop()
     }
 
-    /// Whether the job in flight has to be dropped for the stop that is under way.
+    /// Whether the job in flight has to be dropped for the stop that is under way. What the drive has taken waits for nothing but
+    /// the statuses that confirm it.
     pub(super) fn drops_for_stop(&self) -> bool {
-        match self.in_flight {
-            Some(Job::Stop(mode)) => self.stopping.as_ref().is_some_and(|stopping| stopping.mode != mode),
-            Some(_) => true,
-            None => false,
+        match (self.in_flight, &self.stopping) {
+            (Some(Job::Stop(mode)), Some(stopping)) => stopping.mode != mode,
+            (Some(_), Some(stopping)) => !stopping.taken,
+            _ => false,
         }
     }
 
-    /// Stops for a policy. A stop that is under way keeps its mode: whoever asked for it may have wanted it faster than
-    /// the settings do.
+    /// Stops for a policy.
     pub(super) fn stop_by_policy(&mut self, now: Instant, asker: Asker, mode: StopMode) {
-        let mode = self.stopping.as_ref().map_or(mode, |stopping| stopping.mode);
-        self.begin_stop(now, asker, mode, self.settings.times.stop_alarm);
+        self.begin_stop(now, asker, mode.into(), self.settings.times.stop_alarm);
     }
 
-    pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, mode: StopMode, patience: Duration) {
+    /// For how long direct current is to be held now.
+    pub(crate) fn injection(&self) -> Option<Duration> {
+        self.stopping.as_ref().and_then(|stopping| stopping.injection).or(self.settings.injection)
+    }
+
+    pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, order: StopOrder, patience: Duration) {
+        let (mode, injection) = (order.mode, order.injects_for());
         self.end_orders_by_stop();
         self.stops += 1;
         self.started_by = None;
@@ -158,28 +175,37 @@ impl Supervisor {
         self.withdrawal = None;
         // The exit has its own limit; until then the stop is repeated.
         let until = if asker.is_exit() { now + EXIT } else { now + patience };
-        let waiter = Waiter { asker: asker.clone(), asked: mode, until };
+        let mut waiter = Waiter { asker: asker.clone(), asked: order, asked_at: now, until, is_told: false };
         match &mut self.stopping {
             Some(stopping) => {
-                if stopping.mode != mode {
-                    (stopping.mode, stopping.used) = (mode, mode);
+                if strength(mode) > strength(stopping.asked) {
+                    (stopping.asked, stopping.mode, stopping.used) = (mode, mode, mode);
                     stopping.taken = false;
                 }
-                if !stopping.taken {
+                stopping.asked_at = now;
+                // The longer brings the motor to rest.
+                stopping.injection = stopping.injection.max(injection);
+                if stopping.taken {
+                    // It comes down already, and the next status says of this one, too, how far it is.
+                    waiter.until = waiter.until.max(now + self.settings.times.standstill);
+                    self.pace.hurry(now);
+                } else {
                     stopping.next_try = Some(now);
                     stopping.pause = REPEAT.0;
                 }
-                let in_force = waiter.asker.id().filter(|_| stopping.taken);
                 stopping.waiters.push(waiter);
-                self.outputs.extend(in_force.map(|id| Output::InForce(id, Outcome::Confirmed)));
                 stopping.asker = asker;
             }
             None => {
                 self.stopping = Some(Stopping {
+                    asked: mode,
                     mode,
                     used: mode,
                     shown: None,
+                    injection,
+                    injects_for: None,
                     since: now,
+                    asked_at: now,
                     attempts: 0,
                     begun: 0,
                     asker,
@@ -218,7 +244,7 @@ impl Supervisor {
         stopping.begun = stopping.begun.saturating_sub(u32::from(!sent));
         let cause = stopping.asker.cause();
         let status = match result {
-            Ok(Stopped { status, mode: used, instead: why, taken_from, .. }) => {
+            Ok(Stopped { status, mode: used, instead: why, taken_from, injects_for }) => {
                 let asked = stopping.mode;
                 let told = std::mem::replace(&mut stopping.used, used);
                 stopping.next_try = None;
@@ -228,6 +254,7 @@ impl Supervisor {
                 }
                 if used == StopMode::DcInjection {
                     stopping.injects_since.get_or_insert(now);
+                    stopping.injects_for = injects_for;
                 }
                 stopping.error = None;
                 stopping.pause = REPEAT.0;
@@ -237,8 +264,6 @@ impl Supervisor {
                     stopping.alarm_at = Some(now + standstill);
                     for waiter in &mut stopping.waiters {
                         waiter.until = now + standstill;
-                        let in_force = |id| Output::InForce(id, Outcome::Confirmed);
-                        self.outputs.extend(waiter.asker.id().map(in_force));
                     }
                 }
                 if let Some(other) = taken_from {
@@ -253,10 +278,7 @@ impl Supervisor {
                 stopping.next_try = Some(now + stopping.pause);
                 stopping.pause = (stopping.pause * 2).min(REPEAT.1);
                 stopping.taken = false;
-                let status = match &error {
-                    Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
-                    _ => None,
-                };
+                let status = status_of(&error);
                 stopping.error = Some(error);
                 status
             }
@@ -266,11 +288,12 @@ impl Supervisor {
         }
     }
 
-    /// What a new status says of a stop under way.
+    /// What a new status says of a stop under way. Nothing is confirmed before the drive has taken it: a motor that stands for
+    /// another reason may hold a run command.
     pub(super) fn judge_stop(&mut self, now: Instant) {
-        let Some(status) = self.status.as_ref().map(|status| &*status.value) else { return };
-        let (motion, output, standstill) =
-            (status.motion, status.output_frequency, self.settings.times.standstill);
+        let Some(status) = &self.status else { return };
+        let (at, motion, output) = (status.at, status.value.motion, status.value.output_frequency);
+        let standstill = self.settings.times.standstill;
         let Some(stopping) = &mut self.stopping else { return };
         if stopping.attempts == 0 {
             return;
@@ -283,31 +306,62 @@ impl Supervisor {
             _ if injects && injected_for.is_some_and(|time| time >= INJECTION_AT_MOST) => {
                 stopping.go_on_by_ramp(now);
             }
-            Motion::Held | Motion::AtRest => self.stop_confirmed(motion),
-            // The output is off, and no more is to be had: the shaft may coast.
-            Motion::Coasting if stopping.taken => self.stop_confirmed(motion),
-            Motion::Driven if stopping.taken => {
+            _ if !stopping.taken => {}
+            Motion::Driven => {
                 stopping.taken = false;
                 stopping.next_try = Some(now);
             }
-            Motion::Braking if stopping.taken => stopping.comes_down(now, output, standstill),
-            _ => {}
+            _ => {
+                if motion == Motion::Braking {
+                    stopping.comes_down(now, output, standstill);
+                }
+                self.tell_taken(at);
+                // Without an output no more is to be had: the shaft may coast.
+                if matches!(motion, Motion::Held | Motion::AtRest | Motion::Coasting) {
+                    self.stop_confirmed(now, at, motion);
+                }
+            }
         }
     }
 
-    fn stop_confirmed(&mut self, motion: Motion) {
-        let Some(stopping) = self.stopping.take() else { return };
-        if let Some(status) = &self.status {
-            self.retraction.confirmed(status.at, stopping.mode);
+    /// A status that was read then shows that no run command is in force.
+    fn tell_taken(&mut self, at: Instant) {
+        let Some(stopping) = &mut self.stopping else { return };
+        for waiter in stopping.waiters.iter_mut().filter(|waiter| !waiter.is_told && waiter.asked_at <= at) {
+            waiter.is_told = true;
+            let in_force = |id| Output::InForce(id, Outcome::Confirmed);
+            self.outputs.extend(waiter.asker.id().map(in_force));
         }
+    }
+
+    /// A status that was read then confirms what was asked for before.
+    fn stop_confirmed(&mut self, now: Instant, at: Instant, motion: Motion) {
+        let Some(mut stopping) = self.stopping.take() else { return };
+        self.retraction.confirmed(at, stopping.mode);
         self.given = None;
+        let (confirmed, later): (Vec<_>, Vec<_>) =
+            stopping.waiters.drain(..).partition(|waiter| waiter.asked_at <= at);
+        let is_over = stopping.asked_at <= at;
         let modes = |asked| stopping.modes(asked);
-        let waiters: Vec<_> =
-            stopping.waiters.iter().map(|waiter| (waiter.asker.clone(), modes(waiter.asked))).collect();
-        for (asker, modes) in waiters {
+        let confirmed: Vec<_> =
+            confirmed.into_iter().map(|waiter| (waiter.asker, modes(waiter.asked))).collect();
+        if is_over {
+            let event = EventKind::StopConfirmed { mode: stopping.used, motion };
+            for (asker, modes) in confirmed {
+                self.conclude(asker, Command::Stop(modes.asked), None, Outcome::Stopped(modes));
+            }
+            self.emit_shown(event, stopping.asker.cause());
+            return;
+        }
+        // Somebody has asked for it again since.
+        stopping.waiters = later;
+        stopping.since = stopping.asked_at;
+        stopping.alarm_at = Some(now + self.settings.times.standstill);
+        self.stopping = Some(stopping);
+        self.pace.hurry(now);
+        for (asker, modes) in confirmed {
             self.conclude(asker, Command::Stop(modes.asked), None, Outcome::Stopped(modes));
         }
-        self.emit_shown(EventKind::StopConfirmed { mode: stopping.used, motion }, stopping.asker.cause());
     }
 
     pub(super) fn check_stop_times(&mut self, now: Instant) {
@@ -321,7 +375,7 @@ impl Supervisor {
         }
         let (since, attempts) = (now.saturating_duration_since(stopping.since), stopping.begun);
         let cause = stopping.asker.cause();
-        let asked = stopping.mode;
+        let asked = StopOrder { mode: stopping.asked, injection: stopping.injection };
         let over: Vec<_> = over.into_iter().map(|waiter| (waiter.asker, waiter.asked)).collect();
         if alarm {
             let outcome = self.unconfirmed_stop(now, asked);
@@ -329,12 +383,12 @@ impl Supervisor {
         }
         for (asker, asked) in over {
             let outcome = self.unconfirmed_stop(now, asked);
-            self.conclude(asker, Command::Stop(asked), None, outcome);
+            self.conclude(asker, Command::Stop(asked.mode), None, outcome);
         }
     }
 
     /// What is known of a stop that is not confirmed: only a status that is fresh, and younger than it, says anything of it.
-    fn unconfirmed_stop(&self, now: Instant, asked: StopMode) -> Outcome {
+    fn unconfirmed_stop(&self, now: Instant, asked: StopOrder) -> Outcome {
         let Some(stopping) = &self.stopping else { return Outcome::Confirmed };
         let stop = Some(stopping.modes(asked));
         let error = stopping.error.clone().or_else(|| self.last_error.clone());
@@ -351,6 +405,11 @@ impl Supervisor {
                     _ => None,
                 };
                 Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because, stop })
+            }
+            // An exception is an answer: it was not carried out.
+            (_, Some(denied)) if denied.kind() == ErrorKind::Exception => {
+                let (error, stop) = (denied.clone(), stopping.modes(asked));
+                Outcome::NotConfirmed(Unconfirmed::StopDenied { error, stop })
             }
             _ => {
                 let last = self.status.as_ref().map(|status| status.seen(now));

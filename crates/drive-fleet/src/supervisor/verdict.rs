@@ -35,6 +35,14 @@ impl Supervisor {
                     ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::Exception => {
                         self.end_order(Outcome::Refused(error.into()));
                     }
+                    // The word that the drive holds is not what it follows: the family has looked.
+                    ErrorKind::NotConfirmed => {
+                        let status = status_of(&error);
+                        self.end_order(Outcome::NotConfirmed(Unconfirmed::Denied(error)));
+                        if let Some(status) = status {
+                            self.accept_status(now, status);
+                        }
+                    }
                     _ => self.verify(now, Job::SetSetpoint(setpoint), error),
                 }
             }
@@ -92,31 +100,23 @@ impl Supervisor {
             Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
                 self.end_order(Outcome::Refused(error.into()));
             }
-            Err(error) if job == Job::Persist => self.end_order(match denied(&error) {
-                Some(outcome) => outcome,
-                None if error.kind() == ErrorKind::NotConfirmed => {
-                    Outcome::NotConfirmed(Unconfirmed::Denied(error))
-                }
-                // A save is an edge and cannot be read back.
-                None => self.unknown(now, Some(error)),
-            }),
-            Err(error) => {
-                let status = match &error {
-                    Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
-                    _ => None,
-                };
-                match job {
-                    // The family has looked for as long as it takes: nobody here knows better.
-                    Job::Start(_) if status.is_some() => {
-                        self.end_order(Outcome::NotConfirmed(Unconfirmed::Denied(error)));
-                        self.withdraw_start(now);
-                    }
-                    _ => self.verify(now, job, error),
+            // The family has looked for as long as it takes: nobody here knows better.
+            Err(error) if error.kind() == ErrorKind::NotConfirmed => {
+                let status = status_of(&error);
+                self.end_order(Outcome::NotConfirmed(Unconfirmed::Denied(error)));
+                if let Job::Start(_) = job {
+                    self.withdraw_start(now);
                 }
                 if let Some(status) = status {
                     self.accept_status(now, status);
                 }
             }
+            // A save is an edge and cannot be read back.
+            Err(error) if job == Job::Persist => {
+                let outcome = denied(&error).unwrap_or_else(|| self.unknown(now, Some(error)));
+                self.end_order(outcome);
+            }
+            Err(error) => self.verify(now, job, error),
         }
     }
 
@@ -253,7 +253,15 @@ impl Supervisor {
     /// nobody expects it any more. A stop takes it back.
     fn withdraw_start(&mut self, now: Instant) {
         let by = Asker::Policy(Policy::StartNotConfirmed);
-        self.begin_stop(now, by, StopMode::Ramp, self.settings.times.stop_alarm);
+        self.stop_by_policy(now, by, StopMode::Ramp);
+    }
+}
+
+/// The status that an error rests on.
+pub(super) fn status_of(error: &Error) -> Option<Status> {
+    match error {
+        Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
+        _ => None,
     }
 }
 

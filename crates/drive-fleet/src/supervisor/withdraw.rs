@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Lack, Refusal, Result, Status, StopMode, Verdict, Withdrawn};
+use drive_core::{Command, Error, ErrorKind, Lack, Refusal, Result, StopMode, Verdict, Withdrawn};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor, stopping::REPEAT};
+use super::{Asker, Job, Supervisor, stopping::REPEAT, verdict::status_of};
 use crate::{
     cause::{Cause, Policy},
     event::EventKind,
@@ -147,10 +147,7 @@ impl Supervisor {
                 if withdrawal.alarm_at.is_none() {
                     withdrawal.stands = Some(error.clone());
                 }
-                let status = match &error {
-                    Error::NotConfirmed { status, .. } => Some(Status::clone(status)),
-                    _ => None,
-                };
+                let status = status_of(&error);
                 if alarm {
                     self.emit(EventKind::RunCommandStands(error));
                 }

@@ -104,7 +104,7 @@ fn request(target: Target, body: impl Asks, arrived: Instant) -> Result<Request,
 }
 
 fn stop(target: Target, said: Said, arrived: Instant) -> Request {
-    let action = Action::Stop(said.stops().unwrap_or(StopMode::Ramp));
+    let action = Action::Stop(said.stops().unwrap_or(StopMode::Ramp.into()));
     Request { id: said.id, target, action, lifetime: LIFETIME, arrived }
 }
 

@@ -1,12 +1,17 @@
 //! `drived stop`: stops the motor of one drive.
 
-use drive_core::StopMode;
+use std::time::Duration;
+
+use clap::builder::ArgPredicate;
+use drive_core::{INJECTION_AT_MOST, StopMode};
+use drive_fleet::StopOrder;
 use serde_json::json;
 
 use crate::{
     client::{self, Target, Told},
     commanded::UNCONFIRMED,
     failure::Failure,
+    json::milliseconds,
     one_drive::{OneDriveArgs, unnamed},
     plant::commands::ActionWord,
 };
@@ -27,19 +32,39 @@ pub(crate) struct Args {
     one: OneDriveArgs,
     /// How: along the deceleration ramp (ramp), along the drive's short ramp (fast), by cutting the output (freewheel), or by
     /// injecting direct current (dc-injection)
-    #[arg(long, default_value_t = StopMode::Ramp)]
+    #[arg(long, default_value_t = StopMode::Ramp, default_value_if("injection", ArgPredicate::IsPresent, "dc-injection"))]
     mode: StopMode,
+    /// For how long direct current is injected to bring the motor to rest, in whole seconds, at the most 30; without it as the
+    /// configuration says, else 5. It makes the mode dc-injection
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=INJECTION_AT_MOST.as_secs()))]
+    injection: Option<u64>,
+}
+
+impl Args {
+    /// How the motor is to be stopped.
+    fn order(&self) -> Result<StopOrder, Failure> {
+        match (self.mode, self.injection) {
+            (StopMode::DcInjection, Some(seconds)) => Ok(StopOrder::injecting(Duration::from_secs(seconds))),
+            (mode, Some(_)) => Err(Failure::Input(format!(
+                "--injection is for a stop by dc-injection, and not by {mode}: leave it out, or --mode"
+            ))),
+            (mode, None) => Ok(mode.into()),
+        }
+    }
 }
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let order = args.order()?;
     if !args.one.is_on_line() {
-        return through_daemon(&args).await;
+        return through_daemon(&args, order).await;
     }
     let mut one = args.one.stop()?;
-    match one.stop(args.mode).await {
-        Ok(status) => args.one.say_done(&one, "stop", &status, "stands still")?,
+    match one.stop(order).await {
+        Ok((stop, status)) => args.one.say_stopped(&one, stop, &status)?,
         Err(failure) => {
-            return Err(match args.one.whose().await {
+            // Whoever else has the port open is in nobody's way where the drive has answered.
+            let whose = if one.is_unsent() { args.one.whose().await } else { None };
+            return Err(match whose {
                 Some(whose) => Failure::Drive(format!("{failure}; {whose}")),
                 None => failure,
             });
@@ -50,11 +75,14 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
 }
 
 /// A stop that the daemon did not get may leave a motor turning, whatever the reason is.
-async fn through_daemon(args: &Args) -> Result<(), Failure> {
+async fn through_daemon(args: &Args, order: StopOrder) -> Result<(), Failure> {
     let unsent = |failure: Failure| Failure::Drive(format!("{UNCONFIRMED}. {failure}"));
     let told = Told {
         action: ActionWord::Stop,
-        body: json!({ "mode": args.mode }),
+        body: match order.injection {
+            Some(time) => json!({ "mode": order.mode, "injection_ms": milliseconds(time) }),
+            None => json!({ "mode": order.mode }),
+        },
         done: "stands still".to_owned(),
     };
     let mut daemon = args.one.daemon.connect().await.map_err(unsent)?;

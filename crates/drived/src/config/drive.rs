@@ -134,7 +134,8 @@ settings! {
     coast: Parsed<Time> = "none",
         |to, said| to.settings.coast = Some(said.0.0),
         tells "coasts" told::coasts;
-    /// how long direct current takes to bring the motor to rest, up to 30 s: for so long a `dc-injection` stop holds it
+    /// how long direct current takes to bring the motor to rest, up to 30 s: for so long a `dc-injection` stop holds it, unless it
+    /// says for how long itself (`injection_ms`)
     injection: Parsed<Time> = "5 s",
         acts(_),
         |to, said| to.settings.injection = Some(said.0.0),

@@ -13,7 +13,7 @@ pub(crate) mod testing;
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
 
-use drive_core::StopMode;
+use drive_fleet::StopOrder;
 use serde_json::Value;
 use tokio::{
     sync::{mpsc, watch},
@@ -90,8 +90,8 @@ pub(crate) struct Desk<A> {
     closing: watch::Receiver<bool>,
     /// How fast each may come.
     paces: HashMap<String, Pace>,
-    /// When each target was last stopped by each mode.
-    stopped: HashMap<(Target, StopMode), Instant>,
+    /// When each target was last stopped so.
+    stopped: HashMap<(Target, StopOrder), Instant>,
 }
 
 impl<A: Answers + Sync> Desk<A> {
@@ -120,14 +120,14 @@ impl<A: Answers + Sync> Desk<A> {
         let Some(target) = message.target.take() else {
             return self.counter.refuse(&caller, record, &answers, named, Refusal::NotFound);
         };
-        if let Some(mode) = stop {
-            let key = (target.clone(), mode);
+        if let Some(order) = stop {
+            let key = (target.clone(), order);
             if !in_time && self.stopped.get(&key).is_some_and(|at| arrived < *at + SAME_STOP) {
                 return;
             }
             self.stopped.insert(key, arrived);
             let request =
-                Request { id: named.0, target, action: Action::Stop(mode), lifetime: LIFETIME, arrived };
+                Request { id: named.0, target, action: Action::Stop(order), lifetime: LIFETIME, arrived };
             return self.counter.stop(&caller, request, record, &answers);
         }
         self.stopped.clear();

@@ -167,7 +167,7 @@ impl Desk {
         let request = Request {
             id: None,
             target: Target::Drive(drive.name().to_string()),
-            action: Action::Stop(mode),
+            action: Action::Stop(mode.into()),
             lifetime: LONGEST_LIFETIME,
             arrived,
         };

@@ -135,7 +135,7 @@ fn said(verb: Verb, payload: &[u8]) -> Said {
         Verb::Command => return Said::of(text),
         Verb::Stop => return Said::stopping(text),
         Verb::Run => match text {
-            "stop" => Ok(Action::Stop(StopMode::Ramp)),
+            "stop" => Ok(Action::Stop(StopMode::Ramp.into())),
             "forward" => Ok(started(Direction::Forward)),
             "reverse" => Ok(started(Direction::Reverse)),
             _ => Err("expected forward, reverse or stop".to_owned()),

@@ -3,12 +3,7 @@
 
 use drive_fleet::{EepromLedger, EventKind};
 
-use super::records::Records;
-
-/// The file of the state folder.
-pub(super) const FILE: &str = "eeprom.json";
-/// What is not so where they cannot be kept.
-pub(super) const LOSS: &str = "the next run of this program counts the writes to EEPROM anew";
+use crate::records::Records;
 
 /// Notes what has happened. Gives whether the file is another now.
 pub(super) fn note(records: &mut Records<EepromLedger>, drive: &str, kind: &EventKind) -> bool {

@@ -6,7 +6,6 @@ mod exit;
 mod json;
 mod notify;
 mod picture;
-mod records;
 pub(crate) mod reload;
 mod report;
 mod runs;
@@ -15,15 +14,14 @@ mod watchdogs;
 use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
-use drive_fleet::{Fleet, FleetBuilder};
+use drive_fleet::{Fleet, FleetBuilder, Left};
 use futures_util::future::OptionFuture;
 use tokio::sync::mpsc;
 
 use self::{
     notify::Notify,
     picture::Picture,
-    records::{Records, in_folder},
-    reload::{Before, Reloader},
+    reload::Reloader,
     report::{Form, Report},
 };
 use crate::{
@@ -38,10 +36,11 @@ use crate::{
     failure::Failure,
     findings,
     gateway::Gateways,
-    journal, logging, metrics,
+    journal, ledger, logging, metrics,
     mqtt::Mqtt,
     own_line, page,
     plant::Plant,
+    records::{self, Records, in_folder},
     screen::Screen,
     signals::{Ending, Wish, Wishes},
     sparkplug::Sparkplug,
@@ -89,8 +88,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let state = &config.doors.state;
     let watchdogs = Records::open(state.watchdogs.as_deref(), watchdogs::LOSS);
     let started = Records::open(in_folder(state.folder.as_deref(), runs::FILE).as_deref(), runs::LOSS);
-    let eeproms = Records::open(in_folder(state.folder.as_deref(), eeprom::FILE).as_deref(), eeprom::LOSS);
-    let before = |drive: &str| Before {
+    let eeproms = Records::open(in_folder(state.folder.as_deref(), ledger::FILE).as_deref(), ledger::LOSS);
+    let before = |drive: &str| Left {
+        identity: None,
         watchdog: watchdogs.of(drive).cloned(),
         run: started.of(drive).cloned(),
         eeprom: eeproms.of(drive).cloned(),
@@ -223,7 +223,7 @@ fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     lines.map_err(|error| Failure::Input(error.to_string()))
 }
 
-fn build(config: &Config, lines: &[Line], before: impl Fn(&str) -> Before) -> FleetBuilder {
+fn build(config: &Config, lines: &[Line], before: impl Fn(&str) -> Left) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);

@@ -7,10 +7,8 @@ use std::{
     sync::{Arc, PoisonError},
 };
 
-use drive_bus::Line;
-use drive_fleet::{
-    DriveSettings, EepromLedger, Fleet, FleetBuilder, FleetError, LineBudget, RunRecord, WatchdogBefore,
-};
+use drive_bus::{Endpoint, Line};
+use drive_fleet::{Fleet, FleetBuilder, FleetError, Left, LineBudget};
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
@@ -19,6 +17,7 @@ use crate::{
     api::Reload,
     config::{DrivePart, LinePart},
     config_file::Config,
+    drive_spec::DriveName,
     failure::Failure,
     json::unix,
     metrics::{Id, Samples, Source},
@@ -38,12 +37,21 @@ struct Inner {
     config: Mutex<Config>,
     /// Whether what was read last holds, and when what holds was read.
     last: std::sync::Mutex<(bool, u64)>,
+    /// What is left of drives that were taken out.
+    leavings: std::sync::Mutex<Leavings>,
 }
 
 impl Reloader {
     pub(super) fn new(plant: Plant, notify: Notify, file: PathBuf, config: Config) -> Self {
         let last = std::sync::Mutex::new((true, unix(Instant::now())));
-        Self(Arc::new(Inner { plant, notify, file, config: Mutex::new(config), last }))
+        Self(Arc::new(Inner {
+            plant,
+            notify,
+            file,
+            config: Mutex::new(config),
+            last,
+            leavings: std::sync::Mutex::default(),
+        }))
     }
 
     /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
@@ -58,7 +66,14 @@ impl Reloader {
             lines.push((part.name.clone(), part.budget, line));
         }
         let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
+        let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
+        let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
+        let gone: Vec<_> = gone.collect();
         let actions = fleet.remove(&leaving, config.shutdown).await;
+        let mut leavings =
+            std::mem::take(&mut *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner));
+        leavings.retain(|(left, _)| gone.iter().all(|(place, _)| place != left));
+        leavings.extend(gone.into_iter().map(|(place, handle)| (place, handle.left())));
         let turning = actions.iter().filter(|(_, action)| action.is_alarm());
         let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
         for name in changes.iter().filter_map(Change::closed_line) {
@@ -73,8 +88,9 @@ impl Reloader {
         // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
         config.groups = std::mem::take(&mut new.groups);
         plant.set_groups(config.groups.clone());
-        let made =
-            add_all(&fleet, &changes, &new, &lines).map(|()| settle(&fleet, config, &mut new, &changes));
+        let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
+            .map(|()| settle(&fleet, config, &mut new, &changes));
+        *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         if !changes.is_empty() {
             plant.revisions().begin_anew();
         }
@@ -163,6 +179,7 @@ fn add_all(
     changes: &[Change],
     new: &Config,
     lines: &[(String, LineBudget, Line)],
+    leavings: &mut Leavings,
 ) -> Result<(), FleetError> {
     fleet.extend(|mut builder| {
         for (name, budget, line) in lines {
@@ -172,11 +189,10 @@ fn add_all(
             let is_added = |drive: &&DrivePart| {
                 changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
             };
-            builder = part
-                .drives
-                .iter()
-                .filter(is_added)
-                .fold(builder, |builder, drive| add(builder, part, drive, Before::default()));
+            builder = part.drives.iter().filter(is_added).fold(builder, |builder, drive| {
+                let left = taken(leavings, new, &drive.settings.name);
+                add(builder, part, drive, left)
+            });
         }
         // The file was planned as a whole.
         builder.whatever_the_plan()
@@ -230,19 +246,32 @@ impl Source for Reloader {
     }
 }
 
-/// What an earlier run of the program has left of a drive.
-#[derive(Debug, Default)]
-pub(crate) struct Before {
-    pub(crate) watchdog: Option<WatchdogBefore>,
-    pub(crate) run: Option<RunRecord>,
-    pub(crate) eeprom: Option<EepromLedger>,
+/// Where a drive is, whatever it and its line are called: its port, its address and its family.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Place(Endpoint, DriveName);
+
+/// The places of the drives of a configuration, by their names.
+fn places(config: &Config) -> impl Iterator<Item = (&str, Place)> {
+    config.lines.iter().flat_map(|line| {
+        let place = |drive: &DrivePart| Place(line.config.endpoint.clone(), drive.name);
+        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), place(drive)))
+    })
 }
 
-/// Adds a drive of a line.
-pub(crate) fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, before: Before) -> FleetBuilder {
+/// What is left of drives that are not in the fleet any more, for when they are taken up again, by whatever name.
+type Leavings = Vec<(Place, Left)>;
+
+/// Takes what is left of a drive.
+fn taken(leavings: &mut Leavings, config: &Config, name: &str) -> Left {
+    let place = places(config).find_map(|(other, place)| (other == name).then_some(place));
+    let at = leavings.iter().position(|(left, _)| Some(left) == place.as_ref());
+    at.map(|at| leavings.swap_remove(at).1).unwrap_or_default()
+}
+
+/// Adds a drive of a line, of which a run before has left this.
+pub(crate) fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left) -> FleetBuilder {
     let DrivePart { name, settings, options } = drive;
-    let Before { watchdog: watchdog_before, run: run_before, eeprom: eeprom_before } = before;
-    let settings = DriveSettings { watchdog_before, run_before, eeprom_before, ..settings.clone() };
+    let settings = settings.clone().after(left);
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, &options.values)
     })

@@ -7,7 +7,7 @@ use tokio::{
     task::{JoinHandle, spawn_blocking},
 };
 
-use super::records::Records;
+use crate::records::Records;
 
 /// The file of the state folder.
 pub(super) const FILE: &str = "runs.json";

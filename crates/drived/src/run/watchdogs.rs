@@ -3,7 +3,7 @@
 
 use drive_fleet::{EventKind, WatchdogBefore};
 
-use super::records::Records;
+use crate::records::Records;
 
 /// What is not so where they cannot be kept.
 pub(super) const LOSS: &str = "watchdogs that an earlier run, or one that is killed, has armed stay armed";

@@ -21,6 +21,7 @@ use crate::{
     limits::{Band, FrequencyLimits},
     outcome::{Order, Refused, Unconfirmed, Until},
     settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss, WatchdogContract},
+    stop_order::StopOrder,
     testing::CAPABILITIES,
 };
 
@@ -54,6 +55,10 @@ struct Paper {
     denies_watchdog: bool,
     /// It refuses the write of its watchdog: not now.
     refuses_watchdog: bool,
+    /// It refuses every stop: not now.
+    refuses_stops: bool,
+    /// It takes every stop and goes on, because.
+    denies_stops: Option<Refusal>,
     /// The run command of this side that it holds.
     lease: Option<Lease>,
     /// The run command that stands in it, whoever has given it, once one of before was taken for ours.
@@ -71,6 +76,12 @@ fn slave() -> SlaveAddress {
 
 fn port_error(problem: PortError) -> Error {
     Error::Port { slave: slave(), exchange: Exchange { function: 3, register: Some(3201) }, problem }
+}
+
+/// A write that the drive refuses by exception 04.
+fn not_now(register: u16) -> Error {
+    let exchange = Exchange { function: 6, register: Some(register) };
+    Error::Exception { slave: slave(), exchange, code: 4, meaning: drive_core::ExceptionMeaning::NotNow }
 }
 
 impl Paper {
@@ -97,6 +108,8 @@ impl Paper {
             keeps_watchdog: false,
             denies_watchdog: false,
             refuses_watchdog: false,
+            refuses_stops: false,
+            denies_stops: None,
             lease: None,
             held: None,
             says: None,
@@ -170,6 +183,12 @@ impl Paper {
         self.log.push(job);
         let reached = self.failing.is_none();
         match job {
+            Job::Stop(_) if self.refuses_stops => Reply::Stopped(Err(not_now(8501))),
+            Job::Stop(mode) if self.denies_stops.is_some() => {
+                let (slave, command, because) = (slave(), Command::Stop(mode), self.denies_stops);
+                let status = Box::new(self.status.clone());
+                Reply::Stopped(Err(Error::NotConfirmed { slave, command, status, because }))
+            }
             Job::Stop(asked) => {
                 if reached && self.obeys {
                     self.stand();
@@ -229,11 +248,7 @@ impl Paper {
                 Reply::Ordered(self.status())
             }
             Job::Persist => Reply::Saved(self.result(1)),
-            Job::ArmWatchdog(..) if self.refuses_watchdog => {
-                let exchange = Exchange { function: 6, register: Some(6005) };
-                let meaning = drive_core::ExceptionMeaning::NotNow;
-                Reply::Watchdog(Err(Error::Exception { slave: slave(), exchange, code: 4, meaning }))
-            }
+            Job::ArmWatchdog(..) if self.refuses_watchdog => Reply::Watchdog(Err(not_now(6005))),
             Job::ArmWatchdog(..) if self.denies_watchdog => {
                 let (slave, command) = (slave(), Command::Configure("watchdog"));
                 let status = Box::new(self.status.clone());
@@ -378,9 +393,9 @@ impl Rig {
         CallId(self.next_call)
     }
 
-    fn stop(&mut self, mode: StopMode) -> CallId {
+    fn stop(&mut self, order: impl Into<StopOrder>) -> CallId {
         let asker = self.asker();
-        if self.machine.handle_stop(self.now, asker, mode, false, None) {
+        if self.machine.handle_stop(self.now, asker, order.into(), None) {
             self.machine.handle_dropped();
         }
         CallId(self.next_call)

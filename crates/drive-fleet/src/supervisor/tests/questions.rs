@@ -69,7 +69,7 @@ fn a_stop_goes_before_every_question() {
     for _ in 0..10 {
         rig.question(Question::Read(&ROW));
     }
-    rig.machine.handle_stop(rig.now, Asker::Policy(Policy::OnLoss), StopMode::Ramp, false, None);
+    rig.machine.handle_stop(rig.now, Asker::Policy(Policy::OnLoss), StopMode::Ramp.into(), None);
     rig.pass(50 * MS);
     assert!(matches!(rig.drive.log.first(), Some(Job::Stop(_))), "{:?}", rig.drive.log);
 }

@@ -10,7 +10,7 @@ fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
     let waiting = rig.order(Order::Persist);
     let asker = rig.asker();
-    assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, false, None));
+    assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp.into(), None));
     rig.machine.handle_dropped();
     let stop = CallId(rig.next_call);
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
@@ -240,8 +240,13 @@ fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
     assert!(said.contains("the drive was last seen stopping") && said.ends_with(" s ago"), "{said}");
 }
 
+/// How a stop without an injection was asked for, and done.
+const fn modes(asked: StopMode, used: Option<StopMode>, why: Option<&'static str>) -> StopModes {
+    StopModes { asked, used, why, injection_asked: None, injection_used: None }
+}
+
 /// Asked for, and done.
-const BY_RAMP: StopModes = StopModes { asked: StopMode::Ramp, used: Some(StopMode::Ramp), why: None };
+const BY_RAMP: StopModes = modes(StopMode::Ramp, Some(StopMode::Ramp), None);
 
 #[test]
 fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
@@ -307,17 +312,18 @@ fn a_stop_under_way_keeps_its_mode_whatever_policy_or_group_stops_the_drive_besi
     }
 
     let mut rig = unheard(mode);
-    let asker = rig.asker();
-    rig.machine.handle_stop(rig.now, asker, StopMode::Ramp, true, None);
+    let weaker = rig.stop(StopMode::Ramp);
     rig.drive.failing = None;
     rig.pass(1_000 * MS);
     assert!(rig.drive.writes().iter().all(|job| *job == Job::Stop(mode)));
+    let joined = modes(StopMode::Ramp, Some(mode), None);
+    assert_eq!(rig.outcome(weaker), Some(&Outcome::Stopped(joined)));
 
-    let mut rig = unheard(mode);
+    let mut rig = unheard(StopMode::Ramp);
     rig.drive.failing = None;
-    rig.stop(StopMode::Ramp);
+    rig.stop(mode);
     rig.pass(1_000 * MS);
-    assert_eq!(rig.drive.writes().last(), Some(&Job::Stop(StopMode::Ramp)), "who stops anew says how");
+    assert_eq!(rig.drive.writes().last(), Some(&Job::Stop(mode)), "what stops harder takes its place");
 }
 
 #[test]
@@ -360,7 +366,7 @@ fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     rig.drive.stops_by = Some((StopMode::Ramp, WHY));
-    let replaced = StopModes { asked: StopMode::Fast, used: Some(StopMode::Ramp), why: Some(WHY) };
+    let replaced = modes(StopMode::Fast, Some(StopMode::Ramp), Some(WHY));
     let id = rig.stop(StopMode::Fast);
     rig.pass(1_000 * MS);
     assert_eq!(rig.outcome(id), Some(&Outcome::Stopped(replaced)));
@@ -380,7 +386,7 @@ fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
     rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
     let id = rig.stop(StopMode::Freewheel);
     rig.pass(8_000 * MS);
-    let unknown = StopModes { asked: StopMode::Freewheel, used: None, why: None };
+    let unknown = modes(StopMode::Freewheel, None, None);
     assert!(matches!(rig.outcome(id), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(id));
     assert_eq!(rig.outcome(id).and_then(Outcome::stop), Some(unknown));
 
@@ -394,7 +400,7 @@ fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
     let stopped = Stopped::by(StopMode::DcInjection, rig.drive.status.clone());
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
     rig.pass(3_000 * MS);
-    let injected = StopModes { asked: StopMode::DcInjection, used: Some(StopMode::DcInjection), why: None };
+    let injected = modes(StopMode::DcInjection, Some(StopMode::DcInjection), None);
     assert_eq!(rig.outcome(id), Some(&Outcome::Stopped(injected)));
 }
 
@@ -413,4 +419,97 @@ fn a_stop_that_never_left_is_not_confirmed_by_a_motor_that_stands_anyway() {
     rig.pass(1_000 * MS);
     assert!(rig.drive.writes().contains(&Job::Stop(StopMode::Ramp)));
     assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
+fn a_stop_that_the_drive_refuses_is_not_confirmed_by_a_motor_that_stands_anyway() {
+    let mut rig = Rig::ready();
+    rig.drive.refuses_stops = true;
+    let id = rig.stop(StopMode::Ramp);
+    rig.pass(30_000 * MS);
+    assert!(rig.events().contains(&"stop unconfirmed"), "a run command may stand in it: {:?}", rig.events());
+    let Some(Outcome::NotConfirmed(Unconfirmed::StopDenied { error, .. })) = rig.outcome(id) else {
+        panic!("{:?}", rig.outcome(id))
+    };
+    assert!(matches!(error, Error::Exception { code: 4, .. }), "{error}");
+    assert!(!rig.events().contains(&"stop confirmed"));
+    rig.drive.refuses_stops = false;
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"), "it was repeated until the drive took it");
+}
+
+/// A status that was read before now.
+fn read_before(rig: &Rig, status: Status) -> Reply {
+    Reply::Status(Ok(Status { at: Some(rig.now), ..status }))
+}
+
+#[test]
+fn a_second_stop_is_taken_into_the_one_under_way_and_confirmed_by_a_status_that_is_newer_than_itself() {
+    let (mut rig, first) = coming_down();
+    rig.drive.log.clear();
+    rig.now += 600 * MS;
+    rig.machine.handle_heard(rig.now);
+    let step = rig.machine.next(rig.now);
+    assert!(matches!(step, Step::Do { job: Job::Status { .. }, .. }), "{step:?}");
+    rig.drive.stand();
+    let older = read_before(&rig, rig.drive.status.clone());
+    rig.now += 20 * MS;
+    let asker = rig.asker();
+    let drops = rig.machine.handle_stop(rig.now, asker, StopMode::Ramp.into(), None);
+    assert!(!drops, "what confirms the first is not cut for the second");
+    let second = CallId(rig.next_call);
+    rig.now += 20 * MS;
+    rig.machine.handle_reply(rig.now, older);
+    rig.collect();
+    assert!(rig.outcome(first).is_some_and(Outcome::is_confirmed));
+    let in_force = |rig: &Rig| {
+        rig.outputs.iter().any(|output| matches!(output, Output::InForce(id, _) if *id == second))
+    };
+    assert!(rig.outcome(second).is_none() && !in_force(&rig), "that was read before it was asked for");
+    rig.pass(100 * MS);
+    assert!(rig.outcome(second).is_some_and(Outcome::is_confirmed), "the next status is not far");
+    assert!(in_force(&rig));
+    assert_eq!(rig.drive.writes(), [], "the stop stood");
+}
+
+#[test]
+fn a_second_stop_is_written_again_where_the_motor_turns_again_behind_the_first() {
+    let (mut rig, _) = coming_down();
+    rig.drive.log.clear();
+    let second = rig.stop(StopMode::Ramp);
+    rig.drive.run();
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+    assert!(rig.outcome(second).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
+fn direct_current_is_held_for_the_time_of_the_call_and_the_outcome_says_what_was_asked_for_and_used() {
+    let second = Duration::from_secs(1);
+    let mut rig = Rig::ready();
+    rig.machine.settings.injection = Some(4 * second);
+    assert_eq!(rig.machine.injection(), Some(4 * second), "without a stop its owner's counts");
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    let id = rig.stop(StopOrder::injecting(60 * second));
+    assert_eq!(rig.machine.injection(), Some(60 * second));
+    let again = rig.stop(StopOrder::injecting(2 * second));
+    assert_eq!(rig.machine.injection(), Some(60 * second), "the longer brings the motor to rest");
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    rig.drive.status.motion = Motion::Held;
+    // The driver holds it for as long as a motor bears.
+    let stopped = Stopped {
+        injects_for: Some(30 * second),
+        ..Stopped::by(StopMode::DcInjection, rig.drive.status.clone())
+    };
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
+    rig.pass(3_000 * MS);
+    let told =
+        |id| rig.outcome(id).and_then(Outcome::stop).map(|stop| (stop.injection_asked, stop.injection_used));
+    assert_eq!(told(id), Some((Some(60 * second), Some(30 * second))));
+    assert_eq!(told(again), Some((Some(2 * second), Some(30 * second))));
+    let said = rig.outcome(id).map(ToString::to_string);
+    let words = "confirmed: asked for a DC injection stop held for 60s, it is held for 30s";
+    assert_eq!(said.as_deref(), Some(words));
+    assert_eq!(rig.machine.injection(), Some(4 * second), "and it ends with the stop");
 }

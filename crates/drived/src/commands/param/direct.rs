@@ -7,6 +7,7 @@ use super::shown::{find, value_cells, value_table};
 use crate::{
     drive_spec::DriveName,
     failure::Failure,
+    ledger::LedgerArgs,
     one_drive::{OneDrive, OneDriveArgs},
     output,
     own_line::told,
@@ -35,7 +36,13 @@ pub(super) async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(),
 }
 
 /// Writes one register, reads it back, and saves it if that is wanted.
-pub(super) async fn set(args: &OneDriveArgs, register: &str, value: &str, save: bool) -> Result<(), Failure> {
+pub(super) async fn set(
+    args: &OneDriveArgs,
+    register: &str,
+    value: &str,
+    save: bool,
+    ledger: &LedgerArgs,
+) -> Result<(), Failure> {
     let name = args.name()?;
     let row = find(name.family, register)?;
     if save {
@@ -51,10 +58,11 @@ pub(super) async fn set(args: &OneDriveArgs, register: &str, value: &str, save: 
     if !is_scaled {
         wanted(row, value)?;
     }
-    let mut one = args.open().await?;
+    let mut one = args.open_to_write(ledger).await?;
     let shown = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
     let word = wanted(&shown, value)?;
     let written = told(name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
+    one.count_of(row, &written);
     let written = written.map_err(|error| one.failure(&error))?;
     let what = if written.changed { "is now" } else { "was already" };
     let kept = match written.storage {
@@ -93,10 +101,10 @@ pub(super) async fn set(args: &OneDriveArgs, register: &str, value: &str, save: 
 }
 
 /// Saves the drive's parameters to its EEPROM.
-pub(super) async fn save_all(args: &OneDriveArgs) -> Result<(), Failure> {
+pub(super) async fn save_all(args: &OneDriveArgs, ledger: &LedgerArgs) -> Result<(), Failure> {
     let name = args.name()?;
     saving(name, "each write says where its register is kept")?;
-    let mut one = args.open().await?;
+    let mut one = args.open_to_write(ledger).await?;
     let (saves, text) = persist(&mut one).await?;
     let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
     args.daemon.say(&body, || output::say(text))?;
@@ -119,6 +127,7 @@ async fn persist(one: &mut OneDrive) -> Result<(u32, String), Failure> {
     let (name, by) = (one.name, saving(one.name, "")?);
     one.drive.assume_changed();
     let saves = told(name, &mut Ending::listen()?, one.drive.persist()).await?;
+    one.count_save(&saves);
     let saves = saves.map_err(|error| one.failure(&error))?;
     let text = format!(
         "{name} has saved its parameters to EEPROM by {by}: all that it kept in RAM, not one alone; saves counted: {saves}"

@@ -20,6 +20,7 @@ use self::{
 use crate::{
     client::{DaemonArgs, Target},
     failure::Failure,
+    ledger::LedgerArgs,
     one_drive::OneDriveArgs,
     output,
     plant::parameters::ParameterView,
@@ -59,6 +60,8 @@ pub(crate) enum Command {
         /// there already
         #[arg(long)]
         save: bool,
+        #[command(flatten)]
+        ledger: LedgerArgs,
     },
     /// Save a drive's parameters to its EEPROM, all that are kept in RAM, by the family's command for it
     ///
@@ -70,6 +73,8 @@ pub(crate) enum Command {
         name: Option<String>,
         #[command(flatten)]
         one: OneDriveArgs,
+        #[command(flatten)]
+        ledger: LedgerArgs,
     },
     /// Read every register that can be read
     Dump {
@@ -94,8 +99,8 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Get { one, words } if one.is_on_line() => get(&one, &words).await,
         Command::Get { one, words } => remote::get(&one, &words).await,
-        Command::Set { one, words, save } => match (one.is_on_line(), &*words) {
-            (true, [register, value]) => set(&one, register, value, save).await,
+        Command::Set { one, words, save, ledger } => match (one.is_on_line(), &*words) {
+            (true, [register, value]) => set(&one, register, value, save, &ledger).await,
             (false, [name, register, value]) => remote::set(&one, name, register, value, save).await,
             (true, _) => {
                 Err(Failure::Input("expected REGISTER and VALUE beside --line and --drive".to_owned()))
@@ -104,8 +109,8 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
                 "expected NAME, REGISTER and VALUE, or --line and --drive instead of the name".to_owned(),
             )),
         },
-        Command::Save { one, .. } if one.is_on_line() => save_all(&one).await,
-        Command::Save { one, name } => remote::save(&one, name.as_deref()).await,
+        Command::Save { one, ledger, .. } if one.is_on_line() => save_all(&one, &ledger).await,
+        Command::Save { one, name, .. } => remote::save(&one, name.as_deref()).await,
         Command::Dump { one, .. } if one.is_on_line() => dump(&one).await,
         Command::Dump { one, name } => remote::dump(&one, name.as_deref()).await,
         Command::Backup(args) => backup::run(args).await,

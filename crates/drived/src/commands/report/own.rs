@@ -65,7 +65,7 @@ impl Own {
         let builder = part
             .drives
             .iter()
-            .fold(builder, |builder, drive| reload::add(builder, part, drive, reload::Before::default()));
+            .fold(builder, |builder, drive| reload::add(builder, part, drive, drive_fleet::Left::default()));
         let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
         let plant = Plant::start(fleet.clone(), Vec::new(), false);
         for drive in fleet.drives() {

@@ -96,7 +96,8 @@ async fn setpoint_and_run_command_in_one_write_are_one_order() {
 
 fn stop_of_all(arrived: Instant) -> (Caller, Request) {
     let caller = Caller::new("page", "page", Rights::ALL);
-    let (target, action, lifetime) = (Target::All, Action::Stop(StopMode::Ramp), Duration::from_secs(1));
+    let (target, action, lifetime) =
+        (Target::All, Action::Stop(StopMode::Ramp.into()), Duration::from_secs(1));
     (caller, Request { id: None, target, action, lifetime, arrived })
 }
 

@@ -100,6 +100,10 @@ pub(crate) struct Stop {
     id: Option<String>,
     /// `ramp` unless it is said.
     mode: Option<StopMode>,
+    /// For a stop by `dc_injection`: for so long direct current is held to bring the motor to rest, at the most for 30000; unless it
+    /// is said, as the drive's configuration does.
+    #[schemars(range(min = 1, max = 30_000))]
+    injection_ms: Option<u64>,
 }
 
 /// Changes the setpoint.

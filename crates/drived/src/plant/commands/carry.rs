@@ -6,7 +6,6 @@ use std::{
     time::Duration,
 };
 
-use drive_core::StopMode;
 use drive_fleet::{
     Act, DriveHandle, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
     StopTicket, Ticket, view::StopModesView,
@@ -170,8 +169,8 @@ impl Work {
     fn post(&self) -> Posted {
         let Inner { request, members, .. } = &*self.0;
         match (request.action, &request.target, &**members) {
-            (Action::Stop(mode), Target::Drive(_), [member]) => Posted::Stop(member.stop(mode)),
-            (Action::Stop(mode), ..) => Posted::StopOfSeveral(self.group().stop(mode)),
+            (Action::Stop(order), Target::Drive(_), [member]) => Posted::Stop(member.stop(order)),
+            (Action::Stop(order), ..) => Posted::StopOfSeveral(self.group().stop(order)),
             (Action::Start { .. }, Target::Group(_) | Target::All, _) => Posted::Nothing,
             (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
                 Posted::SetpointOfSeveral(self.group().set_setpoint(setpoint))
@@ -349,9 +348,7 @@ fn order(action: Action) -> Option<Order> {
         Action::Reset => Order::ResetFaults,
         Action::Release => Order::Release,
         Action::Save => Order::Persist,
-        Action::Stop(StopMode::Ramp | StopMode::Fast | StopMode::Freewheel | StopMode::DcInjection) => {
-            return None;
-        }
+        Action::Stop(_) => return None,
     })
 }
 

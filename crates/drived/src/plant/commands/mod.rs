@@ -16,8 +16,8 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Direction, Setpoint, StopMode};
-use drive_fleet::{DriveHandle, Until};
+use drive_core::{Direction, Setpoint};
+use drive_fleet::{DriveHandle, StopOrder, Until};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout};
@@ -65,7 +65,7 @@ pub(crate) enum Action {
         setpoint: Option<Setpoint>,
         until: Until,
     },
-    Stop(StopMode),
+    Stop(StopOrder),
     Setpoint {
         setpoint: Setpoint,
         until: Until,
@@ -148,7 +148,7 @@ impl Action {
                 format!("start {direction} at {setpoint}")
             }
             Self::Start { direction, setpoint: None, .. } => format!("start {direction}"),
-            Self::Stop(mode) => format!("{mode} stop"),
+            Self::Stop(order) => order.to_string(),
             Self::Setpoint { setpoint, .. } => format!("setpoint {setpoint}"),
             Self::Reset => "fault reset".to_owned(),
             Self::Release => "release".to_owned(),
@@ -272,6 +272,7 @@ async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
 
 #[cfg(test)]
 mod tests {
+    use drive_core::StopMode;
     use drive_fleet::{EventKind, Outcome, Received, Refused};
     use tokio::{sync::mpsc, task::spawn_blocking};
 
@@ -313,7 +314,7 @@ mod tests {
         let mut stops = Vec::new();
         // Each message that is there at once takes a part of what this task may spend before it lets others run.
         while inbox.recv().await.is_some() {
-            let (action, arrived) = (Action::Stop(StopMode::Ramp), Instant::now());
+            let (action, arrived) = (Action::Stop(StopMode::Ramp.into()), Instant::now());
             let target = Target::Drive("pump 1".to_owned());
             let _ = plant.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived });
             stops.push(beside.stop(StopMode::Ramp));

@@ -55,7 +55,7 @@ pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Opt
     };
     let text = match outcome {
         Outcome::Started(started) => Some(started.to_string()),
-        Outcome::Stopped(stop) if stop.is_replaced() => Some(stop.to_string()),
+        Outcome::Stopped(stop) if stop.is_told() => Some(stop.to_string()),
         Outcome::Confirmed | Outcome::Stopped(_) => None,
         Outcome::Expired => Some("its time was over before it was sent: it never will be".to_owned()),
         Outcome::NotConfirmed(why) => Some(why.to_string()),

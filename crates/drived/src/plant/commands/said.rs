@@ -3,7 +3,10 @@
 //! Two values of one key, a key that nobody knows and a `null` are refused by the name of the key, at every door. What names
 //! a stop without being one is said to be neither stop nor start, so that nobody believes that the motor stops.
 
+use std::time::Duration;
+
 use drive_core::StopMode;
+use drive_fleet::StopOrder;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
@@ -45,7 +48,7 @@ impl Said {
     /// An object with its `action` and perhaps `issued_unix_ms` beside the body of the API.
     pub(crate) fn of(text: &str) -> Self {
         if text.trim() == STOP {
-            return Self::plain(Action::Stop(StopMode::Ramp), Value::from(text));
+            return Self::plain(Action::Stop(StopMode::Ramp.into()), Value::from(text));
         }
         let object = match object(text.as_bytes()) {
             Ok(object) => object,
@@ -70,7 +73,7 @@ impl Said {
         match object(text.as_bytes()) {
             Ok(object) => Self::stop(&object),
             Err(_) => Self::plain(
-                Action::Stop(mode(&Value::from(text.trim())).unwrap_or(StopMode::Ramp)),
+                Action::Stop(mode(&Value::from(text.trim())).unwrap_or(StopMode::Ramp).into()),
                 Value::from(text),
             ),
         }
@@ -78,8 +81,11 @@ impl Said {
 
     fn stop(object: &Object) -> Self {
         let mode = object.one("mode").and_then(mode).unwrap_or(StopMode::Ramp);
+        let injection = object.one("injection_ms").and_then(Value::as_u64).map(Duration::from_millis);
+        let injection = injection.filter(|time| mode == StopMode::DcInjection && !time.is_zero());
+        let order = StopOrder { mode, injection };
         let id = object.one("id").and_then(Value::as_str).filter(|id| is_id(id)).map(str::to_owned);
-        Self { id, ..Self::plain(Action::Stop(mode), object.shown()) }
+        Self { id, ..Self::plain(Action::Stop(order), object.shown()) }
     }
 
     /// What is asked for without an object.
@@ -94,9 +100,9 @@ impl Said {
     }
 
     /// How it stops, if it is a stop.
-    pub(crate) fn stops(&self) -> Option<StopMode> {
+    pub(crate) fn stops(&self) -> Option<StopOrder> {
         match &self.asked {
-            Ok(Asked { action: Action::Stop(mode), .. }) => Some(*mode),
+            Ok(Asked { action: Action::Stop(order), .. }) => Some(*order),
             _ => None,
         }
     }
@@ -185,17 +191,37 @@ mod tests {
             (r#"{"action": "stop", "mode": "fast", "mode": "freewheel"}"#, StopMode::Ramp),
             (r#"{"action": "stop", "start": true, "setpoint": 50}"#, StopMode::Ramp),
         ] {
-            assert_eq!(Said::of(text).stops(), Some(expected), "{text}");
+            assert_eq!(Said::of(text).stops(), Some(expected.into()), "{text}");
         }
         for text in ["", "{", "null", "whatever", r#"{"action": "start"}"#, "\u{0}"] {
-            assert_eq!(Said::stopping(text).stops(), Some(StopMode::Ramp), "{text}");
+            assert_eq!(Said::stopping(text).stops(), Some(StopMode::Ramp.into()), "{text}");
         }
-        assert_eq!(Said::stopping("freewheel").stops(), Some(StopMode::Freewheel));
+        assert_eq!(Said::stopping("freewheel").stops(), Some(StopMode::Freewheel.into()));
+    }
+
+    #[test]
+    fn a_stop_says_for_how_long_direct_current_is_held_and_is_a_stop_whatever_it_says_of_that() {
+        let (dc, ramp) = (StopMode::DcInjection, StopMode::Ramp);
+        for (text, expected) in [
+            (
+                r#"{"mode": "dc_injection", "injection_ms": 3000}"#,
+                StopOrder::injecting(Duration::from_secs(3)),
+            ),
+            (r#"{"mode": "dc_injection"}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": 0}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": "long"}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": 1, "injection_ms": 2}"#, dc.into()),
+            (r#"{"injection_ms": 3000}"#, ramp.into()),
+        ] {
+            assert_eq!(Said::stopping(text).stops(), Some(expected), "{text}");
+        }
+        let text = r#"{"action": "stop", "mode": "dc_injection", "injection_ms": 250}"#;
+        assert_eq!(Said::of(text).stops(), Some(StopOrder::injecting(Duration::from_millis(250))));
     }
 
     #[test]
     fn nobody_knows_the_id_of_what_has_two() {
         let said = Said::of(r#"{"action": "stop", "id": "a", "id": "b"}"#);
-        assert_eq!((said.stops(), said.id), (Some(StopMode::Ramp), None));
+        assert_eq!((said.stops(), said.id), (Some(StopMode::Ramp.into()), None));
     }
 }

@@ -47,7 +47,7 @@ async fn what_is_told_reads_back_as_it_was_told() {
     test.machines[2].mute();
     sleep(Duration::from_secs(10)).await;
     let refused = begin(plant, Target::Drive("pump 2".to_owned()), start);
-    let stopped = begin(plant, Target::All, Action::Stop(drive_core::StopMode::Ramp));
+    let stopped = begin(plant, Target::All, Action::Stop(drive_core::StopMode::Ramp.into()));
     for wait in [0, 5, 60] {
         sleep(Duration::from_secs(wait)).await;
         for told in [&started, &refused, &stopped] {
@@ -76,7 +76,7 @@ fn heard(name: &str, data: &impl Serialize) -> Heard {
 async fn every_event_of_the_stream_is_understood() {
     let test = TestPlant::of(1).await;
     let plant = &test.plant;
-    let stopped = begin(plant, Target::All, Action::Stop(drive_core::StopMode::Ramp));
+    let stopped = begin(plant, Target::All, Action::Stop(drive_core::StopMode::Ramp.into()));
     assert!(matches!(heard("drive", &plant.drive("pump 1")), Heard::Drive(_)));
     assert!(matches!(heard("line", &plant.lines()[0]), Heard::Line(_)));
     assert!(matches!(heard("command", &**stopped.borrow()), Heard::Command(_)));

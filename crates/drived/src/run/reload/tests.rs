@@ -57,7 +57,7 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
     let config = Config::load_workable(&file).unwrap();
     let lines: Vec<Line> =
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
-    let fleet = super::super::build(&config, &lines, |_| Before::default()).start().unwrap();
+    let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
     let reloader = Reloader::new(plant, Notify::start(), file.clone(), config);
     // Somebody else in the program has taken a name that the file does not know yet.

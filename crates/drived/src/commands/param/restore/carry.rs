@@ -1,9 +1,6 @@
 //! Carrying a restore out: one register after the other, each at standstill and read back, up to the first that cannot be.
 
-use drive_core::{
-    Row,
-    registers::{Change, Storage},
-};
+use drive_core::{Row, registers::Change};
 
 use super::plan::{Plan, ordered};
 use crate::{
@@ -36,8 +33,7 @@ pub(super) struct Stopped {
 impl Carried {
     /// How many of the writes went to EEPROM each, or are to be taken for that.
     pub(super) fn eeprom_writes(&self) -> usize {
-        let wears = |change: &&Change| matches!(change.row.storage, Storage::Eeprom | Storage::Unknown);
-        self.written.iter().filter(wears).count()
+        self.written.iter().filter(|change| change.row.storage.may_wear()).count()
     }
 }
 

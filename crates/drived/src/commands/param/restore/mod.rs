@@ -17,7 +17,7 @@ use super::{
     file::Backup,
     source::{Source, SourceArgs},
 };
-use crate::{failure::Failure, output, signals::Ending};
+use crate::{failure::Failure, ledger::LedgerArgs, output, signals::Ending};
 
 /// Put parameters from a file back into a drive, in the order that its manual wants; without --write it is only said what would
 /// be written
@@ -50,6 +50,8 @@ pub(crate) struct Args {
     other_model: bool,
     #[command(flatten)]
     source: SourceArgs,
+    #[command(flatten)]
+    ledger: LedgerArgs,
 }
 
 /// What became of one file.
@@ -184,6 +186,7 @@ async fn restore(
     if !args.source.daemon.is_json() {
         text.drain(..).try_for_each(output::say)?;
     }
+    source.to_write(&args.ledger).await?;
     let mut carried = carry(&plan, source, ending).await;
     let mut failure =
         carried.stopped.as_ref().map(|stopped| Failure::Drive(stopped.in_words(&name, &carried)));

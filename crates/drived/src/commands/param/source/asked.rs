@@ -52,7 +52,9 @@ impl Source {
                     }
                     Err(error) => return Err(Unwritten::Refused(error.to_string())),
                 }
-                match one.drive.write_parameter(row, word).await {
+                let written = one.drive.write_parameter(row, word).await;
+                one.count_of(row, &written);
+                match written {
                     Ok(_) => Ok(()),
                     Err(error) if may_have_written(&error) => Err(Unwritten::Unknown(error.to_string())),
                     Err(error) => Err(Unwritten::Refused(error.to_string())),
@@ -80,7 +82,9 @@ impl Source {
         match self {
             Self::OnLine(one) => {
                 one.drive.assume_changed();
-                let saves = one.drive.persist().await.map_err(|error| one.failure(&error))?;
+                let saves = one.drive.persist().await;
+                one.count_save(&saves);
+                let saves = saves.map_err(|error| one.failure(&error))?;
                 Ok(format!("; saves counted: {saves}"))
             }
             Self::OfDaemon { daemon, view } => {

@@ -12,6 +12,7 @@ use crate::{
     drive_options::OptionArgs,
     drive_spec::{self, DriveName, DriveSpec},
     failure::Failure,
+    ledger::LedgerArgs,
     line_spec::{self, LineSpec},
     one_drive::OneDrive,
     plant::views::DriveView,
@@ -134,6 +135,15 @@ impl Named {
 }
 
 impl Source {
+    /// That it may be written to. The daemon judges that itself, and keeps the ledger.
+    pub(super) async fn to_write(&mut self, ledger: &LedgerArgs) -> Result<(), Failure> {
+        if let Self::OnLine(one) = self {
+            one.is_meant().await?;
+            one.ledger = Some(ledger.of(one.name, one.config()));
+        }
+        Ok(())
+    }
+
     pub(super) fn family(&self) -> Result<Family, Failure> {
         match self {
             Self::OnLine(one) => Ok(one.name.family),

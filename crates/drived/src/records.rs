@@ -14,7 +14,7 @@ use crate::kept::{Kept, Readers};
 
 /// One record of each drive, in a file.
 #[derive(Debug)]
-pub(super) struct Records<T> {
+pub(crate) struct Records<T> {
     file: Option<Kept>,
     drives: BTreeMap<String, T>,
     /// Writing has failed, which is told once.
@@ -25,7 +25,7 @@ pub(super) struct Records<T> {
 
 impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
     /// Reads the file. One that cannot be read keeps no motor from being watched: `loss` says what is missing then.
-    pub(super) fn open(file: Option<&Path>, loss: &'static str) -> Self {
+    pub(crate) fn open(file: Option<&Path>, loss: &'static str) -> Self {
         let file = file.map(Kept::at);
         let read = file.as_ref().map(|file| match file.read() {
             Ok(Some((text, _))) => serde_json::from_slice(&text).map_err(io::Error::from),
@@ -41,12 +41,12 @@ impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
     }
 
     /// The record of a drive.
-    pub(super) fn of(&self, drive: &str) -> Option<&T> {
+    pub(crate) fn of(&self, drive: &str) -> Option<&T> {
         self.drives.get(drive)
     }
 
     /// Has this be the record of a drive. Gives whether the file is to be written for it.
-    pub(super) fn set(&mut self, drive: &str, record: Option<T>) -> bool {
+    pub(crate) fn set(&mut self, drive: &str, record: Option<T>) -> bool {
         match record {
             Some(record) if self.drives.get(drive) == Some(&record) => false,
             Some(record) => {
@@ -58,7 +58,7 @@ impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
     }
 
     /// Writes the file. What cannot be written is told once, until it can be again.
-    pub(super) fn write(&mut self) {
+    pub(crate) fn write(&mut self) {
         let Some(file) = &self.file else { return };
         let written = serde_json::to_vec_pretty(&self.drives)
             .map_err(io::Error::from)
@@ -71,7 +71,7 @@ impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
 }
 
 /// Follows the drives until the fleet ends: `note` says whether the file is another after an event.
-pub(super) fn follow<T>(
+pub(crate) fn follow<T>(
     mut records: Records<T>,
     mut events: Events,
     note: fn(&mut Records<T>, &str, &EventKind) -> bool,
@@ -101,7 +101,7 @@ where
 }
 
 /// The file of this name in the state folder.
-pub(super) fn in_folder(folder: Option<&Path>, name: &str) -> Option<PathBuf> {
+pub(crate) fn in_folder(folder: Option<&Path>, name: &str) -> Option<PathBuf> {
     folder.map(|folder| folder.join(name))
 }
 
