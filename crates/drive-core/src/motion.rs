@@ -63,6 +63,9 @@ pub enum Output {
     Injection,
     /// There is no output, and the drive has not cut it by itself: a ramp has ended.
     None,
+    /// There is no output any more, of a motor that a stop brought down in whose place another may stand by now: only how fast it
+    /// came down tells a ramp that has ended from a cut.
+    Gone,
     /// The output is cut: freewheel, a blocked output, a trip, no mains.
     Cut,
     /// The words do not tell.
@@ -191,7 +194,12 @@ impl Shaft {
         let was_lost = std::mem::take(&mut self.was_lost);
         let descent = std::mem::take(&mut self.descent);
         let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
-        let shown = if is_cut && shown == Output::None { Output::Cut } else { shown };
+        let shown = match shown {
+            Output::None if is_cut => Output::Cut,
+            Output::Gone if is_cut || descent.rate.is_none() => Output::Cut,
+            Output::Gone => Output::None,
+            shown => shown,
+        };
         if shown != Output::NotKnown && shown != Output::Injection {
             self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
         }
@@ -218,12 +226,12 @@ impl Shaft {
                 (self.past, self.injected_since) = (Past::AtRest, None);
                 Motion::Held
             }
-            Output::None | Output::Cut if turns => {
+            Output::None | Output::Gone | Output::Cut if turns => {
                 // It tells an output all the same: it comes down.
                 self.past = Past::Braked { still: false };
                 Motion::Braking
             }
-            Output::None | Output::Cut => self.without_output(at, shown == Output::Cut),
+            Output::None | Output::Gone | Output::Cut => self.without_output(at, shown == Output::Cut),
         }
     }
 
@@ -301,8 +309,23 @@ mod tests {
                 );
             }
             // 18 Hz at 10 Hz/s take 1.8 s.
+            let mut other = shaft;
             assert_eq!(shaft.see(after(200 + last), Output::None, Some(Frequency::ZERO)), motion, "{last}");
+            assert_eq!(other.see(after(200 + last), Output::Gone, Some(Frequency::ZERO)), motion, "{last}");
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_output_that_is_gone_behind_one_look_alone_tells_no_ramp_where_another_stop_may_stand() {
+        for (shown, motion) in [(Output::None, Motion::AtRest), (Output::Gone, Motion::Coasting)] {
+            let (mut shaft, begun) = (Shaft::new(), Instant::now());
+            shaft.see(begun, Output::Braking(Frequency::from_hertz(20)), Some(Frequency::from_hertz(20)));
+            let later = begun + Duration::from_millis(400);
+            assert_eq!(shaft.see(later, shown, Some(Frequency::ZERO)), motion, "{shown:?}");
+        }
+        let (mut resting, now) = (Shaft::new(), Instant::now());
+        resting.see(now, Output::None, Some(Frequency::ZERO));
+        assert_eq!(resting.see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]

@@ -359,7 +359,8 @@ impl StatusWords {
             }
             _ if fed => Output::Braking(at),
             // A ramp has ended, or a run command stands and asks for nothing.
-            ChartState::OperationEnabled if ramps || braked => Output::None,
+            ChartState::OperationEnabled if ramps => Output::None,
+            ChartState::OperationEnabled if braked => Output::Gone,
             ChartState::QuickStopActive => Output::None,
             ChartState::SwitchedOn if braked => Output::None,
             // A trip cuts off a motor that was coming down for another reason.
