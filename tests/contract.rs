@@ -1,8 +1,16 @@
 //! What every family promises of itself, through `dyn Drive` and the same door as families from outside.
 
+use std::panic::AssertUnwindSafe;
+
 use drive_families::Family;
-use drive_testing::mutants::Mutant;
-use support::contracts::contract;
+use drive_sim::models;
+use drive_testing::{
+    Contract,
+    mutants::Mutant,
+    worlds::{Configuration, Share, Surrounded},
+};
+use futures_util::FutureExt;
+use support::{contracts::contract, drives};
 
 #[tokio::test(start_paused = true)]
 async fn whatever_a_drive_says_nothing_panics_and_only_control_words_of_its_manual_are_written() {
@@ -89,4 +97,49 @@ async fn the_contract_complains_of_every_family_that_breaks_it() {
         }
     }
     assert!(unseen.is_empty(), "not seen: {unseen:#?}");
+}
+
+/// A family whose author has told how its drives are commanded and nothing else: no referee knows it.
+struct FromOutside;
+
+impl Surrounded for FromOutside {
+    fn configurations(&self) -> Vec<Configuration> {
+        let of = |name: &str, settings: &[&str]| Configuration {
+            name: name.to_owned(),
+            open: Box::new(|port, slave| drives::drive(Family::Atv28, port, slave)),
+            machine: Box::new(|| Box::new(models::atv28::Atv28::new())),
+            settings: settings.iter().map(|&setting| setting.to_owned()).collect(),
+        };
+        vec![of("as delivered", &[]), of("HSP 30 Hz", &["set HSP 30"])]
+    }
+}
+
+fn from_outside() -> Contract {
+    Contract { around: Some(Box::new(FromOutside)), ..contract(Family::Atv28) }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_family_that_tells_only_its_configurations_is_judged_by_shaft_and_twin_in_its_worlds() {
+    let share = Share { one_in: 7, doubtful_one_in: 101 };
+    let tally = from_outside().is_true_in_worlds(share).await;
+    assert!(tally.lived > 200 && tally.decided == 0, "{tally}");
+    // Broken, it passes no longer.
+    for mutant in [Mutant::StartConfirmedByAnything, Mutant::AlwaysInForce, Mutant::NoOutputIsStandstill] {
+        let tally = mutant.of(from_outside()).live_in_worlds(share).await;
+        assert!(!tally.contradictions.is_empty(), "{mutant:?}: {tally}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_check_that_is_published_fails_for_every_family_that_breaks_the_contract() {
+    contract(Family::Atv312).check().await;
+    let mut passed = Vec::new();
+    for mutant in Mutant::ALL {
+        let broken = mutant.of(contract(Family::Atv312));
+        match AssertUnwindSafe(broken.check()).catch_unwind().await {
+            Ok(()) => passed.push(mutant),
+            Err(why) => println!("{mutant:?}: {}", why.downcast_ref::<String>().map_or("", String::as_str)),
+        }
+    }
+    assert!(passed.is_empty(), "{passed:?}");
 }

@@ -28,18 +28,30 @@ rules! { Atv28 RULES
 }
 
 silences! { Atv28 SILENCES
-    TERMINAL_RUN "S2 (variables manual named on p.4); BBV p.57" "which inputs run and stop the motor, level or edge (tCt has no address), at which reference";
-    PRIORITIES "S2 p.4; BBV p.11" "which of terminals and bus has priority when both have commanded";
-    STOP_INPUTS "BBV p.57" "fast stop, DC injection and freewheel by inputs: no address says whether one is assigned, so an open input may stop or lock";
-    AFTER_DISABLE "BBV p.11, p.35" "whether 15 starts again at once after W400 was 0, without the chart";
-    TIME_OUT "S2 p.8 to p.12" "whether the drive watches the line, how long, and what the motor does";
-    MAINS "S2 p.4" "what the motor does at a loss and at a return of the mains, and what stands in W400 then";
-    RESTART "S2 p.4" "automatic restart after a fault, and flying restart";
-    REMOTE_KEYS "BBV p.38" "what stands at the remote terminal";
-    BOTH_SIGNS "S2 p.12" "reverse command with a negative reference";
-    STOP_MODE "BBV p.57" "how a normal stop comes down: Stt has no address";
-    EXTENDED "BBV p.57 (402 CMI)" "which bits CMI has on an ATV28";
-    BROADCAST "S2 p.9, p.11" "whether a broadcast command reaches a drive that the terminals command";
+    TERMINAL_RUN "S2 (variables manual named on p.4); BBV p.57" "which inputs run and stop the motor, level or edge (tCt has no address), at which reference"
+        => "resets no fault and writes neither tCC nor LCC while any input LI1 to LI6 is closed, or where IOLR is not there";
+    PRIORITIES "S2 p.4; BBV p.11" "which of terminals and bus has priority when both have commanded"
+        => "believes ETI and ETA bit 9, in each status";
+    STOP_INPUTS "BBV p.57" "fast stop, DC injection and freewheel by inputs: no address says whether one is assigned, so an open input may stop or lock"
+        => "believes ETI bits 5 and 12 and the chart: a run is not in force while one of them acts";
+    AFTER_DISABLE "BBV p.11, p.35" "whether 15 starts again at once after W400 was 0, without the chart"
+        => "climbs the chart, and waits until the motor turns";
+    TIME_OUT "S2 p.8 to p.12" "whether the drive watches the line, how long, and what the motor does"
+        => "arms nothing: the watchdog is unsupported";
+    MAINS "S2 p.4" "what the motor does at a loss and at a return of the mains, and what stands in W400 then"
+        => "reads CMD before it believes it; a lease ends only where the drive no longer holds the word";
+    RESTART "S2 p.4" "automatic restart after a fault, and flying restart"
+        => "knows no register for it: a motor that runs again without a start of this side is in no status told as this side's";
+    REMOTE_KEYS "BBV p.38" "what stands at the remote terminal"
+        => "believes ETI: under the remote terminal a run is not in force, and a start is refused";
+    BOTH_SIGNS "S2 p.12" "reverse command with a negative reference"
+        => "starts nothing at a negative reference; a setpoint leaves the sign of a motor that runs";
+    STOP_MODE "BBV p.57" "how a normal stop comes down: Stt has no address"
+        => "takes 100Fh for a ramp: told at rest only once it was seen to come down; a trip or a lock amid it may coast";
+    EXTENDED "BBV p.57 (402 CMI)" "which bits CMI has on an ATV28"
+        => "never writes CMI";
+    BROADCAST "S2 p.9, p.11" "whether a broadcast command reaches a drive that the terminals command"
+        => "confirms each drive by itself";
 }
 
 pub(super) struct Atv28;

@@ -21,18 +21,30 @@ rules! { Atv58 RULES
 }
 
 silences! { Atv58 SILENCES
-    COMMANDER "S3 p.10, p.34 (\"Internal communication variables\" is named)" "who commands: how local and line are configured, and which input hands over";
-    TERMINAL_RUN "S3 p.34" "what terminals, keypad and forced local do";
-    HIGH_BITS "S3 p.34" "what bits 4 to 15 of W400 mean: reverse, stops, reset";
-    UNITS "S3 p.10, p.34 (W401)" "the unit of W401, and what its sign does to the direction";
-    LIMITS "S3 p.12, p.36 (W250 to W253 are read)" "the lowest and the highest frequency, and whether a run at 0 turns the motor";
-    STOP_MODE "S3 p.34" "how the motor stops at a disable operation, a shutdown and a quick stop";
-    TIME_OUT "S3 p.24, p.48 (note on the lamps)" "10 s without a message, 1 s in ASCII, is a communication fault of the card: what the motor does, and whether it goes on when messages come back";
-    MAINS "S3 p.33" "the state at switching on, and what stands in W400 then";
-    RESET "S3 p.34" "how a fault is reset from the bus, and whether a run that stands starts then";
-    RESTART "S3 p.34" "automatic restart and flying restart";
-    LISTEN_ONLY "S3 p.19, p.43 (08/04)" "whether a drive in listen only mode trips for want of messages that it does not process";
-    BROADCAST "S3 p.18, p.42" "whether a broadcast command reaches a drive that others command";
+    COMMANDER "S3 p.10, p.34 (\"Internal communication variables\" is named)" "who commands: how local and line are configured, and which input hands over"
+        => "believes the bit that the map names for the line; resets no fault while local control is forced, or where the map names no such bit";
+    TERMINAL_RUN "S3 p.34" "what terminals, keypad and forced local do"
+        => "believes the bit that the map names for the line; a run is judged by chart, output and reference";
+    HIGH_BITS "S3 p.34" "what bits 4 to 15 of W400 mean: reverse, stops, reset"
+        => "writes bits 7 and 11 only, the latter as the map says";
+    UNITS "S3 p.10, p.34 (W401)" "the unit of W401, and what its sign does to the direction"
+        => "takes both as the map says; starts nothing at a negative W401, and a setpoint leaves the sign of a motor that runs";
+    LIMITS "S3 p.12, p.36 (W250 to W253 are read)" "the lowest and the highest frequency, and whether a run at 0 turns the motor"
+        => "reads the words that the map names; where there are none, no limit is checked";
+    STOP_MODE "S3 p.34" "how the motor stops at a disable operation, a shutdown and a quick stop"
+        => "told at rest only once it was seen to come down; else it may coast, as after a trip amid a stop";
+    TIME_OUT "S3 p.24, p.48 (note on the lamps)" "10 s without a message, 1 s in ASCII, is a communication fault of the card: what the motor does, and whether it goes on when messages come back"
+        => "tells the time and no reaction";
+    MAINS "S3 p.33" "the state at switching on, and what stands in W400 then"
+        => "a lease ends only where the drive no longer holds the word";
+    RESET "S3 p.34" "how a fault is reset from the bus, and whether a run that stands starts then"
+        => "the edge of bit 7 once, then 0000h: nothing of this side stands behind it";
+    RESTART "S3 p.34" "automatic restart and flying restart"
+        => "knows no register for it: a lease ends only where the drive no longer holds the word";
+    LISTEN_ONLY "S3 p.19, p.43 (08/04)" "whether a drive in listen only mode trips for want of messages that it does not process"
+        => "enters that mode only by a method of its name, which says that the card takes no stop then";
+    BROADCAST "S3 p.18, p.42" "whether a broadcast command reaches a drive that others command"
+        => "confirms each drive by itself";
 }
 
 pub(super) struct Atv58;

@@ -196,11 +196,31 @@ mod tests {
 
     #[test]
     fn where_a_manual_is_silent_it_is_written_down_what_the_driver_does() {
-        for family in [Family::Atv21, Family::Omron3g3ev] {
+        for family in Family::ALL {
             for silence in family.manual().silences() {
                 assert!(silence.driver.is_some(), "{family:?}: {}", silence.name);
             }
         }
+    }
+
+    #[test]
+    fn the_page_of_silences_says_what_stands_here() {
+        let mut page = String::from(include_str!("silences_head.md"));
+        for family in Family::ALL {
+            page.push_str(&format!("\n## {family:?}\n\n| What the manual does not say | Where one would look | What the driver does |\n|---|---|---|\n"));
+            for Silence { question, source, driver, .. } in family.manual().silences() {
+                page.push_str(&format!("| {question} | {source} | {} |\n", driver.unwrap_or("")));
+            }
+        }
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/SILENCES.md");
+        if std::env::var_os("UPDATE_SILENCES").is_some() {
+            std::fs::write(path, &page).expect("it can be written");
+        }
+        let stands = std::fs::read_to_string(path).unwrap_or_default();
+        assert!(
+            stands == page,
+            "write it anew: UPDATE_SILENCES=1 cargo test -p drive-testing the_page_of_silences"
+        );
     }
 
     #[test]

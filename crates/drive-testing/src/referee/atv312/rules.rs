@@ -63,35 +63,66 @@ rules! { Atv312 RULES
 }
 
 silences! { Atv312 SILENCES
-    PRIORITIES "BBV p.8, p.11 (the programming manual is named)" "L1 and L2: which of terminals, keys and bus has priority when two have commanded";
-    CHART_AFTER_DISABLE "BBV p.11" "L1 and L2: whether after a disable voltage or a fault the chart must be followed, or 000Fh starts again at once";
-    SIM_DIAL "BBV p.36 (CHCF)" "SIM: who commands when Fr1 is the dial or +/- speed";
-    FORCED_LOCAL_LEVEL "BBV p.55 (FLO)" "which level of the input forces local, and what a run that stands does when local begins or ends";
-    FORCED_LOCAL_NOT_L3 "BBV p.55 (FLOC)" "forced local with L1 or L2: FLOC is active with L3 only, so which of terminals and display terminal commands";
-    OTHER_BUS_RUN "BBV p.11" "how words of Modbus and of another bus share one chart";
-    CHANNEL_RETURNS "BBV p.37 (CCS, COP)" "what the chart and the last word of the bus do when its channel is switched to; a change of direction is announced";
-    COPIED "BBV p.37 (COP)" "COP with a control channel copied: what stands after the switch until the bus writes";
-    SAME_WORD_AGAIN "BBV p.8 against p.40" "fast stop by input under bus control: p.8 asks for nothing but the input, p.40 for a new run command; whether the same 000Fh again is one";
-    FREEWHEEL_LEVEL "BBV p.8 against p.41" "freewheel input released under bus control with 2-wire level: p.8 wants the chart, p.41 lets a run that stands restart";
-    INJECTION_RELEASED "BBV p.8, p.40 (dCI)" "whether a run that stands goes on when a DC injection input is released: no word on a new run command there";
-    STOP_KEY_MODE "BBV p.8, p.10" "whether the STOP key and a 3-wire stop come down on a ramp or coast into switch on disabled, and what a level at the terminals does when STOP is released";
-    BOTH_DIRECTIONS "BBV p.33 (tCt)" "2-wire LEL or trn with forward and reverse closed together";
-    THREE_WIRE_START "BBV p.8, p.15, p.33" "3-wire: which input starts forward (p.15 has LI1 forward with 2C and 3C, p.8 has LI1 stop)";
-    BOTH_SIGNS "BBV p.19" "reverse command with a negative reference: nothing says that direction is command times sign";
-    TWO_REFERENCES "BBV p.16, p.19" "which of LFr and LFRD counts";
-    PRESET_AND_BUS "BBV p.14" "preset speeds and jog are said to go before analog references: whether before a reference of the bus too, and which speed two inputs make";
-    REFERENCE_NONE "BBV p.36 (Fr2)" "what the motor does when rFC selects an Fr2 that is not assigned";
-    ASSIGNED_BITS "BBV p.19 (CMD bits 11, 12)" "L3: whether bits 11 and 12 keep reverse and stop when they are assigned too";
-    STOP_BITS_ELSEWHERE "BBV p.40 (FSt, dCI), p.8" "whether a bit of CMD that a stop is assigned to acts while another channel commands: p.40 prints the bit, p.8 names the inputs only";
-    LIMIT_SWITCHES "BBV p.50 (LAF, LAr)" "at which level a limit switch stops, and whether the motor goes on when it is left";
-    RESTART_BY_BUS "BBV p.51 (Atr)" "automatic restart under bus control: the chart is in fault and then in switch on disabled, yet Atr restarts";
-    RESTART_AFTER_RESET "BBV p.52 (FLr)" "whether a run at terminals in 3-wire control starts again at the reset of a fault: FLr speaks of 2-wire level only";
-    AFTER_FACTORY "BBV p.20, p.32, p.35" "state and commander right after factory settings, by which L3 becomes L1 and terminals command";
-    L3_AND_INPUTS "BBV p.35 against p.33" "whether LAC = L3, which puts tCC back, also unassigns the stop inputs as every change of tCC does";
-    WORDS_OVER_POWER "BBV p.11" "L1 and L2: whether CMD and LFr are 0 after a power cycle, where operation is enabled at once";
-    LINK_NOT_COMMANDING "BBV p.9" "whether SLF comes while the bus does not command, and from which first frame the time-out runs";
-    STOPS_TOGETHER "BBV p.14 (table)" "which of two stops at once: the arrows of the table are lost";
-    STATE_AFTER_RP "BBV p.56 (rP)" "which state rP = 1 leads to, and whether it needs the cause gone";
-    TUNING "BBV p.30 (tUn)" "whether the motor may turn while tuning puts nominal current into it, at a run, at power-up or at an input";
-    TERMINALS_IN_L3 "BBV p.11" "L3 with a terminal channel: the state of the chart, and whether switch on disabled locks the terminals too";
+    PRIORITIES "BBV p.8, p.11 (the programming manual is named)" "L1 and L2: which of terminals, keys and bus has priority when two have commanded"
+        => "believes ETI and FrH: a start that follows another reference is not confirmed";
+    CHART_AFTER_DISABLE "BBV p.11" "L1 and L2: whether after a disable voltage or a fault the chart must be followed, or 000Fh starts again at once"
+        => "climbs the chart, and waits until the motor turns";
+    SIM_DIAL "BBV p.36 (CHCF)" "SIM: who commands when Fr1 is the dial or +/- speed"
+        => "believes ETI";
+    FORCED_LOCAL_LEVEL "BBV p.55 (FLO)" "which level of the input forces local, and what a run that stands does when local begins or ends"
+        => "told as taken; the run command is withdrawn by 100Fh";
+    FORCED_LOCAL_NOT_L3 "BBV p.55 (FLOC)" "forced local with L1 or L2: FLOC is active with L3 only, so which of terminals and display terminal commands"
+        => "believes ETA bit 9 and ETI: not in force while they name another";
+    OTHER_BUS_RUN "BBV p.11" "how words of Modbus and of another bus share one chart"
+        => "reads CMD again in its turn: another word in its place ends the lease; the chart is believed as it shows";
+    CHANNEL_RETURNS "BBV p.37 (CCS, COP)" "what the chart and the last word of the bus do when its channel is switched to; a change of direction is announced"
+        => "writes nothing that moves control while CMD holds a run command or an input asks for one";
+    COPIED "BBV p.37 (COP)" "COP with a control channel copied: what stands after the switch until the bus writes"
+        => "reads CMD and the references before it believes them";
+    SAME_WORD_AGAIN "BBV p.8 against p.40" "fast stop by input under bus control: p.8 asks for nothing but the input, p.40 for a new run command; whether the same 000Fh again is one"
+        => "not in force from the stop on; the run command is withdrawn, and nothing of this side starts again";
+    FREEWHEEL_LEVEL "BBV p.8 against p.41" "freewheel input released under bus control with 2-wire level: p.8 wants the chart, p.41 lets a run that stands restart"
+        => "not in force from the input on; the run command is withdrawn, and nothing of this side starts again";
+    INJECTION_RELEASED "BBV p.8, p.40 (dCI)" "whether a run that stands goes on when a DC injection input is released: no word on a new run command there"
+        => "not in force while the input injects; the run command is withdrawn, and nothing of this side starts again";
+    STOP_KEY_MODE "BBV p.8, p.10" "whether the STOP key and a 3-wire stop come down on a ramp or coast into switch on disabled, and what a level at the terminals does when STOP is released"
+        => "may coast unless it was seen to come down";
+    BOTH_DIRECTIONS "BBV p.33 (tCt)" "2-wire LEL or trn with forward and reverse closed together"
+        => "refuses a reset where a closed input may start the motor, and judges a motion by ETA, ETI and the output";
+    THREE_WIRE_START "BBV p.8, p.15, p.33" "3-wire: which input starts forward (p.15 has LI1 forward with 2C and 3C, p.8 has LI1 stop)"
+        => "refuses a reset where a closed input may start the motor, whichever it is";
+    BOTH_SIGNS "BBV p.19" "reverse command with a negative reference: nothing says that direction is command times sign"
+        => "starts nothing at a negative reference; a setpoint keeps the sign of a motor that runs";
+    TWO_REFERENCES "BBV p.16, p.19" "which of LFr and LFRD counts"
+        => "takes the later one to count; confirmed by FrH or FRHD";
+    PRESET_AND_BUS "BBV p.14" "preset speeds and jog are said to go before analog references: whether before a reference of the bus too, and which speed two inputs make"
+        => "refuses a start while one is selected";
+    REFERENCE_NONE "BBV p.36 (Fr2)" "what the motor does when rFC selects an Fr2 that is not assigned"
+        => "refuses a start: Fr2 is not Mdb";
+    ASSIGNED_BITS "BBV p.19 (CMD bits 11, 12)" "L3: whether bits 11 and 12 keep reverse and stop when they are assigned too"
+        => "takes each bit for what the assignments read from the drive say; a stop whose bit means something else is replaced, and says so";
+    STOP_BITS_ELSEWHERE "BBV p.40 (FSt, dCI), p.8" "whether a bit of CMD that a stop is assigned to acts while another channel commands: p.40 prints the bit, p.8 names the inputs only"
+        => "writes it, and says that it is not confirmed while the motor turns";
+    LIMIT_SWITCHES "BBV p.50 (LAF, LAr)" "at which level a limit switch stops, and whether the motor goes on when it is left"
+        => "not in force while one stops";
+    RESTART_BY_BUS "BBV p.51 (Atr)" "automatic restart under bus control: the chart is in fault and then in switch on disabled, yet Atr restarts"
+        => "refuses a start until the restart is accepted by name";
+    RESTART_AFTER_RESET "BBV p.52 (FLr)" "whether a run at terminals in 3-wire control starts again at the reset of a fault: FLr speaks of 2-wire level only"
+        => "refuses the reset where a level would start it";
+    AFTER_FACTORY "BBV p.20, p.32, p.35" "state and commander right after factory settings, by which L3 becomes L1 and terminals command"
+        => "writes no factory settings: they are no parameter";
+    L3_AND_INPUTS "BBV p.35 against p.33" "whether LAC = L3, which puts tCC back, also unassigns the stop inputs as every change of tCC does"
+        => "reads the functions of the inputs again behind what it writes of the level and of tCC";
+    WORDS_OVER_POWER "BBV p.11" "L1 and L2: whether CMD and LFr are 0 after a power cycle, where operation is enabled at once"
+        => "reads CMD and LFr before it believes them";
+    LINK_NOT_COMMANDING "BBV p.9" "whether SLF comes while the bus does not command, and from which first frame the time-out runs"
+        => "says what is set, and no more";
+    STOPS_TOGETHER "BBV p.14 (table)" "which of two stops at once: the arrows of the table are lost"
+        => "believes the chart and ETI; where the words do not show a ramp, the motor may coast";
+    STATE_AFTER_RP "BBV p.56 (rP)" "which state rP = 1 leads to, and whether it needs the cause gone"
+        => "never writes rP";
+    TUNING "BBV p.30 (tUn)" "whether the motor may turn while tuning puts nominal current into it, at a run, at power-up or at an input"
+        => "never writes tUn = YES";
+    TERMINALS_IN_L3 "BBV p.11" "L3 with a terminal channel: the state of the chart, and whether switch on disabled locks the terminals too"
+        => "believes ETA and ETI: a run is in force only under the bus";
 }
