@@ -10,7 +10,7 @@ use drive_core::{
     Setpoint, Speed, Status, StopMode, Verdict, Withdrawn,
 };
 use drive_families::Family;
-use drive_testing::{bench, rig::Rig};
+use drive_testing::{bench, rig::Rig, truth::contradiction};
 use support::drives;
 use tokio::time::sleep;
 
@@ -64,7 +64,9 @@ impl Bench {
     }
 
     async fn status(&mut self) -> Status {
-        self.drive().status().await.unwrap()
+        let status = self.drive().status().await.unwrap();
+        assert_eq!(contradiction(&status, &self.rig.machine.observe()), None, "the words against the shaft");
+        status
     }
 
     /// Something happens around the machine, as a line of the simulator's text.

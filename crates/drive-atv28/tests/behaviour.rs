@@ -9,16 +9,16 @@ use drive_core::{
     Refusal, Row, Setpoint, SetpointProblem, Speed, State, StopMode,
 };
 use drive_sim::{Panel, SimSlave, models};
-use drive_testing::bench;
+use drive_testing::{bench, truth::Judged};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
 
 /// A line with one drive, and the machine beside it.
-fn rig() -> (Atv28<Slave>, SimSlave, Line) {
+fn rig() -> (Judged<Atv28<Slave>>, SimSlave, Line) {
     bench::on_a_line(&CAPABILITIES, models::atv28::Atv28::new(), Atv28::new)
 }
 
-async fn running() -> (Atv28<Slave>, SimSlave, Line) {
+async fn running() -> (Judged<Atv28<Slave>>, SimSlave, Line) {
     let (mut drive, machine, line) = rig();
     bench::run_at_fifty(&mut drive, &machine).await;
     (drive, machine, line)

@@ -12,7 +12,7 @@ use drive_core::{
 use drive_sim::{SimSlave, models};
 use drive_testing::bench;
 
-type Drive312 = Atv312<Slave>;
+type Drive312 = drive_testing::truth::Judged<Atv312<Slave>>;
 
 const CMD: u16 = 8501;
 const TWENTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(20));

@@ -10,21 +10,21 @@ use drive_core::{
     SetpointProblem, Speed, State, StopMode, Watchdog,
 };
 use drive_sim::{Panel, SimLine, SimSlave, Wiring, models};
-use drive_testing::bench;
+use drive_testing::{bench, truth::Judged};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
 
 /// A line with one drive, and the machine beside it.
-fn rig_with(map: Atv58Map) -> (Atv58<Slave>, SimSlave, Line) {
+fn rig_with(map: Atv58Map) -> (Judged<Atv58<Slave>>, SimSlave, Line) {
     let open = |port, slave| Atv58::with_map(port, slave, map);
     bench::on_a_line(&CAPABILITIES, models::atv58::Atv58::new(), open)
 }
 
-fn rig() -> (Atv58<Slave>, SimSlave, Line) {
+fn rig() -> (Judged<Atv58<Slave>>, SimSlave, Line) {
     rig_with(Atv58Map::default())
 }
 
-async fn running() -> (Atv58<Slave>, SimSlave, Line) {
+async fn running() -> (Judged<Atv58<Slave>>, SimSlave, Line) {
     let (mut drive, machine, line) = rig();
     bench::run_at_fifty(&mut drive, &machine).await;
     (drive, machine, line)

@@ -5,6 +5,8 @@ use drive_core::{BroadcastWrite, Capabilities, Direction, Drive, Frequency, Resu
 use drive_sim::{Model, Panel, SimLine, SimSlave, Wiring};
 use tokio_modbus::{Request, client::Client};
 
+use crate::truth::Judged;
+
 /// An address of a slave.
 ///
 /// # Panics
@@ -14,21 +16,22 @@ pub fn address(number: u8) -> SlaveAddress {
     SlaveAddress::try_from(number).expect("it is an address")
 }
 
-/// The drive that `open` makes, the machine that it talks to, and the line between, at the family's factory speed.
+/// The drive that `open` makes, the machine that it talks to, and the line between, at the family's factory speed. What the drive
+/// says of its motor is held against the machine.
 ///
 /// # Panics
 /// When the line itself is wrong.
-pub fn on_a_line<D>(
+pub fn on_a_line<D: Drive>(
     capabilities: &Capabilities,
     model: impl Model + 'static,
     open: impl FnOnce(Slave, SlaveAddress) -> D,
-) -> (D, SimSlave, Line) {
+) -> (Judged<D>, SimSlave, Line) {
     let simulated = SimLine::new(Wiring::rtu(capabilities.factory));
     let machine = simulated.add(1, model).expect("the address is free");
     let pause = SlaveSettings { turnaround: capabilities.turnaround, ..SlaveSettings::default() };
     let config = LineConfig::stream(capabilities.factory).slave(1, pause);
     let line = Line::over(simulated.in_memory(), config);
-    (open(line.slave(1), address(1)), machine, line)
+    (Judged::new(open(line.slave(1), address(1)), machine.clone()), machine, line)
 }
 
 /// Starts a drive forward and waits until its machine runs at 50 Hz. A machine that trips for want of messages sooner
@@ -36,7 +39,7 @@ pub fn on_a_line<D>(
 ///
 /// # Panics
 /// When the drive does not start.
-pub async fn run_at_fifty(drive: &mut impl Drive, machine: &SimSlave) {
+pub async fn run_at_fifty(drive: &mut Judged<impl Drive>, machine: &SimSlave) {
     drive.set_setpoint(Frequency::from_hertz(50).into()).await.expect("it takes 50 Hz");
     drive.start(Direction::Forward).await.expect("it starts");
     machine.wait_until(|seen| seen.output_frequency == 5_000).await;
@@ -47,7 +50,11 @@ pub async fn run_at_fifty(drive: &mut impl Drive, machine: &SimSlave) {
 ///
 /// # Errors
 /// The start's.
-pub async fn start_taken_back(drive: &mut impl Drive, machine: &SimSlave, panel: Panel) -> Result<Status> {
+pub async fn start_taken_back(
+    drive: &mut Judged<impl Drive>,
+    machine: &SimSlave,
+    panel: Panel,
+) -> Result<Status> {
     let taken_back = async {
         machine.wait_until(|seen| seen.running).await;
         machine.panel(panel);

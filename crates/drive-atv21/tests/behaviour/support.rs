@@ -25,7 +25,6 @@ impl Rig {
         let (drive, machine, line) = bench::on_a_line(&CAPABILITIES, model, Atv21::new);
         // The time-out would trip a drive that a test leaves alone.
         machine.poke(0x0803, 0);
-        let drive = Judged::new(drive, machine.clone());
         (Self { machine, line }, drive)
     }
 
