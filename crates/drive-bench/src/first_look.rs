@@ -8,6 +8,8 @@ use std::{
     process::Command,
 };
 
+use serde_json::Value;
+
 use crate::{
     Error,
     doors::plant::{Folder, Running, free, program, text, until},
@@ -126,8 +128,9 @@ impl Plant {
             let mut asked = Command::new(&program);
             let told = asked.args(["status", "--json", "--socket"]).arg(&socket).output();
             told.is_ok_and(|told| {
-                let told = String::from_utf8_lossy(&told.stdout).matches("\"link\":\"connected\"").count();
-                told == drives
+                let state: Value = serde_json::from_slice(&told.stdout).unwrap_or_default();
+                let there = state["drives"].as_array().into_iter().flatten();
+                there.filter(|drive| drive["link"] == "connected").count() == drives
             })
         })?;
         Ok(Self { http, _running: running, _folder: folder })

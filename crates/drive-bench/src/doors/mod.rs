@@ -167,7 +167,11 @@ impl<'a> Stopper<'a> {
                 let mut stream = TcpStream::connect_timeout(&self.plant.gateway, PATIENCE)?;
                 // Altivar 312, CMD (8501) = 0000h: disable voltage, which stops whatever the motor does.
                 stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 6, 0x21, 0x35, 0, 0])?;
-                return self.observer.heard_of("modbus ", began);
+                let heard = self.observer.heard_of("modbus ", began);
+                // As a client does, which sends its next request after the answer: the drive has confirmed it then.
+                stream.set_read_timeout(Some(PATIENCE))?;
+                stream.read_exact(&mut [0; 12])?;
+                return heard;
             }
             Door::Mqtt => {
                 let broker = self.plant.broker.ok_or(ErrorKind::NotFound)?;

@@ -1,6 +1,7 @@
 //! Somebody on the control socket who hears of each command as soon as it waits for its line.
 
 use std::{
+    collections::HashSet,
     io::{BufRead as _, BufReader, Error, ErrorKind, Result, Write as _},
     os::unix::net::UnixStream,
     path::Path,
@@ -12,7 +13,11 @@ use std::{
 use super::PATIENCE;
 
 /// What was heard, with its time.
-pub(super) struct Observer(Receiver<(Instant, String)>);
+pub(super) struct Observer {
+    heard: Receiver<(Instant, String)>,
+    /// The commands that are known: each is told again when something becomes of it.
+    known: HashSet<String>,
+}
 
 impl Observer {
     /// Follows the events of a daemon from now on.
@@ -28,16 +33,18 @@ impl Observer {
                 }
             }
         });
-        Ok(Self(heard))
+        Ok(Self { heard, known: HashSet::new() })
     }
 
-    /// How long after that it was heard of a command which came from there and whose outcome was open.
-    pub(super) fn heard_of(&self, origin: &str, began: Instant) -> Result<Duration> {
+    /// How long after that it was heard of another command which came from there, whatever has become of it by then.
+    pub(super) fn heard_of(&mut self, origin: &str, began: Instant) -> Result<Duration> {
         let origin = format!("\"origin\":\"{origin}");
         loop {
             let left = PATIENCE.saturating_sub(began.elapsed());
-            let (at, data) = self.0.recv_timeout(left).map_err(|_| Error::from(ErrorKind::TimedOut))?;
-            if at >= began && data.contains(&origin) && data.contains("\"outcome\":\"pending\"") {
+            let (at, data) = self.heard.recv_timeout(left).map_err(|_| Error::from(ErrorKind::TimedOut))?;
+            let id = data.split_once("\"id\":\"").and_then(|(_, rest)| rest.split_once('"'));
+            let is_new = id.is_some_and(|(id, _)| self.known.insert(id.to_owned()));
+            if is_new && at >= began && data.contains(&origin) {
                 return Ok(at - began);
             }
         }

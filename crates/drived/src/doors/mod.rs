@@ -32,7 +32,7 @@ use std::{
 use axum::Router;
 use drive_fleet::Events;
 use tokio::{
-    net::{TcpListener, TcpStream},
+    net::{TcpListener, TcpSocket, TcpStream},
     sync::{mpsc, watch},
     task::JoinHandle,
     time::{Instant, sleep, timeout},
@@ -72,6 +72,10 @@ pub(crate) fn usual_places() -> Vec<std::path::PathBuf> {
 
 /// From one try to open a door or to accept a connection to the next, when the system has no room for it.
 pub(crate) const TRIED_AGAIN: Duration = Duration::from_secs(1);
+
+/// Connections that wait to be let in. One that finds no room there comes again after a second, with whatever stop it brings: so there is
+/// as much as a system gives.
+const QUEUE: u32 = 4_096;
 
 /// The open doors.
 pub(crate) struct Doors {
@@ -225,7 +229,7 @@ async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender
 pub(crate) async fn listen(address: SocketAddr) -> TcpListener {
     let mut told = false;
     loop {
-        match TcpListener::bind(address).await {
+        match bound(address) {
             Ok(listener) => return listener,
             Err(error) if !told => {
                 told = true;
@@ -235,6 +239,15 @@ pub(crate) async fn listen(address: SocketAddr) -> TcpListener {
         }
         sleep(TRIED_AGAIN).await;
     }
+}
+
+fn bound(address: SocketAddr) -> io::Result<TcpListener> {
+    let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
+    // An address that was served a moment ago may be served again; elsewhere than on Unix that means something else.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(QUEUE)
 }
 
 /// A door and who stands in it.

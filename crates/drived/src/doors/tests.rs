@@ -402,6 +402,18 @@ async fn what_cannot_be_audited_is_not_done_but_a_stop() {
     assert_eq!(rig.ask_on_socket(&START).await.status, StatusCode::CONFLICT, "the disk is there again");
 }
 
+/// A connection that the system puts off comes again a second later, and a stop with it. Measured from outside, for a queue that is
+/// full is told to nobody.
+#[tokio::test]
+async fn three_hundred_who_come_while_nobody_is_let_in_find_room_to_wait() {
+    let listener = listen("127.0.0.1:0".parse().unwrap()).await;
+    let address = listener.local_addr().unwrap();
+    let patience = Duration::from_secs(20);
+    let come = move |_| std::net::TcpStream::connect_timeout(&address, patience);
+    let waiting = tokio::task::spawn_blocking(move || (0..300).map(come).collect::<Result<Vec<_>, _>>());
+    assert_eq!(waiting.await.unwrap().unwrap().len(), 300);
+}
+
 #[tokio::test]
 async fn a_request_says_64_kib_at_the_most() {
     let rig = Rig::new("body");
