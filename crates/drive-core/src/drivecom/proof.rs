@@ -251,3 +251,71 @@ impl<L: Copy + PartialEq> Proof<L> {
         self.motion = self.watch.shaft.see(at.unwrap_or_else(Instant::now), shown, frequency);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setpoint::Direction;
+
+    const RUN: Lease = Lease::new(Direction::Forward, 0x000F);
+
+    fn gone(_: u16) -> RunWord {
+        RunWord::Gone
+    }
+
+    #[test]
+    fn a_word_that_was_only_written_tells_of_no_lease_that_has_gone() {
+        let mut proof = Proof::<u8>::default();
+        proof.is_writing(0x0007);
+        proof.was_written(0x0007);
+        assert_eq!(proof.told_word(gone), RunWord::NotTold);
+        proof.was_read(0x0007, 0);
+        assert_eq!(proof.told_word(gone), RunWord::Gone);
+    }
+
+    #[test]
+    fn a_word_that_the_drive_cannot_hold_any_more_was_not_read_either() {
+        let mut proof = Proof::<u8>::default();
+        proof.was_read(0x000F, 200);
+        proof.holds_if(|_| true);
+        assert_eq!((proof.held(), proof.watch.run.held()), (Some(0x000F), Some(0x000F)));
+        proof.holds_if(|_| false);
+        assert_eq!((proof.held(), proof.watch.run.held()), (None, None));
+    }
+
+    #[test]
+    fn the_setpoint_of_a_run_outlives_a_lost_line_and_that_of_no_run_does_not() {
+        for (lease, kept) in [(Some(RUN), Some((401, 200))), (None, None)] {
+            let mut proof = Proof::<u8>::default();
+            lease.into_iter().for_each(|lease| proof.adopt(lease));
+            proof.gives(401, 200, true);
+            proof.forget();
+            assert_eq!((proof.given, proof.reference), (kept, None));
+        }
+    }
+
+    #[test]
+    fn what_every_status_needs_leaves_the_others_their_turn_and_one_that_was_lost_comes_again() {
+        let mut proof = Proof::<u8>::default();
+        proof.was_read(0x000F, 0);
+        let looks: Vec<_> = (0..40).map(|_| proof.choose(Some(9), [], 2, |turn| turn as u8)).collect();
+        assert_eq!(looks.iter().filter(|look| **look != Some(9)).count(), 2, "{looks:?}");
+        // What is wanted at the same moment goes first, and the turn comes with the next status.
+        let mut proof = Proof::<u8>::default();
+        for _ in 0..19 {
+            assert_eq!(proof.choose(None, [], 2, |turn| turn as u8), None);
+        }
+        assert_eq!(proof.choose(None, [(7, true)], 2, |turn| turn as u8), Some(7));
+        assert_eq!(proof.choose(None, [], 2, |turn| turn as u8), Some(0));
+    }
+
+    #[test]
+    fn only_a_motor_that_was_seen_to_be_braked_by_the_reaction_has_reacted() {
+        let mut proof = Proof::<u8>::default();
+        assert!(!proof.has_reacted(Some(ChartState::FaultReactionActive)));
+        assert!(!proof.has_reacted(Some(ChartState::Fault)), "nobody saw it brake");
+        proof.watch.shaft.see(Instant::now(), Output::Braking(Frequency::from_hertz(9)), None);
+        assert!(!proof.has_reacted(Some(ChartState::FaultReactionActive)), "not yet");
+        assert!(proof.has_reacted(Some(ChartState::Fault)));
+    }
+}
