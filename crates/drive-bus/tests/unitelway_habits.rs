@@ -254,3 +254,30 @@ fn a_slow_drive_does_not_hold_the_line() {
         assert!(read[1] >= 15 && read[2] >= least && read[3] >= least, "silent: {silent}, {read:?}");
     }
 }
+
+/// How many of 120 reads in 12 s one slave answers, which needs so long for each reply.
+fn read_in_twelve_seconds(silent: bool, work: Duration) -> u32 {
+    let slave = Habits { work, silent, ..Habits::plain() };
+    let mut line = Telway::new(0, config(UniTelwaySettings::default()), [slave]);
+    let (mut told, mut next) = (0, line.start);
+    while line.now < line.start + 12 * SECOND {
+        if line.now >= next && line.waiting(1) == 0 {
+            line.read(1, 4, Class::Status).unwrap();
+            next = line.now + 100 * MS;
+        }
+        if let Some(ended) = line.run_for(MS) {
+            assert!(is_ok(&ended), "{:?}", ended.outcome);
+            told += 1;
+        }
+    }
+    told
+}
+
+#[test]
+fn a_slave_that_is_silent_until_it_is_ready_is_read_at_its_pace() {
+    for work in [10 * MS, 30 * MS] {
+        let (says_so, silent) = (read_in_twelve_seconds(false, work), read_in_twelve_seconds(true, work));
+        println!("{work:?}: {says_so} of one that says so, {silent} of one that is silent");
+        assert!(silent >= 85, "{silent} of 120, {says_so} of one that says so");
+    }
+}

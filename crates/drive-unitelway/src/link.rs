@@ -114,6 +114,7 @@ impl UniTelway {
             reply: self.speed.characters(reply_len(request.likely_reply())),
             request,
             requested: None,
+            polled_after: Duration::ZERO,
             waiting_since: None,
             refusals: 0,
             damaged: 0,
@@ -167,7 +168,11 @@ impl UniTelway {
                 current.requested = Some(end);
                 reply_by.min(end + link_timeout + self.speed.characters(1))
             }
-            Stage::Polling(_) => end + link_timeout + current.reply,
+            Stage::Polling(_) => {
+                let asked = current.requested.unwrap_or(end);
+                current.polled_after = end.saturating_duration_since(asked);
+                end + link_timeout + current.reply
+            }
             // The echo of an acknowledgement must not be taken for one of the next request.
             Stage::Answering(_) if self.echoes => end + self.chunk_gap,
             Stage::Answering(_) | Stage::Before(_) => end,

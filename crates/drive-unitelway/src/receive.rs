@@ -62,7 +62,7 @@ impl UniTelway {
             (Stage::Asking, ACK) => {
                 current.waiting_since = None;
                 current.refusals = 0;
-                self.after_silence(now, Next::Poll(Wanted::Reply))
+                self.poll_when_ready(now)
             }
             // What stands among other bytes is no refusal: the slave may have taken the request.
             (Stage::Asking, NAK) if alone => {
@@ -110,6 +110,7 @@ impl UniTelway {
                 Some(Ok(unite)) if *unite == mark.reply => {
                     current.mark = None;
                     current.is_proven = true;
+                    self.known.entry(address).or_default().note_reply(current.polled_after);
                     self.answer_with(now, ACK, Then::Ask)
                 }
                 other => {
@@ -126,6 +127,7 @@ impl UniTelway {
                 };
                 match answer {
                     Ok(answer) => {
+                        self.known.entry(address).or_default().note_reply(current.polled_after);
                         let said = self.speed.characters(1 + POLL_LEN + frame::len(message.len()));
                         self.took = current.requested.map(|end| {
                             now.saturating_duration_since(end).saturating_sub(said + self.silence)

@@ -31,6 +31,9 @@ impl UniTelway {
             Stage::Asking => self.fail(),
             Stage::Polling(wanted) => {
                 current.unanswered += 1;
+                if wanted == Wanted::Reply {
+                    self.known.entry(current.slave).or_default().note_silent_poll(current.polled_after);
+                }
                 self.nothing_came(now, wanted, false)
             }
         }
@@ -59,6 +62,19 @@ impl UniTelway {
                 self.close()
             }
         }
+    }
+
+    /// The slave has taken what it was asked: it is polled at once, or when one that is silent until then is likely ready.
+    pub(crate) fn poll_when_ready(&mut self, now: Instant) -> Step {
+        let Some(current) = &self.current else { return Step::More };
+        let after = self.known.get(&current.slave).map_or(Duration::ZERO, |known| known.poll_after());
+        let ready = current.requested.unwrap_or(now) + after;
+        let pause = ready.saturating_duration_since(now);
+        if pause <= self.silence {
+            return self.after_silence(now, Next::Poll(Wanted::Reply));
+        }
+        let Some(current) = self.current.take() else { return Step::More };
+        self.put_aside(now, current, Next::Poll(Wanted::Reply), pause)
     }
 
     pub(crate) fn go_on(&mut self, now: Instant, then: Then) -> Step {
@@ -163,6 +179,9 @@ impl UniTelway {
     }
 
     pub(crate) fn fail(&mut self) -> Step {
+        if let Some(known) = self.current.as_ref().and_then(|current| self.known.get_mut(&current.slave)) {
+            known.note_failure();
+        }
         let misfit = self.current.as_mut().and_then(|current| current.misfit.take());
         self.end(Err(misfit.map_or(Failure::Timeout, Failure::Mismatch)))
     }

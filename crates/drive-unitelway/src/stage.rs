@@ -30,6 +30,8 @@ pub(crate) struct Current {
     pub(crate) reply: Duration,
     /// End of the request on the line.
     pub(crate) requested: Option<Instant>,
+    /// When the last poll was sent, from the end of the mark or the request.
+    pub(crate) polled_after: Duration,
     /// Since when the slave keeps us waiting, for its reply or until it takes the request.
     pub(crate) waiting_since: Option<Instant>,
     /// How often the slave has refused the request since then.
