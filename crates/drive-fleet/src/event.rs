@@ -7,6 +7,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
+use drive_bus::evidence::Finding;
 use drive_core::{
     Command, Control, Current, Error, Ground, Identity, Lease, Motion, Percent, Refusal, SelfRestart,
     Setpoint, State, Status, StopMode, Watchdog,
@@ -255,6 +256,14 @@ pub enum EventKind {
     ContractChanged(Ground),
     /// A second, different answer came to the question that its last status has answered: what that showed counts for nothing.
     ValueWithdrawn,
+    /// The line has found something wrong by what it has heard, or does not find it any more. What concerns no single slave is told
+    /// of the first drive of the line.
+    LineFinding {
+        /// What, with its share of the traffic and what to do next.
+        finding: Finding,
+        /// Whether it is found; `false`: not any more.
+        present: bool,
+    },
     /// The run command of an earlier run of this program stands in the drive: it is ours again.
     RunAdopted(Lease),
     /// There is a record of a run command of an earlier run of this program, and it is not ours: why.
@@ -306,6 +315,7 @@ impl EventKind {
             Self::CommandOverridden(_) => "command overridden",
             Self::ContractChanged(_) => "contract changed",
             Self::ValueWithdrawn => "value withdrawn",
+            Self::LineFinding { .. } => "line finding",
             Self::RunAdopted(_) => "run adopted",
             Self::RunNotAdopted(_) => "run not adopted",
             Self::Reconfigured(_) => "reconfigured",
@@ -426,6 +436,14 @@ impl fmt::Display for EventKind {
             }
             Self::ContractChanged(ground) => write!(f, ": {ground}"),
             Self::ValueWithdrawn => f.write_str(": another answer came to the same question"),
+            Self::LineFinding { finding, present } => {
+                let whose = if finding.slave.is_some() { "" } else { "the line: " };
+                write!(f, "{}: {whose}{finding}", if *present { "" } else { ", not any more" })?;
+                match finding.next().first().filter(|_| *present) {
+                    Some(next) => write!(f, ". Next: {next}"),
+                    None => Ok(()),
+                }
+            }
             Self::FaultCleared | Self::ControlReturned | Self::StopConfirmed { .. } => Ok(()),
         }
     }

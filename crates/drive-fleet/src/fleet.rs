@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use drive_bus::Line;
+use drive_bus::{Line, evidence::Finding};
 use futures_core::Stream;
 use futures_util::future::join_all;
 use tokio::{
@@ -25,8 +25,8 @@ use tokio::{
 };
 
 use crate::{
-    cause::Policy,
-    event::{Event, ExitAction, Teller},
+    cause::{Cause, Policy},
+    event::{Event, EventKind, ExitAction, Happened, Teller},
     handle::{DriveHandle, Entry},
     plan::{LineBudget, LinePlan},
     task::Urgent,
@@ -195,6 +195,14 @@ impl Fleet {
 
     pub(crate) fn members(&self) -> Arc<Members> {
         Arc::clone(&self.inner.members.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Tells of what the line of a drive has found wrong by what it has heard, or does not find any more. What a line finds is asked
+    /// of it by whoever wants to know ([`Line::findings`]); this makes it an event among all others, in their order.
+    pub fn tell_finding(&self, drive: &DriveHandle, finding: Finding, present: bool) {
+        let Some(teller) = self.sender() else { return };
+        let kind = EventKind::LineFinding { finding, present };
+        teller.tell(Arc::clone(drive.name()), Happened { kind, cause: Cause::Found, words: Arc::default() });
     }
 
     /// Exchanges the members. Who changes them holds [`Inner::changing`].

@@ -420,6 +420,20 @@ pub enum Happened {
     },
     /// Another answer came to the question that the last status has answered.
     ValueWithdrawn,
+    /// The line has found something wrong, or does not find it any more.
+    LineFinding {
+        /// What, by its name.
+        defect: String,
+        /// How often it was seen.
+        part: u32,
+        /// Of how many.
+        of: u32,
+        /// Whether it concerns the whole line.
+        of_line: bool,
+        present: bool,
+        /// What to do next, the likeliest first.
+        next: Vec<String>,
+    },
     /// A run command of an earlier run of the program stands, and is ours again.
     RunAdopted {
         /// The run command.
@@ -509,6 +523,14 @@ impl From<&EventKind> for Happened {
                 Self::EepromWritten { by: *by, ledger: EepromLedger::clone(ledger) }
             }
             EventKind::ValueWithdrawn => Self::ValueWithdrawn,
+            EventKind::LineFinding { finding, present } => Self::LineFinding {
+                defect: finding.defect.name().to_owned(),
+                part: finding.share.0,
+                of: finding.share.1,
+                of_line: finding.slave.is_none(),
+                present: *present,
+                next: finding.next().iter().map(|next| (*next).to_owned()).collect(),
+            },
             EventKind::RunAdopted(lease) => Self::RunAdopted { lease: *lease },
             EventKind::RunNotAdopted(why) => Self::RunNotAdopted { why: why.clone() },
             EventKind::Reconfigured(settings) => {

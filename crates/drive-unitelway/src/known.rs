@@ -72,7 +72,8 @@ impl Known {
     /// When the first poll for a reply is worth it, from the end of its request.
     pub(crate) fn poll_after(self) -> Duration {
         let Some(Pace { silent_at, ready_at: Some(ready_at), .. }) = self.pace else { return Duration::ZERO };
-        let at = if ready_at.saturating_sub(silent_at) > NEAR { (silent_at + ready_at) / 2 } else { ready_at };
+        let at =
+            if ready_at.saturating_sub(silent_at) > NEAR { (silent_at + ready_at) / 2 } else { ready_at };
         if at > LONGEST { Duration::ZERO } else { at }
     }
 

@@ -6,6 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
+use drive_bus::evidence::{Certainty, Defect, Finding};
 use drive_core::{
     Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Ground, Identity,
     Lease, Measurements, Motion, Percent, PortError, RawWord, Reaction, Refusal, SelfRestart, SlaveAddress,
@@ -347,6 +348,15 @@ fn every_kind() -> Vec<EventKind> {
         EventKind::ReferenceTaken(Refusal::MotorRunning),
         EventKind::CommandOverridden(Refusal::NotInControl(Control::Panel)),
         EventKind::ContractChanged(Ground::Limits),
+        EventKind::LineFinding {
+            finding: Finding {
+                defect: Defect::FirstByteCut,
+                slave: Some(3),
+                share: (20, 40),
+                certainty: Certainty::Certain,
+            },
+            present: true,
+        },
         EventKind::Reconfigured(vec!["periods"]),
         EventKind::Exit(ExitAction::Stopped(unknown)),
         EventKind::Exit(ExitAction::TimeOver),

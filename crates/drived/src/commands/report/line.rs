@@ -47,6 +47,19 @@ pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
             }
             p { "Measured since the line was opened, " (span(measured.elapsed_ms)) " before this report; "
                 (line.exchanges) " requests were sent." }
+            @if !line.findings.is_empty() {
+                h4 { "What is wrong with it" }
+                ul { @for finding in &line.findings {
+                    li {
+                        @if let Some(slave) = finding.slave {
+                            (finding.drive.clone().unwrap_or_else(|| format!("address {slave}"))) ": "
+                        }
+                        (finding.text)
+                        @if let Some(what) = &finding.cannot_be_told_from { " (it cannot be told from " (what) ")" }
+                        @for next in &finding.next { "; " (next) }
+                    }
+                } }
+            }
             h4 { "Plan against measured" }
             (plan(detail))
             h4 { "How long answers took" }

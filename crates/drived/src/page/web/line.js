@@ -44,12 +44,14 @@ export function line(root, name) {
   }
   const place = el('p.hint');
   const big = ['utilisation', 'worst_stop', 'cycle', 'exchanges', 'errors'].map(text => el('div', {}, el('dt', {}, t(text)), el('dd.number')));
+  const found = el('section.panel');
   const kinds = el('p.hint');
   const slaves = el('div.wide');
   const last = lastExchanges(name);
   root.append(
     el('header.drive-head', {}, el('div', {}, el('h1', { tabindex: -1 }, name), place)),
     el('dl.big', {}, ...big),
+    found,
     el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('exchange_times')),
       el('a.button', { href: address(`${path('lines', name)}/capture`), download: `${name}.pcapng` }, t('capture'))), slaves, kinds),
     last.panel);
@@ -66,6 +68,12 @@ export function line(root, name) {
     values.forEach((value, index) => setText(big[index].lastChild, value));
     big[0].title = named(t('since_opening'), quantity(now.utilisation_since_opening_percent, 0, '%'));
     last.update();
+    const findings = now.findings ?? [];
+    found.hidden = findings.length === 0;
+    found.replaceChildren(el('h2', {}, t('line_findings')), el('ul', {}, ...findings.map(finding => el('li', {},
+      el('b', {}, [finding.drive ?? (finding.slave && `${t('slave')} ${finding.slave}`), word(finding.defect)].filter(Boolean).join(': ')),
+      ` ${t('of_traffic', { part: finding.part, of: finding.of })}. `,
+      el('span.hint', { lang: 'en' }, [finding.text, ...finding.next].join('; '))))));
     setText(kinds, LINE_ERRORS.filter(kind => now.errors?.[kind] !== undefined).map(kind => named(word(kind), quantity(now.errors[kind], 0))).join(' · '));
     const rows = now.slaves ?? [];
     const longest = Math.max(1, ...rows.map(row => row.answer_ms?.max ?? 0));

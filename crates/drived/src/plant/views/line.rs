@@ -2,6 +2,7 @@
 
 use drive_bus::{
     Line,
+    evidence::{Certainty, Finding},
     stats::{Histogram, SlaveStats, Stats},
 };
 use drive_fleet::{DriveHandle, LinePlan};
@@ -36,7 +37,52 @@ pub(crate) struct LineView {
     /// Requests that were sent.
     pub(crate) exchanges: u64,
     pub(crate) errors: LineErrors,
+    /// What is wrong with it by what it has heard lately; absent where nothing is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) findings: Vec<FindingView>,
     pub(crate) slaves: Vec<SlaveView>,
+}
+
+/// What a line has found wrong with itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(crate) struct FindingView {
+    /// What, by its name.
+    pub(crate) defect: String,
+    /// The address that it concerns; absent where it is the line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) slave: Option<u8>,
+    /// The drive that has this address.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) drive: Option<String>,
+    /// How often it was seen.
+    pub(crate) part: u32,
+    /// Of how many.
+    pub(crate) of: u32,
+    /// From what it cannot be told; absent where it is certain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) cannot_be_told_from: Option<String>,
+    pub(crate) text: String,
+    /// What to do next, the likeliest first.
+    pub(crate) next: Vec<String>,
+}
+
+impl FindingView {
+    fn of(finding: &Finding, drives: &[DriveHandle]) -> Self {
+        let named = |slave: u8| drives.iter().find(|drive| drive.slave().number() == slave);
+        Self {
+            defect: finding.defect.name().to_owned(),
+            slave: finding.slave,
+            drive: finding.slave.and_then(named).map(|drive| drive.name().to_string()),
+            part: finding.share.0,
+            of: finding.share.1,
+            cannot_be_told_from: match finding.certainty {
+                Certainty::CannotBeToldFrom(what) => Some(what.to_owned()),
+                _ => None,
+            },
+            text: finding.to_string(),
+            next: finding.next().iter().map(|next| (*next).to_owned()).collect(),
+        }
+    }
 }
 
 /// Whether the port is there.
@@ -115,6 +161,7 @@ impl LineView {
             cycle_ms: milliseconds(plan.sweep),
             exchanges: slaves.iter().map(|slave| slave.exchanges).sum(),
             errors: LineErrors::of_line(&stats),
+            findings: line.findings().iter().map(|finding| FindingView::of(finding, drives)).collect(),
             slaves,
         }
     }
