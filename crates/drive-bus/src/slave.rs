@@ -6,7 +6,7 @@ use async_trait::async_trait;
 use drive_core::{Port, PortError, SlaveAddress, Terms};
 use tokio::time::Instant;
 use tokio_modbus::{
-    Request, Response,
+    ExceptionCode, Request, Response,
     client::{Client, Context},
     slave::SlaveContext,
 };
@@ -33,11 +33,13 @@ pub struct Slave {
     address: u8,
     pub(crate) terms: Terms,
     asked_at: Option<Instant>,
+    /// How many more refusals are worth it, and the last.
+    refusals: Option<(u32, ExceptionCode)>,
 }
 
 impl Slave {
     pub(crate) fn new(handle: Arc<Handle>, address: u8) -> Self {
-        Self { handle, address, terms: Terms::default(), asked_at: None }
+        Self { handle, address, terms: Terms::default(), asked_at: None, refusals: None }
     }
 
     /// Its address, 0 for the broadcast.
@@ -60,6 +62,14 @@ impl Slave {
         self.handle.shared.master().answered_at(self.address)
     }
 
+    /// This slave for somebody who does not know what it is: when it has refused him so often, whatever he asks further counts as
+    /// refused in the same way, and nothing is sent.
+    #[must_use]
+    pub fn until_refused(mut self, times: u32) -> Self {
+        self.refusals = Some((times, ExceptionCode::IllegalDataAddress));
+        self
+    }
+
     /// This slave under other terms.
     #[must_use]
     pub fn with_terms(mut self, terms: Terms) -> Self {
@@ -80,6 +90,9 @@ impl fmt::Debug for Slave {
 #[async_trait]
 impl Client for Slave {
     async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        if let Some((0, refusal)) = self.refusals {
+            return Ok(Err(refusal));
+        }
         let (caller, outcome) = Caller::new();
         let submitted = self.handle.shared.master().submit(
             Instant::now(),
@@ -98,6 +111,9 @@ impl Client for Slave {
         waiting.done();
         if outcome.is_ok() {
             self.asked_at = Some(at);
+        }
+        if let (Some((left, last)), Ok(Err(refusal))) = (&mut self.refusals, &outcome) {
+            (*left, *last) = (*left - 1, *refusal);
         }
         outcome.map_err(|error| tokio_modbus::Error::Transport(error.into_io()))
     }

@@ -12,7 +12,7 @@ use drive_bus::{
     evidence::{Defect, Finding, What},
     exchange::{mbap, rtu},
 };
-use drive_core::serial::SerialSettings;
+use drive_core::{PortError, serial::SerialSettings};
 use support::{MS, characters};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -272,4 +272,23 @@ async fn what_is_kept_is_bounded_and_counts_what_came_lately() {
     .await;
     assert_eq!(findings, []);
     assert!(line.evidence().len() <= 64);
+}
+
+/// How a read of slave 3 ends to which this comes.
+async fn ends(answer: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static) -> PortError {
+    let (line, _) = found(rtu_line(), (100 * MS, Duration::ZERO), answer).await;
+    let mut slave = line.slave(3);
+    PortError::from_modbus(slave.call(Request::ReadHoldingRegisters(100, 1)).await.unwrap_err())
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_bytes_came_nobody_is_told_that_no_answer_came() {
+    let noise = ends(|_, _| vec![(5 * MS, vec![0xFF, 0x00, 0xFE])]).await;
+    assert!(noise.to_string().contains("3 bytes came, FF 00 FE: no frame whose check fits"), "{noise}");
+    let cut = ends(|_, request| at_once(whole(request)[1..].to_vec())).await;
+    assert!(cut.to_string().contains("the answer without its first byte"), "{cut}");
+    let silent = ends(|_, _| Vec::new()).await;
+    assert!(matches!(silent, PortError::Timeout { .. }), "{silent}");
+    let anothers = ends(|_, request| at_once(rtu::frame(4, &proper(request)).to_vec())).await;
+    assert!(matches!(anothers, PortError::Timeout { .. }), "{anothers}");
 }

@@ -32,6 +32,25 @@ async fn an_exception_is_the_inner_error_and_is_not_repeated() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn who_has_been_refused_often_enough_is_refused_further_without_a_question() {
+    let (line, mut peer) = line(|config| config);
+    let mut slave = line.slave(3).until_refused(2);
+    let call = tokio::spawn(async move {
+        let mut answers = Vec::new();
+        for register in 9..13 {
+            answers.push(slave.call(Request::ReadHoldingRegisters(register, 1)).await.unwrap().unwrap_err());
+        }
+        answers
+    });
+    peer.answer(&[0x83, 1]).await;
+    peer.answer(&[0x83, 2]).await;
+    let refusals = call.await.unwrap();
+    assert_eq!(refusals[..2], [ExceptionCode::IllegalFunction, ExceptionCode::IllegalDataAddress]);
+    assert_eq!(refusals[2..], [ExceptionCode::IllegalDataAddress; 2]);
+    assert_eq!(line.stats().slaves[&3].sent, 2);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_late_answer_is_never_taken_for_the_next() {
     let (line, mut peer) = line(without_retries);
     let (mut slave, mut same) = (line.slave(3), line.slave(3));

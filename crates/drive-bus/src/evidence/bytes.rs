@@ -44,6 +44,27 @@ pub(super) fn what_came(came: &[u8], slave: u8, expected: usize) -> Came {
     if is_whole(came) { Came::Frames } else { Came::Other }
 }
 
+/// So many bytes are told of what came.
+const TOLD: usize = 8;
+
+/// What came instead of an answer, in words: how much, which bytes first, and why it was not taken. `None`: nothing of this slave.
+pub(super) fn told(came: &[u8], slave: u8, expected: usize, is_early: bool) -> Option<String> {
+    let why = match what_came(came, slave, expected) {
+        _ if came.is_empty() => return None,
+        Came::WithoutFirst => "the answer without its first byte",
+        Came::WithoutLast => "the answer without its last byte",
+        Came::TwoThatDiffer => "two answers that differ",
+        // Somebody else's.
+        Came::Frames if !is_early => return None,
+        _ if is_early => "sooner than the speed of the line can carry it",
+        Came::Frames | Came::Other => "no frame whose check fits",
+    };
+    let first: Vec<String> = came.iter().take(TOLD).map(|byte| format!("{byte:02X}")).collect();
+    let more = if came.len() > TOLD { " ..." } else { "" };
+    let bytes = if came.len() == 1 { "byte" } else { "bytes" };
+    Some(format!("{} {bytes} came, {}{more}: {why}", came.len(), first.join(" ")))
+}
+
 /// What stands behind the whole answer of `len` bytes of PDU.
 pub(super) fn behind(came: &[u8], slave: u8, len: usize) -> &[u8] {
     let len = len + AROUND;
@@ -84,6 +105,19 @@ mod tests {
         let refusal = rtu::frame(3, &[0x83, 2]);
         assert_eq!(what_came(&refusal[1..], 3, 4), Came::WithoutFirst);
         assert_eq!(what_came(&refusal[..4], 3, 4), Came::WithoutLast);
+    }
+
+    #[test]
+    fn what_came_instead_of_an_answer_is_told_with_its_length_its_first_bytes_and_why_it_was_not_taken() {
+        let frame = rtu::frame(3, &[3, 2, 0x12, 0x34]);
+        let said = |came: &[u8], is_early| told(came, 3, 4, is_early);
+        assert_eq!(said(&[0xFF], false).unwrap(), "1 byte came, FF: no frame whose check fits");
+        assert!(said(&frame[1..], false).unwrap().ends_with(": the answer without its first byte"));
+        assert!(said(&frame, true).unwrap().starts_with("7 bytes came, 03 03 02 12 34 "));
+        assert!(said(&frame, true).unwrap().ends_with("sooner than the speed of the line can carry it"));
+        assert!(said(&[0; 20], false).unwrap().starts_with("20 bytes came, 00 00 00 00 00 00 00 00 ...: no"));
+        assert_eq!(said(&[], false), None);
+        assert_eq!(said(&rtu::frame(4, &[3, 2, 0, 1]), false), None, "another's");
     }
 
     #[test]

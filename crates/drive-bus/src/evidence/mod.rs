@@ -86,6 +86,8 @@ pub(crate) struct Evidence {
     number_zero: u32,
     /// Pieces that are nothing but a character that acknowledges (UNI-TELWAY).
     acknowledged: u32,
+    /// What came to the question that is under way came too soon.
+    early: bool,
     sent: Vec<u8>,
     heard: Vec<u8>,
     /// Whose exchange ended last, and when, until what comes behind it is judged.
@@ -200,6 +202,7 @@ impl Evidence {
             return;
         }
         self.judge_behind(now);
+        self.early = false;
         self.sent.clear();
         self.heard.clear();
         add(&mut self.sent, bytes);
@@ -215,13 +218,24 @@ impl Evidence {
         }
     }
 
-    /// An exchange ended. `expected`: the bytes of PDU that its answer has.
-    pub(crate) fn ended(&mut self, now: Instant, slave: u8, is_rtu: bool, ended: Ended, expected: usize) {
+    /// An exchange ended. `expected`: the bytes of PDU that its answer has. Gives what came instead of the answer, in words.
+    pub(crate) fn ended(
+        &mut self,
+        now: Instant,
+        slave: u8,
+        is_rtu: bool,
+        ended: Ended,
+        expected: usize,
+    ) -> Option<String> {
         self.behind.clear();
         self.last = None;
         let heard = std::mem::take(&mut self.heard);
         let echoed = self.sent.len() > 1 && heard.len() > self.sent.len();
         let came = heard.strip_prefix(&self.sent[..]).filter(|_| echoed).unwrap_or(&heard);
+        let is_early = std::mem::take(&mut self.early);
+        let instead = (is_rtu && ended == Ended::InVain)
+            .then(|| bytes::told(came, slave, expected, is_early))
+            .flatten();
         let lately = self.slaves.entry(slave).or_default();
         lately.asked();
         let fact = match ended {
@@ -281,6 +295,7 @@ impl Evidence {
         }
         self.heard = heard;
         self.heard.clear();
+        instead
     }
 
     /// What came behind the last answer has come.
@@ -297,6 +312,7 @@ impl Evidence {
 
     /// An intact frame that was not asked for, or not now.
     pub(crate) fn stray(&mut self, now: Instant, slave: u8, what: What) {
+        self.early |= what == What::Early;
         match what {
             What::OthersRequest => {
                 let (count, first) = self.requests.map_or((0, now), |(count, first, _)| (count, first));

@@ -41,7 +41,7 @@ impl<C> Master<C> {
             Err(Failure::Doubted(_) | Failure::Refused(_)) => Ended::Unclear,
             Err(_) => Ended::InVain,
         };
-        self.evidence.ended(now, slave, self.config.protocol == Protocol::Rtu, ended, expected);
+        let instead = self.evidence.ended(now, slave, self.config.protocol == Protocol::Rtu, ended, expected);
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
@@ -74,6 +74,11 @@ impl<C> Master<C> {
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
                     });
+                    // To the line it is silent; whoever asked is told what came.
+                    let failure = match (failure, instead) {
+                        (Failure::Timeout, Some(came)) if !entry.work.is_write => Failure::Mismatch(came),
+                        (failure, _) => failure,
+                    };
                     self.fail(now, entry, failure, waited);
                 }
             },

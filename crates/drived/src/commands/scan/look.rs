@@ -24,6 +24,9 @@ const EVERY_TIME: u32 = 4;
 /// How often something is asked that takes several exchanges, of which now one and now another is damaged.
 const ASKED: u32 = 12;
 
+/// So many refusals of what each drive of a family answers tell that it is none of that family.
+const TELL_TALE: u32 = 2;
+
 /// How many exchanges the line keeps: those of one status.
 const KEPT: usize = 8;
 
@@ -124,7 +127,8 @@ impl<T> From<Asked<T>> for Looks<T> {
 
 /// Whether a slave can be read as a drive of a family.
 pub(super) async fn status(line: &Line, family: Family, slave: SlaveAddress) -> Looks<()> {
-    let mut drive = open(line, family, slave);
+    let mut drive = family.open(line.slave(slave.number()).until_refused(TELL_TALE), slave);
+    one_drive::wait_at_most(&mut *drive);
     match often(line, async || drive.status().await).await {
         // What it does not have is not in its status: a drive without a status word is none of the family.
         Asked::Told(status) if !status.is_explained() => Looks::Unlike,

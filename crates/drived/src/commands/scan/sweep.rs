@@ -7,7 +7,7 @@ use drive_families::Family;
 use tokio::time::Instant;
 
 use super::{
-    answer::Answer,
+    answer::{Answer, Likeness},
     feeding::{Feeding, interval},
     look::{self, Heard, Looks},
     plan::{Found, Plan, Step},
@@ -16,6 +16,9 @@ use crate::{drive_spec::DriveName, failure::Failure, line_spec, own_line};
 
 /// How long one look at a slave takes at the slowest settings: some watchdogs are not much longer.
 const LOOK: Duration = Duration::from_millis(600);
+
+/// The function by which a drive tells its name (Modbus Application Protocol V1.1b3, section 6.21).
+const IDENTIFICATION: u8 = 0x2B;
 
 /// How much longer one is waited for whose answer came too late.
 const SLOWER: u32 = 10;
@@ -141,7 +144,13 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
         let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
         let mut longest = 0;
-        for family in Family::ALL {
+        // Those that tell their names come first: whoever has told his is asked for no other's words.
+        let mut families = Family::ALL;
+        families.sort_by_key(|family| !family.capabilities().functions.contains(&IDENTIFICATION));
+        for family in families {
+            if alike.iter().any(|likeness: &Likeness| likeness.certain) {
+                break;
+            }
             let line = self.line_fed_for(step, LOOK).await?;
             let config = line.config();
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {

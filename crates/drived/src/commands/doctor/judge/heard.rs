@@ -5,8 +5,8 @@ use drive_bus::evidence::{self, Finding};
 use super::Case;
 use crate::commands::doctor::verdict::{Certainty, Defect, Verdict};
 
-/// What it has found, the same defect of several told once. That two have one address, and that one answers twice, is judged here
-/// by more than that: by what was heard after each question.
+/// What it has found, the same defect of several told once; but for [`two`], which is told of those for whom nothing
+/// else explains it.
 pub(super) fn verdicts(case: &Case<'_>) -> Vec<Verdict> {
     let mut verdicts: Vec<Verdict> = Vec::new();
     for finding in &case.seen.findings {
@@ -32,6 +32,18 @@ pub(super) fn second_master(case: &Case<'_>) -> Option<Verdict> {
     let is_it = |finding: &&Finding| matches!(finding.defect, evidence::Defect::SecondMaster(_));
     let finding = case.seen.findings.iter().find(is_it)?;
     Some(Verdict::new(Defect::SecondMaster, &[], certainty(finding), finding.to_string(), finding.next()))
+}
+
+/// Two drives that have one address, or one that answers twice. Where another master asks the same slaves their answers to him are
+/// no second answers to us.
+pub(super) fn two(case: &Case<'_>, slave: u8) -> Option<Verdict> {
+    let is_it = |finding: &&Finding| {
+        finding.slave == Some(slave)
+            && matches!(finding.defect, evidence::Defect::TwoAtOneAddress | evidence::Defect::AnswersTwice)
+    };
+    let finding = case.seen.findings.iter().find(is_it).filter(|_| !case.is_shared)?;
+    let told = format!("{}: {finding}", case.seen.name(slave));
+    Some(Verdict::new(Defect::TwoAtOneAddress, &[slave], certainty(finding), told, finding.next()))
 }
 
 /// Whether nothing else can be judged beside it.

@@ -67,7 +67,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     }
     of_one(address::absent(&case), &mut explained);
     // Two that speak for one disturb whoever is asked next.
-    let is_doubled = case.figures.iter().any(|figures| address::two(&case, figures.slave).is_some());
+    let is_doubled = case.figures.iter().any(|figures| heard::two(&case, figures.slave).is_some());
     for figures in &case.figures {
         let slave = figures.slave;
         if explained.contains(&slave) {
@@ -75,7 +75,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         }
         let found = timing::needs_pause(&case, slave)
             .or_else(|| cable::interference(&case, slave))
-            .or_else(|| address::two(&case, slave))
+            .or_else(|| heard::two(&case, slave))
             .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_doubled || figures.silent > FEW));
         of_one(found, &mut explained);
     }
