@@ -2,6 +2,7 @@
 
 use std::{fmt, io, sync::Arc, time::Duration};
 
+use drive_clock::Sleeps;
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     sync::watch,
@@ -40,7 +41,7 @@ impl Line {
     pub async fn open(config: LineConfig) -> Result<Self, OpenError> {
         let mut connector = Connector::to(&config)?;
         let stream = connector.connect().ok_or(OpenError::NoPort)?.await?;
-        Ok(Self::spawn(config, connector, Some(stream)))
+        Ok(Self::spawn(config, connector, Some(stream), Sleeps::new()))
     }
 
     /// Starts the line without waiting for its port, which is opened as soon as it is there. Until then calls end with
@@ -50,19 +51,34 @@ impl Line {
     /// [`OpenError`] when the configuration names no port.
     pub fn start(config: LineConfig) -> Result<Self, OpenError> {
         let connector = Connector::to(&config)?;
-        Ok(Self::spawn(config, connector, None))
+        Ok(Self::spawn(config, connector, None, Sleeps::new()))
     }
 
     /// A line over a stream that the caller brings: one end of a `tokio::io::duplex`, a pty, a socket. When the stream
     /// ends the line is down for good.
     #[must_use]
     pub fn over(stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static, config: LineConfig) -> Self {
-        Self::spawn(config, Connector::None, Some(Box::new(stream)))
+        Self::spawn(config, Connector::None, Some(Box::new(stream)), Sleeps::new())
     }
 
     /// A line over streams that `open` makes: called at once and again whenever the stream has ended.
     #[must_use]
-    pub fn over_reopened<S, F>(mut open: impl FnMut() -> F + Send + 'static, config: LineConfig) -> Self
+    pub fn over_reopened<S, F>(open: impl FnMut() -> F + Send + 'static, config: LineConfig) -> Self
+    where
+        S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
+        F: Future<Output = io::Result<S>> + Send + 'static,
+    {
+        Self::over_reopened_by(open, config, Sleeps::new())
+    }
+
+    /// The same on a computer of which `sleeps` tells when it was asleep: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn over_reopened_by<S, F>(
+        mut open: impl FnMut() -> F + Send + 'static,
+        config: LineConfig,
+        sleeps: Sleeps,
+    ) -> Self
     where
         S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
         F: Future<Output = io::Result<S>> + Send + 'static,
@@ -71,13 +87,13 @@ impl Line {
             let stream = open();
             Box::pin(async move { stream.await.map(|stream| Box::new(stream) as BoxedStream) })
         });
-        Self::spawn(config, Connector::Given(given), None)
+        Self::spawn(config, Connector::Given(given), None, sleeps)
     }
 
-    fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>) -> Self {
+    fn spawn(config: LineConfig, connector: Connector, stream: Option<BoxedStream>, sleeps: Sleeps) -> Self {
         let (finished, when_finished) = watch::channel(false);
         let shared = Arc::new(Shared::new(Master::new(Instant::now(), config.clone())));
-        let task = Task::new(&config, Arc::clone(&shared), connector, stream);
+        let task = Task::new(&config, Arc::clone(&shared), connector, stream, sleeps);
         tokio::spawn(async move {
             task.run().await;
             let _ = finished.send(true);

@@ -85,6 +85,7 @@ impl Task {
         shared: Arc<Shared>,
         connector: Connector,
         stream: Option<BoxedStream>,
+        sleeps: Sleeps,
     ) -> Self {
         let on_descriptor = config.endpoint.is_serial() || config.endpoint.is_connection();
         let precise = on_descriptor && config.protocol.is_paced() || config.precise_timer;
@@ -104,7 +105,7 @@ impl Task {
             second: Connection::Gone,
             timer: if precise { Timer::precise() } else { Timer::tokio() },
             watch: (precise && config.stay_awake).then(Watch::new),
-            sleeps: Sleeps::new(),
+            sleeps,
             awake: None,
             backoff: REOPEN_BACKOFF.0,
             received: vec![0; 512],

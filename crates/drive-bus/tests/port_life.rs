@@ -5,9 +5,14 @@
 
 mod support;
 
-use std::{future::ready, time::Duration};
+use std::{
+    future::ready,
+    sync::atomic::{AtomicU64, Ordering},
+    time::Duration,
+};
 
 use drive_bus::{Line, LineConfig, Protocol};
+use drive_clock::Sleeps;
 use drive_core::{Class, PortError, SerialSettings, Terms};
 use drive_sim::{Gateway, GatewayInMemory, SimLine, SimSlave, Wiring, models::atv312::Atv312};
 use support::{MS, read, write};
@@ -24,6 +29,10 @@ struct Plant {
 }
 
 fn plant(habits: Gateway) -> Plant {
+    plant_on(habits, Sleeps::new())
+}
+
+fn plant_on(habits: Gateway, sleeps: Sleeps) -> Plant {
     let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
     let drives =
         (1..=3).map(|address| simulated.add(address, Atv312::under_bus_control()).unwrap()).collect();
@@ -31,7 +40,7 @@ fn plant(habits: Gateway) -> Plant {
     let protocol = if habits.rtu { Protocol::Rtu } else { Protocol::Tcp };
     let config = LineConfig { protocol, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
     let far = gateway.clone();
-    let line = Line::over_reopened(move || ready(Ok(far.connect())), config);
+    let line = Line::over_reopened_by(move || ready(Ok(far.connect())), config, sleeps);
     Plant { drives, gateway, line }
 }
 
@@ -131,4 +140,29 @@ async fn a_stop_waits_for_nothing_that_a_new_connection_is_listened_to_for() {
     let received = plant.drives[0].received();
     let stop = received.iter().find(|request| request.pdu[..] == [6, 0x21, 0x35, 0, 0]).unwrap();
     assert!(stop.at - called < 20 * MS, "{:?}", stop.at - called);
+}
+
+/// For how many seconds the computer of a test was asleep.
+static ASLEEP: AtomicU64 = AtomicU64::new(0);
+
+#[tokio::test(start_paused = true)]
+async fn a_computer_that_slept_has_lost_its_line_and_takes_nothing_that_lay_in_it() {
+    let clocks = || {
+        let asleep = Duration::from_secs(ASLEEP.load(Ordering::Relaxed));
+        Some([SECOND, SECOND + asleep, SECOND])
+    };
+    for rtu in [true, false] {
+        let plant = plant_on(Gateway { rtu, replays: 3, ..Gateway::default() }, Sleeps::by(clocks));
+        assert!(plant.drives[0].poke(ACC, 100));
+        assert_eq!(ramp(&plant.line, 1, 3).await, Ok(100));
+        assert_eq!(plant.line.stats().opened, 1);
+        ASLEEP.fetch_add(3_600, Ordering::Relaxed);
+        assert!(plant.drives[0].poke(ACC, 200));
+        assert_eq!(ramp(&plant.line, 1, 3).await, Ok(200));
+        let stats = plant.line.stats();
+        assert_eq!((stats.lost, stats.opened), (1, 2), "{rtu}");
+        // Only once.
+        assert_eq!(ramp(&plant.line, 1, 3).await, Ok(200));
+        assert_eq!(plant.line.stats().opened, 2);
+    }
 }

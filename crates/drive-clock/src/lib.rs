@@ -35,7 +35,10 @@ use tokio::time::{Instant, Sleep};
 
 use crate::{alarm::Alarm, company::Member};
 
-pub use crate::{sleep::Sleeps, watch::Watch};
+pub use crate::{
+    sleep::{Clocks, Sleeps},
+    watch::Watch,
+};
 
 /// How much before the deadline the timer is aimed at the most, and with it how long a wait spins at the most.
 const LONGEST_LEAD: Duration = Duration::from_micros(120);

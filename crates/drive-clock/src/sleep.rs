@@ -7,24 +7,41 @@ const LEAST: Duration = Duration::from_millis(100);
 
 /// Tells when the computer was asleep: the time since it was switched on has gone on then, and the time by which everybody
 /// waits has not. A value that was read before looks as young as if it had not slept, and nothing has timed out.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Sleeps {
+    clocks: Clocks,
     /// By how much the one was ahead of the other at the most.
     ahead: Option<Duration>,
+}
+
+/// Reads the time by which everybody waits, that since the computer was switched on, and the first once more. `None`: the system
+/// has no such clocks.
+pub type Clocks = fn() -> Option<[Duration; 3]>;
+
+impl Default for Sleeps {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Sleeps {
     /// From now on.
     #[must_use]
     pub fn new() -> Self {
-        let mut sleeps = Self::default();
+        Self::by(clocks)
+    }
+
+    /// From now on, by other clocks than the computer's: to see what becomes of a program whose computer sleeps.
+    #[must_use]
+    pub fn by(clocks: Clocks) -> Self {
+        let mut sleeps = Self { clocks, ahead: None };
         sleeps.slept();
         sleeps
     }
 
     /// For how long it was asleep since this was last called; `None`: it was not, or the system does not say.
     pub fn slept(&mut self) -> Option<Duration> {
-        let [before, since_boot, after] = clocks()?;
+        let [before, since_boot, after] = (self.clocks)()?;
         self.told(before, since_boot, after)
     }
 
@@ -62,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_computer_that_was_asleep_is_told_once_and_for_how_long() {
-        let mut sleeps = Sleeps::default();
+        let mut sleeps = Sleeps::by(|| None);
         assert_eq!(sleeps.told(10 * SECOND, 15 * SECOND, 10 * SECOND), None);
         assert_eq!(sleeps.told(11 * SECOND, 16 * SECOND, 11 * SECOND), None);
         assert_eq!(sleeps.told(12 * SECOND, 3_617 * SECOND, 12 * SECOND), Some(3_600 * SECOND));
@@ -71,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_process_that_stood_still_was_not_asleep() {
-        let mut sleeps = Sleeps::default();
+        let mut sleeps = Sleeps::by(|| None);
         assert_eq!(sleeps.told(10 * SECOND, 10 * SECOND, 10 * SECOND), None);
         // Between the first reading and the second, then between the second and the third.
         assert_eq!(sleeps.told(11 * SECOND, 15 * SECOND, 15 * SECOND), None);

@@ -76,7 +76,9 @@ impl<C> Master<C> {
                     });
                     // To the line it is silent; whoever asked is told what came.
                     let failure = match (failure, instead) {
-                        (Failure::Timeout, Some(came)) if !entry.work.is_write => Failure::Mismatch(came),
+                        (Failure::Timeout | Failure::Mismatch(_), Some(came)) if !entry.work.is_write => {
+                            Failure::Mismatch(came)
+                        }
                         (failure, _) => failure,
                     };
                     self.fail(now, entry, failure, waited);

@@ -128,7 +128,7 @@ impl<T> From<Asked<T>> for Looks<T> {
 /// Whether a slave can be read as a drive of a family.
 pub(super) async fn status(line: &Line, family: Family, slave: SlaveAddress) -> Looks<()> {
     let mut drive = family.open(line.slave(slave.number()).until_refused(TELL_TALE), slave);
-    one_drive::wait_at_most(&mut *drive);
+    own_line::wait_at_most(&mut *drive);
     match often(line, async || drive.status().await).await {
         // What it does not have is not in its status: a drive without a status word is none of the family.
         Asked::Told(status) if !status.is_explained() => Looks::Unlike,

@@ -13,8 +13,8 @@ use super::feeding::Feeding;
 const REQUEST: usize = 5;
 const ANSWER: usize = 4;
 
-/// Exchanges by which a drive is looked at, at the most: statuses of all families, and all of its own.
-pub(super) const LOOKS: u32 = 86;
+/// Exchanges by which a drive is looked at, at the most: the first refusals of the families that it is none of, and all of its own.
+pub(super) const LOOKS: u32 = 29;
 
 /// Addresses that most drives have: of three of the families these are all there are. They are asked at every setting before
 /// the others are.
