@@ -110,7 +110,7 @@ mod tests {
     fn the_first_poll_comes_to_be_sent_when_the_reply_is_there_and_follows_a_slave_that_grows_slow() {
         const MS: Duration = Duration::from_millis(1);
         let mut known = Known::default();
-        let mut silent = |known: &mut Known, work: Duration, replies: u32| {
+        let silent = |known: &mut Known, work: Duration, replies: u32| {
             let mut in_vain = 0;
             for _ in 0..replies {
                 let mut at = known.poll_after();
