@@ -70,7 +70,7 @@ impl UniTelway {
         let after = self.known.get(&current.slave).map_or(Duration::ZERO, |known| known.poll_after());
         let ready = current.requested.unwrap_or(now) + after;
         let pause = ready.saturating_duration_since(now);
-        if pause <= self.silence {
+        if after.is_zero() || pause <= self.silence {
             return self.after_silence(now, Next::Poll(Wanted::Reply));
         }
         let Some(current) = self.current.take() else { return Step::More };
