@@ -19,8 +19,10 @@ const EVERY: Duration = Duration::from_secs(5);
 
 /// A drive that is asked for its status and nothing else.
 fn settings(family: Family, name: &str) -> DriveSettings {
-    // One that the bus can set hears enough by its polls.
+    // One that the bus can set hears enough by its polls. That of an Altivar 21 is looked at in turn from when it is armed, also at
+    // rest, and is left alone here.
     let is_settable = family.capabilities().watchdog.is_some_and(|watchdog| watchdog.settable);
+    let is_settable = is_settable && family != Family::Atv21;
     let watchdog = contract(family)
         .filter(|_| is_settable)
         .map(|contract| WatchdogContract { timeout: Duration::from_secs(10), ..contract });
