@@ -28,16 +28,28 @@ with sync_playwright() as playwright:
     page.set_default_timeout(120_000)
     session = page.context.new_cdp_session(page)
     session.send("Network.enable")
-    received = {"bytes": 0, "requests": 0}
-    session.on("Network.dataReceived", lambda event: received.update(bytes=received["bytes"] + max(event["encodedDataLength"], 0)))
-    session.on("Network.responseReceived", lambda event: received.update(requests=received["requests"] + 1))
+    received, live = {"bytes": 0, "requests": 0}, set()
+
+    def answered(event):
+        received["requests"] += 1
+        # What happens to the drives from then on is no part of the first look.
+        if event["response"]["mimeType"] == "text/event-stream":
+            live.add(event["requestId"])
+
+    def came(event):
+        if event["requestId"] not in live:
+            received["bytes"] += max(event["encodedDataLength"], 0)
+
+    session.on("Network.responseReceived", answered)
+    session.on("Network.dataReceived", came)
     if far:
         latency, speed = map(float, far)
         session.send("Network.emulateNetworkConditions",
                      {"offline": False, "latency": latency, "downloadThroughput": speed, "uploadThroughput": speed})
     page.add_init_script(NOTED.replace("DRIVES", drives))
     page.goto(url, wait_until="commit")
-    page.wait_for_function("noted.all !== undefined")
+    while page.evaluate("noted.all") is None:
+        page.wait_for_timeout(50)
     noted = page.evaluate("noted")
     print(noted["stop"], noted["value"], noted["all"], received["bytes"], received["requests"], flush=True)
     browser.close()
