@@ -219,7 +219,7 @@ async fn connection(behind: Arc<Behind>, stream: impl AsyncRead + AsyncWrite + S
     let counted = Counted::new(&behind);
     match behind.habits.second {
         SecondConnection::Refused if counted.is_second() => return Ok(()),
-        SecondConnection::EndsTheFirst if counted.is_second() => _ = behind.cut.send_replace(()),
+        SecondConnection::EndsTheFirst if counted.is_second() => behind.cut.send_replace(()),
         _ => {}
     }
     let mut cut = behind.cut.subscribe();

@@ -125,7 +125,7 @@ impl Contract {
                     tally.decided += usize::from(cell.decided);
                     match judged {
                         Ok(outcome) => {
-                            *tally.outcomes.entry((format!("{operation:?}"), outcome)).or_default() += 1
+                            *tally.outcomes.entry((format!("{operation:?}"), outcome)).or_default() += 1;
                         }
                         Err(why) => tally.contradictions.push(format!(
                             "[{}] {} {comes:?} {:?} {operation:?}: {why}",

@@ -186,7 +186,7 @@ async fn restore(
     if !args.source.daemon.is_json() {
         text.drain(..).try_for_each(output::say)?;
     }
-    source.to_write(&args.ledger).await?;
+    source.ready_for_writing(&args.ledger).await?;
     let mut carried = carry(&plan, source, ending).await;
     let mut failure =
         carried.stopped.as_ref().map(|stopped| Failure::Drive(stopped.in_words(&name, &carried)));

@@ -136,7 +136,7 @@ impl Named {
 
 impl Source {
     /// That it may be written to. The daemon judges that itself, and keeps the ledger.
-    pub(super) async fn to_write(&mut self, ledger: &LedgerArgs) -> Result<(), Failure> {
+    pub(super) async fn ready_for_writing(&mut self, ledger: &LedgerArgs) -> Result<(), Failure> {
         if let Self::OnLine(one) = self {
             one.is_meant().await?;
             one.ledger = Some(ledger.of(one.name, one.config()));
