@@ -39,7 +39,7 @@ use crate::plant::Plant;
 /// The largest body that is read.
 const LARGEST_BODY: usize = 64 << 10;
 
-/// Everything under `/api/v1`, `/healthz` and `/readyz`. Who asks is a [`Caller`] in the extensions
+/// Everything under `/api/v1`, `/healthz` and `/readyz`. Who asks is a [`Caller`](crate::rights::Caller) in the extensions
 /// of each request.
 pub(crate) fn router(plant: Plant) -> Router {
     let mut all = routes();
