@@ -118,9 +118,14 @@ macro_rules! watched_by {
 
 #[cfg(test)]
 mod tests {
-    use crate::setpoint::Direction;
+    use tokio::time::Instant;
 
     use super::*;
+    use crate::{
+        motion::{Motion, Output},
+        setpoint::Direction,
+        units::Frequency,
+    };
 
     #[test]
     fn a_ground_is_told_once_when_it_is_found_otherwise_and_only_while_anything_rests_on_it() {
@@ -145,5 +150,14 @@ mod tests {
         watch.lose_sight();
         assert!(watch.is_kept() && watch.run.held().is_none());
         assert!(!watch.finds(7, 31, Ground::Limits));
+    }
+
+    /// It was being brought down, the line was lost, and at the next look there is no output: by the ramp, or cut.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_came_down_out_of_sight_is_not_told_at_rest() {
+        let (mut watch, now) = (Watch::default(), Instant::now());
+        watch.shaft.see(now, Output::Braking(Frequency::from_hertz(30)), None);
+        watch.lose_sight();
+        assert_eq!(watch.shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
     }
 }
