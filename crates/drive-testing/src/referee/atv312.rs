@@ -64,11 +64,6 @@ fn tripped(world: &World, code: u16) -> Answer<Order> {
     }
 }
 
-/// The world without the bits of the control words.
-fn without_bits(world: &World) -> World {
-    World { command: None, other_command: 0, ..world.clone() }
-}
-
 /// What ends a motion, or rest.
 fn ended(world: &World, how: Stop) -> Order {
     if world.turning { Order::Stop(how) } else { Order::Rest }
@@ -178,7 +173,7 @@ impl Manual for Atv312 {
             Answer::Says(by, _) => by,
         };
         if let Some((stop, rule)) = inputs::stop(world, by) {
-            if by != Who::Bus && inputs::stop(&without_bits(world), by).is_none() {
+            if inputs::is_stopped_by_bits_elsewhere(world, by) {
                 return Answer::Silent(&STOP_BITS_ELSEWHERE);
             }
             return Answer::Says(if world.turning { Order::Stop(stop) } else { Order::Locked }, rule);
@@ -211,7 +206,7 @@ impl Manual for Atv312 {
             return None;
         }
         // stops of the terminals and of the STOP key go before every channel
-        inputs::stop(&without_bits(world), Who::Terminals).map(|(_, rule)| rule)
+        inputs::stop(&inputs::without_bits(world), Who::Terminals).map(|(_, rule)| rule)
     }
 
     fn of_itself(&self, world: &World, change: &Change) -> Option<Answer<Start>> {

@@ -169,7 +169,8 @@ impl<'a> Cell<'a> {
         let held = self.scene.drive.lease().is_some();
         let (seen, twin) = (self.scene.seen(), self.scene.twin());
         let turns = seen.running && seen.setpoint != 0 && !is_at(&seen, 0);
-        if turns && !held && !twin.running && !self.has_masters() {
+        // A panel that has taken over a motor which ran commands it; its twin was taken over at rest.
+        if turns && !held && !twin.running && !seen.local && !self.has_masters() {
             return Err(at(format!("it turns, and no lease stands: {seen:?}, the twin {twin:?}")));
         }
         let Some(judge) = self.judge.as_mut().filter(|_| !self.doubtful) else { return Ok(()) };

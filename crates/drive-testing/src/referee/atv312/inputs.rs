@@ -139,3 +139,13 @@ pub(super) fn stop(world: &World, by: Who) -> Option<(Stop, &'static Rule)> {
         _ => Some((Stop::Unsaid, &STOPS_FIRST)),
     }
 }
+
+/// Whether nothing stops but bits of CMD while another channel commands: the manual leaves open whether they act.
+pub(super) fn is_stopped_by_bits_elsewhere(world: &World, by: Who) -> bool {
+    by != Who::Bus && stop(world, by).is_some() && stop(&without_bits(world), by).is_none()
+}
+
+/// The world without the bits of the control words.
+pub(super) fn without_bits(world: &World) -> World {
+    World { command: None, other_command: 0, ..world.clone() }
+}

@@ -243,6 +243,10 @@ fn input(world: &World, after: &mut World, bit: u8, closed: bool) {
             Some(direction) if rises && !stopped && world.mains && world.tripped.is_none() => {
                 after.latched = Some(direction);
             }
+            // Whether this edge began a run is as open as whether those bits stop.
+            Some(_) if rises && inputs::is_stopped_by_bits_elsewhere(after, Who::Terminals) => {
+                after.unsure = Some(&STOP_BITS_ELSEWHERE);
+            }
             Some(direction) if falls && world.latched == Some(direction) => after.latched = None,
             _ => {}
         }
