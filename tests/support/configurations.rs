@@ -192,6 +192,12 @@ impl Surrounded for Around {
             _ if LEFT_ALONE.contains(&row.code) => None,
             // The functions of the Altivar 21's inputs that its manual names.
             Range::Any if row.code.starts_with("F11") => Some(Values::Listed(vec![0, 2, 38, 48, 52, 53])),
+            // No drive lets itself be set to a low speed above its high speed.
+            _ if row.code == "LSP" => Some(Values::Between(0, 400)),
+            ref range if row.code == "HSP" => match Values::of(range) {
+                Some(Values::Between(_, high)) => Some(Values::Between(400, high)),
+                listed => listed,
+            },
             ref range => Values::of(range),
         }
     }

@@ -10,6 +10,9 @@ use drive_sim::{Observation, SimSlave};
 /// What is seen of a motor that stands, or has reached a speed, in hundredths of a hertz.
 pub const TOLERANCE: i32 = 20;
 
+/// Below this a ramp may pass zero within one exchange.
+const CROSSING: Frequency = Frequency::from_hertz(2);
+
 /// What the status says that the machine contradicts: told at rest or held, and the shaft turns; told in force, and nothing drives
 /// the motor, or it turns the other way, or at another speed than the reference that it is said to have reached.
 #[must_use]
@@ -27,8 +30,12 @@ pub fn contradiction(status: &Status, seen: &Observation) -> Option<String> {
     if asks && !seen.running {
         return told("in force");
     }
+    // A motor that is turned round passes zero between its reading and the look.
+    let is_slow = |frequency: Frequency| frequency < CROSSING;
+    let crosses = status.output_frequency.is_some_and(is_slow)
+        && is_slow(Frequency::from_centihertz(seen.shaft_frequency.unsigned_abs()));
     let is_other = |way: Direction| (way == Direction::Reverse) != (seen.shaft_frequency < 0);
-    if turns && status.direction.is_some_and(is_other) {
+    if turns && !crosses && status.direction.is_some_and(is_other) {
         return told("in force in that direction");
     }
     let reached = status.reference.filter(|_| status.at_reference == Some(true));
