@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::{
-    access::Calls,
+    calls::Calls,
     error::{Error, ExceptionMeaning, Result},
     port::Port,
 };

@@ -3,7 +3,7 @@
 use std::{fmt, time::Duration};
 
 use crate::{
-    error::SlaveAddress,
+    address::SlaveAddress,
     registers::{Restoring, Row, Scaled},
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,

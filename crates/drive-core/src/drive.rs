@@ -5,18 +5,21 @@ use std::time::Duration;
 use async_trait::async_trait;
 
 use crate::{
-    access::Lifetimes,
+    address::SlaveAddress,
+    calls::Lifetimes,
     capabilities::{Capabilities, Reaction, Watchdog, WatchdogCapability},
-    error::{Error, Result, SelfRestart, SlaveAddress},
+    error::{Error, Result},
     faults::Faults,
     identity::Identity,
     intent::Intent,
     kept_readings::KeptReadings,
-    lease::{Ground, Lease, Recognised, Withdrawn},
+    lease::{Ground, Lease, Recognised},
+    refusal::SelfRestart,
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
     stopped::Stopped,
+    withdrawn::Withdrawn,
 };
 
 /// A write to all slaves at once: no slave answers, so nothing is confirmed by it.

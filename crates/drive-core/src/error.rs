@@ -3,46 +3,17 @@
 use std::{fmt, time::Duration};
 
 use crate::{
-    named::Word,
+    access::Access,
+    address::SlaveAddress,
     port::PortError,
+    refusal::Refusal,
     setpoint::{Command, Setpoint},
-    status::{Control, State, Status},
+    status::Status,
     units::{Frequency, Speed},
 };
 
 /// The result of everything that talks to a drive.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
-
-/// The address of one slave, 1 to 247.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SlaveAddress(u8);
-
-impl SlaveAddress {
-    /// The address as a number.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self.0
-    }
-}
-
-impl TryFrom<u8> for SlaveAddress {
-    type Error = SlaveAddressError;
-
-    fn try_from(number: u8) -> Result<Self, SlaveAddressError> {
-        if (1..=247).contains(&number) { Ok(Self(number)) } else { Err(SlaveAddressError(number)) }
-    }
-}
-
-impl fmt::Display for SlaveAddress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-/// A number that is no slave's address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is not a slave address: expected 1 to 247 (0 is the broadcast, 248 to 255 are reserved)")]
-pub struct SlaveAddressError(u8);
 
 /// Which exchange failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -138,139 +109,6 @@ impl fmt::Display for ExceptionMeaning {
             Self::Busy => "the drive is busy",
             Self::Unknown => "a code that the manual does not list",
         })
-    }
-}
-
-/// A setting by which a drive starts its motor again without being told: after a trip, a power cut or the loss of the line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub struct SelfRestart {
-    /// The manual's mnemonic of the setting, such as `Atr`: the name by which it is accepted.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialize::kept"))]
-    pub code: Word,
-    /// What it does, in words that finish "the drive …".
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::serialize::kept"))]
-    pub meaning: Word,
-}
-
-impl fmt::Display for SelfRestart {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "by {} the drive {}", self.code, self.meaning)
-    }
-}
-
-/// Why a command is refused before anything is sent, or what keeps one that was sent from being in force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// The drive has tripped; reset it first.
-    Fault(u16),
-    /// The drive has tripped and did not say why in the words that were read; reset it first.
-    Tripped,
-    /// Somebody else commands the drive.
-    NotInControl(Control),
-    /// The drive is in a state that does not allow it.
-    State(State),
-    /// This direction is not authorised by the drive's settings.
-    DirectionForbidden,
-    /// The drive's settings do not let the bus command it; the text says which setting, and after a colon what to do.
-    Settings(&'static str),
-    /// Something else than this command decides what the motor does.
-    Overridden {
-        /// What decides instead, such as an input with its function, a channel or a setting, by the manual's mnemonics.
-        by: &'static str,
-        /// What to set or do, so that the bus decides.
-        remedy: &'static str,
-    },
-    /// A setting of the drive starts the motor again by itself, such as `Atr` of the Altivar 312, and nobody has accepted
-    /// that: see [`Drive::accept_self_restart`](crate::Drive::accept_self_restart).
-    RestartsItself(SelfRestart),
-    /// Nothing has changed since the last save: the EEPROM is not written.
-    NothingToSave,
-    /// The EEPROM's life is used up by this drive's own count of saves.
-    EepromLife,
-    /// The motor runs and this needs it stopped.
-    MotorRunning,
-    /// The drive has said that it is another one than its family's, in these words: it is read, and stopped when that is asked
-    /// for, and nothing else is written.
-    AnotherDrive(&'static str),
-}
-
-impl Refusal {
-    /// Its word for programs.
-    #[must_use]
-    pub const fn word(&self) -> &'static str {
-        match self {
-            Self::Fault(_) | Self::Tripped => "fault",
-            Self::NotInControl(_) => "not_remote",
-            Self::State(_) => "not_ready",
-            Self::DirectionForbidden => "forbidden_direction",
-            Self::Settings(_) => "settings",
-            Self::Overridden { .. } => "overridden",
-            Self::RestartsItself(_) => "restarts_itself",
-            Self::NothingToSave => "nothing_to_save",
-            Self::EepromLife => "eeprom_life",
-            Self::MotorRunning => "motor_running",
-            Self::AnotherDrive(_) => "another_drive",
-        }
-    }
-}
-
-/// What is done about a trip.
-const MEND: &str = "remove the cause, then reset it";
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Fault(code) => write!(f, "the drive has tripped (fault {code}): {MEND}"),
-            Self::Tripped => write!(f, "the drive has tripped: {MEND}"),
-            Self::NotInControl(control) => f.write_str(match control {
-                Control::Bus => "this bus commands the drive already: stop it first",
-                Control::Terminals => {
-                    "the terminals command the drive: switch off the input that gives them command, or set the channel of \
-                     commands to the bus"
-                }
-                Control::Panel => {
-                    "the panel commands the drive: give command back at the panel, or set the channel of commands to the bus"
-                }
-                Control::Local => {
-                    "the terminals or the panel command the drive: switch off what forces local control, or set the channel \
-                     of commands to the bus"
-                }
-                Control::OtherBus => {
-                    "another bus commands the drive: give command back there, or set the channel of commands to this one"
-                }
-            }),
-            Self::State(state) => {
-                let remedy = match state {
-                    State::NotReady => "switch on the supply of its power part and wait until it is ready",
-                    State::Stopping | State::QuickStop | State::FaultReaction => "wait until the motor stands",
-                    State::Running => "stop it first",
-                    State::Fault => MEND,
-                    State::Disabled | State::Ready => "start it first",
-                    State::Unknown => "see what its display says, for its manual does not explain its status word",
-                };
-                write!(f, "the drive's state is \"{state}\": {remedy}")
-            }
-            Self::DirectionForbidden => {
-                f.write_str("the drive's settings forbid this direction: allow it there, or start the other way")
-            }
-            Self::Settings(which) => f.write_str(which),
-            Self::Overridden { by, remedy } => write!(f, "{by} decides instead: {remedy}"),
-            Self::RestartsItself(restart) => {
-                let code = restart.code;
-                write!(f, "{restart}: switch {code} off, or accept it by name (accept-self-restart {code})")
-            }
-            Self::NothingToSave => {
-                f.write_str("nothing has changed since the last save: change a parameter first")
-            }
-            Self::EepromLife => f.write_str(
-                "the saves that were counted have used up the EEPROM's life: replace the drive, or correct the count",
-            ),
-            Self::MotorRunning => f.write_str("the motor runs: stop it first"),
-            Self::AnotherDrive(it_is) => write!(f, "the drive says that it is {it_is}; change the family that is set for it"),
-        }
     }
 }
 
@@ -393,7 +231,7 @@ pub enum Error {
         /// The register's mnemonic.
         code: &'static str,
         /// Its access.
-        access: crate::registers::Access,
+        access: Access,
     },
     /// The setpoint cannot be given to this drive. Nothing was sent.
     #[error("slave {slave}: setpoint {setpoint}: {problem}")]
@@ -529,14 +367,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_address_is_1_to_247() {
-        assert!(SlaveAddress::try_from(0).is_err());
-        assert!(SlaveAddress::try_from(1).is_ok());
-        assert!(SlaveAddress::try_from(247).is_ok());
-        assert!(SlaveAddress::try_from(248).is_err());
-    }
-
-    #[test]
     fn an_exchange_that_fails_after_a_write_never_says_that_nothing_was_sent() {
         let slave = SlaveAddress::try_from(7).unwrap();
         let exchange = Exchange { function: 3, register: Some(3201) };
@@ -548,43 +378,6 @@ mod tests {
             Error::Answer { slave, exchange, reason: "the answer is of another function" },
         ] {
             assert_eq!(error.after_write().kind(), ErrorKind::OutcomeUnknown);
-        }
-    }
-
-    #[test]
-    fn each_refusal_says_what_is_so_and_what_to_do() {
-        let overridden = Refusal::Overridden { by: "input F", remedy: "switch it off" };
-        let restart = SelfRestart { code: "Atr", meaning: "starts the motor again by itself" };
-        let control = [Control::Bus, Control::Terminals, Control::Panel, Control::Local, Control::OtherBus];
-        let states = [
-            State::NotReady,
-            State::Disabled,
-            State::Ready,
-            State::Running,
-            State::Stopping,
-            State::QuickStop,
-            State::FaultReaction,
-            State::Fault,
-            State::Unknown,
-        ];
-        let others = [
-            Refusal::Fault(17),
-            Refusal::Tripped,
-            Refusal::DirectionForbidden,
-            overridden,
-            Refusal::RestartsItself(restart),
-            Refusal::NothingToSave,
-            Refusal::EepromLife,
-            Refusal::MotorRunning,
-        ];
-        let controlled = control.map(Refusal::NotInControl);
-        for refusal in others.into_iter().chain(controlled).chain(states.map(Refusal::State)) {
-            let text = refusal.to_string();
-            let (_, remedy) = text.split_once(": ").unwrap_or_else(|| panic!("{text}"));
-            let verb = remedy.split(' ').next().unwrap_or_default();
-            let verbs =
-                ["allow", "change", "give", "remove", "replace", "see", "start", "stop", "switch", "wait"];
-            assert!(verbs.contains(&verb), "{text}");
         }
     }
 

@@ -1,5 +1,8 @@
 //! Faults as the vendor lists them, in a form that a person can act on.
 
+#[cfg(feature = "serde")]
+mod json;
+
 use std::fmt;
 
 /// What is known of one fault code.

@@ -1,9 +1,15 @@
 //! Who moves the motor: [`Lease`], the record that a run command of this side stands, and [`Verdict`], what a status says
 //! of it.
 
+#[cfg(feature = "serde")]
+pub(crate) mod object;
+
 use std::fmt;
 
-use crate::{error::Refusal, setpoint::Direction, status::Status};
+use crate::{refusal::Refusal, setpoint::Direction};
+
+#[cfg(feature = "serde")]
+pub(crate) use object::VerdictObject;
 
 /// What a drive's own words say of the run command that this side has given. The family alone decides it; whoever sits
 /// above carries it on and judges nothing by the [`State`](crate::State).
@@ -110,33 +116,6 @@ impl Lease {
     #[must_use]
     pub const fn new(direction: Direction, word: u16) -> Self {
         Self { direction, word }
-    }
-}
-
-/// What became of a withdrawal.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Withdrawn {
-    /// A run command of this side stood, and the drive shows that it stands no more.
-    Ended(Status),
-    /// None of this side's stood: nothing was written.
-    Nothing(Status),
-}
-
-impl Withdrawn {
-    /// The status that shows it.
-    #[must_use]
-    pub const fn status(&self) -> &Status {
-        match self {
-            Self::Ended(status) | Self::Nothing(status) => status,
-        }
-    }
-
-    /// The same, as a value.
-    #[must_use]
-    pub fn into_status(self) -> Status {
-        match self {
-            Self::Ended(status) | Self::Nothing(status) => status,
-        }
     }
 }
 

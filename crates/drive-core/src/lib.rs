@@ -16,7 +16,9 @@
 #![forbid(unsafe_code)]
 
 mod absent;
-mod access;
+pub mod access;
+mod address;
+mod calls;
 mod capabilities;
 mod confirm;
 mod drive;
@@ -32,44 +34,48 @@ mod named;
 mod own_run;
 pub mod port;
 mod reconnecting;
+mod refusal;
 pub mod registers;
 pub mod serial;
 #[cfg(feature = "serde")]
 pub mod serialize;
 mod setpoint;
+mod state;
 mod status;
 mod stopped;
 mod turns;
 mod units;
 mod watch;
+mod withdrawn;
 
 pub use async_trait::async_trait;
 pub use tokio_modbus;
 
 pub use absent::Absent;
-pub use access::{Calls, Lifetimes, Registers};
+pub use address::{SlaveAddress, SlaveAddressError};
+pub use calls::{Calls, Lifetimes, Registers};
 pub use capabilities::{Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
 pub use drive::{BroadcastWrite, Drive};
-pub use error::{
-    Error, ErrorKind, ExceptionMeaning, Exchange, Refusal, Result, SelfRestart, SetpointProblem,
-    SlaveAddress, SlaveAddressError,
-};
+pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SetpointProblem};
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use intent::Intent;
 pub use kept_readings::KeptReadings;
-pub use lease::{Ground, Lack, Lease, Recognised, Verdict, Withdrawn};
+pub use lease::{Ground, Lack, Lease, Recognised, Verdict};
 pub use motion::{INJECTION_AT_MOST, INJECTION_TIME, Motion, Output, Shaft};
 pub use named::{NameError, is_name};
 pub use own_run::{Evidence, OwnRun, RunWord, Told};
 pub use port::{Class, Effect, Port, PortError, Terms};
 pub use reconnecting::Reconnecting;
+pub use refusal::{Refusal, SelfRestart};
 pub use registers::{Row, Written};
 pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
-pub use status::{Control, Measurements, RawWord, State, Status};
+pub use state::{Control, State};
+pub use status::{Measurements, RawWord, Status};
 pub use stopped::Stopped;
 pub use turns::{STATUSES_PER_TURN, Turns};
 pub use units::{Current, Frequency, Percent, Power, Speed, UnitError, Voltage};
 pub use watch::Watch;
+pub use withdrawn::Withdrawn;

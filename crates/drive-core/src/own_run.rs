@@ -2,8 +2,8 @@
 //! in a drive's words.
 
 use crate::{
-    error::Refusal,
     lease::{Lack, Lease, Verdict},
+    refusal::Refusal,
 };
 
 /// What the drive's own words say of the run command that was given.
@@ -215,7 +215,7 @@ impl OwnRun {
 
 #[cfg(test)]
 mod tests {
-    use crate::{setpoint::Direction, status::Control};
+    use crate::{setpoint::Direction, state::Control};
 
     use super::*;
 

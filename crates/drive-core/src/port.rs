@@ -6,7 +6,7 @@ use async_trait::async_trait;
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
 
-use crate::error::SlaveAddress;
+use crate::address::SlaveAddress;
 
 /// How urgent a call is. A line serves a higher class first, always.
 ///

@@ -24,13 +24,6 @@ use serde::{
 };
 use tokio::time::Instant;
 
-use crate::{
-    error::Refusal,
-    faults::{Fault, FaultEntry},
-    lease::{Lack, Verdict},
-    setpoint::{Command, Direction, Setpoint, StopMode},
-};
-
 /// A moment, or none, as its age in milliseconds when it is written.
 ///
 /// # Errors
@@ -157,11 +150,10 @@ const KEPT: usize = 1 << 20;
 /// Words of a manual that were read, each kept once for the life of the program.
 struct Words {
     texts: BTreeSet<&'static str>,
-    entries: Vec<&'static FaultEntry>,
     bytes: usize,
 }
 
-static WORDS: Mutex<Words> = Mutex::new(Words { texts: BTreeSet::new(), entries: Vec::new(), bytes: 0 });
+static WORDS: Mutex<Words> = Mutex::new(Words { texts: BTreeSet::new(), bytes: 0 });
 
 impl Words {
     /// Whether there is room for so many bytes more; they are counted then.
@@ -182,16 +174,16 @@ impl Words {
         self.texts.insert(kept);
         kept
     }
+}
 
-    fn entry(&mut self, entry: FaultEntry) -> Option<&'static FaultEntry> {
-        let known = self.entries.iter().copied().find(|known| **known == entry);
-        known.or_else(|| {
-            let kept: &'static FaultEntry =
-                self.takes(size_of::<FaultEntry>()).then(|| &*Box::leak(Box::new(entry)))?;
-            self.entries.push(kept);
-            Some(kept)
-        })
-    }
+/// The same text, kept; `?` where there is no room.
+pub(crate) fn text(text: &str) -> &'static str {
+    WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(text)
+}
+
+/// Whether what is read may take so many bytes more; they are counted then.
+pub(crate) fn there_is_room_for(bytes: usize) -> bool {
+    WORDS.lock().unwrap_or_else(PoisonError::into_inner).takes(bytes)
 }
 
 /// A word of a manual, such as a mnemonic, for `#[serde(deserialize_with = "…")]`: the types of a drive have it from the
@@ -201,8 +193,7 @@ impl Words {
 /// # Errors
 /// Those of the deserializer.
 pub fn kept<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
-    let text = String::deserialize(deserializer)?;
-    Ok(WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&text))
+    Ok(text(&String::deserialize(deserializer)?))
 }
 
 fn whole_ms(time: Duration) -> u64 {
@@ -264,192 +255,6 @@ impl Visitor<'_> for Number {
     fn visit_u64<E: de::Error>(self, value: u64) -> Result<i64, E> {
         let signed = i64::try_from(value);
         self.visit_i64(signed.map_err(|_| E::custom("the number is too large"))?)
-    }
-}
-
-/// What the manual does not list has a code alone.
-impl Serialize for Fault {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Unlisted {
-            code: u16,
-        }
-        match self.entry {
-            Some(entry) => FaultEntry { code: self.code, ..*entry }.serialize(serializer),
-            None => Unlisted { code: self.code }.serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Fault {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        struct Listed {
-            code: u16,
-            mnemonic: Option<String>,
-            meaning: Option<String>,
-            remedy: Option<String>,
-        }
-        let Listed { code, mnemonic, meaning, remedy } = Listed::deserialize(deserializer)?;
-        let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = mnemonic.zip(meaning).zip(remedy).and_then(|((mnemonic, meaning), remedy)| {
-            let (mnemonic, meaning) = (words.text(&mnemonic), words.text(&meaning));
-            let remedy = words.text(&remedy);
-            words.entry(FaultEntry { code, mnemonic, meaning, remedy })
-        });
-        Ok(Self { code, entry })
-    }
-}
-
-/// Its word, its text and what it was given: `{"action": "start", "command": "start forward", "direction": "forward"}`.
-impl Serialize for Command {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut told = Told {
-            action: self.action().into(),
-            command: self.to_string(),
-            direction: None,
-            mode: None,
-            setpoint: None,
-            register: None,
-        };
-        match *self {
-            Self::Start(direction) => told.direction = Some(direction),
-            Self::Stop(mode) => told.mode = Some(mode),
-            Self::Setpoint(setpoint) => told.setpoint = Some(setpoint),
-            Self::WriteParameter(register) => told.register = Some(register),
-            _ => {}
-        }
-        told.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Command {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Told { action, command, direction, mode, setpoint, register } = Told::deserialize(deserializer)?;
-        let missing = |field| de::Error::missing_field(field);
-        Ok(match &*action {
-            "start" => Self::Start(direction.ok_or_else(|| missing("direction"))?),
-            "stop" => Self::Stop(mode.ok_or_else(|| missing("mode"))?),
-            "withdraw" => Self::Withdraw,
-            "setpoint" => Self::Setpoint(setpoint.ok_or_else(|| missing("setpoint"))?),
-            "reset" => Self::ResetFaults,
-            "release" => Self::Release,
-            "watchdog" => Self::ArmWatchdog,
-            "parameter" => Self::WriteParameter(register.ok_or_else(|| missing("register"))?),
-            "save" => Self::Persist,
-            "configure" => {
-                Self::Configure(WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&command))
-            }
-            other => return Err(de::Error::custom(format_args!("no command is called {other:?}"))),
-        })
-    }
-}
-
-#[derive(Serialize, Deserialize)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-struct Told {
-    action: String,
-    command: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    direction: Option<Direction>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    mode: Option<StopMode>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    setpoint: Option<Setpoint>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    register: Option<u16>,
-}
-
-/// A verdict as an object: its word, what is lacking, and the sentence.
-pub(crate) mod verdict {
-    use super::{Deserialize, Deserializer, Serialize, Serializer, Verdict, VerdictObject};
-
-    pub(crate) fn serialize<S: Serializer>(
-        verdict: &Option<Verdict>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        verdict.as_ref().map(VerdictObject::from).serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Verdict>, D::Error> {
-        Ok(Option::<VerdictObject>::deserialize(deserializer)?.map(Verdict::from))
-    }
-}
-
-#[derive(Serialize, Deserialize)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub(crate) struct VerdictObject {
-    verdict: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    lacks: Option<Lack>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    because: Option<String>,
-}
-
-impl From<&Verdict> for VerdictObject {
-    fn from(verdict: &Verdict) -> Self {
-        let lacks = match verdict {
-            Verdict::NotInForce { lacks, .. } => Some(*lacks),
-            Verdict::InForce | Verdict::NotKnown => None,
-        };
-        let because = verdict.because().map(|because| because.to_string());
-        Self { verdict: verdict.word().to_owned(), lacks, because }
-    }
-}
-
-impl From<VerdictObject> for Verdict {
-    fn from(object: VerdictObject) -> Self {
-        let VerdictObject { verdict, lacks, because } = object;
-        match (&*verdict, lacks) {
-            ("in_force", _) => Self::InForce,
-            ("not_in_force", Some(lacks)) => {
-                let because = because.unwrap_or_default();
-                let because = WORDS.lock().unwrap_or_else(PoisonError::into_inner).text(&because);
-                // The sentence is what is told of a reason.
-                Self::lacks(lacks, Refusal::Settings(because))
-            }
-            _ => Self::NotKnown,
-        }
-    }
-}
-
-#[cfg(feature = "schemars")]
-mod schemas {
-    use std::borrow::Cow;
-
-    use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-
-    use super::{Command, Fault, Told};
-
-    impl JsonSchema for Command {
-        fn schema_name() -> Cow<'static, str> {
-            "Command".into()
-        }
-
-        fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-            Told::json_schema(generator)
-        }
-    }
-
-    impl JsonSchema for Fault {
-        fn schema_name() -> Cow<'static, str> {
-            "Fault".into()
-        }
-
-        fn json_schema(_: &mut SchemaGenerator) -> Schema {
-            json_schema!({
-                "type": "object",
-                "properties": {
-                    "code": {"type": "integer"},
-                    "mnemonic": {"type": "string"},
-                    "meaning": {"type": "string"},
-                    "remedy": {"type": "string"}
-                },
-                "required": ["code"]
-            })
-        }
     }
 }
 

@@ -1,5 +1,8 @@
 //! What is asked of a drive: direction, setpoint, stop mode.
 
+#[cfg(feature = "serde")]
+mod json;
+
 use std::{fmt, str::FromStr};
 
 use crate::units::{Frequency, Percent, Speed, UnitError};

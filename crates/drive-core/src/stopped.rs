@@ -2,11 +2,7 @@
 
 use std::{fmt, time::Duration};
 
-use crate::{
-    motion::Shaft,
-    setpoint::StopMode,
-    status::{Control, Status},
-};
+use crate::{motion::Shaft, setpoint::StopMode, state::Control, status::Status};
 
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]

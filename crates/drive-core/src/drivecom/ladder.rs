@@ -8,15 +8,19 @@ use super::{
     words::ControlWord,
 };
 use crate::{
+    address::SlaveAddress,
     confirm::Confirming,
-    error::{Error, ErrorKind, Refusal, Result, SlaveAddress},
-    lease::{Lease, Withdrawn},
+    error::{Error, ErrorKind, Result},
+    lease::Lease,
     own_run::OwnRun,
     port::{Class, Effect},
+    refusal::Refusal,
     setpoint::{Command, Direction, StopMode},
-    status::{Control, State, Status},
+    state::{Control, State},
+    status::Status,
     stopped::Stopped,
     units::Frequency,
+    withdrawn::Withdrawn,
 };
 
 /// After how many readings that do not show a stop it is written again: half a second apart, once the readings have found

@@ -1,7 +1,7 @@
 //! The limits of a setpoint in rpm, as the Altivar 28 and 312 hold them, and whether the drive follows a setpoint.
 
 use crate::{
-    access::Calls,
+    calls::Calls,
     error::{Result, SetpointProblem},
     port::Port,
     registers::{Register, access::Readable},

@@ -10,13 +10,14 @@ use super::{
     proof::Question,
 };
 use crate::{
-    error::Refusal,
     intent::Intent,
     lease::Lease,
     motion::Output,
     own_run::{Evidence, RunWord, Told},
+    refusal::Refusal,
     setpoint::{Direction, StopMode},
-    status::{Control, State, Status},
+    state::{Control, State},
+    status::Status,
     units::Frequency,
 };
 

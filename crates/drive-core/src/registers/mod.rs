@@ -49,7 +49,6 @@
 //! write(ETA);
 //! ```
 
-pub mod access;
 mod guard;
 mod restoring;
 mod row;
@@ -57,7 +56,7 @@ mod unit;
 
 use std::{fmt, marker::PhantomData};
 
-pub use access::Access;
+pub use crate::access::{self, Access};
 pub use guard::refuse_commands;
 pub use restoring::{Change, Part, Restoring, Scaled, Step, in_order};
 pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::{access::Access, unit::Unit};
+use super::unit::Unit;
+use crate::access::Access;
 
 /// Where a written value lives, and so what a power cycle and a write cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
