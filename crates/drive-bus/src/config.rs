@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, time::Duration};
 use drive_core::serial::SerialSettings;
 
 pub use crate::exchange::echo::Echo;
-use crate::{gateway::Gateway, pdu::MAX_PDU, protocol::Protocol};
+use crate::{exchange::Machine, gateway::Gateway, pdu::MAX_PDU, protocol::Protocol};
 
 /// Where a line goes. Ways whose feature is not compiled in do not exist.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -166,6 +166,11 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
+    /// The machine of what this line speaks.
+    pub(crate) fn machine(&self) -> Box<dyn Machine> {
+        self.protocol.machine(self.serial, self.chunk_gap, self.echo)
+    }
+
     /// A serial port, echo found out by the line. Feature `serial`.
     #[cfg(feature = "serial")]
     #[must_use]

@@ -14,7 +14,9 @@ use crate::exchange::ascii;
 pub use crate::exchange::ascii::AsciiSettings;
 #[cfg(feature = "tcp")]
 use crate::exchange::mbap;
-use crate::exchange::rtu;
+#[cfg(feature = "unitelway")]
+use crate::exchange::unitelway;
+use crate::exchange::{Machine, echo::Echo, rtu};
 #[cfg(feature = "unitelway")]
 pub use drive_unitelway::{NetworkHeader, UniTelwaySettings};
 
@@ -51,6 +53,19 @@ impl Protocol {
             Self::Ascii(_) => "ascii",
             #[cfg(feature = "unitelway")]
             Self::UniTelway(_) => "unitelway",
+        }
+    }
+
+    /// The machine of its exchanges, on a line with these settings.
+    pub(crate) fn machine(self, serial: SerialSettings, chunk_gap: Duration, echo: Echo) -> Box<dyn Machine> {
+        match self {
+            Self::Rtu => Box::new(rtu::Rtu::new(serial, chunk_gap, echo)),
+            #[cfg(feature = "tcp")]
+            Self::Tcp => Box::new(mbap::Mbap::new()),
+            #[cfg(feature = "ascii")]
+            Self::Ascii(settings) => Box::new(ascii::Ascii::new(serial, settings, echo)),
+            #[cfg(feature = "unitelway")]
+            Self::UniTelway(settings) => Box::new(unitelway::UniTelway::new(serial, settings, chunk_gap)),
         }
     }
 

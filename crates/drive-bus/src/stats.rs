@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, time::Duration};
 use drive_core::Class;
 
 #[cfg(feature = "unitelway")]
-use crate::unite::LinkCounters;
+use drive_unitelway::LinkCounters;
 
 /// Buckets of an octave.
 const SUB: usize = 8;

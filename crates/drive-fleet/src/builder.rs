@@ -18,13 +18,15 @@ use tokio::{
 
 use crate::{
     event::Teller,
-    fleet::{Fleet, LineEntry, Members},
+    fleet::{Fleet, Members},
     handle::Entry,
+    line_entry::LineEntry,
     plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
     runs::{Keeper, RunKept},
-    settings::{DriveSettings, WatchdogContract},
+    settings::DriveSettings,
     supervisor::Supervisor,
     task::{Desk, Task},
+    watchdog::WatchdogContract,
 };
 
 /// How many orders of one drive may be on their way to its task.

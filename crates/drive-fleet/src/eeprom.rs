@@ -7,7 +7,7 @@ use std::{
 
 use tokio::time::Instant;
 
-use crate::settings::WatchdogContract;
+use crate::watchdog::WatchdogContract;
 
 /// How often an EEPROM may be written in a day until that is an alarm, and what the fleet itself writes is held back. The least that
 /// is known of the families is 10 000 writes in a life, so that this is more than a year.

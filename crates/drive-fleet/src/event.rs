@@ -9,8 +9,8 @@ use std::{
 
 use drive_bus::evidence::Finding;
 use drive_core::{
-    Command, Control, Current, Error, Ground, Identity, Lease, Motion, Percent, Refusal, SelfRestart,
-    Setpoint, State, Status, StopMode, Watchdog,
+    Command, Control, Error, Ground, Identity, Lease, Motion, Refusal, SelfRestart, Setpoint, State, Status,
+    StopMode, Watchdog,
 };
 use tokio::{
     sync::{broadcast, mpsc},
@@ -20,10 +20,11 @@ use tokio::{
 use crate::{
     cause::{Cause, ChangedWord},
     eeprom::{EepromLedger, EepromUse},
+    exceeded::Limit,
     outcome::{Outcome, Tenths},
     runs::RunKept,
-    settings::WatchdogBefore,
     snapshot::Trip,
+    watchdog::WatchdogBefore,
 };
 
 /// Something that happened to a drive.
@@ -466,58 +467,6 @@ fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
             Some(code) => write!(f, ": fault {code}"),
             None => Ok(()),
         },
-    }
-}
-
-/// A measured value that has a limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(tag = "of", rename_all = "snake_case")
-)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub enum Limit {
-    /// The motor current.
-    Current {
-        /// Measured.
-        #[cfg_attr(feature = "serde", serde(rename = "measured_a"))]
-        measured: Current,
-        /// Its limit.
-        #[cfg_attr(feature = "serde", serde(rename = "limit_a"))]
-        limit: Current,
-    },
-    /// The thermal state of the drive.
-    DriveThermal {
-        /// Measured.
-        #[cfg_attr(feature = "serde", serde(rename = "measured_percent"))]
-        measured: Percent,
-        /// Its limit.
-        #[cfg_attr(feature = "serde", serde(rename = "limit_percent"))]
-        limit: Percent,
-    },
-    /// The thermal state of the motor.
-    MotorThermal {
-        /// Measured.
-        #[cfg_attr(feature = "serde", serde(rename = "measured_percent"))]
-        measured: Percent,
-        /// Its limit.
-        #[cfg_attr(feature = "serde", serde(rename = "limit_percent"))]
-        limit: Percent,
-    },
-}
-
-impl fmt::Display for Limit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Current { measured, limit } => write!(f, "current {measured} of {limit}"),
-            Self::DriveThermal { measured, limit } => {
-                write!(f, "thermal state of the drive {measured} of {limit}")
-            }
-            Self::MotorThermal { measured, limit } => {
-                write!(f, "thermal state of the motor {measured} of {limit}")
-            }
-        }
     }
 }
 

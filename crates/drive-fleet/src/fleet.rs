@@ -17,53 +17,17 @@ use futures_core::Stream;
 use futures_util::future::join_all;
 use tokio::{
     runtime::Handle,
-    sync::{
-        Semaphore,
-        broadcast::{self, error::RecvError},
-    },
-    time::Instant,
+    sync::broadcast::{self, error::RecvError},
 };
 
 use crate::{
     cause::{Cause, Policy},
     event::{Event, EventKind, ExitAction, Happened, Teller},
     handle::{DriveHandle, Entry},
-    plan::{LineBudget, LinePlan},
-    task::Urgent,
+    line_entry::LineEntry,
+    message::Urgent,
+    plan::LinePlan,
 };
-
-/// A line of the fleet.
-pub(crate) struct LineEntry {
-    pub(crate) name: Arc<str>,
-    pub(crate) line: Line,
-    pub(crate) budget: LineBudget,
-    plan: Mutex<LinePlan>,
-    /// When the commands of groups may use it again; who holds it is using it.
-    pub(crate) commands: tokio::sync::Mutex<Instant>,
-    /// The turn that its drives take one after the other.
-    pub(crate) turns: Arc<Semaphore>,
-}
-
-impl LineEntry {
-    pub(crate) fn new(name: String, line: Line, budget: LineBudget, plan: LinePlan) -> Self {
-        Self {
-            name: Arc::from(name),
-            line,
-            budget,
-            plan: Mutex::new(plan),
-            commands: tokio::sync::Mutex::new(Instant::now()),
-            turns: Arc::new(Semaphore::new(1)),
-        }
-    }
-
-    pub(crate) fn plan(&self) -> LinePlan {
-        *self.plan.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(crate) fn set_plan(&self, plan: LinePlan) {
-        *self.plan.lock().unwrap_or_else(PoisonError::into_inner) = plan;
-    }
-}
 
 /// Who belongs to the fleet.
 #[derive(Clone, Default)]

@@ -22,9 +22,10 @@ use tokio_modbus::{Request, client::Client};
 
 use crate::{
     cause::Act,
-    fleet::{Fleet, LineEntry, Members},
-    group_ticket::{GroupStop, GroupTicket, Told},
+    fleet::{Fleet, Members},
+    group_ticket::{GroupStop, GroupTicket, StopReport, Told},
     handle::{DriveHandle, Entry},
+    line_entry::LineEntry,
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     snapshot::{Link, Snapshot, has_reached},
     stop_order::{StopOrder, strength},
@@ -65,42 +66,6 @@ impl Fleet {
     /// Stops every drive: see [`Group::stop`].
     pub fn stop_all(&self, order: impl Into<StopOrder>) -> GroupStop {
         self.all().stop(order)
-    }
-}
-
-/// What became of a stop of several drives.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[must_use = "a stop that is not confirmed is an alarm"]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub struct StopReport {
-    /// Drives that show standstill.
-    pub confirmed: Vec<Arc<str>>,
-    /// Drives that do not, and why. Their stops go on being repeated.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::view::by_drive"))]
-    #[cfg_attr(feature = "schemars", schemars(with = "Vec<crate::view::OfDrive>"))]
-    pub unconfirmed: Vec<(Arc<str>, Outcome)>,
-    /// Drives that are only read: nothing was sent to them.
-    pub read_only: Vec<Arc<str>>,
-    /// Lines on which one broadcast went out first.
-    pub broadcasts: Vec<Arc<str>>,
-}
-
-impl StopReport {
-    /// Whether every drive that may be commanded shows standstill.
-    #[must_use]
-    pub fn is_confirmed(&self) -> bool {
-        self.unconfirmed.is_empty()
-    }
-}
-
-impl fmt::Display for StopReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} confirmed", self.confirmed.len())?;
-        for (name, outcome) in &self.unconfirmed {
-            write!(f, "; {name}: {outcome}")?;
-        }
-        Ok(())
     }
 }
 

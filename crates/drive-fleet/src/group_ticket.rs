@@ -11,7 +11,6 @@ use futures_util::future::join_all;
 use tokio::{runtime::Handle, sync::watch, task::AbortHandle};
 
 use crate::{
-    group::StopReport,
     outcome::Outcome,
     ticket::{StopTicket, Ticket},
 };
@@ -84,6 +83,42 @@ impl IntoFuture for GroupStop {
 
     fn into_future(self) -> Self::IntoFuture {
         Box::pin(async move { self.finished().await })
+    }
+}
+
+/// What became of a stop of several drives.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[must_use = "a stop that is not confirmed is an alarm"]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+pub struct StopReport {
+    /// Drives that show standstill.
+    pub confirmed: Vec<Arc<str>>,
+    /// Drives that do not, and why. Their stops go on being repeated.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "crate::view::by_drive"))]
+    #[cfg_attr(feature = "schemars", schemars(with = "Vec<crate::view::OfDrive>"))]
+    pub unconfirmed: Vec<(Arc<str>, Outcome)>,
+    /// Drives that are only read: nothing was sent to them.
+    pub read_only: Vec<Arc<str>>,
+    /// Lines on which one broadcast went out first.
+    pub broadcasts: Vec<Arc<str>>,
+}
+
+impl StopReport {
+    /// Whether every drive that may be commanded shows standstill.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.unconfirmed.is_empty()
+    }
+}
+
+impl fmt::Display for StopReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} confirmed", self.confirmed.len())?;
+        for (name, outcome) in &self.unconfirmed {
+            write!(f, "; {name}: {outcome}")?;
+        }
+        Ok(())
     }
 }
 

@@ -23,15 +23,16 @@ use tokio::{
 use crate::{
     cause::Act,
     event::ExitAction,
-    fleet::LineEntry,
+    line_entry::LineEntry,
+    message::{Message, Urgent},
     outcome::{Order, Refused, Until},
     plan::Demand,
+    progress::{Progress, refused},
     settings::{DriveSettings, Left},
     snapshot::{Snapshot, WatchdogCheck},
     stop_order::StopOrder,
     supervisor::{CallId, Leave, Question, Told},
-    task::{Message, Urgent},
-    ticket::{Progress, StopTicket, Ticket, refused},
+    ticket::{StopTicket, Ticket},
 };
 
 /// What the handles of a drive share.

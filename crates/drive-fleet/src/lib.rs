@@ -49,14 +49,18 @@ mod cause;
 mod concern;
 mod eeprom;
 mod event;
+mod exceeded;
 mod fleet;
 mod group;
 mod group_ticket;
 mod handle;
 mod limits;
+mod line_entry;
 mod membership;
+mod message;
 mod outcome;
 mod plan;
+mod progress;
 mod runs;
 mod settings;
 mod shows;
@@ -67,17 +71,20 @@ mod task;
 #[cfg(test)]
 mod testing;
 mod ticket;
+mod troubles;
 #[cfg(feature = "serde")]
 pub mod view;
+mod watchdog;
 
 pub use builder::{FleetBuilder, FleetError, SettingProblem, check_settings};
 pub use cause::{Act, Cause, ChangedWord, Policy};
 pub use concern::{Concern, ConcernKind, Severity};
 pub use eeprom::{EEPROM_WRITES_A_DAY, EepromLedger, EepromUse, InVain};
-pub use event::{Event, EventKind, ExitAction, Limit};
+pub use event::{Event, EventKind, ExitAction};
+pub use exceeded::Limit;
 pub use fleet::{Events, Fleet, Received};
-pub use group::{Group, GroupFailure, GroupStart, GroupStarted, NoSuchDrive, StopReport};
-pub use group_ticket::{GroupStop, GroupTicket};
+pub use group::{Group, GroupFailure, GroupStart, GroupStarted, NoSuchDrive};
+pub use group_ticket::{GroupStop, GroupTicket, StopReport};
 pub use handle::DriveHandle;
 pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{
@@ -87,7 +94,7 @@ pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, foreca
 pub use runs::RunKept;
 pub use settings::{
     Alarms, Commanders, DriveSettings, Left, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
-    OnLoss, Periods, RunRecord, Times, WatchdogBefore, WatchdogContract,
+    OnLoss, Periods, RunRecord, Times,
 };
 pub use shows::Shows;
 pub use snapshot::{
@@ -96,3 +103,4 @@ pub use snapshot::{
 pub use stop_order::StopOrder;
 pub use supervisor::checks::FEED_PART;
 pub use ticket::{StopTicket, Ticket};
+pub use watchdog::{WatchdogBefore, WatchdogContract};

@@ -11,10 +11,11 @@ use crate::{
     builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
     cause::Policy,
     event::ExitAction,
-    fleet::{Fleet, LineEntry, Members, end},
+    fleet::{Fleet, Members, end},
+    line_entry::LineEntry,
+    message::Urgent,
     plan::forecast,
     settings::DriveSettings,
-    task::Urgent,
 };
 
 impl Fleet {

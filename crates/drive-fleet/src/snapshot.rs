@@ -1,5 +1,8 @@
 //! What a fleet knows of a drive: [`Snapshot`], with the time of each value and a verdict on its age.
 
+#[cfg(feature = "serde")]
+mod json;
+
 use std::{
     borrow::Cow,
     collections::VecDeque,
@@ -15,7 +18,7 @@ use tokio::time::Instant;
 
 use crate::{
     concern::ConcernKind,
-    event::Limit,
+    exceeded::Limit,
     outcome::{LastSeen, Refused},
 };
 
@@ -155,7 +158,7 @@ pub enum WatchdogCheck {
     /// The settings have no contract for it. As it was found it is fed all the same.
     NoContract {
         /// As it was found; `None` where it has not been read, or cannot be.
-        #[cfg_attr(feature = "serde", serde(flatten, deserialize_with = "crate::view::watchdog"))]
+        #[cfg_attr(feature = "serde", serde(flatten, deserialize_with = "json::watchdog"))]
         found: Option<Watchdog>,
     },
     /// Not read since the drive was connected.
@@ -166,8 +169,8 @@ pub enum WatchdogCheck {
     Verified(Watchdog),
     /// It cannot be brought to what the contract says.
     Broken(
-        #[cfg_attr(feature = "serde", serde(with = "crate::view::why"))]
-        #[cfg_attr(feature = "schemars", schemars(with = "crate::view::Why"))]
+        #[cfg_attr(feature = "serde", serde(with = "json::why"))]
+        #[cfg_attr(feature = "schemars", schemars(with = "json::Why"))]
         String,
     ),
 }

@@ -8,64 +8,23 @@ use std::{
 };
 
 use drive_bus::Slave;
-use drive_core::{Drive, Error, Lease, Lifetimes, Setpoint};
+use drive_core::{Drive, Error, Lease, Lifetimes};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
 };
 
 use crate::{
-    cause::{Act, Policy},
+    cause::Act,
     event::{ExitAction, Teller},
-    outcome::{Order, Refused},
+    message::{Message, Urgent},
+    outcome::Refused,
+    progress::Report,
     runs::Keeper,
     settings::{DriveSettings, Left, RunRecord},
     snapshot::Snapshot,
-    stop_order::StopOrder,
-    supervisor::{Asker, CallId, Job, Leave, Output, Question, Reply, Step, Supervisor, Told, Turn},
-    ticket::Report,
+    supervisor::{Asker, CallId, Job, Output, Question, Reply, Step, Supervisor, Told, Turn},
 };
-
-/// What waits its turn.
-#[derive(Debug)]
-pub(crate) enum Message {
-    /// An order.
-    Order {
-        id: CallId,
-        order: Order,
-        leave: Option<Leave>,
-        /// When it may not be sent any more; `None`: as the settings say.
-        expires: Option<Instant>,
-        act: Arc<Act>,
-        reply: Report,
-    },
-    /// A question.
-    Question { id: CallId, question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
-    /// The question whether a start would be sent now.
-    Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
-}
-
-/// What waits for nothing.
-#[derive(Debug)]
-pub(crate) enum Urgent {
-    /// A stop.
-    Stop {
-        id: CallId,
-        order: StopOrder,
-        act: Arc<Act>,
-        /// Until its lack of confirmation is an alarm; `None`: as the settings say.
-        patience: Option<Duration>,
-        reply: Report,
-    },
-    /// The ticket of an order was dropped before its outcome was heard.
-    Withdraw(CallId),
-    /// Other settings.
-    Settings(Arc<DriveSettings>),
-    /// The fleet shuts down, or the drive leaves it: by which policy it ends.
-    Exit(Policy),
-    /// The time for shutting down is over.
-    ExitTimeOver,
-}
 
 /// The task of one drive.
 pub(crate) struct Task {

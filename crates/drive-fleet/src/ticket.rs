@@ -7,43 +7,14 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use tokio::sync::{mpsc, watch};
+use tokio::sync::mpsc;
 
 use crate::{
+    message::Urgent,
     outcome::{Outcome, Refused},
+    progress::{Hearer, outcome},
     supervisor::CallId,
-    task::Urgent,
 };
-
-/// How far a command has come.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Progress {
-    /// The drive has shown that it is in force, and how.
-    pub(crate) in_force: Option<Outcome>,
-    pub(crate) finished: Option<Outcome>,
-}
-
-/// Where the progress of a command is told.
-pub(crate) type Report = watch::Sender<Progress>;
-
-/// Where it is heard.
-pub(crate) type Hearer = watch::Receiver<Progress>;
-
-/// A command that has ended before it began.
-pub(crate) fn refused(refused: Refused) -> Hearer {
-    watch::Sender::new(Progress { in_force: None, finished: Some(Outcome::Refused(refused)) }).subscribe()
-}
-
-/// What became of a command, when it is known; with `early` also that it is in force.
-async fn outcome(hearer: &Hearer, early: bool) -> Outcome {
-    let known = |progress: &Progress| {
-        let in_force = progress.in_force.clone().filter(|_| early);
-        in_force.or_else(|| progress.finished.clone())
-    };
-    let mut hearer = hearer.clone();
-    let told = hearer.wait_for(|progress| known(progress).is_some()).await;
-    told.ok().and_then(|progress| known(&progress)).unwrap_or(Outcome::Refused(Refused::ShutDown))
-}
 
 /// An order that was given to a drive: it is on its way, whether or not anybody awaits this.
 ///

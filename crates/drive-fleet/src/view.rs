@@ -22,18 +22,19 @@ use drive_core::{
     Command, Control, Error, ErrorKind, Fault, Ground, Identity, Lease, Measurements, Motion, Refusal,
     SelfRestart, Setpoint, State, Status, StopMode, Watchdog,
 };
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use tokio::time::Instant;
 
 use crate::{
     cause::{Cause, ChangedWord},
     concern::{Concern, ConcernKind, Severity},
     eeprom::{EepromLedger, EepromUse},
-    event::{Event, EventKind, ExitAction, Limit},
+    event::{Event, EventKind, ExitAction},
+    exceeded::Limit,
     outcome::{Became, LastSeen, Outcome, Refused, Started, StopModes, Unconfirmed},
-    settings::WatchdogBefore,
     shows::Shows,
     snapshot::{Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Trip, WatchdogCheck},
+    watchdog::WatchdogBefore,
 };
 
 /// What is known of a drive.
@@ -748,31 +749,6 @@ pub(crate) fn by_drive<S: Serializer>(
         outcome: outcome.into(),
     };
     serializer.collect_seq(outcomes.iter().map(told))
-}
-
-/// Why a watchdog is not as it has to be.
-#[derive(Serialize, Deserialize)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-pub(crate) struct Why {
-    why: String,
-}
-
-/// What is off is told like what nobody has read, and reads back as that.
-pub(crate) fn watchdog<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Watchdog>, D::Error> {
-    let found = Watchdog::deserialize(deserializer)?;
-    Ok((found.timeout.is_some() || found.reaction.is_some()).then_some(found))
-}
-
-pub(crate) mod why {
-    use super::{Deserialize, Deserializer, Serialize, Serializer, Why};
-
-    pub(crate) fn serialize<S: Serializer>(why: &str, serializer: S) -> Result<S::Ok, S::Error> {
-        Why { why: why.to_owned() }.serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-        Ok(Why::deserialize(deserializer)?.why)
-    }
 }
 
 /// Writes a type as its object.

@@ -24,9 +24,9 @@ pub mod referee;
 pub mod rig;
 pub mod truth;
 pub mod words;
-pub mod worlds;
 
 pub use contract::Contract;
+pub use contract::worlds;
 
 /// The examples of the README.
 #[cfg(doctest)]

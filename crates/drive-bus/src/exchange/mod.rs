@@ -20,21 +20,7 @@ use drive_core::Class;
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response};
 
-use crate::{config::LineConfig, pdu, protocol::Protocol, shape::Shape};
-
-/// The machine of what a line of this configuration speaks.
-pub(crate) fn of(config: &LineConfig) -> Box<dyn Machine> {
-    let (serial, chunk_gap, echo) = (config.serial, config.chunk_gap, config.echo);
-    match config.protocol {
-        Protocol::Rtu => Box::new(rtu::Rtu::new(serial, chunk_gap, echo)),
-        #[cfg(feature = "tcp")]
-        Protocol::Tcp => Box::new(mbap::Mbap::new()),
-        #[cfg(feature = "ascii")]
-        Protocol::Ascii(settings) => Box::new(ascii::Ascii::new(serial, settings, echo)),
-        #[cfg(feature = "unitelway")]
-        Protocol::UniTelway(settings) => Box::new(unitelway::UniTelway::new(serial, settings, chunk_gap)),
-    }
-}
+use crate::{pdu, shape::Shape};
 
 const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 

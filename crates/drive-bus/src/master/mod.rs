@@ -31,7 +31,7 @@ use crate::{
     answer,
     config::{self, LineConfig, SlaveSettings},
     evidence::{Evidence, Fact, Finding, Known, What},
-    exchange::{self, Answer, Failure, Frame, Machine, Step, Stray},
+    exchange::{Answer, Failure, Frame, Machine, Step, Stray},
     pdu,
     record::{Ending, Exchange, Record},
     schedule::{Entry, Rules, Schedule, Ticket},
@@ -201,7 +201,7 @@ impl<C> Master<C> {
     #[must_use]
     pub fn new(now: Instant, config: LineConfig) -> Self {
         let mut master = Self {
-            exchange: exchange::of(&config),
+            exchange: config.machine(),
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
             stations: BTreeMap::new(),
             offline: Offline::default(),
@@ -624,7 +624,7 @@ impl<C> Master<C> {
 
     /// A slave has said what its link has counted.
     #[cfg(feature = "unitelway")]
-    pub(crate) fn note_link_counters(&mut self, slave: u8, counters: crate::unite::LinkCounters) {
+    pub(crate) fn note_link_counters(&mut self, slave: u8, counters: drive_unitelway::LinkCounters) {
         self.station(slave).stats.link = Some(counters);
     }
 

@@ -23,7 +23,7 @@ use super::{Asked, Flight, Master, Purpose, port::PortState, probing};
 use crate::{
     answer,
     config::LineConfig,
-    exchange::{self, Answer, Machine, Step},
+    exchange::{Answer, Machine, Step},
     pdu,
     schedule::{Entry, Ticket},
     stats::SecondConnection,
@@ -209,7 +209,7 @@ impl<C> Master<C> {
             return;
         }
         self.second.state = State::Open { since: now, serves: false };
-        self.second.machine = Some(exchange::of(&self.config));
+        self.second.machine = Some(self.config.machine());
         self.second.free_at = None;
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_bus::{LineConfig, Protocol};
 use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
-use crate::settings::{Periods, WatchdogContract};
+use crate::{settings::Periods, watchdog::WatchdogContract};
 
 /// Words that an exchange of a status or of measurements is counted with.
 const WORDS: usize = 8;

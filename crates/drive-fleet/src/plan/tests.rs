@@ -4,10 +4,7 @@ use drive_bus::LineConfig;
 use drive_core::{Capabilities, Reaction, SerialSettings};
 
 use super::*;
-use crate::{
-    settings::{Periods, WatchdogContract},
-    testing::CAPABILITIES,
-};
+use crate::{settings::Periods, testing::CAPABILITIES, watchdog::WatchdogContract};
 
 const MS: Duration = Duration::from_millis(1);
 /// One exchange at 19200 8E1: 8 + 21 characters of 11 bits, t3.5, and the 10 ms of the slave.

@@ -12,9 +12,10 @@ use crate::{
     eeprom::InVain,
     event::EventKind,
     outcome::Refused,
-    settings::{DriveSettings, WatchdogBefore, WatchdogContract},
+    settings::DriveSettings,
     snapshot::{IdentityCheck, WatchdogCheck},
     supervisor::Job,
+    watchdog::{WatchdogBefore, WatchdogContract},
 };
 
 /// Until a check that failed is tried again.

@@ -12,7 +12,8 @@ use tokio::time::Instant;
 use super::{Asker, Job, Supervisor};
 use crate::{
     cause::{Cause, ChangedWord, Policy},
-    event::{EventKind, Limit},
+    event::EventKind,
+    exceeded::Limit,
     outcome::Refused,
     settings::{OnFault, OnLoss},
     snapshot::{Link, Timed, Trip},

@@ -4,15 +4,15 @@ pub mod adversary;
 mod claims;
 mod story;
 mod words;
+pub mod worlds;
 
 use drive_bus::Protocol;
 use drive_core::{Capabilities, Drive, ExceptionMeaning, Port, SerialSettings, SlaveAddress};
 use drive_sim::Model;
 
-use crate::{
-    rig::Rig,
-    worlds::{Share, Surrounded},
-};
+use crate::rig::Rig;
+
+use worlds::{Share, Surrounded};
 
 /// How many of its worlds a family is checked in.
 const CHECKED: Share = Share::one_in(61);

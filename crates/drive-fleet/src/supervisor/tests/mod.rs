@@ -20,9 +20,10 @@ use super::*;
 use crate::{
     limits::{Band, FrequencyLimits},
     outcome::{Order, Refused, Unconfirmed, Until},
-    settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss, WatchdogContract},
+    settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss},
     stop_order::StopOrder,
     testing::CAPABILITIES,
+    watchdog::WatchdogContract,
 };
 
 const MS: Duration = Duration::from_millis(1);

@@ -1,0 +1,56 @@
+//! What the task of a drive is told.
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::Setpoint;
+use tokio::{sync::oneshot, time::Instant};
+
+use crate::{
+    cause::{Act, Policy},
+    outcome::{Order, Refused},
+    progress::Report,
+    settings::DriveSettings,
+    stop_order::StopOrder,
+    supervisor::{CallId, Leave, Question, Told},
+};
+
+/// What waits its turn.
+#[derive(Debug)]
+pub(crate) enum Message {
+    /// An order.
+    Order {
+        id: CallId,
+        order: Order,
+        leave: Option<Leave>,
+        /// When it may not be sent any more; `None`: as the settings say.
+        expires: Option<Instant>,
+        act: Arc<Act>,
+        reply: Report,
+    },
+    /// A question.
+    Question { id: CallId, question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
+    /// The question whether a start would be sent now.
+    Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
+}
+
+/// What waits for nothing.
+#[derive(Debug)]
+pub(crate) enum Urgent {
+    /// A stop.
+    Stop {
+        id: CallId,
+        order: StopOrder,
+        act: Arc<Act>,
+        /// Until its lack of confirmation is an alarm; `None`: as the settings say.
+        patience: Option<Duration>,
+        reply: Report,
+    },
+    /// The ticket of an order was dropped before its outcome was heard.
+    Withdraw(CallId),
+    /// Other settings.
+    Settings(Arc<DriveSettings>),
+    /// The fleet shuts down, or the drive leaves it: by which policy it ends.
+    Exit(Policy),
+    /// The time for shutting down is over.
+    ExitTimeOver,
+}

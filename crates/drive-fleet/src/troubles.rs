@@ -1,0 +1,106 @@
+//! What troubles a drive now, read off its snapshot: by the table of [`ConcernKind`] and nowhere else.
+
+use tokio::time::Instant;
+
+use crate::{
+    concern::{Concern, ConcernKind},
+    outcome::Tenths,
+    snapshot::{Freshness, IdentityCheck, Link, Snapshot, Trip, WatchdogCheck},
+};
+
+impl Snapshot {
+    /// The worst that troubles the drive at `now`; `None` where nothing does.
+    #[must_use]
+    pub fn concern(&self, now: Instant) -> Option<Concern> {
+        self.concerns(now).into_iter().next()
+    }
+
+    /// All that troubles the drive at `now`, the worst first.
+    #[must_use]
+    pub fn concerns(&self, now: Instant) -> Vec<Concern> {
+        ConcernKind::ALL.iter().filter_map(|kind| self.concern_of(*kind, now)).collect()
+    }
+
+    fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
+        let status = self.status.as_ref();
+        let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_standstill());
+        let heard = status.map(|status| status.at);
+        let error = || self.error.as_ref().map(ToString::to_string);
+        let (since, detail) = match kind {
+            ConcernKind::StopUnconfirmed => {
+                let stop = self.stop.filter(|stop| stop.alarm)?;
+                let tries = if stop.attempts == 1 { "time" } else { "times" };
+                (Some(stop.since), Some(format!("{} stop, sent {} {tries}", stop.mode, stop.attempts)))
+            }
+            ConcernKind::RunCommandStands => (None, Some(self.run_command_stands.as_ref()?.to_string())),
+            ConcernKind::LostRunning => (heard, (self.link == Link::Lost && was_moving).then(error)?),
+            ConcernKind::Tripped => {
+                let shown = status.filter(|status| status.value.is_fault())?;
+                let trip = self.present_trip();
+                let fault = trip.and_then(Trip::fault);
+                let unread = || shown.value.fault_code.map(|code| format!("fault {code}"));
+                let told = fault.map(|fault| match fault.entry {
+                    Some(_) => fault.to_string(),
+                    None => format!("fault {}", fault.code),
+                });
+                (trip.map(|trip| trip.at), told.or_else(unread))
+            }
+            ConcernKind::RunSuspended => {
+                let because =
+                    self.suspended.filter(|_| !status.is_some_and(|status| status.value.is_fault()))?;
+                (None, Some(because.to_string()))
+            }
+            ConcernKind::IdentityChanged => match &self.identity {
+                IdentityCheck::Changed { remembered, found } => {
+                    (None, Some(format!("{found} instead of {remembered}")))
+                }
+                _ => return None,
+            },
+            ConcernKind::OtherFamily => match &self.identity {
+                IdentityCheck::OtherFamily { it_is, .. } => (None, Some(it_is.to_string())),
+                _ => return None,
+            },
+            ConcernKind::WatchdogBroken => match &self.watchdog {
+                WatchdogCheck::Broken(why) => (None, Some(why.clone())),
+                _ => return None,
+            },
+            ConcernKind::WatchdogNotInForce => {
+                let waits = matches!(self.watchdog, WatchdogCheck::WaitsForStandstill(_));
+                let turns = status.is_some_and(|status| !status.value.is_undriven());
+                (None, (waits && turns && self.link == Link::Connected).then_some(None)?)
+            }
+            ConcernKind::Lost => (heard, (self.link == Link::Lost && !was_moving).then(error)?),
+            ConcernKind::Stale => {
+                let is_old = self.link == Link::Connected && self.freshness(now) == Freshness::Stale;
+                (heard.filter(|_| is_old).map(Some)?, error())
+            }
+            ConcernKind::RestartsItself => {
+                let by =
+                    self.self_restarts.as_ref().filter(|by| !by.is_empty() && !self.restarts_accepted)?;
+                let codes: Vec<&str> = by.iter().map(|restart| restart.code).collect();
+                (None, Some(codes.join(", ")))
+            }
+            ConcernKind::EepromWorn => {
+                let times = self.eeprom_worn?;
+                (None, Some(format!("{times} times today")))
+            }
+            ConcernKind::LimitExceeded => {
+                let limits: Vec<String> = self.exceeded.iter().map(ToString::to_string).collect();
+                (None, (!limits.is_empty()).then(|| Some(limits.join(", ")))?)
+            }
+            ConcernKind::Warning => {
+                (None, status.filter(|status| status.value.warning == Some(true)).map(|_| None)?)
+            }
+            ConcernKind::ControlTaken => (None, Some(self.control_taken?.to_string())),
+            ConcernKind::StopPending => {
+                let stop = self.stop.filter(|stop| !stop.alarm)?;
+                let lasts = Tenths(now.saturating_duration_since(stop.since));
+                let how = if stop.taken { "the drive is stopping" } else { "it is repeated" };
+                (Some(stop.since), Some(format!("{} stop for {lasts}, {how}", stop.mode)))
+            }
+            ConcernKind::NeverSeen => (None, (self.link == Link::Connecting).then(error)?),
+        };
+        let noted = || self.since.iter().find(|(noted, _)| *noted == kind).map(|(_, since)| *since);
+        Some(Concern { kind, since: since.or_else(noted), detail })
+    }
+}
