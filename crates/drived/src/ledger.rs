@@ -92,7 +92,7 @@ mod tests {
     use drive_fleet::WatchdogContract;
 
     use super::*;
-    use crate::doors::tests::Folder;
+    use drived_config::testing::Folder;
 
     /// Where the ledger of a drive on some line is.
     fn of(config: &Path) -> Result<(PathBuf, String), String> {

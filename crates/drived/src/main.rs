@@ -11,44 +11,34 @@ mod cli;
 mod client;
 mod commanded;
 mod commands;
-mod config;
 mod config_file;
 mod desk;
 mod doors;
-mod drive_options;
-mod drive_spec;
-mod duration;
 mod explain;
-mod failure;
 mod findings;
 mod gateway;
 mod journal;
-mod json;
-mod kept;
 mod ledger;
-mod line_spec;
-mod logging;
 mod metrics;
 mod mqtt;
 mod one_drive;
-mod output;
 mod own_line;
 mod page;
 mod plant;
-mod records;
-mod registers;
-mod rights;
 mod row;
 mod run;
 mod screen;
-mod signals;
 mod simulated;
 mod sparkplug;
-mod values;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+use drived_config::{config, kept, records, rights};
+use drived_words::{
+    drive_options, drive_spec, duration, failure, json, line_spec, logging, output, registers, signals,
+    values,
+};
 
 fn main() -> ExitCode {
     output::choose_form(std::env::args_os());

@@ -16,7 +16,7 @@ use crate::{
 const SNAPSHOTS_APART: Duration = Duration::from_millis(100);
 
 /// The daemon's own settings while they are read.
-pub(crate) struct Draft {
+pub struct Draft {
     pub(super) snapshots: Duration,
     pub(super) shutdown: Duration,
     pub(super) kept: SaidState,

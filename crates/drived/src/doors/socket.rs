@@ -90,7 +90,7 @@ impl Drop for Socket {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doors::tests::Folder;
+    use drived_config::testing::Folder;
 
     #[tokio::test]
     async fn a_socket_that_a_daemon_has_left_is_replaced_and_that_of_a_living_one_is_not() {

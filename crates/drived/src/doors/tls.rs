@@ -90,7 +90,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::doors::tests::Folder;
+    use drived_config::testing::Folder;
 
     /// A certificate for localhost and its key, of these tests alone.
     const CERTIFICATE: &str = include_str!("../../tests/tls/certificate.pem");

@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn a_token_is_found_by_its_secret_until_it_is_removed_and_the_secret_is_nowhere() {
-        let folder = crate::doors::tests::Folder::new("tokens");
+        let folder = drived_config::testing::Folder::new("tokens");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         assert_eq!(tokens.find("drv_0"), Ok(None));
         let secret = tokens.add("panel-1", (Role::Operate, None), None).unwrap();
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_token_ends_when_its_time_is_over_and_one_that_was_replaced_when_its_overlap_is() {
-        let folder = crate::doors::tests::Folder::new("lasting");
+        let folder = drived_config::testing::Folder::new("lasting");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         let hour = Duration::from_secs(3_600);
         let first = tokens.add("scada", (Role::Operate, None), Some(hour)).unwrap();
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn a_name_that_nobody_could_tell_apart_is_refused() {
-        let folder = crate::doors::tests::Folder::new("token-names");
+        let folder = drived_config::testing::Folder::new("token-names");
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         for name in ["", "local", "anonymous", "a b", "päuse", "line\nbreak", &"x".repeat(65)] {
             assert!(tokens.add(name, (Role::View, None), None).is_err(), "{name:?}");
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn no_link_in_their_folder_is_followed() {
         use std::os::unix::fs::symlink;
-        let folder = crate::doors::tests::Folder::new("links");
+        let folder = drived_config::testing::Folder::new("links");
         let (file, precious) = (folder.file("tokens"), folder.file("precious"));
         fs::write(&precious, "precious").unwrap();
         for name in ["tokens.new", ".tokens.new"] {
@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn tokens_that_others_can_read_are_refused() {
         use std::os::unix::fs::PermissionsExt as _;
-        let folder = crate::doors::tests::Folder::new("open-tokens");
+        let folder = drived_config::testing::Folder::new("open-tokens");
         let file = folder.file("tokens");
         Tokens::open(&file).unwrap().add("panel", (Role::View, None), None).unwrap();
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);

@@ -20,7 +20,7 @@ use crate::{
 
 /// A gateway.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct GatewayConfig {
+pub struct GatewayConfig {
     /// By which it commands: it stands in `commanders`, in the audit log and in the events.
     pub(crate) name: String,
     pub(crate) listen: SocketAddr,

@@ -236,12 +236,11 @@ fn last_line(file: &mut fs::File) -> io::Result<Option<Last>> {
 mod tests {
     use std::{fs::OpenOptions, path::PathBuf};
 
+    use drived_config::testing::Folder;
+
     use super::*;
     use crate::{
-        doors::{
-            audit::{Kind, Verdict, verify, verify::verify_since},
-            tests::Folder,
-        },
+        doors::audit::{Kind, Verdict, verify, verify::verify_since},
         rights::{Caller, Rights},
     };
 

@@ -117,7 +117,7 @@ mod tests {
         super::{Kind, Line, Record},
         *,
     };
-    use crate::doors::tests::Folder;
+    use drived_config::testing::Folder;
 
     #[test]
     fn what_is_written_reads_back_as_it_was_written_with_what_a_newer_program_has_added() {

@@ -1,0 +1,78 @@
+//! What the configuration file is made of: how a key is declared ([`table`]) and read ([`values`]), where it stands ([`place`]), and
+//! its tables of lines, drives and groups. Each face has its own table; the file as a whole is [`crate::config_file`].
+
+mod described;
+mod drive;
+mod groups;
+mod line;
+mod place;
+mod state;
+mod table;
+mod values;
+
+use std::collections::BTreeMap;
+
+use drive_bus::LineConfig;
+use drive_families::Options;
+use drive_fleet::{Demand, DriveSettings, LineBudget};
+use toml::Spanned;
+
+pub use self::line::ROOM_PPM;
+use self::line::demand;
+pub use self::{
+    drive::DriveEntry,
+    groups::{Entries as GroupEntries, Group, groups},
+    line::{LineEntries, LineEntry, Members, line_part},
+    place::{ConfigError, Source},
+    state::{Environment, Said as SaidState, State},
+    table::{Entry, Key, Said, Tells, settings, shown, within},
+    values::{NotAmong, Parsed, words},
+};
+use drived_words::drive_spec::DriveName;
+
+/// The keys of a drive.
+pub fn drive_keys() -> &'static [Key] {
+    drive::DriveEntry::KEYS
+}
+
+/// A line and its drives.
+#[derive(Debug)]
+pub struct LinePart {
+    pub name: String,
+    pub config: LineConfig,
+    pub budget: LineBudget,
+    pub drives: Vec<DrivePart>,
+    /// Why the line cannot work, with the arithmetic.
+    pub problem: Option<ConfigError>,
+}
+
+/// A drive of a line.
+#[derive(Debug)]
+pub struct DrivePart {
+    pub name: DriveName,
+    pub settings: DriveSettings,
+    pub options: SaidOptions,
+}
+
+/// The options of a drive, and the texts by which the file says them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SaidOptions {
+    pub values: Options,
+    pub texts: BTreeMap<&'static str, String>,
+}
+
+impl LinePart {
+    /// What its drives want of it.
+    pub fn demands(&self) -> Vec<Demand> {
+        let protocol = self.config.protocol;
+        self.drives
+            .iter()
+            .map(|drive| demand(drive.name, &drive.settings, &drive.options, protocol))
+            .collect()
+    }
+}
+
+/// What a table of the file has, if there is one.
+pub fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
+    said.as_ref().map(Spanned::get_ref)
+}

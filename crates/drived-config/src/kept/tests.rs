@@ -1,0 +1,92 @@
+//! Files in folders of tests, with links in them.
+
+use std::{fs, os::unix::fs::symlink};
+
+use super::*;
+use crate::testing::Folder;
+
+#[test]
+fn a_file_is_replaced_whole_with_its_folder_and_nobody_else_reads_it() {
+    let folder = Folder::new("kept");
+    let kept = Kept::at(&folder.file("deep/er/file"));
+    assert!(kept.read().unwrap().is_none());
+    kept.replace(b"one", Readers::Owner).unwrap();
+    let before = kept.stamp().unwrap().unwrap();
+    kept.replace(b"two", Readers::Owner).unwrap();
+    let (content, after) = kept.read().unwrap().unwrap();
+    assert_eq!(content, b"two");
+    assert!(before != after && after.is_private);
+    assert_eq!(fs::read_dir(folder.file("deep/er")).unwrap().count(), 1, "nothing is left beside it");
+}
+
+#[test]
+fn a_link_in_the_place_of_a_file_is_told_with_what_to_name_instead() {
+    let folder = Folder::new("kept-link");
+    fs::write(folder.file("elsewhere"), "precious").unwrap();
+    symlink("elsewhere", folder.file("file")).unwrap();
+    let kept = Kept::at(&folder.file("file"));
+    for error in [kept.read().unwrap_err(), kept.open_to_append().unwrap_err()] {
+        let wanted = format!(
+            "it is a link, which is not followed: name {} itself",
+            folder.file("elsewhere").display()
+        );
+        assert_eq!(error.to_string(), wanted);
+    }
+    kept.replace(b"new", Readers::Owner).unwrap();
+    assert_eq!(fs::read_to_string(folder.file("elsewhere")).unwrap(), "precious");
+    assert_eq!(fs::read_to_string(folder.file("file")).unwrap(), "new");
+}
+
+#[test]
+fn a_link_of_this_user_on_the_way_to_a_folder_is_followed_and_a_circle_is_not() {
+    let folder = Folder::new("kept-way");
+    fs::create_dir(folder.file("private")).unwrap();
+    symlink("private", folder.file("public")).unwrap();
+    Kept::at(&folder.file("public/file")).replace(b"x", Readers::Owner).unwrap();
+    assert_eq!(fs::read(folder.file("private/file")).unwrap(), b"x");
+    symlink("circle", folder.file("circle")).unwrap();
+    assert!(Kept::at(&folder.file("circle/file")).replace(b"x", Readers::Owner).is_err());
+    assert!(Kept::at(&folder.file("private/file/file")).read().is_err(), "a file is no folder");
+}
+
+/// Only root can lay another's link.
+#[test]
+fn root_follows_no_link_of_another_and_opens_no_file_that_is_not_the_folders_owners() {
+    if !geteuid().is_root() {
+        eprintln!("skipped: needs root");
+        return;
+    }
+    let folder = Folder::new("kept-root");
+    let nobody = Some(65_534);
+    fs::create_dir(folder.file("service")).unwrap();
+    fs::write(folder.file("precious"), "precious").unwrap();
+    std::os::unix::fs::chown(folder.file("service"), nobody, nobody).unwrap();
+    symlink(folder.file(""), folder.file("service/way")).unwrap();
+    std::os::unix::fs::lchown(folder.file("service/way"), nobody, nobody).unwrap();
+    let told = Kept::at(&folder.file("service/way/precious")).read().unwrap_err();
+    assert_eq!(told.to_string(), "way is a link of user 65534");
+    fs::hard_link(folder.file("precious"), folder.file("service/file")).unwrap();
+    let kept = Kept::at(&folder.file("service/file"));
+    assert!(kept.read().is_err() && kept.open_to_append().is_err());
+    kept.replace(b"new", Readers::Owner).unwrap();
+    assert_eq!(fs::read_to_string(folder.file("precious")).unwrap(), "precious");
+    let owner = std::os::unix::fs::MetadataExt::uid(&fs::metadata(folder.file("service/file")).unwrap());
+    assert_eq!(owner, 65_534);
+}
+
+#[test]
+fn one_after_the_other_changes_a_folder() {
+    let folder = Folder::new("kept-lock");
+    let kept = Kept::at(&folder.file("count"));
+    let count = || {
+        let _lock = kept.lock().unwrap();
+        let before = kept.read().unwrap().map_or(0, |(content, _)| content.len());
+        kept.replace(&vec![b'x'; before + 1], Readers::Owner).unwrap();
+    };
+    thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| (0..10).for_each(|_| count()));
+        }
+    });
+    assert_eq!(kept.read().unwrap().unwrap().0.len(), 80);
+}

@@ -1,0 +1,16 @@
+//! What holds at `drived` before a drive is spoken to: what a configuration is made of ([`config`]), who may do what
+//! ([`rights`]), and what is kept in files ([`kept`]), such as the records of each drive ([`records`]).
+
+#![forbid(unsafe_code)]
+#![allow(
+    missing_docs,
+    missing_copy_implementations,
+    reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
+)]
+
+pub mod config;
+pub mod kept;
+pub mod records;
+pub mod rights;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;

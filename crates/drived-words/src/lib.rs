@@ -1,0 +1,25 @@
+//! The words of `drived`: what a person writes on the command line, read, and what a person and a program read of it.
+//!
+//! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]).
+//! - What is told: results and tables ([`output`]), objects ([`json`]), measurements ([`values`]), parameters
+//!   ([`registers`]), and the [log](`logging`).
+//! - How it ends: what went wrong ([`failure`]) and being asked to end ([`signals`]).
+
+#![forbid(unsafe_code)]
+#![allow(
+    missing_docs,
+    missing_copy_implementations,
+    reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
+)]
+
+pub mod drive_options;
+pub mod drive_spec;
+pub mod duration;
+pub mod failure;
+pub mod json;
+pub mod line_spec;
+pub mod logging;
+pub mod output;
+pub mod registers;
+pub mod signals;
+pub mod values;
