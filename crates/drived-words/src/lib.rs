@@ -3,7 +3,8 @@
 //! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]).
 //! - What is told: results and tables ([`output`]), objects ([`json`]), measurements ([`values`]), parameters
 //!   ([`registers`]), and the [log](`logging`).
-//! - How it ends: what went wrong ([`failure`]) and being asked to end ([`signals`]).
+//! - How it ends: what went wrong ([`failure`]) being asked to end ([`signals`]) and letting a port go
+//!   ([`closing`]).
 
 #![forbid(unsafe_code)]
 #![allow(
@@ -12,6 +13,7 @@
     reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
 )]
 
+pub mod closing;
 pub mod drive_options;
 pub mod drive_spec;
 pub mod duration;

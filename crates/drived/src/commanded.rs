@@ -259,7 +259,7 @@ fn seen(last: Option<&LastSeen>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress};
+    use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
     use drive_families::Family;
     use drive_sim::{SimLine, Wiring};
     use tokio::time::sleep;
@@ -298,6 +298,29 @@ mod tests {
                 );
             }
             assert!(taken_back > 0, "{family}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_trip_of_every_family_is_read_as_a_fault_and_reset() {
+        for family in Family::ALL {
+            let settings = family.capabilities().factory;
+            let wire = SimLine::new(Wiring::rtu(settings));
+            let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+            let machine = wire.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            let line = Line::over(wire.in_memory(), config.clone());
+            let slave = SlaveAddress::try_from(1).unwrap();
+            let mut drive = family.open_with(line.slave(1), slave, &simulated::options());
+            assert!(!drive.status().await.unwrap().is_fault(), "{family}");
+            machine.trip(simulated::trip_code(family));
+            assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
+            assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
+            let name = DriveName { family, slave };
+            let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
+            // Where any word of the bus takes the command, a stop takes it: a reset is no way to.
+            one.stop(drive_core::StopMode::Ramp).await.unwrap();
+            let outcome = one.command(async |drive| drive.reset_faults().await).await.unwrap();
+            assert!(outcome.is_confirmed() && !one.status().is_fault(), "{family}: {outcome}");
         }
     }
 }

@@ -13,28 +13,25 @@ mod commanded;
 mod commands;
 mod config_file;
 mod desk;
-mod doors;
 mod explain;
-mod findings;
 mod gateway;
-mod journal;
 mod ledger;
 mod metrics;
 mod mqtt;
 mod one_drive;
 mod own_line;
 mod page;
-mod plant;
-mod row;
 mod run;
-mod screen;
-mod simulated;
 mod sparkplug;
 
 use std::process::ExitCode;
 
 use clap::Parser;
 use drived_config::{config, kept, records, rights};
+use drived_doors as doors;
+use drived_plant::{counts, findings, follow, journal, plant};
+use drived_screen::{row, screen};
+use drived_simulated as simulated;
 use drived_words::{
     drive_options, drive_spec, duration, failure, json, line_spec, logging, output, registers, signals,
     values,

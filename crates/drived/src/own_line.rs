@@ -5,7 +5,8 @@ use std::time::Duration;
 use drive_bus::{Line, LineConfig, OpenError};
 use drive_core::{Drive, Error, ErrorKind, Lifetimes, PortError};
 use drive_families::Options;
-use tokio::time::timeout;
+pub(crate) use drived_plant::plant::parameters::may_have_written;
+pub(crate) use drived_words::closing::close;
 
 use crate::{client, drive_options, drive_spec::DriveName, failure::Failure, signals::Ending};
 
@@ -16,20 +17,11 @@ const QUIET_WITHIN: Duration = Duration::from_secs(5);
 pub(crate) const NEVER_QUIET: &str = "the line is never quiet, something else is sending: see whether speed, format and \
     protocol are those of the drives, and whether a second master is on it";
 
-/// How long a port has to let itself be closed.
-const CLOSED_WITHIN: Duration = Duration::from_secs(1);
-
 /// Lets no request to a drive wait without end for a line that is never quiet.
 pub(crate) fn wait_at_most(drive: &mut dyn Drive) {
     let all = Some(QUIET_WITHIN);
     *drive.lifetimes_mut() =
         Lifetimes { stop: None, command: all, keep_alive: all, status: all, background: all };
-}
-
-/// Closes a port, if it lets itself be closed.
-pub(crate) async fn close(line: &Line) {
-    // The program ends, and with it the port.
-    let _ = timeout(CLOSED_WITHIN, line.clone().close()).await;
 }
 
 /// What a person reads when a drive did not do it.
@@ -51,16 +43,6 @@ pub(crate) fn words(name: DriveName, config: &LineConfig, error: &Error) -> Stri
         }
         (_, ErrorKind::Unsupported) => format!("{name}: {error}{}", drive_options::hint(name.family)),
         _ => format!("{name}: {error}"),
-    }
-}
-
-/// Whether a parameter that could not be written, or not be read back, may hold the new value.
-pub(crate) fn may_have_written(error: &Error) -> bool {
-    match (error, error.kind()) {
-        (_, ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed) => true,
-        (Error::Port { exchange, .. }, ErrorKind::NoAnswer) => matches!(exchange.function, 0x06 | 0x10),
-        (Error::Answer { exchange, .. }, _) => matches!(exchange.function, 0x06 | 0x10),
-        _ => false,
     }
 }
 

@@ -8,7 +8,7 @@ mod line;
 mod place;
 mod state;
 mod table;
-mod values;
+pub mod values;
 
 use std::collections::BTreeMap;
 

@@ -40,7 +40,7 @@ macro_rules! words {
     ($(#[$meta:meta])* $name:ident($inner:ty): $($word:literal => $value:expr),+) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub(super) struct $name(pub $inner);
+        pub struct $name(pub $inner);
 
         impl std::str::FromStr for $name {
             type Err = $crate::config::NotAmong;

@@ -14,7 +14,9 @@ mod reload;
 mod routes;
 mod stream;
 #[cfg(test)]
-pub(crate) mod tests;
+pub(crate) mod testing;
+#[cfg(test)]
+mod tests;
 
 use axum::{
     Extension, Router,

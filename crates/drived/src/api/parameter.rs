@@ -20,8 +20,10 @@ use super::{
     read::{fresh, no_drive},
 };
 use crate::{
-    own_line::may_have_written,
-    plant::{Plant, parameters::WrittenView},
+    plant::{
+        Plant,
+        parameters::{WrittenView, may_have_written},
+    },
     registers::wanted,
 };
 

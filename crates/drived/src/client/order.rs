@@ -7,8 +7,8 @@ use tokio::time::{Instant, timeout_at};
 
 use super::{Daemon, DaemonArgs, Remote, Target};
 use crate::{
-    desk::follow::{Follower, News},
     failure::Failure,
+    follow::{Follower, News},
     output,
     plant::{
         commands::{ActionWord, OutcomeWord},

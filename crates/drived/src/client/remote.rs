@@ -7,8 +7,8 @@ use tokio::time::{sleep, timeout};
 
 use super::{Daemon, path_of};
 use crate::{
-    desk::follow::{Lost, Source},
     failure::Failure,
+    follow::{Lost, Source},
     plant::views::CommandView,
 };
 

@@ -126,10 +126,19 @@ impl Frames {
 
 #[cfg(test)]
 mod tests {
+    use serde::Serialize;
     use serde_json::json;
+    use tokio::time::Instant;
 
     use super::*;
-    use crate::plant::testing::told;
+    use crate::{
+        plant::{
+            commands::{Action, LIFETIME, Request, Target},
+            testing::{TestPlant, told},
+            views::NoticeView,
+        },
+        rights::{Caller, Rights},
+    };
 
     #[test]
     fn events_are_whole_however_their_bytes_come() {
@@ -157,5 +166,32 @@ mod tests {
         assert_eq!(text(&drive), Some("pump 1: not live: (ready)".to_owned()));
         (drive["shows"], drive["link"]) = ("lost".into(), "lost".into());
         assert_eq!(text(&drive), Some("pump 1: lost: (ready)".to_owned()));
+    }
+
+    /// What somebody who reads the stream understands of an event of this name.
+    fn heard(name: &str, data: &impl Serialize) -> Heard {
+        Heard::of(name, json!(data)).unwrap_or_else(|| panic!("{name}: {}", json!(data)))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn every_event_of_the_stream_is_understood() {
+        let test = TestPlant::of(1).await;
+        let plant = &test.plant;
+        let request = Request {
+            id: None,
+            target: Target::All,
+            action: Action::Stop(drive_core::StopMode::Ramp.into()),
+            lifetime: LIFETIME,
+            arrived: Instant::now(),
+        };
+        let stopped = plant.begin(&Caller::new("hmi", "test", Rights::ALL), request).unwrap();
+        assert!(matches!(heard("drive", &plant.drive("pump 1")), Heard::Drive(_)));
+        assert!(matches!(heard("line", &plant.lines()[0]), Heard::Line(_)));
+        assert!(matches!(heard("command", &**stopped.borrow()), Heard::Command(_)));
+        let notice = NoticeView::new("audit_log", true, "it cannot be written");
+        let Heard::Event(read) = heard("event", &notice) else { panic!("an event") };
+        assert_eq!(read, notice.into());
+        assert!(matches!(heard("tick", &json!({})), Heard::Other));
+        assert!(Heard::of("drive", json!({"name": "pump 1"})).is_none(), "what is no drive is none");
     }
 }

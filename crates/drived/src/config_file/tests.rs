@@ -5,13 +5,15 @@ use std::path::Path;
 use drive_core::{Frequency, Reaction, StopMode};
 use drive_fleet::{Commanders, OnControlTaken, OnExit, OnFault, Periods, WatchdogContract, plan};
 
+use drived_config::testing::Folder;
+
 use super::*;
 use crate::{
     broker::config::{Address, Discovery},
     config::{DrivePart, ROOM_PPM, SaidOptions, drive_keys},
     doors::Network,
     gateway::config::Units,
-    rights::Role,
+    rights::{Rights, Role},
 };
 
 const FULL: &str = r#"
@@ -643,4 +645,21 @@ fn a_key_that_says_its_default_changes_nothing() {
         }
     }
     assert!(tried > 25, "{tried}");
+}
+
+#[test]
+fn whoever_stands_behind_a_proxy_that_the_file_tells_of_is_not_local() {
+    let rest = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";
+    let folder = Folder::new("proxies");
+    for (http, freely) in [
+        ("", Role::Stop.rights()),
+        // Somebody calls it by a name: a proxy stands before it.
+        ("allowed_hosts = [\"drives.example\"]", Rights::NONE),
+        // A proxy encrypts, as the key says.
+        ("plain = true", Rights::NONE),
+    ] {
+        std::fs::write(folder.file("drives.toml"), format!("[http]\n{http}\n{rest}")).unwrap();
+        let config = Config::load(&folder.file("drives.toml")).unwrap();
+        assert_eq!(config.doors.http.unwrap().freely(false), freely, "{http}");
+    }
 }

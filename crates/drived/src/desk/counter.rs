@@ -8,15 +8,13 @@ use tokio::{
     time::Instant,
 };
 
-use super::{
-    Answer, Answers, Refusal, Refused,
-    follow::{Follower, News},
-};
+use super::{Answer, Answers, Refusal, Refused};
 use crate::{
     doors::{
         Caller,
         audit::{Audit, Kind, Record},
     },
+    follow::{Follower, News},
     json::unix,
     plant::{
         Plant,

@@ -5,7 +5,6 @@
 //! stands in the audit log, except that a stop waits for nothing.
 
 mod counter;
-pub(crate) mod follow;
 mod pace;
 mod refusal;
 #[cfg(test)]

@@ -11,7 +11,7 @@ use std::{
 
 use drive_bus::stats::Spread;
 
-use crate::metrics::{Id, Samples, Source};
+use crate::counts::{Id, Samples, Source};
 
 /// Why a connection was turned away or ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -32,13 +32,13 @@ use self::{
 };
 use crate::{
     config::LinePart,
+    counts::Source,
     doors::{
         TRIED_AGAIN,
         audit::Audit,
         crowd::{Crowd, Limits},
         listen,
     },
-    metrics::Source,
     plant::Plant,
 };
 

@@ -12,8 +12,6 @@ mod named;
 mod negotiation;
 mod process;
 mod requests;
-mod samples;
-mod table;
 #[cfg(test)]
 mod tests;
 
@@ -32,13 +30,14 @@ use axum::{
 };
 use tokio::{sync::Mutex, time::Instant};
 
-pub(crate) use self::{
-    dashboard::dashboard,
-    samples::{Samples, Source},
-    table::Id,
-};
+pub(crate) use self::dashboard::dashboard;
 use self::{negotiation::wanted, requests::Requests};
-use crate::{api::Viewer, json::unix, plant::Plant};
+use crate::{
+    api::Viewer,
+    counts::{Id, Samples, Source, samples, table},
+    json::unix,
+    plant::Plant,
+};
 
 /// The alert rules for Prometheus; `tests/alerts.test.yml` has each fire and not fire.
 pub(crate) const ALERTS: &str = include_str!("alerts.yml");

@@ -15,8 +15,9 @@ use super::{
 };
 use crate::{
     broker::{Arrived, Kept, Message, Qos, config::topic_id},
-    desk::{self, Answer, Answers, Desk, Refusal, follow::SETTLES_FOR},
+    desk::{self, Answer, Answers, Desk, Refusal},
     doors::{Caller, Rights, Role, audit::Audit},
+    follow::SETTLES_FOR,
     plant::commands::{Action, LIFETIME, OutcomeWord, Said, Target, Unclear, is_id},
 };
 

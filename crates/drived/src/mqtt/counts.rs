@@ -2,7 +2,7 @@
 
 use crate::{
     broker::Broker,
-    metrics::{Id, Samples, Source},
+    counts::{Id, Samples, Source},
 };
 
 impl Source for Broker {

@@ -26,9 +26,9 @@ use crate::{
         Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,
         config::{Address, Discovery, MqttConfig},
     },
+    counts::Source,
     doors::{audit::Audit, private},
     failure::Failure,
-    metrics::Source,
     plant::Plant,
 };
 

@@ -15,6 +15,7 @@ use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
 use drive_fleet::{Fleet, FleetBuilder, Left};
+use drived_words::closing;
 use futures_util::future::OptionFuture;
 use tokio::sync::mpsc;
 
@@ -38,7 +39,7 @@ use crate::{
     gateway::Gateways,
     journal, ledger, logging, metrics,
     mqtt::Mqtt,
-    own_line, page,
+    page,
     plant::Plant,
     records::{self, Records, in_folder},
     screen::Screen,
@@ -116,7 +117,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let shutdown = config.shutdown;
     let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
-    let mut sources: Vec<Arc<dyn metrics::Source>> = vec![Arc::new(reloader.clone())];
+    let mut sources: Vec<Arc<dyn drived_plant::counts::Source>> = vec![Arc::new(reloader.clone())];
     let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
     sources.extend(mqtt.iter().map(Mqtt::source));
     sources.extend(gateways.sources());
@@ -181,7 +182,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let told = OptionFuture::from(mqtt.map(Mqtt::close));
     tokio::join!(told, OptionFuture::from(sparkplug.map(Sparkplug::close)));
     for (_, line) in fleet.lines() {
-        own_line::close(&line).await;
+        closing::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
 }

@@ -9,6 +9,7 @@ use std::{
 
 use drive_bus::{Endpoint, Line};
 use drive_fleet::{Fleet, FleetBuilder, FleetError, Left, LineBudget};
+use drived_words::closing;
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
@@ -17,11 +18,10 @@ use crate::{
     api::Reload,
     config::{DrivePart, LinePart},
     config_file::Config,
+    counts::{Id, Samples, Source},
     drive_spec::DriveName,
     failure::Failure,
     json::unix,
-    metrics::{Id, Samples, Source},
-    own_line,
     plant::{Plant, views::NoticeView},
 };
 
@@ -78,7 +78,7 @@ impl Reloader {
         let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
         for name in changes.iter().filter_map(Change::closed_line) {
             if let Some(line) = fleet.remove_line(name) {
-                own_line::close(&line).await;
+                closing::close(&line).await;
             }
         }
         for line in &mut config.lines {

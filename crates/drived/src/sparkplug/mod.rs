@@ -28,10 +28,10 @@ use self::{bd_seq::Kept as KeptBdSeq, commanding::Commanding};
 use crate::{
     broker::config::{MqttConfig, SparkplugConfig},
     broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Will},
+    counts::{Id, Samples, Source},
     doors::audit::Audit,
     failure::Failure,
     json::unix,
-    metrics::{Id, Samples, Source},
     mqtt,
     plant::{Plant, views::DriveView},
 };

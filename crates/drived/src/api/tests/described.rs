@@ -4,20 +4,9 @@ use axum::http::Method;
 use serde_json::json;
 
 use super::*;
+use crate::api::testing::validate;
 
-/// Validates against a schema of the document.
-pub(crate) fn validate(document: &Value, schema: &Value, answer: &Value, what: &str) {
-    let mut schema = schema.clone();
-    schema["components"] = document["components"].clone();
-    let validator = jsonschema::draft202012::options().build(&schema).unwrap();
-    let errors: Vec<String> = validator
-        .iter_errors(answer)
-        .map(|error| format!("{} at {}", error, error.instance_path()))
-        .collect();
-    assert!(errors.is_empty(), "{what}: {errors:?} in {answer}");
-}
-
-/// What is served elsewhere: `doors/tests.rs` and `run/reload/tests.rs` hold it against the document.
+/// What is served elsewhere: [`super::doors`] and the tests of reloading hold it against the document.
 const ELSEWHERE: [&str; 5] =
     ["/api/v1/login", "/api/v1/logout", "/api/v1/reload", "/api/v1/tokens", "/api/v1/tokens/{name}"];
 

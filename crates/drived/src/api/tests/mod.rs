@@ -1,7 +1,8 @@
 //! The API over a simulated plant in virtual time, asked as a client asks it.
 
 mod commanding;
-pub(crate) mod described;
+mod described;
+mod doors;
 mod reading;
 mod streaming;
 

@@ -16,8 +16,8 @@ use super::{
 };
 use crate::{
     client::{AGAIN, Answer, Daemon, GIVEN_UP_AFTER, Remote, Target, timely},
-    desk::follow::{self, Follower},
     failure::Failure,
+    follow::{self, Follower},
 };
 
 /// Between two questions what became of it.

@@ -9,7 +9,7 @@ use tower::ServiceExt as _;
 
 use super::*;
 use crate::{
-    api::tests::described::validate,
+    api::testing::validate,
     doors::{Caller, Rights},
     simulated,
 };

@@ -1,0 +1,500 @@
+//! The doors before a router that only says who came.
+
+use std::fs;
+
+use axum::http::{StatusCode, header};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream};
+
+use super::{gate::Peer, *};
+use crate::testing::{Asked, Rig, START, STATE, STOP};
+
+#[tokio::test]
+async fn on_loopback_to_see_and_to_stop_need_no_login_and_a_proxy_is_no_loopback() {
+    let rig = Rig::new("freely");
+    assert_eq!(rig.ask(&STATE).await.body, "anonymous http 127.0.0.1 vs");
+    assert_eq!(rig.ask(&STOP).await.body, "anonymous http 127.0.0.1 vs");
+    let forwarded = [("x-forwarded-for", "10.0.0.7")];
+    assert_eq!(rig.ask(&Asked { headers: &forwarded, ..STATE }).await.body, "anonymous http 127.0.0.1 ");
+    rig.ask(&Asked { headers: &forwarded, ..STOP }).await.assert_refused(401);
+}
+
+#[tokio::test]
+async fn a_token_has_the_rights_of_its_role_until_it_is_removed() {
+    let rig = Rig::new("roles");
+    for (name, role, rights) in [
+        // What nobody needs a login for is not lost by one.
+        ("a", Role::View, "vs"),
+        ("b", Role::Stop, "vs"),
+        ("c", Role::Operate, "vso"),
+        ("d", Role::Engineer, "vsoe"),
+    ] {
+        let bearer = format!("Bearer {}", rig.token(name, role));
+        let asked = Asked { headers: &[("authorization", &bearer)], ..STATE };
+        assert_eq!(rig.ask(&asked).await.body, format!("{name} http 127.0.0.1 {rights}"));
+        rig.gate.tokens.as_ref().unwrap().remove(name).unwrap();
+        rig.ask(&asked).await.assert_refused(401);
+    }
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn tokens_that_cannot_be_read_keep_nobody_from_a_stop_that_needs_none() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let rig = Rig::new("unreadable");
+    let bearer = format!("Bearer {}", rig.token("panel", Role::Operate));
+    let headers = [("authorization", bearer.as_str())];
+    fs::set_permissions(rig.folder.file("tokens"), fs::Permissions::from_mode(0o644)).unwrap();
+    rig.ask(&Asked { headers: &headers, ..START }).await.assert_refused(503);
+    let stop = rig.ask(&Asked { headers: &headers, ..STOP }).await;
+    assert_eq!(stop.body, "anonymous http 127.0.0.1 vs");
+    let forwarded = [headers[0], ("x-forwarded-for", "10.0.0.7")];
+    rig.ask(&Asked { headers: &forwarded, ..STOP }).await.assert_refused(503);
+}
+
+#[tokio::test]
+async fn a_wrong_token_is_never_taken_for_none_and_ten_a_minute_are_looked_at() {
+    let rig = Rig::new("wrong-token");
+    let right = format!("Bearer {}", rig.token("panel", Role::Operate));
+    for wrong in ["Bearer drv_0", "Bearer ", "Bearer", "Basic YWRtaW46MDAwMA==", "drv_0"] {
+        let asked = Asked { headers: &[("authorization", wrong)], ..STATE };
+        let answer = rig.ask(&asked).await;
+        answer.assert_refused(401);
+        assert_eq!(answer.headers[header::WWW_AUTHENTICATE], "Bearer");
+        rig.ask(&Asked { headers: &[("authorization", wrong)], ..STOP }).await.assert_refused(401);
+    }
+    let asked = Asked { headers: &[("authorization", &right)], ..STATE };
+    let waits = rig.ask(&asked).await;
+    waits.assert_refused(429);
+    assert!(waits.headers.contains_key(header::RETRY_AFTER));
+    // Nobody is kept from a stop by what others do.
+    let stop = rig.ask(&Asked { headers: &[("authorization", &right)], ..STOP }).await;
+    assert_eq!(stop.body, "panel http 127.0.0.1 vso");
+    assert_eq!(rig.ask_from([10, 0, 0, 7], &asked).await.body, "panel http 10.0.0.7 vso");
+    let failures = rig.audited().await;
+    assert_eq!(
+        failures.iter().filter(|line| *line == "login_failed anonymous -").count(),
+        10,
+        "{failures:?}"
+    );
+}
+
+#[tokio::test]
+async fn a_login_gives_a_cookie_that_no_script_reads_and_a_logout_takes_it_back() {
+    let rig = Rig::new("login");
+    let secret = rig.token("panel", Role::Operate);
+    let login = Asked { path: "/api/v1/login", body: &format!("{{\"token\":\"{secret}\"}}"), ..START };
+    let answer = rig.ask(&login).await;
+    assert_eq!(answer.status, StatusCode::OK, "{answer:?}");
+    let set = answer.headers[header::SET_COOKIE].to_str().unwrap();
+    assert!(set.contains("HttpOnly") && set.contains("SameSite=Strict") && !set.contains(&secret), "{set}");
+    let cookie = set.split(';').next().unwrap();
+    let headers = [("cookie", cookie)];
+    let with = |asked| Asked { headers: &headers, ..asked };
+    assert_eq!(rig.ask(&with(STATE)).await.body, "panel page 127.0.0.1 vso");
+    let away = rig.ask(&with(Asked { path: "/api/v1/logout", body: "", ..START })).await;
+    assert!(away.headers[header::SET_COOKIE].to_str().unwrap().contains("Max-Age=0"), "{away:?}");
+    assert_eq!(rig.ask(&with(STATE)).await.body, "anonymous page 127.0.0.1 vs");
+    rig.ask(&Asked { body: "{\"token\":\"drv_0\"}", ..login }).await.assert_refused(401);
+    rig.ask(&Asked { body: "{\"token\"", ..login }).await.assert_refused(400);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(!log.contains(&secret[4..]), "no secret in a log");
+    assert_eq!(rig.audited().await, ["login panel -", "logout panel -", "login_failed anonymous -"]);
+}
+
+#[tokio::test]
+async fn a_wrong_host_or_another_sites_origin_is_refused_before_anything_is_looked_at() {
+    let rig = Rig::new("hosts");
+    for path in ["/", "/api/v1/state", "/api/v1/events", "/metrics", "/nowhere"] {
+        rig.ask(&Asked { headers: &[("host", "evil.example")], path, ..STATE }).await.assert_refused(421);
+    }
+    for foreign in [
+        ("origin", "http://evil.example"),
+        ("origin", "null"),
+        ("origin", "http://localhost:8080"),
+        ("sec-fetch-site", "cross-site"),
+        ("sec-fetch-site", "same-site"),
+    ] {
+        rig.ask(&Asked { headers: &[foreign], ..STOP }).await.assert_refused(403);
+    }
+    for kind in ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"] {
+        rig.ask(&Asked { headers: &[("content-type", kind)], ..STOP }).await.assert_refused(415);
+    }
+    let own = [("origin", "http://localhost:7580"), ("sec-fetch-site", "same-origin")];
+    assert_eq!(rig.ask(&Asked { headers: &own, ..STOP }).await.status, StatusCode::OK);
+    assert_eq!(rig.audited().await.len(), 2, "one command and its answer");
+}
+
+#[tokio::test]
+async fn every_answer_tells_the_browser_to_keep_to_itself_and_no_other_site_is_allowed() {
+    let rig = Rig::new("headers");
+    for asked in
+        [STATE, STOP, Asked { path: "/nowhere", ..STATE }, Asked { headers: &[("host", "x")], ..STATE }]
+    {
+        let answer = rig.ask(&asked).await;
+        for name in [
+            "content-security-policy",
+            "x-content-type-options",
+            "referrer-policy",
+            "cross-origin-resource-policy",
+        ] {
+            assert!(answer.headers.contains_key(name), "{name}: {answer:?}");
+        }
+        assert!(
+            answer.headers.keys().all(|name| !name.as_str().starts_with("access-control-")),
+            "{answer:?}"
+        );
+        assert_eq!(answer.headers.contains_key(header::CACHE_CONTROL), asked.path.starts_with("/api/"));
+    }
+}
+
+#[tokio::test]
+async fn a_browser_comes_by_tls_from_then_on_where_it_has_come_by_it_once_and_nowhere_else() {
+    let rig = Rig::new("hsts");
+    let encrypted = Door { encrypted: true, ..rig.door.clone() };
+    for asked in [STATE, STOP, Asked { path: "/nowhere", ..STATE }] {
+        let peer = Peer::Address([127, 0, 0, 1].into());
+        let answer = rig.ask_as(&encrypted, peer, &asked).await;
+        assert_eq!(answer.headers["strict-transport-security"], "max-age=31536000", "{answer:?}");
+        // RFC 6797, 7.2: not over a transport that is not secure.
+        assert!(!rig.ask(&asked).await.headers.contains_key("strict-transport-security"));
+    }
+}
+
+#[tokio::test]
+async fn each_command_is_audited_with_what_became_of_it() {
+    let rig = Rig::new("audited");
+    rig.ask_on_socket(&START).await;
+    assert_eq!(rig.audited().await, ["command local -", "answer local refused"]);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(log.contains("POST /api/v1/drives/pump%201/start") && log.contains(r#""id":"c-1""#), "{log}");
+}
+
+#[tokio::test]
+async fn what_cannot_be_audited_is_not_done_but_a_stop() {
+    let rig = Rig::new("no-audit");
+    rig.ask_on_socket(&START).await;
+    assert_eq!(rig.audited().await.len(), 2);
+    // A folder in its place: nothing can be written there.
+    fs::remove_file(rig.folder.file("audit")).unwrap();
+    fs::create_dir(rig.folder.file("audit")).unwrap();
+    rig.ask_on_socket(&START).await.assert_refused(503);
+    assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
+    assert_eq!(rig.ask(&STATE).await.status, StatusCode::OK);
+    fs::remove_dir(rig.folder.file("audit")).unwrap();
+    assert_eq!(rig.ask_on_socket(&START).await.status, StatusCode::CONFLICT, "the disk is there again");
+}
+
+/// A connection that the system puts off comes again a second later, and a stop with it. Measured from outside, for a queue that is
+/// full is told to nobody.
+#[tokio::test]
+async fn three_hundred_who_come_while_nobody_is_let_in_find_room_to_wait() {
+    let listener = listen("127.0.0.1:0".parse().unwrap()).await;
+    let address = listener.local_addr().unwrap();
+    let patience = Duration::from_secs(20);
+    let come = move |_| std::net::TcpStream::connect_timeout(&address, patience);
+    let waiting = tokio::task::spawn_blocking(move || (0..300).map(come).collect::<Result<Vec<_>, _>>());
+    assert_eq!(waiting.await.unwrap().unwrap().len(), 300);
+}
+
+#[tokio::test]
+async fn a_request_says_64_kib_at_the_most() {
+    let rig = Rig::new("body");
+    let most = " ".repeat(64 * 1024);
+    assert_eq!(rig.ask_on_socket(&Asked { body: &most, ..START }).await.status, StatusCode::CONFLICT);
+    rig.ask_on_socket(&Asked { body: &(most.clone() + " "), ..START }).await.assert_refused(413);
+}
+
+const HEAD: &[u8] = b"GET /api/v1/state HTTP/1.1\r\nHost: localhost\r\n";
+
+#[tokio::test(start_paused = true)]
+async fn a_head_that_comes_too_slowly_ends_its_connection() {
+    let rig = Rig::new("slow-head");
+    let mut slow = rig.connect();
+    for byte in HEAD.iter().cycle() {
+        if slow.write_all(&[*byte]).await.is_err() {
+            break;
+        }
+        sleep(Duration::from_secs(1)).await;
+    }
+    let mut rest = Vec::new();
+    slow.read_to_end(&mut rest).await.unwrap();
+    assert!(!rest.starts_with(b"HTTP/1.1 200"), "{rest:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_body_that_comes_too_slowly_is_given_up() {
+    let rig = Rig::new("slow-body");
+    let mut slow = rig.connect();
+    let head = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n";
+    slow.write_all(head.as_bytes()).await.unwrap();
+    let mut answer = Vec::new();
+    slow.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 408"), "{}", String::from_utf8_lossy(&answer));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_idle_connection_ends_and_event_streams_end_with_the_server() {
+    let rig = Rig::new("idle");
+    let mut idle = rig.connect();
+    idle.write_all(HEAD).await.unwrap();
+    idle.write_all(b"\r\n").await.unwrap();
+    let mut answer = Vec::new();
+    idle.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
+
+    let mut stream = rig.connect();
+    stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+    let mut heard = Vec::new();
+    while !heard.windows(4).any(|four| four == b"tick") {
+        stream.read_buf(&mut heard).await.unwrap();
+    }
+    rig.end.send_replace(true);
+    stream.read_to_end(&mut heard).await.unwrap();
+    assert!(heard.ends_with(b"0\r\n\r\n"), "{}", String::from_utf8_lossy(&heard));
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_address_has_eight_event_streams() {
+    let rig = Rig::new("streams");
+    let mut open = Vec::new();
+    for number in 1..=10 {
+        let mut stream = rig.connect();
+        stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+        let mut head = Vec::new();
+        while !head.windows(4).any(|four| four == b"\r\n\r\n") {
+            stream.read_buf(&mut head).await.unwrap();
+        }
+        let status = if number <= 8 { &b"HTTP/1.1 200"[..] } else { b"HTTP/1.1 429" };
+        assert!(head.starts_with(status), "{number}: {}", String::from_utf8_lossy(&head));
+        open.push(stream);
+    }
+    open.clear();
+    // They are gone when the next tick finds nobody.
+    sleep(Duration::from_secs(10)).await;
+    let mut stream = rig.connect();
+    stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
+    let mut status = [0; 12];
+    stream.read_exact(&mut status).await.unwrap();
+    assert_eq!(&status, b"HTTP/1.1 200");
+}
+
+/// How much is still heard of a stream in so many of its ticks; `None`: it has ended.
+async fn heard(stream: &mut DuplexStream, ticks: u32) -> Option<usize> {
+    let (mut all, mut ended) = (Vec::new(), false);
+    let _ = timeout(ticks * Duration::from_secs(5), async {
+        ended = stream.read_to_end(&mut all).await.is_ok();
+    })
+    .await;
+    (!ended).then_some(all.len())
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_stream_ends_when_its_token_is_removed_and_others_go_on() {
+    let rig = Rig::new("live");
+    let bearers =
+        ["removed", "other"].map(|name| format!("Authorization: Bearer {}", rig.token(name, Role::View)));
+    let mut removed = rig.stream(&bearers[0]).await;
+    let mut other = rig.stream(&bearers[1]).await;
+    let mut free = rig.stream("X: y").await;
+    rig.gate.tokens.as_ref().unwrap().remove("removed").unwrap();
+    assert_eq!(heard(&mut removed, 2).await, None);
+    assert!(heard(&mut other, 10).await.is_some());
+    assert!(heard(&mut free, 10).await.is_some());
+}
+
+/// Whoever comes by the old secret, himself or by a session, goes with it, also where the new one has been there all along.
+#[tokio::test(start_paused = true)]
+async fn streams_and_sessions_of_a_replaced_token_end_with_the_secret_that_they_came_by() {
+    let rig = Rig::new("rotated");
+    let tokens = Arc::clone(rig.gate.tokens.as_ref().unwrap());
+    let first = rig.token("scada", Role::Operate);
+    let (_, second) = tokens.rotate("scada", Duration::from_secs(3_600)).unwrap();
+    let mut sessions = Vec::new();
+    let mut streams = Vec::new();
+    for secret in [&first, &second] {
+        let login = format!("{{\"token\":\"{secret}\"}}");
+        let answer = rig.ask(&Asked { path: "/api/v1/login", body: &login, ..START }).await;
+        let set = answer.headers[header::SET_COOKIE].to_str().unwrap().to_owned();
+        sessions.push(set.split(';').next().unwrap().to_owned());
+        streams.push(rig.stream(&format!("Authorization: Bearer {secret}")).await);
+        streams.push(rig.stream(&format!("Cookie: {}", sessions.last().unwrap())).await);
+    }
+    // A third makes the first good for nothing, and the second good for an hour yet.
+    tokens.rotate("scada", Duration::from_secs(3_600)).unwrap();
+    let [of_first, in_first, of_second, in_second] = &mut streams[..] else { panic!("four") };
+    assert_eq!((heard(of_first, 2).await, heard(in_first, 2).await), (None, None));
+    assert!(heard(of_second, 10).await.is_some() && heard(in_second, 10).await.is_some());
+    for (session, caller) in [(&sessions[0], "anonymous"), (&sessions[1], "scada")] {
+        let who = rig.ask(&Asked { headers: &[("cookie", session)], ..STATE }).await.body;
+        assert!(who.starts_with(caller), "{who}");
+    }
+    // And one that is replaced at once is no more.
+    tokens.rotate("scada", Duration::ZERO).unwrap();
+    assert_eq!((heard(of_second, 2).await, heard(in_second, 2).await), (None, None));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_event_stream_ends_with_its_session_by_logout_and_by_time() {
+    let rig = Rig::new("live-session");
+    let login = format!("{{\"token\":\"{}\"}}", rig.token("panel", Role::Operate));
+    let login = Asked { path: "/api/v1/login", body: &login, ..START };
+    let mut cookies = Vec::new();
+    for _ in 0..2 {
+        let answer = rig.ask(&login).await;
+        cookies
+            .push(answer.headers[header::SET_COOKIE].to_str().unwrap().split(';').next().unwrap().to_owned());
+    }
+    let mut left = rig.stream(&format!("Cookie: {}", cookies[0])).await;
+    let mut kept = rig.stream(&format!("Cookie: {}", cookies[1])).await;
+    rig.ask(&Asked { path: "/api/v1/logout", headers: &[("cookie", &cookies[0])], ..START }).await;
+    assert_eq!(heard(&mut left, 2).await, None);
+    assert!(heard(&mut kept, 10).await.is_some());
+    // Its cookie lasts for twelve hours.
+    assert_eq!(heard(&mut kept, 12 * 60 * 12 + 2).await, None);
+}
+
+/// A whole stop, and whether it was answered.
+async fn stops(stream: &mut DuplexStream, bearer: &str) -> bool {
+    let request = format!(
+        "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 2\r\n{bearer}\r\n{{}}"
+    );
+    stream.write_all(request.as_bytes()).await.unwrap();
+    let mut status = [0; 12];
+    stream.read_exact(&mut status).await.is_ok() && &status == b"HTTP/1.1 200"
+}
+
+#[tokio::test(start_paused = true)]
+async fn whoever_says_his_login_slowly_keeps_nobody_from_a_stop() {
+    let rig = Rig::new("slow-logins");
+    let bearer = format!("Authorization: Bearer {}\r\n", rig.token("panel", Role::Stop));
+    let login = "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 80\r\n\r\n{";
+    let mut slow = Vec::new();
+    for number in 0..64 {
+        let mut stream = rig.connect_from([10, 0, number / 16, number % 16]).unwrap();
+        stream.write_all(login.as_bytes()).await.unwrap();
+        slow.push(stream);
+    }
+    sleep(Duration::from_millis(10)).await;
+    for address in [[10, 0, 0, 1], [10, 0, 9, 9]] {
+        let mut stream = rig.connect_from(address).expect("the slow make room");
+        assert!(stops(&mut stream, &bearer).await);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn nothing_is_read_for_longer_than_a_second_before_it_is_known_who_asks() {
+    let rig = Rig::new("login-in-time");
+    let mut slow = rig.connect();
+    let login = "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 80\r\n\r\n{";
+    slow.write_all(login.as_bytes()).await.unwrap();
+    let begun = Instant::now();
+    let mut answer = Vec::new();
+    slow.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 408"), "{}", String::from_utf8_lossy(&answer));
+    assert!(begun.elapsed() <= Duration::from_millis(1_100), "{:?}", begun.elapsed());
+}
+
+#[tokio::test]
+async fn a_proxy_that_hides_whom_it_speaks_for_makes_nobody_local() {
+    let rig = Rig::new("hidden-proxy");
+    for (name, value) in
+        [("via", "1.1 front"), ("x-forwarded-host", "drives.example"), ("x-forwarded-proto", "https")]
+    {
+        rig.ask(&Asked { headers: &[(name, value)], ..STOP }).await.assert_refused(401);
+    }
+}
+
+#[tokio::test]
+async fn what_a_viewer_may_not_do_takes_no_room_in_the_log_of_what_was_done() {
+    let rig = Rig::new("refused");
+    let bearer = format!("Bearer {}", rig.token("viewer", Role::View));
+    let body = format!("{{\"a\":\"{}\"}}", "x".repeat(60_000));
+    for _ in 0..50 {
+        let asked = Asked { headers: &[("authorization", &bearer)], body: &body, ..START };
+        rig.ask(&asked).await.assert_refused(403);
+    }
+    // Of fifty ten are told, in a file of their own.
+    assert_eq!(rig.audited().await, vec!["refused viewer -"; 10]);
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(!log.contains("viewer"), "{log}");
+    let size: u64 =
+        fs::read_dir(rig.folder.file("")).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
+    assert!(size < 20_000, "{size} bytes");
+}
+
+#[tokio::test]
+async fn a_token_that_was_sent_to_a_wrong_path_stands_nowhere() {
+    let rig = Rig::new("masked");
+    let bearer = format!("Bearer {}", rig.token("boss", Role::Engineer));
+    let body = format!("{{\"token\":\"{}\",\"password\":\"secret\"}}", &bearer[7..]);
+    let path = format!("/api/v1/logins?token={}", &bearer[7..]);
+    rig.ask(&Asked { path: &path, headers: &[("authorization", &bearer)], body: &body, ..START }).await;
+    rig.audited().await;
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(log.contains("POST /api/v1/logins"), "{log}");
+    assert!(!log.contains(&bearer[11..]) && !log.contains("secret"), "{log}");
+}
+
+#[tokio::test]
+async fn a_stop_that_could_not_be_written_stands_in_the_log_as_soon_as_it_can() {
+    let rig = Rig::new("gap");
+    rig.ask_on_socket(&START).await;
+    rig.audited().await;
+    let held = fs::read(rig.folder.file("audit")).unwrap();
+    fs::remove_file(rig.folder.file("audit")).unwrap();
+    fs::create_dir(rig.folder.file("audit")).unwrap();
+    assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
+    rig.ask_on_socket(&START).await.assert_refused(503);
+    assert!(*rig.gate.audit.failing().borrow());
+    fs::remove_dir(rig.folder.file("audit")).unwrap();
+    fs::write(rig.folder.file("audit"), held).unwrap();
+    rig.audited().await;
+    let log = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    let gap = log.lines().find(|line| line.contains("\"kind\":\"gap\"")).expect("a gap");
+    assert!(gap.contains("POST /api/v1/stop"), "{gap}");
+    assert!(!*rig.gate.audit.failing().borrow());
+    let verdict = audit::verify(&rig.folder.file("audit")).unwrap();
+    assert!(matches!(verdict, audit::Verdict::Unbroken { .. }), "{verdict:?}");
+}
+
+#[tokio::test]
+async fn wrong_tokens_on_the_path_of_a_stop_fill_no_log() {
+    let rig = Rig::new("flood");
+    for number in 0..500 {
+        let wrong = format!("Bearer drv_{number}");
+        rig.ask(&Asked { headers: &[("authorization", &wrong)], ..STOP }).await.assert_refused(401);
+    }
+    rig.audited().await;
+    let mut lines = 0;
+    for file in fs::read_dir(rig.folder.file("")).unwrap() {
+        let text = fs::read_to_string(file.unwrap().path()).unwrap_or_default();
+        lines += text.lines().filter(|line| line.contains("login_failed")).count();
+    }
+    assert!((1..=30).contains(&lines), "{lines}");
+}
+
+#[tokio::test]
+async fn tokens_are_made_and_removed_over_the_socket_and_by_no_door_that_others_reach() {
+    let rig = Rig::new("token-desk");
+    let bearer = format!("Bearer {}", rig.token("boss", Role::Engineer));
+    let new = Asked { path: TOKENS, body: r#"{"name":"panel","role":"operate"}"#, ..START };
+    rig.ask(&Asked { headers: &[("authorization", &bearer)], ..new }).await.assert_refused(403);
+    let made = rig.ask_on_socket(&new).await;
+    let told: serde_json::Value = serde_json::from_str(&made.body).unwrap();
+    let secret = &told["token"];
+    let bearer = format!("Bearer {}", secret.as_str().unwrap());
+    let asked = Asked { headers: &[("authorization", &bearer)], ..STATE };
+    assert_eq!(rig.ask(&asked).await.body, "panel http 127.0.0.1 vso");
+    rig.ask_on_socket(&new).await.assert_refused(422);
+    let listed = rig.ask_on_socket(&Asked { path: TOKENS, ..STATE }).await.body;
+    assert!(
+        listed.contains(r#""name":"panel","role":"operate""#) && !listed.contains(&bearer[11..]),
+        "{listed}"
+    );
+    let remove = Asked { method: "DELETE", path: "/api/v1/tokens/panel", body: "", headers: &[] };
+    assert_eq!(rig.ask_on_socket(&remove).await.status, StatusCode::OK);
+    rig.ask(&asked).await.assert_refused(401);
+    rig.ask_on_socket(&remove).await.assert_refused(404);
+    let audited = rig.audited().await;
+    assert_eq!(audited.iter().filter(|line| *line == "token local -").count(), 2, "{audited:?}");
+}

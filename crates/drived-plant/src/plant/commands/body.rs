@@ -1,0 +1,188 @@
+//! What a command says about itself, in JSON, the same at every face.
+
+use std::time::Duration;
+
+use drive_core::{Direction, Setpoint, StopMode};
+use drive_fleet::Until;
+use schemars::JsonSchema;
+use serde::{Deserialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
+use tokio::time::Instant;
+
+use super::{Action, LIFETIME, LONGEST_LIFETIME, Request, Target};
+
+/// How long an id may be.
+const LONGEST_ID: usize = 64;
+
+/// A body that asks for something.
+pub trait Asks: DeserializeOwned + Send + 'static {
+    /// What it asks for.
+    fn asked(self) -> Asked;
+}
+
+/// What a body says: the caller's id, how long the command may wait until it is sent, and what is to be done.
+#[derive(Debug, Clone)]
+pub struct Asked {
+    pub id: Option<String>,
+    pub expires_in_ms: Option<u64>,
+    pub action: Action,
+}
+
+impl Asked {
+    /// What a body says that belongs to an action of this name.
+    ///
+    /// # Errors
+    /// There is no such action, or its body is another one, in words.
+    pub fn named(action: &str, members: Map<String, Value>) -> Result<Self, String> {
+        fn read<T: Asks>(members: Map<String, Value>) -> Result<Asked, String> {
+            serde_json::from_value::<T>(Value::Object(members))
+                .map(T::asked)
+                .map_err(|error| error.to_string())
+        }
+        match action {
+            "start" => read::<Start>(members),
+            "setpoint" => read::<NewSetpoint>(members),
+            "reset" => read::<Reset>(members),
+            "release" => read::<Release>(members),
+            "save" => read::<Save>(members),
+            _ => Err(format!(
+                "action: expected start, stop, setpoint, reset, release or save, and not {action:?}"
+            )),
+        }
+    }
+
+    /// The request that it is.
+    ///
+    /// # Errors
+    /// What is wrong with its id or its expiry, in words.
+    pub fn of(self, target: Target, arrived: Instant) -> Result<Request, String> {
+        let Self { id, expires_in_ms, action } = self;
+        if id.as_ref().is_some_and(|id| !is_id(id)) {
+            return Err(format!("id: expected 1 to {LONGEST_ID} printable ASCII characters without spaces"));
+        }
+        let lifetime = expires_in_ms.map_or(LIFETIME, Duration::from_millis);
+        if lifetime.is_zero() || lifetime > LONGEST_LIFETIME {
+            return Err(format!("expires_in_ms: expected 1 to {}", LONGEST_LIFETIME.as_millis()));
+        }
+        Ok(Request { id, target, action, lifetime, arrived })
+    }
+}
+
+/// Whether a text may be the name of a command.
+pub fn is_id(text: &str) -> bool {
+    (1..=LONGEST_ID).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_graphic())
+}
+
+/// Starts the motor.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
+    #[schemars(length(min = 1, max = LONGEST_ID))]
+    id: Option<String>,
+    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
+    #[schemars(range(min = 1, max = 10_000))]
+    expires_in_ms: Option<u64>,
+    /// `forward` unless it is said.
+    direction: Option<Direction>,
+    /// Given first; without it the motor starts at what the drive holds.
+    setpoint: Option<Setpoint>,
+    /// When it is confirmed; `in_force` unless it is said.
+    until: Option<Until>,
+}
+
+/// Stops the motor. It never expires, and is carried out each time it arrives, whatever else its body says.
+#[derive(Debug, JsonSchema)]
+#[expect(dead_code, reason = "it is described here, and read as whatever stops is read")]
+pub struct Stop {
+    /// The caller's name of the command, by which its outcome is found. It need not be new.
+    #[schemars(length(min = 1, max = LONGEST_ID))]
+    id: Option<String>,
+    /// `ramp` unless it is said.
+    mode: Option<StopMode>,
+    /// For a stop by `dc_injection`: for so long direct current is held to bring the motor to rest, at the most for 30000; unless it
+    /// is said, as the drive's configuration does.
+    #[schemars(range(min = 1, max = 30_000))]
+    injection_ms: Option<u64>,
+}
+
+/// Changes the setpoint.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewSetpoint {
+    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
+    #[schemars(length(min = 1, max = LONGEST_ID))]
+    id: Option<String>,
+    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
+    #[schemars(range(min = 1, max = 10_000))]
+    expires_in_ms: Option<u64>,
+    setpoint: Setpoint,
+    /// When it is confirmed; `in_force` unless it is said.
+    until: Option<Until>,
+}
+
+/// A command that has nothing to say about itself.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plain {
+    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
+    #[schemars(length(min = 1, max = LONGEST_ID))]
+    id: Option<String>,
+    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
+    #[schemars(range(min = 1, max = 10_000))]
+    expires_in_ms: Option<u64>,
+}
+
+/// Resets the present fault, once.
+#[derive(Debug, Deserialize)]
+#[serde(transparent)]
+pub struct Reset(Plain);
+
+/// Saves the parameters to EEPROM.
+#[derive(Debug, Deserialize)]
+#[serde(transparent)]
+pub struct Save(Plain);
+
+/// Gives control back to the panel or the terminals.
+#[derive(Debug, Deserialize)]
+#[serde(transparent)]
+pub struct Release(Plain);
+
+impl Asks for Start {
+    fn asked(self) -> Asked {
+        let Self { id, expires_in_ms, direction, setpoint, until } = self;
+        let (direction, until) = (direction.unwrap_or(Direction::Forward), until.unwrap_or_default());
+        Asked { id, expires_in_ms, action: Action::Start { direction, setpoint, until } }
+    }
+}
+
+impl Asks for NewSetpoint {
+    fn asked(self) -> Asked {
+        let Self { id, expires_in_ms, setpoint, until } = self;
+        Asked { id, expires_in_ms, action: Action::Setpoint { setpoint, until: until.unwrap_or_default() } }
+    }
+}
+
+impl Asks for Reset {
+    fn asked(self) -> Asked {
+        self.0.asked_to(Action::Reset)
+    }
+}
+
+impl Asks for Release {
+    fn asked(self) -> Asked {
+        self.0.asked_to(Action::Release)
+    }
+}
+
+impl Asks for Save {
+    fn asked(self) -> Asked {
+        self.0.asked_to(Action::Save)
+    }
+}
+
+impl Plain {
+    fn asked_to(self, action: Action) -> Asked {
+        Asked { id: self.id, expires_in_ms: self.expires_in_ms, action }
+    }
+}

@@ -1,0 +1,361 @@
+//! Carrying out: what is asked of the fleet, and how the answer is told.
+
+use std::{
+    borrow::Cow,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use drive_fleet::{
+    Act, DriveHandle, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
+    StopTicket, Ticket, view::StopModesView,
+};
+use futures_util::future::join_all;
+use tokio::{
+    sync::Notify,
+    time::{Instant, sleep, timeout_at},
+};
+
+use super::{
+    Action, ActionWord, OutcomeWord, Request, Target,
+    log::Command,
+    outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, told},
+    settle::settled,
+};
+use crate::plant::{
+    Plant,
+    views::{CommandView, SeveralView, Shown},
+};
+use drived_config::rights::Caller;
+use drived_words::json::{milliseconds, unix};
+
+/// Outcomes of several drives that come within this time are told together.
+const TOGETHER: Duration = Duration::from_millis(50);
+/// For how long an outcome that is not known may still be settled: as long as the command is remembered.
+const SETTLES_FOR: Duration = Duration::from_secs(600);
+
+/// A command and the drives that are meant.
+#[derive(Clone)]
+pub(super) struct Work(Arc<Inner>);
+
+struct Inner {
+    plant: Plant,
+    request: Request,
+    members: Vec<DriveHandle>,
+    /// What is told of each member, in their order.
+    parts: Mutex<Vec<CommandView>>,
+    /// One of them has changed.
+    changed: Notify,
+    /// What holds for all of them.
+    head: CommandView,
+}
+
+/// What was asked of the drives: it is on its way to them.
+enum Posted {
+    Stop(StopTicket),
+    StopOfSeveral(GroupStop),
+    SetpointOfSeveral(GroupTicket<Vec<(Arc<str>, Outcome)>>),
+    /// One for each member.
+    Orders(Vec<Ticket>),
+    /// A start of several waits for its turn first.
+    Nothing,
+}
+
+impl Work {
+    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, members: Vec<DriveHandle>) -> Self {
+        let id = request.id.clone().unwrap_or_else(new_id);
+        let act = Act::of(&caller.name).through(&caller.origin).with_id(&id);
+        let members: Vec<_> = members.iter().map(|member| member.commanded_by(act.clone())).collect();
+        let head = CommandView {
+            id,
+            drive: None,
+            group: None,
+            action: request.action.word(),
+            command: request.action.text(),
+            caller: caller.name.clone(),
+            origin: caller.origin.clone(),
+            outcome: OutcomeWord::Pending,
+            open: true,
+            reason: None,
+            text: None,
+            time_unix_ms: unix(request.arrived),
+            took_ms: None,
+            status: None,
+            counted: None,
+            started: None,
+            stop: None,
+            several: None,
+        };
+        let part = |member: &DriveHandle| {
+            let part = CommandView { drive: Some(member.name().to_string()), ..head.clone() };
+            match (request.action, member.settings().control) {
+                // A stop of several goes to those that may be commanded, and the others are accounted for at once.
+                (Action::Stop(_), false) if request.target != Target::Drive(member.name().to_string()) => {
+                    part.ended(&Outcome::Refused(drive_fleet::Refused::ReadOnly), member, request.arrived)
+                }
+                _ => part,
+            }
+        };
+        let parts = Mutex::new(members.iter().map(part).collect());
+        let head = match &request.target {
+            Target::Group(name) => CommandView { group: Some(name.clone()), ..head },
+            Target::Drive(_) | Target::All => head,
+        };
+        let request = request.clone();
+        Self(Arc::new(Inner { plant, request, members, parts, changed: Notify::new(), head }))
+    }
+
+    /// The command as it is to be told now.
+    pub(super) fn view(&self) -> CommandView {
+        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let (Target::Drive(_), Some(part)) = (&self.0.request.target, parts.first()) {
+            return part.clone();
+        }
+        let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref())));
+        let silent = |part: &CommandView| {
+            let member = self.0.members.iter().find(|member| part.drive.as_deref() == Some(member.name()));
+            member.is_some_and(|member| member.snapshot().link != Link::Connected)
+        };
+        CommandView {
+            outcome,
+            open: parts.iter().any(|part| part.open),
+            took_ms: parts.iter().filter_map(|part| part.took_ms).max(),
+            several: Some(SeveralView::of(parts, silent)),
+            ..self.0.head.clone()
+        }
+    }
+
+    /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
+    /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn.
+    pub(super) fn begin(self, command: Command) {
+        let posted = self.post();
+        self.tell(&command);
+        tokio::spawn(self.carried(posted, command));
+    }
+
+    async fn carried(self, posted: Posted, command: Command) {
+        tokio::select! {
+            () = self.work(posted) => {}
+            () = self.tell_changes(&command) => {}
+        }
+        self.tell(&command);
+        if self.is_open() {
+            tokio::select! {
+                () = self.settle() => {}
+                () = self.tell_changes(&command) => {}
+                () = sleep(SETTLES_FOR) => {}
+            }
+            self.tell(&command);
+        }
+    }
+
+    fn tell(&self, command: &Command) {
+        let view = Arc::new(self.view());
+        self.0.plant.0.tell_command(&view);
+        command.send_replace(view);
+    }
+
+    /// Tells what has changed, for as long as it is polled.
+    async fn tell_changes(&self, command: &Command) {
+        loop {
+            self.0.changed.notified().await;
+            sleep(TOGETHER).await;
+            self.tell(command);
+        }
+    }
+
+    fn post(&self) -> Posted {
+        let Inner { request, members, .. } = &*self.0;
+        match (request.action, &request.target, &**members) {
+            (Action::Stop(order), Target::Drive(_), [member]) => Posted::Stop(member.stop(order)),
+            (Action::Stop(order), ..) => Posted::StopOfSeveral(self.group().stop(order)),
+            (Action::Start { .. }, Target::Group(_) | Target::All, _) => Posted::Nothing,
+            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
+                Posted::SetpointOfSeveral(self.group().set_setpoint(setpoint))
+            }
+            (action, ..) => {
+                let expires = request.arrived + request.lifetime;
+                let order = |member: &DriveHandle| Some(member.order_until(order(action)?, expires));
+                Posted::Orders(members.iter().filter_map(order).collect())
+            }
+        }
+    }
+
+    async fn work(&self, posted: Posted) {
+        match posted {
+            Posted::Stop(stop) => self.end(0, &stop.await),
+            Posted::StopOfSeveral(stops) => {
+                let each = stops.each().iter();
+                join_all(each.map(async |(name, stop)| self.end_of(name, &stop.finished().await))).await;
+            }
+            Posted::SetpointOfSeveral(given) => {
+                for (name, outcome) in given.await {
+                    self.end_of(&name, &outcome);
+                }
+            }
+            Posted::Orders(orders) => {
+                let orders = orders.iter().enumerate();
+                join_all(orders.map(async |(number, order)| self.end(number, &order.finished().await))).await;
+            }
+            Posted::Nothing => {
+                let Inner { plant, request, .. } = &*self.0;
+                let expires = request.arrived + request.lifetime;
+                let Ok(_turn) = timeout_at(expires, plant.0.group_starts.lock()).await else {
+                    let text = "another start of a group was under way";
+                    return self.end_all(OutcomeWord::Expired, GROUP_BUSY, text);
+                };
+                self.start_group().await;
+            }
+        }
+    }
+
+    async fn start_group(&self) {
+        let Action::Start { direction, setpoint, until } = self.0.request.action else { return };
+        let start = GroupStart { direction, setpoint, spacing: Duration::ZERO, until };
+        match self.group().start(start).await {
+            Ok(started) => {
+                for (name, outcome) in started {
+                    self.end_of(&name, &outcome);
+                }
+            }
+            Err(GroupFailure::NotReady(reasons)) => {
+                for (name, refused) in reasons {
+                    self.end_of(&name, &Outcome::Refused(refused));
+                }
+                let text = "nobody of the group was started: another of its drives was not ready";
+                self.end_all(OutcomeWord::Refused, GROUP_NOT_READY, text);
+            }
+            Err(GroupFailure::Failed { outcomes, .. }) => {
+                for (name, outcome) in outcomes {
+                    self.end_of(&name, &outcome);
+                }
+                let text = "the group was stopped again, because not all of its drives started";
+                self.end_all(OutcomeWord::Superseded, GROUP_FAILED, text);
+            }
+        }
+    }
+
+    fn group(&self) -> Group {
+        self.0.plant.fleet().group_of(self.0.members.iter().cloned())
+    }
+
+    /// Waits until what is not known is.
+    async fn settle(&self) {
+        let open = self.0.members.iter().enumerate().filter(|(number, _)| self.is_open_at(*number));
+        let each = open.map(|(number, member)| async move {
+            let ended = Instant::now();
+            if let Some(outcome) = settled(self.0.request.action, member, ended).await {
+                self.end_as(number, outcome, None, None);
+            }
+        });
+        join_all(each).await;
+    }
+
+    fn is_open(&self) -> bool {
+        (0..self.0.members.len()).any(|number| self.is_open_at(number))
+    }
+
+    /// Whether it may still turn out what became of a part.
+    fn is_open_at(&self, number: usize) -> bool {
+        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        parts.get(number).is_some_and(|part| part.open)
+    }
+
+    fn end_of(&self, name: &str, outcome: &Outcome) {
+        if let Some(number) = self.0.members.iter().position(|member| **member.name() == *name) {
+            self.end(number, outcome);
+        }
+    }
+
+    fn end(&self, number: usize, outcome: &Outcome) {
+        self.end_with(number, Some(outcome), told(outcome));
+    }
+
+    /// Ends what has no outcome of its own.
+    fn end_all(&self, word: OutcomeWord, reason: &'static str, text: &str) {
+        for number in 0..self.0.members.len() {
+            let outcome = {
+                let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+                parts.get(number).map(|part| part.outcome)
+            };
+            if outcome == Some(OutcomeWord::Pending) {
+                self.end_as(number, word, Some(reason), Some(text.to_owned()));
+            }
+        }
+    }
+
+    fn end_as(&self, number: usize, word: OutcomeWord, reason: Option<&'static str>, text: Option<String>) {
+        self.end_with(number, None, (word, reason, text));
+    }
+
+    fn end_with(
+        &self,
+        number: usize,
+        outcome: Option<&Outcome>,
+        (word, reason, text): (OutcomeWord, Option<&'static str>, Option<String>),
+    ) {
+        let Some(member) = self.0.members.get(number) else { return };
+        let mut parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(part) = parts.get_mut(number) {
+            let is_first = part.outcome == OutcomeWord::Pending;
+            *part = part.clone().ended_as(word, reason, text, member, self.0.request.arrived);
+            part.stop = outcome.and_then(Outcome::stop).map(StopModesView::from).or(part.stop.take());
+            part.started = outcome.and_then(Outcome::started).or(part.started);
+            if is_first {
+                self.0.plant.tally().count(part);
+            }
+        }
+        drop(parts);
+        self.0.changed.notify_one();
+    }
+}
+
+impl CommandView {
+    fn ended(self, outcome: &Outcome, member: &DriveHandle, arrived: Instant) -> Self {
+        let (word, reason, text) = told(outcome);
+        self.ended_as(word, reason, text, member, arrived)
+    }
+
+    /// The same, ended, with what the drive shows now.
+    fn ended_as(
+        self,
+        outcome: OutcomeWord,
+        reason: Option<&'static str>,
+        text: Option<String>,
+        member: &DriveHandle,
+        arrived: Instant,
+    ) -> Self {
+        let now = Instant::now();
+        let status = Some(Shown::Live(member.snapshot()));
+        let took_ms = Some(milliseconds(now.saturating_duration_since(arrived)));
+        // A stop goes on until it is confirmed.
+        let open = match outcome {
+            OutcomeWord::Pending | OutcomeWord::Unknown => true,
+            OutcomeWord::NotConfirmed => self.action == ActionWord::Stop,
+            _ => false,
+        };
+        Self { outcome, open, reason: reason.map(Cow::from), text, status, took_ms, ..self }
+    }
+}
+
+/// What a drive is asked for an action; `None` for a stop, which is no order.
+fn order(action: Action) -> Option<Order> {
+    Some(match action {
+        Action::Start { direction, setpoint, until } => Order::Start { direction, setpoint, until },
+        Action::Setpoint { setpoint, until } => Order::Setpoint { setpoint, until },
+        Action::Reset => Order::ResetFaults,
+        Action::Release => Order::Release,
+        Action::Save => Order::Persist,
+        Action::Stop(_) => return None,
+    })
+}
+
+/// An id that nobody guesses.
+fn new_id() -> String {
+    let mut bytes = [0; 8];
+    // Without randomness the time must do; an id is no secret.
+    if getrandom::fill(&mut bytes).is_err() {
+        bytes = unix(Instant::now()).to_be_bytes();
+    }
+    format!("c-{:016x}", u64::from_be_bytes(bytes))
+}

@@ -1,0 +1,113 @@
+//! What became of the last commands, by their ids: a command that comes again is answered, not repeated.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use tokio::{sync::watch, time::Instant};
+
+use super::{Action, Rejected, Request, Target};
+use crate::plant::views::CommandView;
+use drived_config::rights::Caller;
+
+/// How many commands are remembered, and for how long.
+const KEPT: usize = 1_000;
+const KEPT_FOR: Duration = Duration::from_secs(600);
+
+/// A command as it is told, now and later.
+pub(super) type Command = Arc<watch::Sender<Arc<CommandView>>>;
+/// The ear of somebody who waits for it.
+pub type Told = watch::Receiver<Arc<CommandView>>;
+
+/// The last commands.
+#[derive(Default)]
+pub(in crate::plant) struct Log(Mutex<Entries>);
+
+#[derive(Default)]
+struct Entries {
+    by_id: HashMap<String, Entry>,
+    /// The ids with the time of their arrival, the oldest first. One that was used again stands here more than once.
+    order: VecDeque<(Instant, String)>,
+}
+
+struct Entry {
+    arrived: Instant,
+    caller: String,
+    target: Target,
+    action: Action,
+    lifetime: Duration,
+    command: Command,
+}
+
+/// What the log knows of an id.
+pub(super) enum Found {
+    /// It is this command that came before.
+    Again(Command),
+    /// It is new.
+    New(Command),
+}
+
+impl Log {
+    /// The command of an id.
+    pub(super) fn of(&self, id: &str) -> Option<Command> {
+        let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.forget(Instant::now());
+        entries.by_id.get(id).map(|entry| Arc::clone(&entry.command))
+    }
+
+    /// The same command of the same caller as it came before, or a new one. A stop is always new.
+    pub(super) fn find_or_add(
+        &self,
+        caller: &Caller,
+        request: Request,
+        view: CommandView,
+    ) -> Result<Found, Rejected> {
+        let Request { id, target, action, lifetime, arrived } = request;
+        let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.forget(arrived);
+        if let Some(id) = id.filter(|_| !matches!(action, Action::Stop(_)))
+            && let Some(entry) = entries.by_id.get(&id)
+        {
+            let is_same = entry.caller == caller.name
+                && (&entry.target, entry.action, entry.lifetime) == (&target, action, lifetime);
+            return if is_same {
+                Ok(Found::Again(Arc::clone(&entry.command)))
+            } else {
+                Err(Rejected::IdReused(id))
+            };
+        }
+        let id = view.id.clone();
+        let command = Arc::new(watch::Sender::new(Arc::new(view)));
+        let (caller, told) = (caller.name.clone(), Arc::clone(&command));
+        let entry = Entry { arrived, caller, target, action, lifetime, command: told };
+        entries.by_id.insert(id.clone(), entry);
+        entries.order.push_back((arrived, id));
+        Ok(Found::New(command))
+    }
+}
+
+#[cfg(test)]
+impl Log {
+    /// No command is added before what it gives is dropped.
+    pub(super) fn hold(&self) -> impl Drop + '_ {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Entries {
+    /// Forgets what is too old, and the oldest of too many.
+    fn forget(&mut self, now: Instant) {
+        while let Some((arrived, _)) = self.order.front() {
+            let is_old = now.saturating_duration_since(*arrived) > KEPT_FOR;
+            if !is_old && self.order.len() < KEPT {
+                return;
+            }
+            let Some((arrived, id)) = self.order.pop_front() else { return };
+            if self.by_id.get(&id).is_some_and(|entry| entry.arrived == arrived) {
+                self.by_id.remove(&id);
+            }
+        }
+    }
+}

@@ -1,0 +1,344 @@
+//! Commands: each has an id, an expiry that counts from its arrival, and an outcome that is told under its id.
+//!
+//! A command goes on when whoever asked for it has gone. A stop never expires, and is carried out each time it arrives.
+
+mod body;
+mod carry;
+mod log;
+mod object;
+mod outcome;
+mod said;
+mod settle;
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use drive_core::{Direction, Setpoint};
+use drive_fleet::{DriveHandle, StopOrder, Until};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tokio::time::{Instant, timeout};
+
+pub(super) use self::log::Log;
+pub use self::{
+    body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
+    log::Told,
+    outcome::OutcomeWord,
+    said::{Said, Unclear, body},
+};
+use self::{carry::Work, log::Found};
+use super::{Plant, views::CommandView};
+use drived_config::{config::Group, rights::Caller};
+
+/// How long a command may wait until it is sent, unless it says so itself, and at the longest.
+pub const LIFETIME: Duration = Duration::from_secs(1);
+pub const LONGEST_LIFETIME: Duration = Duration::from_secs(10);
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The caller's name of it; `None`: it gets one of ours.
+    pub id: Option<String>,
+    pub target: Target,
+    pub action: Action,
+    pub lifetime: Duration,
+    /// When it arrived.
+    pub arrived: Instant,
+}
+
+/// Who is meant.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Target {
+    Drive(String),
+    Group(String),
+    All,
+}
+
+/// What is to be done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    Start {
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+        until: Until,
+    },
+    Stop(StopOrder),
+    Setpoint {
+        setpoint: Setpoint,
+        until: Until,
+    },
+    Reset,
+    Release,
+    /// To EEPROM.
+    Save,
+}
+
+/// Why a command is not taken at all.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Rejected {
+    #[error("{caller} has no right to {right}")]
+    NoRight { caller: String, right: &'static str },
+    #[error("the token {caller} is not for {drive}")]
+    OutOfScope { caller: String, drive: String },
+    #[error("there is no drive {0:?}")]
+    NoDrive(String),
+    #[error("there is no group {0:?}")]
+    NoGroup(String),
+    #[error("a stop of {0} came after it")]
+    Stopped(String),
+    #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
+    IdReused(String),
+}
+
+impl Rejected {
+    /// The outcome and the reason by which every face tells it.
+    pub const fn told(&self) -> (OutcomeWord, &'static str) {
+        match self {
+            Self::NoRight { .. } | Self::OutOfScope { .. } => (OutcomeWord::Refused, "no_right"),
+            Self::NoDrive(_) | Self::NoGroup(_) => (OutcomeWord::Refused, "not_found"),
+            Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
+            Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
+        }
+    }
+}
+
+/// What is to be done, in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ActionWord {
+    Start,
+    Stop,
+    Setpoint,
+    Reset,
+    Release,
+    Save,
+}
+
+impl ActionWord {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::Setpoint => "setpoint",
+            Self::Reset => "reset",
+            Self::Release => "release",
+            Self::Save => "save",
+        }
+    }
+}
+
+impl Action {
+    pub const fn word(&self) -> ActionWord {
+        match self {
+            Self::Start { .. } => ActionWord::Start,
+            Self::Stop(_) => ActionWord::Stop,
+            Self::Setpoint { .. } => ActionWord::Setpoint,
+            Self::Reset => ActionWord::Reset,
+            Self::Release => ActionWord::Release,
+            Self::Save => ActionWord::Save,
+        }
+    }
+
+    pub fn text(&self) -> String {
+        match self {
+            Self::Start { direction, setpoint: Some(setpoint), .. } => {
+                format!("start {direction} at {setpoint}")
+            }
+            Self::Start { direction, setpoint: None, .. } => format!("start {direction}"),
+            Self::Stop(order) => order.to_string(),
+            Self::Setpoint { setpoint, .. } => format!("setpoint {setpoint}"),
+            Self::Reset => "fault reset".to_owned(),
+            Self::Release => "release".to_owned(),
+            Self::Save => "save to EEPROM".to_owned(),
+        }
+    }
+}
+
+impl Plant {
+    /// Carries out a command and waits for its outcome for as long as `wait`; then it is told as it is.
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    ///
+    /// # Cancellation
+    /// The command goes on.
+    pub async fn command(
+        &self,
+        caller: &Caller,
+        request: Request,
+        wait: Duration,
+    ) -> Result<Arc<CommandView>, Rejected> {
+        let told = self.begin(caller, request)?;
+        Ok(settled(told, wait).await)
+    }
+
+    /// The command of an id, after its outcome is known or `wait` is over.
+    pub async fn command_of(&self, id: &str, wait: Duration) -> Option<Arc<CommandView>> {
+        let told = self.0.commands.of(id)?.subscribe();
+        Some(settled(told, wait).await)
+    }
+
+    /// Begins a command: what the drives are asked is on its way to them when this returns. Its outcome is told, and told
+    /// anew for as long as it may still be settled.
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    pub fn begin(&self, caller: &Caller, request: Request) -> Result<Told, Rejected> {
+        let (has_right, right) = match request.action {
+            Action::Stop(_) => (caller.rights.stop, "stop"),
+            Action::Save => (caller.rights.engineer, "save parameters"),
+            _ => (caller.rights.operate, "operate"),
+        };
+        if !has_right {
+            return Err(Rejected::NoRight { caller: caller.name.clone(), right });
+        }
+        self.0.note_commander(&caller.name);
+        let fleet = self.fleet();
+        let is_stop = matches!(request.action, Action::Stop(_));
+        let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
+        let mut members = Vec::new();
+        // A reload gives no name to another drive meanwhile.
+        let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
+        for name in self.named(&groups, &request.target)? {
+            // Whoever may stop, may stop them all.
+            if !is_stop && !caller.may_command(&name, &groups) {
+                return Err(Rejected::OutOfScope { caller: caller.name.clone(), drive: name });
+            }
+            match fleet.drive(&name) {
+                Some(drive) => members.push(drive),
+                // A group is stopped whoever is left of it; nothing else is done to a part of what was meant.
+                None if may_be_less => {}
+                None => return Err(Rejected::NoDrive(name)),
+            }
+        }
+        drop(groups);
+        // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
+        let _passed = self.0.stopped.pass(&request, &members)?;
+        let work = Work::new(self.clone(), caller, &request, members);
+        match self.0.commands.find_or_add(caller, request, work.view())? {
+            Found::Again(told) => Ok(told.subscribe()),
+            Found::New(command) => {
+                let told = command.subscribe();
+                work.begin(command);
+                Ok(told)
+            }
+        }
+    }
+
+    /// The names of the drives that are meant.
+    fn named(&self, groups: &[Group], target: &Target) -> Result<Vec<String>, Rejected> {
+        match target {
+            Target::Drive(name) => Ok(vec![name.clone()]),
+            Target::Group(name) => {
+                let group = groups.iter().find(|group| group.name == *name);
+                group.map(|group| group.drives.clone()).ok_or_else(|| Rejected::NoGroup(name.clone()))
+            }
+            Target::All => Ok(self.fleet().drives().iter().map(|drive| drive.name().to_string()).collect()),
+        }
+    }
+}
+
+/// When a stop was last asked of each drive, by whichever face: what arrived before it is not begun after it.
+#[derive(Default)]
+pub(super) struct Stopped(Mutex<HashMap<String, Instant>>);
+
+/// Nothing else passes while this is there.
+type Passed<'a> = MutexGuard<'a, HashMap<String, Instant>>;
+
+impl Stopped {
+    fn pass(&self, request: &Request, members: &[DriveHandle]) -> Result<Passed<'_>, Rejected> {
+        let mut stopped = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_stop = matches!(request.action, Action::Stop(_));
+        for member in members {
+            let name = member.name().to_string();
+            if is_stop {
+                stopped.insert(name, Instant::now());
+            } else if stopped.get(&name).is_some_and(|at| *at > request.arrived) {
+                return Err(Rejected::Stopped(name));
+            }
+        }
+        Ok(stopped)
+    }
+}
+
+async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
+    // What is not known in time is told as it is.
+    let _ = timeout(wait, told.wait_for(|view| view.outcome != OutcomeWord::Pending)).await;
+    Arc::clone(&told.borrow())
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::StopMode;
+    use drive_fleet::{EventKind, Outcome, Received, Refused};
+    use tokio::{sync::mpsc, task::spawn_blocking};
+
+    use super::*;
+    use crate::plant::testing::TestPlant;
+    use drived_config::rights::Rights;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_start_that_may_be_given_is_on_its_way_before_a_stop_is_taken() {
+        let plant = TestPlant::of(1).await.plant;
+        let held = plant.0.commands.hold();
+        let starting = plant.clone();
+        let started = spawn_blocking(move || {
+            let caller = Caller::new("page", "page", Rights::ALL);
+            let action =
+                Action::Start { direction: Direction::Forward, setpoint: None, until: Until::default() };
+            let (target, arrived) = (Target::Drive("pump 1".to_owned()), Instant::now());
+            starting.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived })
+        });
+        // It has been let pass and is not handed over yet: no stop can be taken meanwhile.
+        let patience = std::time::Instant::now() + Duration::from_secs(20);
+        while plant.0.stopped.0.try_lock().is_ok() {
+            assert!(std::time::Instant::now() < patience, "a stop would be taken before it");
+            std::thread::yield_now();
+        }
+        drop(held);
+        assert!(started.await.unwrap().is_ok());
+        assert!(plant.0.stopped.0.try_lock().is_ok(), "and then stops are taken");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn every_command_of_a_burst_is_on_its_way_when_it_was_taken_however_long_the_burst() {
+        let plant = TestPlant::of(1).await.plant;
+        let (mut events, pump) = (plant.fleet().events(), plant.fleet().drive("pump 1").unwrap());
+        let caller = Caller::new("scada", "mqtt", Rights::ALL);
+        let beside = pump.commanded_by("beside");
+        let (messages, mut inbox) = mpsc::unbounded_channel();
+        (0..1_000).for_each(|number| messages.send(number).unwrap());
+        drop(messages);
+        let mut stops = Vec::new();
+        // Each message that is there at once takes a part of what this task may spend before it lets others run.
+        while inbox.recv().await.is_some() {
+            let (action, arrived) = (Action::Stop(StopMode::Ramp.into()), Instant::now());
+            let target = Target::Drive("pump 1".to_owned());
+            let _ = plant.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived });
+            stops.push(beside.stop(StopMode::Ramp));
+        }
+        for stop in stops {
+            assert!(stop.await.is_confirmed());
+        }
+        let mut commanders = Vec::new();
+        while commanders.len() < 2_000 {
+            let Received::Event(event) = events.recv().await else { panic!("events are missing") };
+            if let EventKind::Command { commander, .. } = event.kind {
+                commanders.push(commander);
+            }
+        }
+        let expected = ["scada", "beside"].into_iter().cycle();
+        let late = commanders.iter().zip(expected).position(|(commander, expected)| **commander != *expected);
+        assert_eq!(late, None, "the stop that was taken first was overtaken");
+    }
+
+    #[test]
+    fn what_a_stop_has_overtaken_is_told_by_the_same_words_whoever_finds_it_out() {
+        let (word, reason, _) = outcome::told(&Outcome::Refused(Refused::Stopped));
+        let (here, why) = Rejected::Stopped("pump 1".to_owned()).told();
+        assert_eq!((here, Some(why)), (word, reason));
+    }
+}

@@ -1,0 +1,227 @@
+//! What a message says, read strictly: whoever asks for motion says one thing, and a stop is one whatever else it says.
+//!
+//! Two values of one key, a key that nobody knows and a `null` are refused by the name of the key, at every door. What names
+//! a stop without being one is said to be neither stop nor start, so that nobody believes that the motor stops.
+
+use std::time::Duration;
+
+use drive_core::StopMode;
+use drive_fleet::StopOrder;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use super::{
+    Action, ActionWord,
+    body::{Asked, is_id},
+    object::Object,
+};
+
+/// The word of a stop.
+const STOP: &str = "stop";
+
+/// Why it cannot be understood.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unclear {
+    #[error("it is no JSON: {0}")]
+    NoJson(String),
+    #[error("{0}")]
+    Malformed(String),
+    /// It names a stop beside something else.
+    #[error("{0}: this is no stop and no start")]
+    Ambiguous(String),
+}
+
+/// A message, as far as it can be understood.
+#[derive(Debug, Clone)]
+pub struct Said {
+    /// For the audit log.
+    pub body: Value,
+    /// What it names, whether or not it can be understood.
+    pub action: Option<ActionWord>,
+    pub id: Option<String>,
+    /// When it was issued, as it says itself.
+    pub issued_unix_ms: Option<u64>,
+    pub asked: Result<Asked, Unclear>,
+}
+
+impl Said {
+    /// An object with its `action` and perhaps `issued_unix_ms` beside the body of the API.
+    pub fn of(text: &str) -> Self {
+        if text.trim() == STOP {
+            return Self::plain(Action::Stop(StopMode::Ramp.into()), Value::from(text));
+        }
+        let object = match object(text.as_bytes()) {
+            Ok(object) => object,
+            Err(unclear) => return Self::unclear(unclear, Value::from(text)),
+        };
+        let actions: Vec<&Value> = object.all("action").collect();
+        let (body, id) = (object.shown(), object.one("id").and_then(Value::as_str));
+        let id = id.filter(|id| is_id(id)).map(str::to_owned);
+        if !actions.is_empty() && actions.iter().all(|action| **action == STOP) {
+            return Self { id, ..Self::stop(&object) };
+        }
+        let action = object.one("action").and_then(|action| serde_json::from_value(action.clone()).ok());
+        let (asked, issued_unix_ms) = match asked(&object) {
+            Ok((asked, issued)) => (Ok(asked), issued),
+            Err(unclear) => (Err(unclear), None),
+        };
+        Self { body, action, id, issued_unix_ms, asked }
+    }
+
+    /// What came where everything is a stop: a mode that is said once is taken, and else it is the ramp.
+    pub fn stopping(text: &str) -> Self {
+        match object(text.as_bytes()) {
+            Ok(object) => Self::stop(&object),
+            Err(_) => Self::plain(
+                Action::Stop(mode(&Value::from(text.trim())).unwrap_or(StopMode::Ramp).into()),
+                Value::from(text),
+            ),
+        }
+    }
+
+    fn stop(object: &Object) -> Self {
+        let mode = object.one("mode").and_then(mode).unwrap_or(StopMode::Ramp);
+        let injection = object.one("injection_ms").and_then(Value::as_u64).map(Duration::from_millis);
+        let injection = injection.filter(|time| mode == StopMode::DcInjection && !time.is_zero());
+        let order = StopOrder { mode, injection };
+        let id = object.one("id").and_then(Value::as_str).filter(|id| is_id(id)).map(str::to_owned);
+        Self { id, ..Self::plain(Action::Stop(order), object.shown()) }
+    }
+
+    /// What is asked for without an object.
+    pub fn plain(action: Action, body: Value) -> Self {
+        let asked = Asked { id: None, expires_in_ms: None, action };
+        Self { body, action: Some(action.word()), id: None, issued_unix_ms: None, asked: Ok(asked) }
+    }
+
+    /// What cannot be understood.
+    pub const fn unclear(unclear: Unclear, body: Value) -> Self {
+        Self { body, action: None, id: None, issued_unix_ms: None, asked: Err(unclear) }
+    }
+
+    /// How it stops, if it is a stop.
+    pub fn stops(&self) -> Option<StopOrder> {
+        match &self.asked {
+            Ok(Asked { action: Action::Stop(order), .. }) => Some(*order),
+            _ => None,
+        }
+    }
+}
+
+/// A body whose address says what it asks for; nothing stands for an object without members.
+///
+/// # Errors
+/// Why it is none of these.
+pub fn body<T: DeserializeOwned>(text: &[u8]) -> Result<T, Unclear> {
+    let text = if text.trim_ascii().is_empty() { b"{}" } else { text };
+    let object = object(text)?;
+    unambiguous(&object)?;
+    let members = strict(object)?;
+    serde_json::from_value(Value::Object(members)).map_err(malformed)
+}
+
+/// What an object that is no stop asks for, and when it was issued.
+fn asked(object: &Object) -> Result<(Asked, Option<u64>), Unclear> {
+    unambiguous(object)?;
+    let mut members = strict(object.clone())?;
+    let Some(Value::String(action)) = members.remove("action") else {
+        return Err(Unclear::Malformed("expected \"action\"".to_owned()));
+    };
+    let issued = members.remove("issued_unix_ms").map(|issued| {
+        let wrong = || Unclear::Malformed("issued_unix_ms: expected milliseconds since 1970".to_owned());
+        issued.as_u64().ok_or_else(wrong)
+    });
+    let asked = Asked::named(&action, members).map_err(Unclear::Malformed)?;
+    Ok((asked, issued.transpose()?))
+}
+
+fn object(text: &[u8]) -> Result<Object, Unclear> {
+    match Object::read(text) {
+        Ok(Some(object)) => Ok(object),
+        Ok(None) => {
+            let what = if text.trim_ascii() == b"null" { ", and not null" } else { "" };
+            Err(Unclear::Malformed(format!("expected an object in JSON{what}")))
+        }
+        Err(error) => Err(Unclear::NoJson(error.to_string())),
+    }
+}
+
+/// Refuses what names a stop and is none.
+fn unambiguous(object: &Object) -> Result<(), Unclear> {
+    let is_stop = |text: &str| text.trim().eq_ignore_ascii_case(STOP);
+    for (key, value) in object.members() {
+        if is_stop(key) {
+            return Err(Unclear::Ambiguous(format!("{key} is no key of a command")));
+        }
+        if key == "action" && value.as_str().is_some_and(is_stop) {
+            return Err(Unclear::Ambiguous(format!("its action is {value}, and not only that")));
+        }
+    }
+    Ok(())
+}
+
+/// Its members, of which each stands there once and has a value.
+fn strict(object: Object) -> Result<Map<String, Value>, Unclear> {
+    if let Some(key) = object.twice() {
+        return Err(Unclear::Malformed(format!("{key} stands there twice")));
+    }
+    if let Some(key) = object.null() {
+        return Err(Unclear::Malformed(format!("{key}: null is no value: leave the key out")));
+    }
+    Ok(object.into_members())
+}
+
+fn mode(value: &Value) -> Option<StopMode> {
+    serde_json::from_value(value.clone()).ok()
+}
+
+fn malformed(error: serde_json::Error) -> Unclear {
+    Unclear::Malformed(error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_is_one_whatever_else_it_says_and_by_the_mode_that_it_says_once() {
+        for (text, expected) in [
+            ("stop", StopMode::Ramp),
+            (r#"{"action": "stop", "mode": "fast"}"#, StopMode::Fast),
+            (r#"{"action": "stop", "mode": "fast", "mode": "freewheel"}"#, StopMode::Ramp),
+            (r#"{"action": "stop", "start": true, "setpoint": 50}"#, StopMode::Ramp),
+        ] {
+            assert_eq!(Said::of(text).stops(), Some(expected.into()), "{text}");
+        }
+        for text in ["", "{", "null", "whatever", r#"{"action": "start"}"#, "\u{0}"] {
+            assert_eq!(Said::stopping(text).stops(), Some(StopMode::Ramp.into()), "{text}");
+        }
+        assert_eq!(Said::stopping("freewheel").stops(), Some(StopMode::Freewheel.into()));
+    }
+
+    #[test]
+    fn a_stop_says_for_how_long_direct_current_is_held_and_is_a_stop_whatever_it_says_of_that() {
+        let (dc, ramp) = (StopMode::DcInjection, StopMode::Ramp);
+        for (text, expected) in [
+            (
+                r#"{"mode": "dc_injection", "injection_ms": 3000}"#,
+                StopOrder::injecting(Duration::from_secs(3)),
+            ),
+            (r#"{"mode": "dc_injection"}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": 0}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": "long"}"#, dc.into()),
+            (r#"{"mode": "dc_injection", "injection_ms": 1, "injection_ms": 2}"#, dc.into()),
+            (r#"{"injection_ms": 3000}"#, ramp.into()),
+        ] {
+            assert_eq!(Said::stopping(text).stops(), Some(expected), "{text}");
+        }
+        let text = r#"{"action": "stop", "mode": "dc_injection", "injection_ms": 250}"#;
+        assert_eq!(Said::of(text).stops(), Some(StopOrder::injecting(Duration::from_millis(250))));
+    }
+
+    #[test]
+    fn nobody_knows_the_id_of_what_has_two() {
+        let said = Said::of(r#"{"action": "stop", "id": "a", "id": "b"}"#);
+        assert_eq!((said.stops(), said.id), (Some(StopMode::Ramp.into()), None));
+    }
+}

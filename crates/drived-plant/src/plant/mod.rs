@@ -1,0 +1,229 @@
+//! What every face shares: the fleet, the groups, and what is told of them. No HTTP is in it.
+
+pub mod commands;
+pub mod history;
+pub mod parameters;
+mod progress;
+pub mod recent;
+pub mod revisions;
+pub mod tally;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+mod usage;
+pub mod views;
+mod watching;
+
+use std::sync::{Arc, PoisonError, RwLock};
+
+use drive_bus::Line;
+use drive_fleet::{DriveHandle, Fleet};
+use tokio::{
+    sync::{Mutex, watch},
+    time::Instant,
+};
+
+use self::views::{
+    DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, NoticeView,
+    PlannedLineView, SettingsView, StateView,
+};
+use self::{
+    commands::{Log, Stopped},
+    history::{History, HistoryView},
+    parameters::Words,
+    progress::Progress,
+    recent::{Recent, RecentView},
+    revisions::Revisions,
+    tally::Tally,
+    usage::Usage,
+};
+use drived_config::{config::Group, rights::Caller};
+use drived_words::json::unix;
+
+/// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
+const EXCHANGES: usize = 100;
+
+/// The plant as its faces see it. Cheap to clone.
+#[derive(Clone)]
+pub struct Plant(Arc<Inner>);
+
+struct Inner {
+    fleet: Fleet,
+    groups: RwLock<Vec<Group>>,
+    started_unix_ms: u64,
+    demo: bool,
+    commands: Log,
+    /// When a stop was last asked of each drive.
+    stopped: Stopped,
+    /// One group starts at a time.
+    group_starts: Mutex<()>,
+    revisions: Revisions,
+    history: History,
+    words: Words,
+    progress: Progress,
+    recent: Recent,
+    tally: Tally,
+    usage: Usage,
+}
+
+impl Plant {
+    pub fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
+        let inner = Arc::new(Inner {
+            fleet,
+            groups: RwLock::new(groups),
+            started_unix_ms: unix(Instant::now()),
+            demo,
+            commands: Log::default(),
+            stopped: Stopped::default(),
+            group_starts: Mutex::default(),
+            revisions: Revisions::new(),
+            history: History::default(),
+            words: Words::default(),
+            progress: Progress::default(),
+            recent: Recent::default(),
+            tally: Tally::default(),
+            usage: Usage::default(),
+        });
+        watching::start(&inner);
+        history::start(&inner);
+        Self(inner)
+    }
+
+    pub fn fleet(&self) -> Fleet {
+        self.0.fleet.clone()
+    }
+
+    pub fn groups(&self) -> Vec<Group> {
+        self.0.groups.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub fn state(&self, caller: &Caller) -> StateView {
+        let now = Instant::now();
+        StateView {
+            revision: self.0.revisions.last(),
+            time_unix_ms: unix(now),
+            daemon: DaemonView {
+                version: env!("CARGO_PKG_VERSION").into(),
+                started_unix_ms: self.0.started_unix_ms,
+                demo: self.0.demo,
+                rights: caller.rights,
+                caller: caller.name.clone(),
+                scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
+            },
+            lines: self.lines(),
+            drives: self.drives(),
+            groups: self.groups(),
+        }
+    }
+
+    /// Whether somebody may command a drive, as far as his rights go.
+    pub fn may_command(&self, caller: &Caller, drive: &str) -> bool {
+        caller.may_command(drive, &self.groups())
+    }
+
+    /// The drives that somebody may command, as far as his rights go.
+    fn commanded_by(&self, caller: &Caller) -> Vec<String> {
+        let (groups, fleet) = (self.groups(), self.fleet());
+        let names = fleet.drives().into_iter().map(|drive| drive.name().to_string());
+        names.filter(|name| caller.may_command(name, &groups)).collect()
+    }
+
+    /// Tells what happened to the program itself.
+    pub fn tell_notice(&self, notice: NoticeView) {
+        self.0.tell_notice(notice);
+    }
+
+    /// The stream of what happens.
+    pub fn revisions(&self) -> &Revisions {
+        &self.0.revisions
+    }
+
+    /// How many commands ended how.
+    pub fn tally(&self) -> &Tally {
+        &self.0.tally
+    }
+
+    /// Tells in the event stream whether the audit log can be written.
+    pub fn follow_audit(&self, failing: watch::Receiver<bool>) {
+        watching::follow_audit(&self.0, failing);
+    }
+
+    /// The groups are these from now on.
+    pub fn set_groups(&self, groups: Vec<Group>) {
+        *self.0.groups.write().unwrap_or_else(PoisonError::into_inner) = groups;
+    }
+
+    /// What happened lately, the newest last.
+    pub fn recent(&self) -> Vec<RecentView> {
+        self.0.recent.all()
+    }
+
+    pub fn lines(&self) -> Vec<LineView> {
+        self.0.lines()
+    }
+
+    /// A line with its plan, what was measured on it, and its last exchanges.
+    pub fn line(&self, name: &str) -> Option<LineDetailView> {
+        let (name, line) = self.0.fleet.lines().into_iter().find(|(known, _)| **known == *name)?;
+        let last = line.exchanges().iter().map(ExchangeView::of).collect();
+        Some(LineDetailView {
+            line: self.0.line(&name, &line)?,
+            planned: PlannedLineView::of(&line, self.0.fleet.plan(&name)?),
+            measured: MeasuredLineView::of(&line, &self.0.fleet.drives_on(&name)),
+            last,
+        })
+    }
+
+    /// The lines on which no drive has been asked for longer than its periods allow.
+    pub fn standing_lines(&self) -> Vec<String> {
+        self.0.progress.standing(&self.0.fleet)
+    }
+
+    /// The drives, line by line.
+    pub fn drives(&self) -> Vec<DriveView> {
+        self.members().map(|(line, drive)| DriveView::of(&line, &drive)).collect()
+    }
+
+    pub fn drive(&self, name: &str) -> Option<DriveView> {
+        let (line, drive) = self.members().find(|(_, drive)| **drive.name() == *name)?;
+        Some(DriveView::of(&line, &drive))
+    }
+
+    /// What a drive was told when the fleet was started, and what the plan of its line makes of it.
+    pub fn settings(&self, name: &str) -> Option<SettingsView> {
+        let drive = self.0.fleet.drive(name)?;
+        let plan = self.0.fleet.plan(drive.line().0)?;
+        Some(SettingsView::of(&drive, plan))
+    }
+
+    /// The last ten minutes of a drive.
+    pub fn history(&self, name: &str, since_unix_ms: Option<u64>) -> Option<HistoryView> {
+        self.0.fleet.drive(name).map(|_| self.0.history.of(name, since_unix_ms))
+    }
+
+    fn members(&self) -> impl Iterator<Item = (Arc<str>, DriveHandle)> {
+        let fleet = self.fleet();
+        fleet.lines().into_iter().flat_map(move |(name, _)| {
+            fleet.drives_on(&name).into_iter().map(move |drive| (Arc::clone(&name), drive))
+        })
+    }
+}
+
+impl Inner {
+    fn lines(&self) -> Vec<LineView> {
+        self.fleet.lines().iter().filter_map(|(name, line)| self.line(name, line)).collect()
+    }
+
+    fn line(&self, name: &str, line: &Line) -> Option<LineView> {
+        let plan = self.fleet.plan(name)?;
+        Some(LineView::of(name, line, plan, &self.fleet.drives_on(name), &self.usage))
+    }
+
+    /// Looks at the lines, once a second: those that a reload has brought keep their last exchanges from then on.
+    fn look_at_lines(&self) {
+        let lines = self.fleet.lines();
+        for (_, line) in &lines {
+            line.keep_exchanges(EXCHANGES);
+        }
+        self.usage.look(lines.iter().map(|(name, line)| (name, line.stats())));
+    }
+}

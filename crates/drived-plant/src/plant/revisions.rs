@@ -1,0 +1,226 @@
+//! The stream that feeds every face: numbered revisions in a bounded ring. Each is put into bytes once, whoever reads it.
+//!
+//! Nobody waits for a reader: he takes what is new when he likes, and who comes so late that the ring has gone on is told
+//! to begin anew.
+
+use std::{
+    collections::VecDeque,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use bytes::Bytes;
+use serde::Serialize;
+use tokio::{sync::watch, time::Instant};
+
+use drived_words::json::{line, unix};
+
+/// How many revisions are kept.
+const KEPT: usize = 4_096;
+/// How many bytes they may have together.
+const KEPT_BYTES: usize = 8 << 20;
+
+/// How many a reader takes at a time: what one who never reads on keeps from being freed.
+const AT_ONCE: usize = 64;
+
+/// What a revision is of, as the event stream names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subject {
+    Drive,
+    Line,
+    Command,
+    Event,
+    Tick,
+}
+
+impl Subject {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Drive => "drive",
+            Self::Line => "line",
+            Self::Command => "command",
+            Self::Event => "event",
+            Self::Tick => "tick",
+        }
+    }
+}
+
+/// The revisions of a plant.
+pub struct Revisions {
+    ring: Mutex<Ring>,
+    last: watch::Sender<u64>,
+}
+
+struct Ring {
+    /// The number of the newest.
+    last: u64,
+    frames: VecDeque<Bytes>,
+    bytes: usize,
+}
+
+/// What a reader gets.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Next {
+    /// What is new, in order, as server-sent events.
+    Frames(Vec<Bytes>),
+    /// He is too far behind: this tells him to read the state again.
+    Reset(Bytes),
+    /// The plant is gone.
+    End,
+}
+
+impl Revisions {
+    /// An empty ring. Numbers go on from the time, so that those of an earlier run of the program are not taken for
+    /// numbers of this one.
+    pub fn new() -> Self {
+        let last = unix(Instant::now());
+        let ring = Ring { last, frames: VecDeque::new(), bytes: 0 };
+        Self { ring: Mutex::new(ring), last: watch::Sender::new(last) }
+    }
+
+    /// The number of the newest.
+    pub fn last(&self) -> u64 {
+        *self.last.borrow()
+    }
+
+    /// How many read along.
+    pub fn readers(&self) -> usize {
+        self.last.receiver_count()
+    }
+
+    /// Adds a revision, and gives its number.
+    pub fn push(&self, subject: Subject, data: &impl Serialize) -> u64 {
+        let data = line(data);
+        let mut ring = self.ring();
+        ring.last += 1;
+        let frame = Bytes::from(frame(ring.last, subject.name(), &data));
+        ring.bytes += frame.len();
+        ring.frames.push_back(frame);
+        while ring.frames.len() > KEPT || ring.bytes > KEPT_BYTES {
+            let Some(oldest) = ring.frames.pop_front() else { break };
+            ring.bytes -= oldest.len();
+        }
+        let last = ring.last;
+        // Still under the lock, so that readers see the numbers rise.
+        self.last.send_replace(last);
+        last
+    }
+
+    /// Lines, drives or groups are others: every reader is told to read the state again.
+    pub fn begin_anew(&self) {
+        let mut ring = self.ring();
+        ring.frames.clear();
+        ring.bytes = 0;
+        ring.last += 1;
+        let last = ring.last;
+        self.last.send_replace(last);
+    }
+
+    /// A reader of what comes after revision `since`; `None`: from now on.
+    pub fn reader(&self, since: Option<u64>) -> Reader {
+        let last = self.last.subscribe();
+        let since = since.unwrap_or(*last.borrow());
+        Reader { since, last }
+    }
+
+    /// What is new for a reader, when there is something.
+    ///
+    /// # Cancellation
+    /// Safe to drop: nothing is lost.
+    pub async fn next(&self, reader: &mut Reader) -> Next {
+        loop {
+            reader.last.mark_unchanged();
+            match self.ring().after(reader.since) {
+                Some((_, frames)) if frames.is_empty() => {}
+                Some((last, frames)) => {
+                    reader.since = last;
+                    return Next::Frames(frames);
+                }
+                None => {
+                    reader.since = self.last();
+                    let data = format!("{{\"revision\":{}}}", reader.since);
+                    return Next::Reset(frame(reader.since, "reset", &data).into());
+                }
+            }
+            if reader.last.changed().await.is_err() {
+                return Next::End;
+            }
+        }
+    }
+
+    fn ring(&self) -> MutexGuard<'_, Ring> {
+        self.ring.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Ring {
+    /// The next frames after a revision, and the number of the last of them; `None` when some of them are gone, or it is none
+    /// of this ring.
+    fn after(&self, since: u64) -> Option<(u64, Vec<Bytes>)> {
+        let count = usize::try_from(self.last.checked_sub(since)?).ok()?;
+        let first = self.frames.len().checked_sub(count)?;
+        let taken: Vec<Bytes> = self.frames.iter().skip(first).take(AT_ONCE).cloned().collect();
+        Some((since + taken.len() as u64, taken))
+    }
+}
+
+fn frame(number: u64, name: &str, data: &str) -> String {
+    format!("id: {number}\nevent: {name}\ndata: {data}\n\n")
+}
+
+/// How far somebody has read.
+#[derive(Debug)]
+pub struct Reader {
+    since: u64,
+    last: watch::Receiver<u64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_reader_gets_every_revision_once_and_in_order() {
+        let revisions = Revisions::new();
+        let first = revisions.last();
+        let mut reader = revisions.reader(None);
+        for number in 0..3 {
+            revisions.push(Subject::Event, &number);
+        }
+        let Next::Frames(frames) = revisions.next(&mut reader).await else { panic!("frames") };
+        let expected = |number: u64| format!("id: {}\nevent: event\ndata: {number}\n\n", first + number + 1);
+        assert_eq!(frames, [expected(0), expected(1), expected(2)]);
+        revisions.push(Subject::Tick, &3);
+        let Next::Frames(frames) = revisions.next(&mut reader).await else { panic!("frames") };
+        assert_eq!(frames.len(), 1);
+        let Next::Frames(frames) = revisions.next(&mut revisions.reader(Some(first + 2))).await else {
+            panic!("frames")
+        };
+        assert_eq!(frames.len(), 2, "a reader that comes again goes on where it was");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_reader_that_is_too_far_behind_or_from_another_run_is_told_to_begin_anew() {
+        let revisions = Revisions::new();
+        let (mut slow, before) = (revisions.reader(None), revisions.last() - 1);
+        for number in 0..=KEPT {
+            revisions.push(Subject::Event, &number);
+        }
+        assert!(matches!(revisions.next(&mut slow).await, Next::Reset(_)));
+        assert!(matches!(revisions.next(&mut revisions.reader(Some(before))).await, Next::Reset(_)));
+        let future = revisions.last() + 1;
+        assert!(matches!(revisions.next(&mut revisions.reader(Some(future))).await, Next::Reset(_)));
+        let ring = revisions.ring();
+        assert_eq!(ring.frames.len(), KEPT);
+        assert_eq!(ring.bytes, ring.frames.iter().map(Bytes::len).sum::<usize>());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn large_revisions_do_not_make_the_ring_larger_than_its_bytes() {
+        let revisions = Revisions::new();
+        let large = "x".repeat(KEPT_BYTES / 4);
+        for _ in 0..10 {
+            revisions.push(Subject::Event, &large);
+        }
+        assert!(revisions.ring().bytes <= KEPT_BYTES);
+    }
+}

@@ -1,0 +1,56 @@
+//! What every face tells of the plant, as JSON: units in the names of the keys, an age and a quality with every value.
+//!
+//! A key whose value is not known, or that a family does not have, is left out: nothing is 0 because it is missing.
+
+mod command;
+mod drive;
+mod exchange;
+mod line;
+mod measured;
+mod notice;
+#[cfg(test)]
+mod tests;
+
+use std::borrow::Cow;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use self::{
+    command::{CommandView, SeveralView},
+    drive::{DriveView, Gist, Shown},
+    exchange::{ExchangeView, LineDetailView, ResultWord},
+    line::{AnswerTimes, LineErrors, LineLink, LineView, SlaveView},
+    measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
+    notice::{HappenedView, NoticeView},
+};
+use drived_config::{config::Group, rights::Rights};
+
+/// Everything at one moment.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+pub struct StateView {
+    /// The last revision that is in it: events after this one complete it.
+    pub revision: u64,
+    /// Now, in milliseconds since 1970.
+    pub time_unix_ms: u64,
+    pub daemon: DaemonView,
+    pub lines: Vec<LineView>,
+    pub drives: Vec<DriveView>,
+    pub groups: Vec<Group>,
+}
+
+/// The program that answers, and what it lets the asker do.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct DaemonView {
+    pub version: Cow<'static, str>,
+    pub started_unix_ms: u64,
+    /// Whether its drives are simulated.
+    pub demo: bool,
+    /// What the asker may do.
+    pub rights: Rights,
+    /// Who the asker is: the name of his token, `local` on the socket, or `anonymous`.
+    pub caller: String,
+    /// The drives that the asker's token is for; absent where it is for all. He may stop the others, too, where he may stop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scope: Option<Vec<String>>,
+}

@@ -1,0 +1,96 @@
+//! The terminal in its drawing mode. It is given back when this is dropped, and by a panic.
+
+use std::{
+    io::{self, Stdout},
+    panic,
+    sync::Once,
+};
+
+use crossterm::{
+    cursor::{Hide, Show},
+    execute,
+    terminal::{EnterAlternateScreen, LeaveAlternateScreen},
+};
+use ratatui::{Frame, backend::CrosstermBackend};
+
+use drived_words::logging;
+
+pub(super) struct Terminal(ratatui::Terminal<CrosstermBackend<Stdout>>);
+
+impl Terminal {
+    /// Takes the terminal. Ctrl-C and Ctrl-Z still make signals; everything else that is typed is a key, Ctrl-S too, and is
+    /// not shown.
+    pub(super) fn open() -> io::Result<Self> {
+        static GIVEN_BACK: Once = Once::new();
+        GIVEN_BACK.call_once(|| {
+            let before = panic::take_hook();
+            panic::set_hook(Box::new(move |info| {
+                give_back();
+                before(info);
+            }));
+        });
+        let terminal = ratatui::Terminal::new(CrosstermBackend::new(io::stdout()))?;
+        execute!(io::stdout(), EnterAlternateScreen, Hide)?;
+        keys::take();
+        logging::show();
+        Ok(Self(terminal))
+    }
+
+    pub(super) fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) -> io::Result<()> {
+        self.0.draw(picture).map(|_| ())
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        give_back();
+    }
+}
+
+/// Gives the terminal back, once however often it is asked.
+fn give_back() {
+    if !logging::is_shown() {
+        return;
+    }
+    // A terminal that is gone needs nothing.
+    let _ = execute!(io::stdout(), LeaveAlternateScreen, Show);
+    keys::give_back();
+    logging::write_again();
+}
+
+/// Whether what is typed is shown, kept until the end of a line, and holds up or quotes what the terminal shows.
+#[cfg(unix)]
+mod keys {
+    use std::{
+        io::stdin,
+        sync::{Mutex, PoisonError},
+    };
+
+    use rustix::termios::{InputModes, LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+
+    static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
+
+    pub(super) fn take() {
+        let Ok(before) = tcgetattr(stdin()) else { return };
+        let mut quiet = before.clone();
+        quiet.local_modes -= LocalModes::ECHO | LocalModes::ICANON | LocalModes::IEXTEN;
+        quiet.input_modes -= InputModes::IXON;
+        if tcsetattr(stdin(), OptionalActions::Now, &quiet).is_ok() {
+            *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);
+        }
+    }
+
+    pub(super) fn give_back() {
+        if let Some(before) = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            // What was typed meanwhile is nobody's.
+            let _ = tcsetattr(stdin(), OptionalActions::Flush, &before);
+        }
+    }
+}
+
+#[cfg(not(unix))]
+mod keys {
+    pub(super) fn take() {}
+
+    pub(super) fn give_back() {}
+}

@@ -1,0 +1,44 @@
+//! What the doors answer themselves, held against the description of the API.
+
+use drived_doors::{
+    Role, TOKENS,
+    testing::{Asked, Rig, START},
+};
+
+use crate::api::{described, testing::validate};
+
+#[tokio::test]
+async fn login_and_logout_are_answered_as_the_document_says() {
+    let rig = Rig::new("described");
+    let token = rig.token("panel", Role::Operate);
+    let document = described();
+    let right = format!("{{\"token\": \"{token}\"}}");
+    for (path, body, status) in [
+        ("/api/v1/login", right.as_str(), 200),
+        ("/api/v1/login", "{\"token\": \"drv_wrong\"}", 401),
+        ("/api/v1/login", "nonsense", 400),
+        ("/api/v1/logout", "{}", 200),
+    ] {
+        let answer = rig.ask(&Asked { method: "POST", path, body, headers: &[] }).await;
+        assert_eq!(answer.status.as_u16(), status, "{path} {body}");
+        let kind = answer.headers["content-type"].to_str().unwrap();
+        let described = &document["paths"][path]["post"]["responses"][status.to_string()]["content"][kind];
+        let told = serde_json::from_str(&answer.body).unwrap();
+        assert!(described.is_object(), "{path} {status} {kind} is not described");
+        validate(&document, &described["schema"], &told, path);
+    }
+    let schema =
+        &document["paths"]["/api/v1/login"]["post"]["requestBody"]["content"]["application/json"]["schema"];
+    validate(&document, schema, &serde_json::from_str(&right).unwrap(), "the body");
+}
+
+#[tokio::test]
+async fn a_token_that_is_made_over_the_socket_is_answered_as_the_document_says() {
+    let rig = Rig::new("token-described");
+    let new = Asked { path: TOKENS, body: r#"{"name":"panel","role":"operate"}"#, ..START };
+    let told = serde_json::from_str(&rig.ask_on_socket(&new).await.body).unwrap();
+    let document = described();
+    let schema =
+        &document["paths"][TOKENS]["post"]["responses"]["200"]["content"]["application/json"]["schema"];
+    validate(&document, schema, &told, TOKENS);
+}
