@@ -1,22 +1,25 @@
 //! What is in force is decided by the families and by nobody above them: no source of the fleet or of the program compares a
 //! drive's [`State`](drive_core::State) to decide. Who shows states, by a word, a colour or a number for each, is listed here.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Where a state is shown and nothing is decided by it.
 const SHOWS: &[&str] = &[
     "drive-fleet/src/shows.rs",
     "drive-fleet/src/view.rs",
     "drived/src/commands/poll/json.rs",
-    "drived/src/gateway/virtual_unit.rs",
-    "drived/src/journal/words.rs",
-    "drived/src/metrics/drives.rs",
-    "drived/src/mqtt/discovery.rs",
-    "drived/src/row/mod.rs",
-    "drived/src/simulated.rs",
+    "drived-broker/src/mqtt/discovery.rs",
+    "drived-gateway/src/virtual_unit.rs",
+    "drived-http/src/metrics/drives.rs",
+    "drived-plant/src/journal/words.rs",
+    "drived-screen/src/row/mod.rs",
+    "drived-simulated/src/lib.rs",
 ];
 
-fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("it is a folder") {
         let path = entry.expect("it can be read").path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -42,9 +45,17 @@ fn names_a_state(line: &str) -> bool {
 fn nothing_above_a_family_decides_by_the_state_that_a_drive_shows() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
     let mut offenders = Vec::new();
-    for owner in ["drive-fleet/src", "drived/src"] {
+    let all =
+        fs::read_dir(&crates).expect("it is a folder").map(|entry| entry.expect("it can be read").path());
+    let above = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        name.starts_with("drived") || name == "drive-fleet"
+    };
+    let owners: Vec<PathBuf> = all.filter(above).collect();
+    assert!(owners.len() > 10, "{owners:?}");
+    for owner in owners {
         let mut files = Vec::new();
-        sources(&crates.join(owner), &mut files);
+        sources(&owner.join("src"), &mut files);
         for file in files {
             let name = file.strip_prefix(&crates).expect("it is below").to_string_lossy().replace('\\', "/");
             if SHOWS.contains(&name.as_str()) {

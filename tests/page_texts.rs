@@ -5,7 +5,7 @@ use drive_fleet::{LimitProblem, Refused};
 
 #[test]
 fn every_fault_and_alarm_of_every_family_has_its_french_text_on_the_page() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/drived/src/page/web/faults_fr.js");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/drived-http/src/page/web/faults_fr.js");
     let french = std::fs::read_to_string(path).expect("it is read").replace("\\'", "'");
     let tables: [&[FaultEntry]; 8] = [
         drive_atv21::FAULTS,
@@ -35,7 +35,7 @@ fn quoted(source: &str) -> impl Iterator<Item = &str> {
 fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/");
     let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("it is read");
-    let french = read("drived/src/page/web/sentences_fr.js").replace("\\'", "'");
+    let french = read("drived-http/src/page/web/sentences_fr.js").replace("\\'", "'");
     let mut sentences: Vec<String> = Vec::new();
     for family in ["atv21", "atv28", "atv58", "atv312", "3g3ev"] {
         let folder = std::fs::read_dir(format!("{root}drive-{family}/src")).expect("it is a folder");

@@ -101,7 +101,7 @@ async fn of_every_pair_of_troubles_in_both_orders_the_page_tells_the_same_worst(
         })
         .collect();
     let module = async |Path(name): Path<String>| {
-        let web = concat!(env!("CARGO_MANIFEST_DIR"), "/src/page/web");
+        let web = concat!(env!("CARGO_MANIFEST_DIR"), "/../drived-http/src/page/web");
         let text = std::fs::read_to_string(format!("{web}/{name}")).unwrap_or_default();
         ([(CONTENT_TYPE, "text/javascript")], text)
     };

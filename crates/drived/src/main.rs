@@ -4,31 +4,24 @@
 
 #[cfg(test)]
 mod agreement;
-mod api;
-#[allow(dead_code, reason = "a Sparkplug node stands on the rest of it")]
-mod broker;
 mod cli;
-mod client;
 mod commanded;
 mod commands;
 mod config_file;
-mod desk;
 mod explain;
-mod gateway;
 mod ledger;
-mod metrics;
-mod mqtt;
 mod one_drive;
-mod own_line;
-mod page;
 mod run;
-mod sparkplug;
 
 use std::process::ExitCode;
 
 use clap::Parser;
-use drived_config::{config, kept, records, rights};
+use drived_broker::{broker, mqtt, sparkplug};
+use drived_client::{self as client, own_line};
+use drived_config::{config, kept, records};
 use drived_doors as doors;
+use drived_gateway as gateway;
+use drived_http::{api, metrics, page};
 use drived_plant::{counts, findings, follow, journal, plant};
 use drived_screen::{row, screen};
 use drived_simulated as simulated;

@@ -152,7 +152,7 @@ fn programs_of_others_read_the_metrics_of_five_families() {
 
 #[test]
 fn every_alert_fires_where_it_should_and_nowhere_else() {
-    const RULES: &str = include_str!("../src/metrics/alerts.yml");
+    const RULES: &str = include_str!("../../drived-http/src/metrics/alerts.yml");
     const TESTS: &str = include_str!("alerts.test.yml");
     let alerts: Vec<&str> = RULES.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")).collect();
     assert!(alerts.len() > 10, "{alerts:?}");

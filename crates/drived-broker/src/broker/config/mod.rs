@@ -1,0 +1,9 @@
+//! `[mqtt]` and `[mqtt.sparkplug]`: the brokers, and what is told and taken there.
+
+mod mqtt;
+mod sparkplug;
+
+pub use self::{
+    mqtt::{Address, Discovery, MqttConfig, MqttEntry, topic_id},
+    sparkplug::SparkplugConfig,
+};

@@ -1,0 +1,148 @@
+//! Behind the desk: carrying out, the audit log, and telling what becomes of it.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use tokio::{
+    sync::{Semaphore, mpsc},
+    time::Instant,
+};
+
+use super::{Answer, Answers, Refusal, Refused};
+use drived_doors::{
+    Caller,
+    audit::{Audit, Kind, Record},
+};
+use drived_plant::{
+    follow::{Follower, News},
+    plant::{
+        Plant,
+        commands::{ActionWord, OutcomeWord, Request, Told},
+    },
+};
+use drived_words::json::unix;
+
+/// Commands whose outcome is waited for.
+const FOLLOWED: usize = 256;
+
+/// The id and the action of a message, as far as they are known.
+type Named = (Option<String>, Option<ActionWord>);
+
+/// A command that waits for its record in the audit log.
+pub(super) struct Order<A> {
+    pub(super) caller: Caller,
+    pub(super) request: Request,
+    pub(super) record: Record,
+    pub(super) answers: A,
+}
+
+/// What carries commands out.
+pub(super) struct Counter {
+    plant: Plant,
+    audit: Audit,
+    followed: Arc<Semaphore>,
+}
+
+impl Counter {
+    pub(super) fn new(plant: Plant, audit: Audit) -> Self {
+        Self { plant, audit, followed: Arc::new(Semaphore::new(FOLLOWED)) }
+    }
+
+    /// Stops at once: no disk and no other command holds it up.
+    pub(super) fn stop(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
+        self.audit.record(record.clone()).whenever();
+        self.begin(caller, request, record, answers);
+    }
+
+    /// Carries out what waits, one after the other, when it stands in the audit log.
+    pub(super) async fn work<A: Answers + Sync>(self: Arc<Self>, mut orders: mpsc::Receiver<Order<A>>) {
+        while let Some(Order { caller, request, record, answers }) = orders.recv().await {
+            if let Err(error) = self.audit.record(record.clone()).done().await {
+                let named = named(&request);
+                self.refuse(&caller, record, &answers, named, Refusal::Audit(error.to_string()));
+                continue;
+            }
+            self.begin(&caller, request, record, &answers);
+        }
+    }
+
+    fn begin(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
+        let named = named(&request);
+        match self.plant.begin(caller, request) {
+            Ok(told) => self.follow(caller, told, record, answers),
+            Err(rejected) => self.tell_refusal(caller, record, answers, named, rejected.into()),
+        }
+    }
+
+    /// Tells what is known, and what becomes of it.
+    fn follow(&self, caller: &Caller, told: Told, record: Record, answers: &impl Answers) {
+        let mut follower = Follower::new(told);
+        let view = follower.last();
+        self.answered(caller, record, Some(view.id.clone()), view.outcome);
+        answers.tell(Answer::Command(&view));
+        if !view.open {
+            return;
+        }
+        // Of so many that their outcomes are not waited for, they stand in the audit log.
+        let Ok(permit) = Arc::clone(&self.followed).try_acquire_owned() else { return };
+        let answers = answers.clone();
+        tokio::spawn(async move {
+            let mut outcome = view.outcome;
+            while let Some(news) = follower.next().await {
+                if let News::Told(view) = news
+                    && view.outcome != outcome
+                {
+                    outcome = view.outcome;
+                    answers.tell(Answer::Command(&view));
+                }
+            }
+            drop(permit);
+        });
+    }
+
+    /// Does nothing, and says why.
+    pub(super) fn refuse(
+        &self,
+        caller: &Caller,
+        record: Record,
+        answers: &impl Answers,
+        named: Named,
+        refusal: Refusal,
+    ) {
+        self.audit.record(record.clone()).whenever();
+        self.tell_refusal(caller, record, answers, named, refusal);
+    }
+
+    fn tell_refusal(
+        &self,
+        caller: &Caller,
+        record: Record,
+        answers: &impl Answers,
+        (id, action): Named,
+        refusal: Refusal,
+    ) {
+        let (outcome, reason) = refusal.told();
+        self.answered(caller, record, id.clone(), outcome);
+        answers.tell(Answer::Refused(&Refused {
+            id,
+            action,
+            outcome,
+            reason,
+            text: refusal.to_string(),
+            caller: caller.name.clone(),
+            origin: caller.origin.clone(),
+            time_unix_ms: unix(Instant::now()),
+        }));
+    }
+
+    /// Keeps the first answer in the audit log.
+    fn answered(&self, caller: &Caller, record: Record, id: Option<String>, outcome: OutcomeWord) {
+        let outcome = json!(outcome).as_str().map(str::to_owned);
+        let answer = Record { id, outcome, ..Record::new(Kind::Answer, caller, record.what) };
+        self.audit.record(answer).whenever();
+    }
+}
+
+fn named(request: &Request) -> Named {
+    (request.id.clone(), Some(request.action.word()))
+}

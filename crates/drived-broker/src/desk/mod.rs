@@ -1,0 +1,193 @@
+//! One desk that takes commands for every broker: what a message says is judged here, once, before the plant hears of it.
+//!
+//! A broker says neither that a message is young nor that it comes once. So what is retained, late, old or repeated moves no
+//! motor, and a stop is taken whatever it looks like. Commands are carried out in the order in which they come, each when it
+//! stands in the audit log, except that a stop waits for nothing.
+
+mod counter;
+mod pace;
+mod refusal;
+#[cfg(test)]
+pub mod testing;
+
+use std::{collections::HashMap, sync::Arc, time::Duration};
+
+use drive_fleet::StopOrder;
+use serde_json::Value;
+use tokio::{
+    sync::{mpsc, watch},
+    time::Instant,
+};
+
+pub use self::refusal::{Refusal, Refused};
+use self::{
+    counter::{Counter, Order},
+    pace::Pace,
+};
+use drived_doors::{
+    Caller,
+    audit::{Audit, Kind, Record},
+};
+use drived_plant::plant::{
+    Plant,
+    commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, Request, Said, Target},
+    views::CommandView,
+};
+use drived_words::json::{milliseconds, unix};
+
+/// Commands that wait for the audit log.
+const WAITING: usize = 64;
+/// How far the clock of somebody who says when a command was issued may be ahead.
+const AHEAD: Duration = Duration::from_secs(1);
+/// In a flood, a stop that comes so soon after the same one has nothing to add.
+const SAME_STOP: Duration = Duration::from_millis(50);
+
+/// Where it is told what becomes of a message.
+pub trait Answers: Clone + Send + 'static {
+    /// Tells it. Nobody waits for it.
+    fn tell(&self, answer: Answer<'_>);
+}
+
+/// What becomes of a message.
+#[derive(Debug, Clone, Copy)]
+pub enum Answer<'a> {
+    Command(&'a CommandView),
+    Refused(&'a Refused),
+}
+
+/// A message, as a broker's face has it.
+pub struct Message<A> {
+    pub said: Said,
+    pub caller: Caller,
+    /// Whose pace it comes at.
+    pub pace_of: String,
+    /// Whom it means; `None`: nobody of this plant.
+    pub target: Option<Target>,
+    /// What the face itself has against it, unless it is a stop.
+    pub doubt: Option<Refusal>,
+    pub arrived: Instant,
+    /// When it was sent, by the clock of its sender.
+    pub sent_unix_ms: Option<u64>,
+    /// How long it may wait unless it says so itself, and at the longest in any case.
+    pub lifetime: Duration,
+    pub longest: Option<Duration>,
+    /// It may come again, so that it has to have a name.
+    pub needs_id: bool,
+    /// Its name, where it says none.
+    pub id: Option<String>,
+    /// For the audit log.
+    pub what: String,
+    pub answers: A,
+}
+
+/// What takes commands.
+pub struct Desk<A> {
+    counter: Arc<Counter>,
+    orders: mpsc::Sender<Order<A>>,
+    closing: watch::Receiver<bool>,
+    /// How fast each may come.
+    paces: HashMap<String, Pace>,
+    /// When each target was last stopped so.
+    stopped: HashMap<(Target, StopOrder), Instant>,
+}
+
+impl<A: Answers + Sync> Desk<A> {
+    /// Takes commands until it is dropped; nothing but stops once it is `closing`.
+    pub fn open(plant: Plant, audit: Audit, closing: watch::Receiver<bool>) -> Self {
+        let (orders, waiting) = mpsc::channel(WAITING);
+        let counter = Arc::new(Counter::new(plant, audit));
+        tokio::spawn(Arc::clone(&counter).work(waiting));
+        Self { counter, orders, closing, paces: HashMap::new(), stopped: HashMap::new() }
+    }
+
+    /// Takes a message.
+    pub fn take(&mut self, mut message: Message<A>) {
+        let stop = message.said.stops();
+        let pace = self.paces.entry(std::mem::take(&mut message.pace_of));
+        let in_time = pace.or_insert_with(|| Pace::new(message.arrived)).allows(message.arrived);
+        if !in_time && stop.is_none() {
+            // Nothing of a flood reaches the audit log, which is there for everybody.
+            return;
+        }
+        let record = self.record(&message);
+        let id = message.said.id.clone().or_else(|| message.id.clone());
+        let named = (id.clone(), message.said.action);
+        let Message { caller, answers, arrived, .. } = &message;
+        let (caller, answers, arrived) = (caller.clone(), answers.clone(), *arrived);
+        let Some(target) = message.target.take() else {
+            return self.counter.refuse(&caller, record, &answers, named, Refusal::NotFound);
+        };
+        if let Some(order) = stop {
+            let key = (target.clone(), order);
+            if !in_time && self.stopped.get(&key).is_some_and(|at| arrived < *at + SAME_STOP) {
+                return;
+            }
+            self.stopped.insert(key, arrived);
+            let request =
+                Request { id: named.0, target, action: Action::Stop(order), lifetime: LIFETIME, arrived };
+            return self.counter.stop(&caller, request, record, &answers);
+        }
+        self.stopped.clear();
+        let request = match self.judged(message, target, id) {
+            Ok(request) => request,
+            Err(refusal) => return self.counter.refuse(&caller, record, &answers, named, refusal),
+        };
+        let (audited, to) = (record.clone(), answers.clone());
+        let order = Order { caller: caller.clone(), request, record: audited, answers: to };
+        if self.orders.try_send(order).is_err() {
+            self.counter.refuse(&caller, record, &answers, named, Refusal::Busy);
+        }
+    }
+
+    /// What a message that is no stop asks for.
+    fn judged(&self, message: Message<A>, target: Target, id: Option<String>) -> Result<Request, Refusal> {
+        if let Some(doubt) = message.doubt {
+            return Err(doubt);
+        }
+        if *self.closing.borrow() {
+            return Err(Refusal::Closing);
+        }
+        let Said { asked, issued_unix_ms, .. } = message.said;
+        let asked = asked?;
+        if target == Target::All {
+            return Err(Refusal::malformed("all drives can be stopped together, and nothing else"));
+        }
+        let says_itself = asked.expires_in_ms.is_some();
+        let asked = Asked { id, ..asked };
+        let mut request = asked.of(target, message.arrived).map_err(Refusal::malformed)?;
+        let longest = message.longest.map(|longest| longest.min(LONGEST_LIFETIME));
+        request.lifetime = match (says_itself, longest) {
+            (true, Some(longest)) => request.lifetime.min(longest),
+            (true, None) => request.lifetime,
+            (false, longest) => longest.unwrap_or(message.lifetime),
+        };
+        if let Some(sent) = [message.sent_unix_ms, issued_unix_ms].into_iter().flatten().min() {
+            let age = age(sent, message.arrived)?;
+            if age >= request.lifetime {
+                return Err(Refusal::Expired { age, lifetime: request.lifetime });
+            }
+            // Its time has run since it was sent; and the same command is the same again, whenever it comes.
+            request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
+        }
+        if message.needs_id && request.id.is_none() {
+            return Err(Refusal::IdNeeded);
+        }
+        Ok(request)
+    }
+
+    /// What stands in the audit log of a message.
+    fn record(&self, message: &Message<A>) -> Record {
+        let body = Some(message.said.body.clone()).filter(|body| *body != Value::Null);
+        Record { body, ..Record::new(Kind::Command, &message.caller, message.what.clone()) }
+    }
+}
+
+/// How old something is that was sent then, by a clock that may differ.
+fn age(sent_unix_ms: u64, arrived: Instant) -> Result<Duration, Refusal> {
+    let now = unix(arrived);
+    let ahead = sent_unix_ms.saturating_sub(now);
+    if ahead > milliseconds(AHEAD) {
+        return Err(Refusal::malformed(format!("it was sent {ahead} ms in the future: the clocks differ")));
+    }
+    Ok(Duration::from_millis(now.saturating_sub(sent_unix_ms)))
+}

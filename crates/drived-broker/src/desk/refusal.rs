@@ -1,0 +1,81 @@
+//! Why a message does nothing, in the same words at every broker.
+
+use std::time::Duration;
+
+use serde::Serialize;
+
+use drived_plant::plant::commands::{ActionWord, OutcomeWord, Rejected, Unclear};
+
+/// Why a message does nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    #[error("there is none of this name")]
+    NotFound,
+    #[error("{0} cannot be written")]
+    ReadOnly(String),
+    #[error("it is retained: the broker would send it again and again; publish it without the retain flag")]
+    Retained,
+    #[error("the connection to the broker has stalled, and nobody can say how old it is")]
+    Late,
+    #[error("the births have not been told: nobody can know what it writes")]
+    NotBorn,
+    #[error("the daemon is about to end")]
+    Closing,
+    #[error(transparent)]
+    Unclear(#[from] Unclear),
+    #[error("it is {} ms old, and was to be carried out within {} ms", .age.as_millis(), .lifetime.as_millis())]
+    Expired { age: Duration, lifetime: Duration },
+    #[error(
+        "expected an id: without one it may come again when nobody expects it, and its outcome is not found"
+    )]
+    IdNeeded,
+    #[error("too many commands are waiting")]
+    Busy,
+    #[error("{0}: until it can, only stops are carried out")]
+    Audit(String),
+    /// By the plant.
+    #[error(transparent)]
+    Rejected(#[from] Rejected),
+}
+
+impl Refusal {
+    /// What is wrong with what a message says.
+    pub fn malformed(text: impl Into<String>) -> Self {
+        Self::Unclear(Unclear::Malformed(text.into()))
+    }
+
+    /// The outcome and the reason, a word each.
+    pub const fn told(&self) -> (OutcomeWord, &'static str) {
+        let reason = match self {
+            Self::Expired { .. } => return (OutcomeWord::Expired, "expired"),
+            Self::Rejected(rejected) => return rejected.told(),
+            Self::NotFound => "not_found",
+            Self::ReadOnly(_) => "read_only",
+            Self::Retained => "retained",
+            Self::Late => "late",
+            Self::NotBorn => "not_born",
+            Self::Closing => "closing",
+            Self::Unclear(Unclear::Ambiguous(_)) => "ambiguous",
+            Self::Unclear(_) => "malformed",
+            Self::IdNeeded => "id_needed",
+            Self::Busy => "busy",
+            Self::Audit(_) => "audit",
+        };
+        (OutcomeWord::Refused, reason)
+    }
+}
+
+/// A message that does nothing, as it is told.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Refused {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub action: Option<ActionWord>,
+    pub outcome: OutcomeWord,
+    pub reason: &'static str,
+    pub text: String,
+    pub caller: String,
+    pub origin: String,
+    pub time_unix_ms: u64,
+}

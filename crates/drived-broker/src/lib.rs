@@ -1,0 +1,15 @@
+//! The faces of `drived` on a message broker: MQTT for everybody and for Home Assistant ([`mqtt`]), and an edge node of Sparkplug B
+//! ([`sparkplug`]). Both stand on one connection to a broker ([`broker`]) and take commands at one desk ([`desk`]).
+
+#![forbid(unsafe_code)]
+#![allow(
+    missing_docs,
+    missing_copy_implementations,
+    reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
+)]
+
+#[allow(dead_code, reason = "a Sparkplug node stands on the rest of it")]
+pub mod broker;
+pub mod desk;
+pub mod mqtt;
+pub mod sparkplug;

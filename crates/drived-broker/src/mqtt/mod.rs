@@ -1,0 +1,297 @@
+//! The plant on an MQTT v5 broker: what it is like, what is asked of it there, and how Home Assistant finds it.
+//!
+//! Everything stands on [`broker`](crate::broker), which never holds up anybody. State is retained and expires, so that
+//! nothing of a daemon that is gone looks alive; commands are judged by the [desk](crate::desk) before the plant hears of them.
+
+mod commanding;
+mod counts;
+mod discovery;
+mod telling;
+#[cfg(test)]
+mod tests;
+mod topics;
+
+use std::{collections::HashMap, fs, sync::Arc, time::Duration};
+
+use drive_fleet::{DriveHandle, Received};
+use tokio::{
+    sync::{Notify, mpsc, watch},
+    task::JoinHandle,
+    time::{Instant, MissedTickBehavior, interval, sleep_until},
+};
+
+use self::{commanding::Commanding, discovery::Discovered, telling::Teller, topics::Topics};
+use crate::broker::{
+    Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,
+    config::{Address, Discovery, MqttConfig},
+};
+use drived_doors::{audit::Audit, private};
+use drived_plant::{counts::Source, plant::Plant};
+use drived_words::failure::Failure;
+
+/// The longest silence before the broker is asked for a sign of life; half as much again, and the broker publishes the will.
+const KEEP_ALIVE: Duration = Duration::from_secs(20);
+/// News that may wait for a broker that is away.
+const NEWS: usize = 1_000;
+/// Between two looks at which drives there are.
+const LOOKS: Duration = Duration::from_secs(1);
+/// When Home Assistant has begun, everything is told again after a time of up to this.
+const BIRTH: Duration = Duration::from_secs(5);
+/// How long the goodbye may take.
+const CLOSED_WITHIN: Duration = Duration::from_secs(3);
+
+/// What holds for the whole face.
+struct Face {
+    plant: Plant,
+    config: MqttConfig,
+    topics: Topics,
+    broker: Broker,
+    /// The newest line of the audit log.
+    audited: watch::Receiver<Option<String>>,
+    /// Rises when everything is to be told again.
+    anew: watch::Sender<u64>,
+}
+
+impl Face {
+    /// Tells state, which the broker keeps until it has not been told again for three heartbeats.
+    fn tell(&self, topic: String, payload: String) {
+        let expires = Some(Instant::now() + self.config.heartbeat * 3);
+        let message = Message { qos: Qos::AtMostOnce, expires, ..Message::new(topic, payload).retained() };
+        self.broker.publish(message, Kept::Latest);
+    }
+
+    /// Tells what holds until it is told otherwise.
+    fn tell_for_good(&self, topic: String, payload: impl Into<bytes::Bytes>) {
+        self.broker.publish(Message::new(topic, payload).retained(), Kept::Latest);
+    }
+}
+
+/// A face that only has to be opened: the files that it needs have been read.
+pub struct Prepared {
+    config: MqttConfig,
+    options: Options,
+}
+
+/// The open face.
+pub struct Mqtt {
+    face: Arc<Face>,
+    closing: watch::Sender<bool>,
+    closed: Arc<Notify>,
+    /// Gives its events back, so that the connection stands until its end.
+    task: JoinHandle<mpsc::Receiver<Event>>,
+}
+
+impl Mqtt {
+    /// Reads the files of a configuration.
+    ///
+    /// # Errors
+    /// A certificate, a key or a password cannot be read.
+    pub fn prepare(config: MqttConfig) -> Result<Prepared, Failure> {
+        let options = Options {
+            subscriptions: subscriptions(&config),
+            queue: NEWS,
+            is_urgent: topics::is_urgent,
+            ..options(&config)?
+        };
+        Ok(Prepared { config, options })
+    }
+
+    /// Nothing but stops is taken from the broker from now on.
+    pub fn closing(&self) {
+        self.closing.send_replace(true);
+    }
+
+    /// Says goodbye. It takes no longer than [`CLOSED_WITHIN`].
+    pub async fn close(self) {
+        let Self { face, closed, task, .. } = self;
+        closed.notify_one();
+        let events = task.await;
+        telling::tell_head(&face);
+        face.tell_for_good(face.topics.status(), "offline");
+        face.broker.clone().end(Goodbye::Normal, CLOSED_WITHIN).await;
+        drop(events);
+    }
+
+    /// What it counts, for the metrics.
+    pub fn source(&self) -> Arc<dyn Source> {
+        Arc::new(self.face.broker.clone())
+    }
+}
+
+/// What a connection to the brokers of a configuration begins with, whatever it is for.
+///
+/// # Errors
+/// A certificate, a key or a password cannot be read.
+pub fn options(config: &MqttConfig) -> Result<Options, Failure> {
+    let encrypted = config.servers.iter().any(|server| server.tls);
+    let secured = || Secured::open(config.authorities.as_deref(), config.identity.as_ref());
+    let secured =
+        encrypted.then(secured).transpose().map_err(|error| Failure::Input(format!("mqtt: {error}")))?;
+    let server = |address: &Address| Server {
+        host: address.host.clone(),
+        port: address.port,
+        tls: secured.clone().filter(|_| address.tls),
+    };
+    Ok(Options {
+        servers: config.servers.iter().map(server).collect(),
+        client_id: config.client_id.clone(),
+        login: login(config)?,
+        keep_alive: KEEP_ALIVE,
+        subscriptions: Vec::new(),
+        queue: 0,
+        is_urgent: |_| false,
+        #[cfg(test)]
+        dial: None,
+    })
+}
+
+fn login(config: &MqttConfig) -> Result<Option<Login>, Failure> {
+    let Some(user) = config.user.clone() else { return Ok(None) };
+    let password = config.password.as_ref().map(|file| {
+        private(file)?;
+        let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+        Ok(text.trim_end_matches(['\r', '\n']).to_owned())
+    });
+    let password = password.transpose().map_err(|error: String| Failure::Input(format!("mqtt: {error}")))?;
+    Ok(Some(Login { user, password }))
+}
+
+/// Commands are never taken from what the broker has kept: it is asked not to send that, and what comes with the flag is
+/// refused.
+fn subscriptions(config: &MqttConfig) -> Vec<Subscription> {
+    let topics = Topics::new(config);
+    let commands = config.commands.then(|| topics.command_filters().into_iter().chain([topics.echo()]));
+    let commands = commands.into_iter().flatten();
+    let birth = (config.discovery != Discovery::Off).then(|| topics.birth());
+    commands
+        .chain(birth)
+        .map(|filter| Subscription { filter, qos: Qos::AtLeastOnce, retained: false })
+        .collect()
+}
+
+impl Prepared {
+    /// Connects, and tells and asks from now on. Nothing waits for the broker.
+    pub fn open(self, plant: Plant, audit: Audit) -> Mqtt {
+        let Self { config, options } = self;
+        let topics = Topics::new(&config);
+        let will = Will { message: Message::new(topics.status(), "offline").retained() };
+        let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
+        let audited = audit.head();
+        let face = Arc::new(Face { plant, config, topics, broker, audited, anew: watch::Sender::new(0) });
+        let (closing, closes) = watch::channel(false);
+        let commanding = Commanding::new(Arc::clone(&face), audit, closes);
+        let closed = Arc::new(Notify::new());
+        let task = tokio::spawn(keep(Arc::clone(&face), events, commanding, Arc::clone(&closed)));
+        Mqtt { face, closing, closed, task }
+    }
+}
+
+/// Tells what there is, and hears what is asked, until it is closed.
+async fn keep(
+    face: Arc<Face>,
+    mut events: mpsc::Receiver<Event>,
+    mut commanding: Commanding,
+    closed: Arc<Notify>,
+) -> mpsc::Receiver<Event> {
+    let mut looks = interval(LOOKS);
+    looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut tellers: HashMap<Arc<str>, Watched> = HashMap::new();
+    let mut daemon = telling::Daemon::default();
+    let mut birth = None;
+    let mut happened = Some(face.plant.fleet().events());
+    loop {
+        let next = async {
+            match &mut happened {
+                Some(events) => events.recv().await,
+                None => std::future::pending().await,
+            }
+        };
+        let born = async {
+            match birth {
+                Some(at) => sleep_until(at).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            event = events.recv() => match event {
+                Some(Event::Connected(_)) => {
+                    face.tell_for_good(face.topics.status(), "online");
+                    face.anew.send_modify(|number| *number += 1);
+                    daemon.tell(&face, true);
+                    commanding.connected();
+                }
+                Some(Event::Disconnected) => {}
+                Some(Event::Message(arrived)) if arrived.topic == face.topics.birth() => {
+                    if arrived.payload.as_ref() == b"online" {
+                        birth = Some(Instant::now() + some_of(BIRTH));
+                    }
+                }
+                Some(Event::Message(arrived)) => commanding.handle(&arrived),
+                None => return events,
+            },
+            received = next => match received {
+                Received::Event(event) => telling::tell_event(&face, &event),
+                Received::Missed(_) => {}
+                Received::End => happened = None,
+            },
+            () = closed.notified() => return events,
+            _ = looks.tick() => {
+                look(&face, &mut tellers);
+                daemon.tell(&face, false);
+                commanding.call();
+            }
+            () = born => {
+                birth = None;
+                face.tell_for_good(face.topics.status(), "online");
+                face.anew.send_modify(|number| *number += 1);
+                daemon.tell(&face, true);
+            }
+        }
+    }
+}
+
+/// A drive that is told.
+struct Watched {
+    task: JoinHandle<()>,
+    discovered: Discovered,
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+/// Tells the drives that have come, and takes back what was told of those that have gone.
+fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>) {
+    let mut there: Vec<(Arc<str>, Arc<str>, DriveHandle)> = Vec::new();
+    for (line, _) in face.plant.fleet().lines() {
+        for drive in face.plant.fleet().drives_on(&line) {
+            there.push((Arc::clone(drive.name()), Arc::clone(&line), drive));
+        }
+    }
+    let gone = |name: &Arc<str>| !there.iter().any(|(known, ..)| known == name);
+    let left: Vec<Arc<str>> = tellers.keys().filter(|name| gone(name)).cloned().collect();
+    for name in left {
+        if let Some(watched) = tellers.remove(&name) {
+            watched.task.abort();
+            telling::take_back(face, &name);
+            watched.discovered.take_back(face);
+        }
+    }
+    for (name, line, drive) in there {
+        // A drive that ended and began anew is another one.
+        if tellers.get(&name).is_none_or(|watched| watched.task.is_finished()) {
+            let discovered = Discovered::default();
+            let teller = Teller::new(Arc::clone(face), line, drive, discovered.clone());
+            tellers.insert(name, Watched { task: tokio::spawn(teller.run()), discovered });
+        }
+    }
+}
+
+/// A part of a time, drawn.
+fn some_of(time: Duration) -> Duration {
+    let mut byte = [u8::MAX];
+    let _ = getrandom::fill(&mut byte);
+    time * u32::from(byte[0]) / u32::from(u8::MAX)
+}

@@ -1,0 +1,786 @@
+use std::collections::BTreeMap;
+
+use drive_core::Frequency;
+use drive_fleet::{Band, Commanders, DriveSettings, FrequencyLimits};
+use rumqttc::{Packet, Publish, PublishProperties};
+use serde_json::{Value, json};
+use tokio::time::sleep;
+
+use super::*;
+use crate::{
+    broker::config::Address,
+    broker::testing::{Conduct, TestBroker, publish},
+    desk::testing::{NO_OBJECTS, REFUSED, STOPS},
+};
+use drived_doors::Role;
+use drived_plant::plant::testing::TestPlant;
+
+fn config() -> MqttConfig {
+    MqttConfig {
+        servers: vec![Address { host: "memory".to_owned(), port: 1883, tls: false }],
+        authorities: None,
+        identity: None,
+        user: None,
+        password: None,
+        client_id: "drived".to_owned(),
+        base: "plant/north".to_owned(),
+        heartbeat: Duration::from_secs(30),
+        interval: Duration::from_secs(1),
+        commands: true,
+        commanders: BTreeMap::new(),
+        discovery: Discovery::Device,
+        discovery_prefix: "homeassistant".to_owned(),
+    }
+}
+
+/// A plant, its face, and the broker that it is on.
+struct Bench {
+    plant: TestPlant,
+    broker: TestBroker,
+    mqtt: Mqtt,
+}
+
+impl Bench {
+    async fn of(drives: u8) -> Self {
+        Self::with(TestPlant::of(drives).await, config()).await
+    }
+
+    async fn with(plant: TestPlant, config: MqttConfig) -> Self {
+        let broker = TestBroker::default();
+        let mut prepared = Mqtt::prepare(config).unwrap_or_else(|failure| panic!("{failure}"));
+        prepared.options.dial = broker.options().dial;
+        let mqtt = prepared.open(plant.plant.clone(), Audit::default());
+        broker.until(|broker| broker.retained().contains_key("plant/north/status")).await;
+        sleep(Duration::from_secs(2)).await;
+        Self { plant, broker, mqtt }
+    }
+
+    /// A retained topic, as JSON.
+    fn state(&self, topic: &str) -> Value {
+        let retained = self.broker.retained();
+        let publish = retained.get(topic).unwrap_or_else(|| panic!("{topic} is among {:?}", retained.keys()));
+        serde_json::from_slice(&publish.payload)
+            .unwrap_or_else(|_| Value::from(String::from_utf8(publish.payload.to_vec()).expect("text")))
+    }
+
+    fn drive(&self, what: &str) -> Value {
+        self.state(&format!("plant/north/drive/pump_1/{what}"))
+    }
+
+    /// The answers so far, on a topic.
+    fn answers_on(&self, topic: &str) -> Vec<Value> {
+        let published = self.broker.published().into_iter().filter(|(to, _)| to == topic);
+        published.map(|(_, payload)| serde_json::from_str(&payload).expect("answers are JSON")).collect()
+    }
+
+    fn answers(&self) -> Vec<Value> {
+        self.answers_on("plant/north/drive/pump_1/outcome")
+    }
+
+    /// The outcomes so far, in their order.
+    fn outcomes(&self) -> Vec<String> {
+        self.answers()
+            .iter()
+            .map(|answer| answer["outcome"].as_str().expect("an outcome").to_owned())
+            .collect()
+    }
+
+    /// Publishes as a client does that is content with QoS 0.
+    fn ask(&self, topic: &str, payload: &str) {
+        self.broker.deliver(publish(&format!("plant/north/{topic}"), payload, Qos::AtMostOnce));
+    }
+
+    fn command(&self, body: &Value) {
+        self.ask("drive/pump_1/command", &body.to_string());
+    }
+
+    fn runs(&self, number: usize) -> bool {
+        self.plant.machines[number].observe().running
+    }
+}
+
+fn start(id: &str) -> Value {
+    json!({ "id": id, "action": "start", "setpoint": { "frequency_hz": 30.0 } })
+}
+
+async fn a_while() {
+    sleep(Duration::from_secs(10)).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_there_is_is_retained_and_expires_with_the_daemon() {
+    let bench = Bench::of(2).await;
+    assert_eq!(bench.state("plant/north/status"), "online");
+    assert_eq!(bench.drive("availability"), "online");
+    let state = bench.drive("state");
+    assert_eq!((&state["name"], &state["status"]["quality"]), (&"pump 1".into(), &"good".into()));
+    assert!(state["time_unix_ms"].is_u64() && state["status"]["age_ms"].is_u64(), "{state}");
+    assert_eq!(bench.drive("fault")["present"], false);
+    a_while().await;
+    assert_eq!(bench.drive("measurements")["line_voltage_v"], 400.0);
+    assert_eq!(bench.state("plant/north/line/north")["link"], "connected");
+    let expires = |topic: &str| {
+        let publish = bench.broker.retained()[topic].clone();
+        publish.properties.and_then(|properties| properties.message_expiry_interval)
+    };
+    for what in ["state", "measurements", "fault"] {
+        assert_eq!(expires(&format!("plant/north/drive/pump_2/{what}")), Some(90));
+    }
+    for holds in ["plant/north/status", "plant/north/drive/pump_1/availability"] {
+        assert_eq!(expires(holds), None, "{holds}");
+    }
+    let Packet::Connect(_, Some(will), _) = &bench.broker.packets()[0] else { panic!("a will") };
+    let will = (&will.topic[..], &will.message[..], will.retain, will.qos);
+    assert_eq!(will, (&b"plant/north/status"[..], &b"offline"[..], true, rumqttc::QoS::AtLeastOnce));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stale_value_is_never_published_as_live() {
+    let bench = Bench::of(1).await;
+    bench.plant.machines[0].mute();
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(bench.drive("availability"), "offline");
+    assert_eq!(bench.drive("state")["status"]["quality"], "stale");
+    assert_eq!(bench.drive("measurements")["quality"], "stale");
+    assert!(bench.drive("state")["status"]["age_ms"].as_u64().unwrap() > 1_000);
+    bench.plant.machines[0].unmute();
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(
+        (bench.drive("availability"), &bench.drive("state")["status"]["quality"]),
+        ("online".into(), &"good".into())
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn everything_is_told_again_at_each_heartbeat_and_after_each_connect() {
+    let bench = Bench::of(1).await;
+    a_while().await;
+    let count = |topic: &str| bench.broker.published().iter().filter(|(to, _)| to == topic).count();
+    let before = count("plant/north/drive/pump_1/fault");
+    sleep(Duration::from_secs(300)).await;
+    assert_eq!(count("plant/north/drive/pump_1/fault") - before, 10, "one each heartbeat");
+    let told = bench.broker.published().len();
+    bench.broker.cut();
+    let connects = |broker: &TestBroker| {
+        broker.packets().iter().filter(|packet| matches!(packet, Packet::Connect(..))).count()
+    };
+    bench.broker.until(|broker| connects(broker) == 2).await;
+    sleep(Duration::from_secs(1)).await;
+    let again: Vec<String> =
+        bench.broker.published().split_off(told).into_iter().map(|(topic, _)| topic).collect();
+    for topic in bench.broker.retained().keys() {
+        assert!(again.contains(topic), "{topic} is among {again:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_is_accepted_first_and_its_outcome_follows_where_it_was_asked_for() {
+    let bench = Bench::of(1).await;
+    let properties = PublishProperties {
+        response_topic: Some("reply/me".to_owned()),
+        correlation_data: Some("42".into()),
+        ..PublishProperties::default()
+    };
+    let asked = publish("plant/north/drive/pump_1/command", &start("a-1").to_string(), Qos::AtLeastOnce);
+    bench.broker.deliver(Publish { properties: Some(properties), ..asked });
+    a_while().await;
+    assert!(bench.runs(0));
+    for topic in ["plant/north/drive/pump_1/outcome", "reply/me"] {
+        let answers = bench.answers_on(topic);
+        let outcomes: Vec<_> = answers.iter().map(|answer| answer["outcome"].as_str().unwrap()).collect();
+        assert_eq!(outcomes, ["accepted", "confirmed"], "{topic}");
+        assert!(answers.iter().all(|answer| answer["id"] == "a-1" && answer["caller"] == "mqtt"));
+        let sent = bench.broker.message(topic).await;
+        assert_eq!((sent.retain, sent.properties.unwrap().correlation_data), (false, Some("42".into())));
+    }
+    bench.ask("drive/pump_1/stop", "");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!bench.runs(0));
+    assert_eq!(bench.outcomes(), ["accepted", "confirmed", "accepted", "confirmed"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn plain_words_command_too() {
+    let bench = Bench::of(1).await;
+    bench.ask("drive/pump_1/set/frequency", "40.0");
+    a_while().await;
+    bench.ask("drive/pump_1/set/run", "reverse");
+    a_while().await;
+    let shown = bench.drive("state");
+    assert_eq!(
+        (&shown["status"]["direction"], &shown["setpoint"]["frequency_hz"]),
+        (&"reverse".into(), &40.0.into())
+    );
+    bench.ask("drive/pump_1/set/run", "stop");
+    sleep(Duration::from_secs(20)).await;
+    assert_eq!(bench.outcomes(), ["accepted", "confirmed"].repeat(3));
+    assert!(bench.answers().iter().all(|answer| answer["id"].as_str().unwrap().starts_with("c-")));
+    for (topic, payload) in [
+        ("set/frequency", "fast"),
+        ("set/frequency", "40,\"x\":1"),
+        ("set/run", "on"),
+        ("set/speed", "-1"),
+        ("command", "x"),
+    ] {
+        bench.ask(&format!("drive/pump_1/{topic}"), payload);
+        sleep(Duration::from_secs(1)).await;
+        assert_eq!(bench.answers().last().unwrap()["reason"], "malformed", "{topic} {payload}");
+    }
+    assert!(!bench.runs(0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_retained_command_is_refused_and_a_retained_stop_stops() {
+    let bench = Bench::of(1).await;
+    let retained = |topic: &str, payload: &str| Publish {
+        retain: true,
+        ..publish(&format!("plant/north/drive/pump_1/{topic}"), payload, Qos::AtLeastOnce)
+    };
+    bench.broker.deliver(retained("command", &start("kept").to_string()));
+    bench.broker.deliver(retained("set/run", "forward"));
+    a_while().await;
+    assert!(!bench.runs(0));
+    let reasons: Vec<_> = bench.answers().into_iter().map(|answer| answer["reason"].clone()).collect();
+    assert_eq!(reasons, ["retained", "retained"]);
+    assert_eq!(bench.answers()[0]["id"], "kept");
+    bench.command(&start("b"));
+    a_while().await;
+    assert!(bench.runs(0));
+    bench.broker.deliver(retained("stop", ""));
+    a_while().await;
+    assert!(!bench.runs(0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_comes_again_moves_no_motor() {
+    let bench = Bench::of(1).await;
+    let deliver = |body: &Value, repeated: bool, correlation: Option<&'static str>| {
+        let properties = PublishProperties {
+            correlation_data: correlation.map(Into::into),
+            ..PublishProperties::default()
+        };
+        let asked = publish("plant/north/drive/pump_1/command", &body.to_string(), Qos::AtLeastOnce);
+        bench.broker.deliver(Publish { dup: repeated, properties: Some(properties), ..asked });
+    };
+    let nameless = json!({ "action": "start", "setpoint": { "frequency_hz": 30.0 } });
+    // Without an id nobody can say whether it has come before.
+    deliver(&nameless, false, None);
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers()[0]["reason"]), (false, &"id_needed".into()));
+    // By its id, and by its Correlation Data.
+    for (body, correlation) in [(start("once"), None), (nameless, Some("\u{1}\u{2}"))] {
+        deliver(&body, false, correlation);
+        a_while().await;
+        assert!(bench.runs(0));
+        bench.ask("drive/pump_1/stop", "fast");
+        a_while().await;
+        for repeated in [false, true] {
+            deliver(&body, repeated, correlation);
+            a_while().await;
+            assert!(!bench.runs(0), "it is answered and not repeated");
+        }
+        bench.broker.cut();
+        a_while().await;
+        deliver(&body, true, correlation);
+        a_while().await;
+        assert!(!bench.runs(0), "nor after a reconnect");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_that_was_held_up_on_its_way_from_the_broker_moves_no_motor() {
+    let bench = Bench::of(1).await;
+    bench.broker.hold();
+    bench.command(&start("late"));
+    sleep(Duration::from_secs(8)).await;
+    bench.broker.release();
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers()[0]["reason"]), (false, &"late".into()));
+    bench.command(&start("in-time"));
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers());
+    bench.broker.hold();
+    bench.ask("drive/pump_1/stop", "");
+    sleep(Duration::from_secs(8)).await;
+    bench.broker.release();
+    a_while().await;
+    assert!(!bench.runs(0), "a stop is never too late");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_lives_as_long_as_its_message_and_no_longer_than_ten_seconds() {
+    let bench = Bench::of(1).await;
+    let deliver = |seconds: Option<u32>, body: &Value| {
+        let properties =
+            PublishProperties { message_expiry_interval: seconds, ..PublishProperties::default() };
+        let asked = publish("plant/north/drive/pump_1/command", &body.to_string(), Qos::AtLeastOnce);
+        bench.broker.deliver(Publish { properties: Some(properties), ..asked });
+    };
+    // A first command holds the drive for longer than those after it may wait.
+    for (number, (seconds, muted, body)) in [
+        (None, 3, start("a")),
+        (Some(2), 4, start("b")),
+        (Some(3_600), 14, start("c")),
+        (
+            Some(8),
+            3,
+            json!({"id": "d", "action": "start", "expires_in_ms": 500, "setpoint": {"frequency_hz": 30.0}}),
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        bench.plant.machines[0].mute();
+        bench.command(&json!({ "action": "setpoint", "setpoint": { "frequency_hz": 10.0 + number as f64 } }));
+        sleep(Duration::from_millis(50)).await;
+        deliver(seconds, &body);
+        sleep(Duration::from_secs(muted)).await;
+        bench.plant.machines[0].unmute();
+        sleep(Duration::from_secs(30)).await;
+        let last = bench.answers().into_iter().rfind(|answer| answer["id"] == body["id"]).unwrap();
+        assert!(["expired", "refused"].contains(&last["outcome"].as_str().unwrap()), "{last}");
+        assert!(!bench.runs(0), "{last}");
+    }
+    let old = json!({ "id": "e", "action": "start", "issued_unix_ms": drived_words::json::unix(Instant::now()) - 1_500 });
+    bench.command(&old);
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers().last().unwrap()["outcome"]), (false, &"expired".into()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_unclear_moves_no_motor_and_the_key_is_named() {
+    let bench = Bench::of(1).await;
+    for (text, outcome, reason, key) in REFUSED {
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(3)).await;
+        let told = bench.answers().pop().unwrap();
+        assert_eq!((&told["outcome"], &told["reason"]), (&outcome.into(), &reason.into()), "{text}: {told}");
+        assert!(told["text"].as_str().unwrap().contains(key), "{text}: {told}");
+        let is_no_stop = told["text"].as_str().unwrap().contains("no stop and no start");
+        assert_eq!(is_no_stop, reason == "ambiguous", "{text}: {told}");
+        assert_eq!(told["id"], serde_json::from_str::<Value>(text).unwrap()["id"], "{text}");
+        assert!(!bench.runs(0), "{text}");
+    }
+    for text in NO_OBJECTS {
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(3)).await;
+        let told = bench.answers().pop().unwrap();
+        assert_eq!(told["reason"], "malformed", "{text}: {told}");
+        assert!(!bench.runs(0), "{text}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_taken_whatever_else_it_says_and_under_its_id() {
+    let bench = Bench::of(1).await;
+    for (number, text) in STOPS.into_iter().enumerate() {
+        bench.command(&start(&format!("start-{number}")));
+        a_while().await;
+        assert!(bench.runs(0), "{text}");
+        bench.ask("drive/pump_1/command", text);
+        sleep(Duration::from_secs(20)).await;
+        assert!(!bench.runs(0), "{text}");
+        let told = bench.answers().pop().unwrap();
+        assert_eq!((&told["id"], &told["outcome"]), (&"s".into(), &"confirmed".into()), "{text}: {told}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_that_says_when_it_was_issued_is_the_same_whenever_it_comes() {
+    let bench = Bench::of(1).await;
+    let mut again = start("same");
+    again["issued_unix_ms"] = drived_words::json::unix(Instant::now()).into();
+    again["expires_in_ms"] = 10_000.into();
+    bench.command(&again);
+    sleep(Duration::from_secs(2)).await;
+    let first = bench.answers().pop().unwrap();
+    bench.command(&again);
+    sleep(Duration::from_secs(3)).await;
+    let second = bench.answers().pop().unwrap();
+    assert_eq!((&second["outcome"], &second["reason"]), (&first["outcome"], &first["reason"]), "{second}");
+    assert!(bench.runs(0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_outcome_is_told_in_the_words_of_the_api() {
+    let limited = |name: String| DriveSettings {
+        limits: FrequencyLimits {
+            forbidden: vec![Band { low: Frequency::from_hertz(20), high: Frequency::from_hertz(22) }],
+            ..FrequencyLimits::default()
+        },
+        ..DriveSettings::controlled(name)
+    };
+    let bench = Bench::with(TestPlant::with(1, limited).await, config()).await;
+    let at = |hertz: f64| json!({ "action": "setpoint", "setpoint": { "frequency_hz": hertz } });
+    bench.command(&at(21.0));
+    a_while().await;
+    assert_eq!(bench.answers().last().unwrap()["reason"], "forbidden_band");
+    bench.command(&start("a"));
+    a_while().await;
+    bench.command(&at(10.0));
+    bench.command(&at(15.0));
+    bench.command(&at(30.0));
+    a_while().await;
+    assert!(bench.outcomes().contains(&"superseded".to_owned()), "{:?}", bench.outcomes());
+    // A stop that the drive cannot confirm is not known, and settled later under its id.
+    bench.plant.machines[0].mute();
+    sleep(Duration::from_secs(8)).await;
+    bench.ask("drive/pump_1/stop", r#"{"id": "s"}"#);
+    sleep(Duration::from_secs(40)).await;
+    let of_stop = |answer: &Value| answer["id"] == "s";
+    let told = |bench: &Bench| -> Vec<Value> {
+        bench.answers().into_iter().filter(of_stop).map(|answer| answer["outcome"].clone()).collect()
+    };
+    assert_eq!(told(&bench), ["accepted", "unknown"]);
+    bench.plant.machines[0].unmute();
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(told(&bench), ["accepted", "unknown", "confirmed"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_may_what_stands_in_the_configuration_and_a_stop_is_a_right_of_its_own() {
+    let commanders = [("hmi", Role::Operate), ("panel", Role::Stop), ("eye", Role::View)]
+        .map(|(name, role)| (name.to_owned(), role));
+    let config = MqttConfig { commanders: commanders.into(), ..config() };
+    let chief = |name: String| match name.as_str() {
+        "pump 2" => DriveSettings {
+            commanders: Commanders::Only(vec!["chief".to_owned()]),
+            ..DriveSettings::controlled(name)
+        },
+        "pump 3" => DriveSettings::watched(name),
+        _ => DriveSettings::controlled(name),
+    };
+    let bench = Bench::with(TestPlant::with(3, chief).await, config).await;
+    let last = |number: u8| {
+        let answers = bench.answers_on(&format!("plant/north/drive/pump_{number}/outcome"));
+        answers.last().cloned().unwrap_or_default()
+    };
+    for (id, (topic, number, reason)) in [
+        ("drive/pump_1/command", 1, "no_right"),
+        ("drive/pump_1/command/panel", 1, "no_right"),
+        ("drive/pump_1/command/eye", 1, "no_right"),
+        ("drive/pump_1/command/stranger", 1, "no_right"),
+        ("drive/pump_2/command/hmi", 2, "no_right"),
+        ("drive/pump_3/command/hmi", 3, "read_only"),
+        ("drive/pump_9/command/hmi", 9, "not_found"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        bench.ask(topic, &start(&format!("x{id}")).to_string());
+        sleep(Duration::from_secs(3)).await;
+        assert_eq!(last(number)["reason"], reason, "{topic}: {}", last(number));
+    }
+    bench.ask("drive/pump_1/command/hmi", &start("y").to_string());
+    a_while().await;
+    assert_eq!((bench.runs(0), last(1)["caller"].clone()), (true, "hmi".into()));
+    for who in ["eye", "stranger"] {
+        bench.ask(&format!("drive/pump_1/stop/{who}"), "");
+        sleep(Duration::from_secs(3)).await;
+        assert!(bench.runs(0));
+    }
+    bench.ask("drive/pump_1/stop/panel", "whatever it says");
+    a_while().await;
+    assert!(!bench.runs(0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_trip_is_told_with_its_meaning_as_it_happens_and_for_as_long_as_it_is_there() {
+    let bench = Bench::of(1).await;
+    bench.plant.machines[0].trip(9);
+    a_while().await;
+    let fault = bench.drive("fault");
+    assert_eq!(
+        (&fault["present"], &fault["code"], &fault["mnemonic"]),
+        (&true.into(), &9.into(), &"OCF".into()),
+        "{fault}"
+    );
+    assert!(fault["meaning"].is_string() && fault["at_trip"].is_object(), "{fault}");
+    let events = bench.answers_on("plant/north/drive/pump_1/event");
+    let trip = events.iter().find(|event| event["event"] == "tripped").expect("it is told");
+    assert_eq!(trip["alarm"], true);
+    assert!(!bench.broker.retained().contains_key("plant/north/drive/pump_1/event"), "it has happened once");
+    let types =
+        bench.state("homeassistant/device/plant_north_pump_1/config")["components"]["alarm"]["event_types"]
+            .clone();
+    assert!(types.as_array().unwrap().contains(&trip["event"]));
+    bench.ask("drive/pump_1/reset", "");
+    a_while().await;
+    assert_eq!(bench.drive("fault")["present"], false);
+}
+
+#[tokio::test(start_paused = true)]
+async fn groups_are_commanded_and_all_are_only_stopped() {
+    let bench = Bench::of(3).await;
+    bench.ask("group/pumps/command", &start("g").to_string());
+    a_while().await;
+    assert!((0..3).all(|number| bench.runs(number)));
+    let told = bench.answers_on("plant/north/group/pumps/outcome");
+    assert_eq!(
+        told.last().map(|told| (told["outcome"].clone(), told["confirmed"].clone())),
+        Some(("confirmed".into(), 3.into()))
+    );
+    bench.ask("all/stop", "");
+    sleep(Duration::from_secs(20)).await;
+    assert!((0..3).all(|number| !bench.runs(number)));
+    bench.ask("all/command", &start("h").to_string());
+    a_while().await;
+    let told = bench.answers_on("plant/north/all/outcome");
+    assert_eq!(told.last().unwrap()["reason"], "malformed");
+    assert!((0..3).all(|number| !bench.runs(number)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn nobody_commands_unless_the_configuration_says_so() {
+    let bench = Bench::with(TestPlant::of(1).await, MqttConfig { commands: false, ..config() }).await;
+    let subscribed: Vec<String> = bench
+        .broker
+        .packets()
+        .into_iter()
+        .filter_map(|packet| if let Packet::Subscribe(asked) = packet { Some(asked.filters) } else { None })
+        .flatten()
+        .map(|filter| filter.path)
+        .collect();
+    assert_eq!(subscribed, ["homeassistant/status"]);
+    let document = bench.state("homeassistant/device/plant_north_pump_1/config");
+    for control in ["setpoint", "start", "start_reverse", "stop", "reset"] {
+        let keys: Vec<_> = document["components"][control].as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["platform"], "{control} is taken back");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_answer_goes_to_no_topic_of_the_daemon() {
+    let bench = Bench::of(2).await;
+    bench.ask("drive/pump_2/command", &start("a").to_string());
+    a_while().await;
+    assert!(bench.runs(1));
+    for topic in ["plant/north/drive/pump_2/stop", "homeassistant/status", "a/#", ""] {
+        let properties =
+            PublishProperties { response_topic: Some(topic.to_owned()), ..PublishProperties::default() };
+        let asked = publish("plant/north/drive/pump_1/set/frequency", "20", Qos::AtMostOnce);
+        bench.broker.deliver(Publish { properties: Some(properties), ..asked });
+        a_while().await;
+        assert!(bench.broker.published().iter().all(|(to, _)| to != topic), "{topic}");
+    }
+    assert!(bench.runs(1));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_flood_of_commands_and_garbage_fills_no_queue_and_a_stop_gets_through() {
+    let bench = Bench::of(2).await;
+    bench.ask("drive/pump_2/command", &start("a").to_string());
+    a_while().await;
+    let writes = |machine: usize| {
+        bench.plant.machines[machine].requests(6) + bench.plant.machines[machine].requests(16)
+    };
+    let before = writes(0);
+    for number in 0..20_000_u32 {
+        let garbage = [
+            "drive/pump_1/command",
+            "drive/pump_1/set/frequency",
+            "x",
+            "drive/pump_1/set/run/eve",
+            "all/command",
+        ];
+        bench.ask(garbage[number as usize % garbage.len()], "\u{0}{{{");
+        bench.ask("drive/nobody/set/run", "forward");
+    }
+    bench.ask("drive/pump_2/stop", "");
+    sleep(Duration::from_secs(30)).await;
+    assert!(!bench.runs(1));
+    assert_eq!(writes(0), before, "the drive has heard of nothing");
+    let counts = bench.mqtt.face.broker.counts();
+    assert!(counts.waiting <= NEWS && counts.connected, "{counts:?}");
+    assert!(counts.arrived + counts.lost.flood >= 40_002, "{counts:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn commands_wait_for_no_broker_and_the_daemon_ends_with_offline() {
+    let bench = Bench::of(1).await;
+    bench.mqtt.closing();
+    bench.command(&start("late"));
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers()[0]["reason"]), (false, &"closing".into()));
+    let Bench { broker, mqtt, .. } = bench;
+    mqtt.close().await;
+    assert_eq!(broker.retained()["plant/north/status"].payload, "offline");
+    assert!(matches!(broker.packets().last(), Some(Packet::Disconnect(_))));
+
+    let bench = Bench::of(1).await;
+    bench.broker.behave(Conduct::Deaf);
+    let begun = Instant::now();
+    bench.mqtt.close().await;
+    assert!(begun.elapsed() <= CLOSED_WITHIN);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_leaves_is_taken_back() {
+    let bench = Bench::of(2).await;
+    a_while().await;
+    let topics = |broker: &TestBroker| -> Vec<String> {
+        broker.retained().into_keys().filter(|topic| topic.contains("pump_2")).collect()
+    };
+    assert_eq!(topics(&bench.broker).len(), 5, "{:?}", topics(&bench.broker));
+    let _ = bench.plant.plant.fleet().remove(&["pump 2"], Duration::from_secs(30)).await;
+    a_while().await;
+    assert_eq!(topics(&bench.broker), ["plant/north/drive/pump_2/availability"]);
+    assert_eq!(bench.state("plant/north/drive/pump_2/availability"), "offline");
+}
+
+#[tokio::test(start_paused = true)]
+async fn home_assistant_is_told_the_real_limits_and_only_what_the_drive_has() {
+    let settings = |name: String| match name.as_str() {
+        "pump 2" => DriveSettings::watched(name),
+        _ => DriveSettings {
+            limits: FrequencyLimits {
+                low: Some(Frequency::from_hertz(10)),
+                high: Some(Frequency::from_centihertz(4_750)),
+                ..FrequencyLimits::default()
+            },
+            ..DriveSettings::controlled(name)
+        },
+    };
+    let bench = Bench::with(TestPlant::with(2, settings).await, config()).await;
+    a_while().await;
+    let document = bench.state("homeassistant/device/plant_north_pump_1/config");
+    let number = &document["components"]["setpoint"];
+    assert_eq!((&number["min"], &number["max"]), (&10.0.into(), &47.5.into()));
+    assert_eq!(number["command_topic"], "plant/north/drive/pump_1/set/frequency");
+    assert!(number["value_template"].as_str().unwrap().contains("10 <= hertz <= 47.5"), "{number}");
+    for control in ["setpoint", "start", "start_reverse", "reset"] {
+        assert_eq!(document["components"][control]["message_expiry_interval"], 2, "{control}");
+    }
+    assert!(
+        document["components"]["stop"].get("message_expiry_interval").is_none(),
+        "a stop is never too late"
+    );
+    assert!(document["components"].get("torque_percent").is_some());
+    assert!(document["components"].get("output_power_kw").is_none(), "an Altivar 312 has none");
+    let topics: Vec<_> = document["components"]["state"]["availability"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| one["topic"].clone())
+        .collect();
+    assert_eq!(topics, ["plant/north/status", "plant/north/drive/pump_1/availability"]);
+    assert_eq!(document["components"]["state"]["availability_mode"], "all");
+    assert_eq!(document["components"]["current_a"]["expire_after"], 90);
+    let watched = bench.state("homeassistant/device/plant_north_pump_2/config");
+    assert_eq!(watched["components"]["stop"], json!({ "platform": "button" }));
+    // Home Assistant begins anew.
+    let told = bench.broker.published().len();
+    bench.broker.deliver(publish("homeassistant/status", "online", Qos::AtMostOnce));
+    a_while().await;
+    let again: Vec<String> =
+        bench.broker.published().split_off(told).into_iter().map(|(topic, _)| topic).collect();
+    for topic in
+        ["plant/north/status", "plant/north/drive/pump_1/availability", "plant/north/drive/pump_2/state"]
+    {
+        assert!(again.iter().any(|to| to == topic), "{topic}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_documents_fit_the_schema_of_what_home_assistant_checks() {
+    const SCHEMA: &str = include_str!("home_assistant.schema.json");
+    let schema: Value = serde_json::from_str(SCHEMA).expect("the schema is JSON");
+    let validator = |part: &str| {
+        let mut schema = schema.clone();
+        schema["$ref"] = format!("#/$defs/{part}").into();
+        jsonschema::validator_for(&schema).expect("the schema is one")
+    };
+    for (discovery, part) in
+        [(Discovery::Device, "device_document"), (Discovery::Component, "component_document")]
+    {
+        for commands in [true, false] {
+            let bench =
+                Bench::with(TestPlant::of(1).await, MqttConfig { discovery, commands, ..config() }).await;
+            a_while().await;
+            let mut documents = 0;
+            for (topic, publish) in bench.broker.retained() {
+                if !topic.starts_with("homeassistant/") {
+                    continue;
+                }
+                documents += 1;
+                let mut document: Value =
+                    serde_json::from_slice(&publish.payload).expect("documents are JSON");
+                if discovery == Discovery::Component {
+                    document["platform"] = topic.split('/').nth(1).expect("a platform").into();
+                }
+                let errors: Vec<String> =
+                    validator(part).iter_errors(&document).map(|error| error.to_string()).collect();
+                assert!(errors.is_empty(), "{topic}: {errors:?}\n{document:#}");
+            }
+            assert!(documents >= 2, "{documents}");
+        }
+    }
+    // The schema is one that refuses.
+    let refused = |document: &Value| !validator("device_document").is_valid(document);
+    let bench = Bench::of(1).await;
+    let right = bench.state("homeassistant/device/plant_north_pump_1/config");
+    assert!(!refused(&right));
+    for (path, value) in [
+        ("/~", json!("plant")),
+        ("/device/colour", json!("red")),
+        ("/components/state/unit_of_measurement", json!("Hz")),
+        ("/components/output_frequency_hz/unit_of_measurement", json!("rpm")),
+        ("/components/current_a/entity_category", json!("config")),
+    ] {
+        let mut wrong = right.clone();
+        let (parent, key) = path.rsplit_once('/').unwrap();
+        wrong.pointer_mut(parent).unwrap()[key] = value;
+        assert!(refused(&wrong), "{path}");
+    }
+}
+
+/// A day on a broker that is cut off each hour, and away for ten minutes of it: nothing grows.
+#[tokio::test(start_paused = true)]
+async fn a_day_leaves_nothing_behind() {
+    live_on(24, false).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_hour_with_commands_leaves_nothing_behind() {
+    live_on(1, true).await;
+}
+
+async fn live_on(hours: u64, commands: bool) {
+    let seldom = |name| DriveSettings {
+        periods: drive_fleet::Periods {
+            running: Duration::from_secs(20),
+            rest: Duration::from_secs(30),
+            slow: Duration::from_secs(300),
+            max_age: Duration::from_secs(120),
+        },
+        ..DriveSettings::controlled(name)
+    };
+    let heartbeat = Duration::from_secs(300);
+    let bench =
+        Bench::with(TestPlant::with(2, seldom).await, MqttConfig { commands, heartbeat, ..config() }).await;
+    bench.broker.forget();
+    a_while().await;
+    let topics = bench.broker.retained().len();
+    let tasks = || tokio::runtime::Handle::current().metrics().num_alive_tasks();
+    let before = tasks();
+    for hour in 0..hours {
+        bench.ask("drive/pump_1/set/run", if hour % 2 == 0 { "forward" } else { "reverse" });
+        sleep(Duration::from_secs(49 * 60)).await;
+        assert_eq!(bench.runs(0), commands);
+        bench.ask("drive/pump_1/stop", "");
+        sleep(Duration::from_secs(60)).await;
+        bench.broker.behave(Conduct::Away);
+        bench.broker.cut();
+        sleep(Duration::from_secs(10 * 60)).await;
+        bench.broker.behave(Conduct::Usual);
+        sleep(Duration::from_secs(60)).await;
+        let counts = bench.mqtt.face.broker.counts();
+        assert!(counts.connected && counts.waiting < 10, "{counts:?}");
+        assert_eq!(bench.broker.retained().len(), topics);
+        assert!(tasks() <= before + 2, "{} tasks, {before} before", tasks());
+    }
+    assert_eq!(bench.mqtt.face.broker.counts().lost.by_reason().map(|(_, lost)| lost), [0; 4]);
+    // Eight topics of drives and two others each five minutes, what the daemon says to itself, and some more.
+    let most = hours * (12 * 10 + 3_600) * 2;
+    assert!((hours * 10 * 8..most).contains(&bench.broker.counted()), "{}", bench.broker.counted());
+}

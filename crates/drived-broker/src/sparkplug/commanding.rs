@@ -1,0 +1,146 @@
+//! What hosts write, as the [desk](crate::desk) takes it.
+//!
+//! A write has no id, no expiry and no answer of its own. So a setpoint is a level, motion is asked for by an object in
+//! `Control/Command`, and what becomes of either stands in `Control/LastCommand/…`. The time of the payload says how old
+//! it is.
+
+use std::time::Duration;
+
+use drive_core::{Frequency, Setpoint, Speed};
+use drive_sparkplug::{Command, Value, Write, WriteError};
+use serde_json::{Value as Json, json};
+use tokio::{
+    sync::{mpsc, watch},
+    time::Instant,
+};
+
+use super::metrics::{COMMAND, SETPOINT, SPEED_SETPOINT};
+use crate::{
+    broker::Arrived,
+    broker::config::SparkplugConfig,
+    desk::{Answer, Answers, Desk, Message, Refusal},
+};
+use drived_doors::{Caller, Rights, Role, audit::Audit};
+use drived_plant::plant::{
+    Plant,
+    commands::{Action, Said, Target, Unclear},
+};
+use drived_words::json::unix;
+
+/// Who asks: hosts do not say who they are.
+const CALLER: &str = "sparkplug";
+
+/// What takes commands.
+pub(super) struct Commanding {
+    desk: Desk<To>,
+    caller: Caller,
+    /// How old a command may be that does not say so itself.
+    lifetime: Duration,
+    /// What became of the last command of a drive.
+    outcomes: mpsc::Sender<(String, Json)>,
+}
+
+/// The drive whose last command it is.
+#[derive(Clone)]
+struct To {
+    drive: String,
+    outcomes: mpsc::Sender<(String, Json)>,
+}
+
+impl Commanding {
+    pub(super) fn new(
+        config: &SparkplugConfig,
+        plant: Plant,
+        audit: Audit,
+        closing: watch::Receiver<bool>,
+        outcomes: mpsc::Sender<(String, Json)>,
+    ) -> Self {
+        let rights = config.commands.map_or(Rights::NONE, Role::rights);
+        let origin = format!("sparkplug {}", config.name.group);
+        let caller = Caller::new(CALLER, origin, rights);
+        Self { desk: Desk::open(plant, audit, closing), caller, lifetime: config.lifetime, outcomes }
+    }
+
+    /// Takes what a host writes, one metric after the other. `is_alive`: the births have been told, so that the host can know
+    /// what it writes.
+    pub(super) fn handle(&mut self, command: Command, arrived: &Arrived, is_alive: bool) {
+        let Command { device, timestamp, is_retained, writes } = command;
+        let Some(drive) = device.map(|device| device.as_str().to_owned()) else {
+            tracing::debug!("Sparkplug: {}: no metric of the node can be written", arrived.topic);
+            return;
+        };
+        for write in writes {
+            let unborn = (!is_alive).then_some(Refusal::NotBorn);
+            let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
+            let undated = timestamp.is_none().then(undated);
+            let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated) };
+            self.desk.take(Message {
+                needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
+                doubt: read_only(&write).or(doubt),
+                said: said(write),
+                caller: self.caller.clone(),
+                pace_of: String::new(),
+                target: Some(Target::Drive(drive.clone())),
+                arrived: arrived.at,
+                sent_unix_ms: timestamp,
+                lifetime: self.lifetime,
+                longest: None,
+                id: None,
+                what: format!("MQTT {}", arrived.topic),
+                answers: To { drive: drive.clone(), outcomes: self.outcomes.clone() },
+            });
+        }
+    }
+}
+
+/// What a write asks for.
+fn said(write: Result<Write, WriteError>) -> Said {
+    let malformed = |why: String, body| Said::unclear(Unclear::Malformed(why), body);
+    let Write { name, value } = match write {
+        Ok(write) => write,
+        Err(error) => return malformed(error.to_string(), Json::from(error.to_string())),
+    };
+    let set = |setpoint| Action::Setpoint { setpoint, until: drive_fleet::Until::default() };
+    match (name.as_str(), value) {
+        (COMMAND, Value::String(text)) => {
+            let said = Said::of(&text);
+            Said { body: json!({ name: said.body }), ..said }
+        }
+        (SETPOINT, Value::Double(hertz)) => number::<Frequency>(hertz)
+            .map(|frequency| Said::plain(set(Setpoint::Frequency(frequency)), json!({ &name: hertz })))
+            .unwrap_or_else(|why| malformed(why, json!({ name: hertz }))),
+        (SPEED_SETPOINT, Value::Double(rpm)) => number::<Speed>(rpm)
+            .map(|speed| Said::plain(set(Setpoint::Speed(speed)), json!({ &name: rpm })))
+            .unwrap_or_else(|why| malformed(why, json!({ name: rpm }))),
+        _ => malformed(format!("{name} has no such value"), Json::from(name)),
+    }
+}
+
+fn number<T: serde::de::DeserializeOwned>(number: f64) -> Result<T, String> {
+    serde_json::from_value(json!(number)).map_err(|error| error.to_string())
+}
+
+/// What is written to something that cannot be.
+fn read_only(write: &Result<Write, WriteError>) -> Option<Refusal> {
+    let Ok(Write { name, .. }) = write else { return None };
+    (![COMMAND, SETPOINT, SPEED_SETPOINT].contains(&name.as_str())).then(|| Refusal::ReadOnly(name.clone()))
+}
+
+impl Answers for To {
+    fn tell(&self, answer: Answer<'_>) {
+        let (id, outcome, reason, text) = match answer {
+            Answer::Command(view) => {
+                (Some(&view.id), view.outcome, view.reason.as_deref(), view.text.as_deref())
+            }
+            Answer::Refused(refused) => {
+                (refused.id.as_ref(), refused.outcome, Some(refused.reason), Some(refused.text.as_str()))
+            }
+        };
+        // Its time is when it is told.
+        let time = unix(Instant::now());
+        let last =
+            json!({ "id": id, "outcome": outcome, "reason": reason, "text": text, "time_unix_ms": time });
+        // Nobody waits for the face: an outcome that finds no room stands in the audit log.
+        let _ = self.outcomes.try_send((self.drive.clone(), last));
+    }
+}

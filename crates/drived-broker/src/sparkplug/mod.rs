@@ -1,0 +1,387 @@
+//! The daemon as an edge node of Sparkplug B, and its drives as devices, for the SCADA hosts of an MQTT broker.
+//!
+//! What may be said, and when, is decided by [`EdgeNode`]; this carries it out, and sets what the drives are like. Nothing
+//! waits in a queue of its own: where the broker takes no more, values are said later, as they are then.
+
+mod bd_seq;
+mod commanding;
+mod metrics;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    collections::{BTreeSet, HashMap},
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use drive_fleet::{DriveHandle, Events, Freshness, Link, Received, Snapshot};
+use drive_sparkplug::{Action, BdSeq, EdgeNode, Event as Heard, Now, Settings};
+use serde_json::{Value as Json, json};
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    task::{JoinHandle, block_in_place},
+    time::{Instant, MissedTickBehavior, interval, timeout},
+};
+
+use self::{bd_seq::Kept as KeptBdSeq, commanding::Commanding};
+use crate::{
+    broker::config::{MqttConfig, SparkplugConfig},
+    broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Will},
+    mqtt,
+};
+use drived_doors::audit::Audit;
+use drived_plant::{
+    counts::{Id, Samples, Source},
+    plant::{Plant, views::DriveView},
+};
+use drived_words::{failure::Failure, json::unix};
+
+/// Messages that may wait for the broker: births of many devices are said in parts.
+const QUEUE: usize = 1_024;
+/// Between two tellings of the lines, whose counters never stand still.
+const LINES: Duration = Duration::from_secs(10);
+/// Until the broker is asked again whether it takes more.
+const ROOM: Duration = Duration::from_millis(20);
+/// Outcomes that wait to be told.
+const OUTCOMES: usize = 256;
+/// How long the goodbye may take.
+const CLOSED_WITHIN: Duration = Duration::from_secs(3);
+
+/// What the connection counts.
+struct Counted(Broker);
+
+impl Source for Counted {
+    fn collect(&self, samples: &mut Samples) {
+        let counts = self.0.counts();
+        samples.add(Id::SparkplugConnected, &[], f64::from(counts.connected));
+        samples.count(Id::SparkplugSent, &[], counts.sent);
+        samples.count(Id::SparkplugArrived, &[], counts.arrived);
+        for (reason, lost) in counts.lost.by_reason() {
+            samples.count(Id::SparkplugLost, &[reason], lost);
+        }
+    }
+}
+
+/// A face that only has to be opened: the files that it needs have been read.
+pub struct Prepared {
+    config: SparkplugConfig,
+    options: Options,
+    /// Between two looks at the drives.
+    interval: Duration,
+    bd_seq: KeptBdSeq,
+    node: EdgeNode,
+}
+
+/// The open face.
+pub struct Sparkplug {
+    broker: Broker,
+    closing: watch::Sender<bool>,
+    leave: oneshot::Sender<()>,
+    /// Gives its events back, so that the connection stands until its end.
+    task: JoinHandle<mpsc::Receiver<Event>>,
+}
+
+impl Sparkplug {
+    /// Reads the files of a configuration that wants it: those of the brokers, and the number that outlives the program.
+    ///
+    /// # Errors
+    /// One of them cannot be read, or is none of this.
+    pub fn prepared(mqtt: &MqttConfig, sparkplug: &SparkplugConfig) -> Result<Prepared, Failure> {
+        let options = mqtt::options(mqtt)?;
+        let client_id = format!("{}-sparkplug", options.client_id);
+        let options = Options { client_id, is_urgent: |topic| topic.contains("/DCMD/"), ..options };
+        Self::prepare(sparkplug.clone(), options, mqtt.interval)
+    }
+
+    /// The same with options of a broker, and the time between two looks at the drives.
+    fn prepare(config: SparkplugConfig, options: Options, interval: Duration) -> Result<Prepared, Failure> {
+        let bd_seq = KeptBdSeq::open(&config.state)
+            .map_err(|error| Failure::Input(format!("mqtt.sparkplug: state: {error}")))?;
+        let settings = Settings {
+            name: config.name.clone(),
+            primary_host: config.primary_host.clone(),
+            has_other_servers: options.servers.len() > 1,
+            rebirth_pause: config.rebirth_pause,
+            commands: config.commands.is_some(),
+        };
+        let node = EdgeNode::new(settings, metrics::of_the_node(&[]), now())
+            .map_err(|error| Failure::Input(format!("mqtt.sparkplug: {error}")))?;
+        let subscribe = |of: drive_sparkplug::Subscription| Subscription {
+            filter: of.filter,
+            qos: Qos::AtLeastOnce,
+            retained: of.wants_retained,
+        };
+        let subscriptions = node.subscriptions().into_iter().map(subscribe).collect();
+        let options = Options { subscriptions, queue: QUEUE, ..options };
+        Ok(Prepared { config, options, interval, bd_seq, node })
+    }
+
+    /// Nothing but stops is taken from the broker from now on.
+    pub fn closing(&self) {
+        self.closing.send_replace(true);
+    }
+
+    /// Says the death of the node, and goodbye. It takes no longer than [`CLOSED_WITHIN`], twice.
+    pub async fn close(self) {
+        let Self { broker, leave, mut task, .. } = self;
+        let _ = leave.send(());
+        let events = timeout(CLOSED_WITHIN, &mut task).await;
+        broker.end(Goodbye::WithWill, CLOSED_WITHIN).await;
+        task.abort();
+        drop(events);
+    }
+
+    /// What the connection counts, for `/metrics`.
+    pub fn source(&self) -> Arc<dyn Source> {
+        Arc::new(Counted(self.broker.clone()))
+    }
+}
+
+impl Prepared {
+    /// Connects, and tells and hears from now on. Nothing waits for the broker.
+    pub fn open(self, plant: Plant, audit: Audit) -> Sparkplug {
+        let Self { config, options, interval, mut bd_seq, node } = self;
+        let number = Arc::new(Mutex::new((0, BdSeq::default())));
+        let (name, next) = (config.name.clone(), Arc::clone(&number));
+        let (broker, events) = Broker::start(options, move |attempt| {
+            let bd_seq = without_blocking(|| bd_seq.next());
+            *next.lock().unwrap_or_else(PoisonError::into_inner) = (attempt.number, bd_seq);
+            Some(Will { message: message(EdgeNode::will(&name, bd_seq, now())) })
+        });
+        let (closing, closes) = watch::channel(false);
+        let (outcomes, told) = mpsc::channel(OUTCOMES);
+        let (leave, leaves) = oneshot::channel();
+        let fleet_events = plant.fleet().events();
+        let commanding = Commanding::new(&config, plant.clone(), audit, closes, outcomes);
+        let (drives, lines) = Default::default();
+        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, lines };
+        let task = tokio::spawn(face.run(events, number, told, fleet_events, leaves, interval));
+        Sparkplug { broker, closing, leave, task }
+    }
+}
+
+/// The one task that numbers and publishes.
+struct Face {
+    plant: Plant,
+    node: EdgeNode,
+    broker: Broker,
+    /// The number of the connection.
+    connection: Option<u64>,
+    commanding: Commanding,
+    drives: HashMap<String, Seen>,
+    /// The names of the lines.
+    lines: BTreeSet<String>,
+}
+
+/// A drive as it was told last.
+#[derive(Default)]
+struct Seen {
+    snapshot: Option<Arc<Snapshot>>,
+    freshness: Option<(Freshness, Freshness)>,
+    /// What became of its last command.
+    last: Json,
+}
+
+impl Face {
+    async fn run(
+        mut self,
+        mut events: mpsc::Receiver<Event>,
+        number: Arc<Mutex<(u64, BdSeq)>>,
+        mut told: mpsc::Receiver<(String, Json)>,
+        mut fleet_events: Events,
+        mut leaves: oneshot::Receiver<()>,
+        pace: Duration,
+    ) -> mpsc::Receiver<Event> {
+        let mut looks = interval(pace);
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut lines = interval(LINES);
+        lines.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut has_more, mut is_over) = (false, false);
+        loop {
+            let deadline = self.node.deadline().map(Instant::from_std);
+            let again = has_more.then(|| Instant::now() + ROOM).into_iter().chain(deadline).min();
+            tokio::select! {
+                event = events.recv() => match event {
+                    Some(Event::Connected(attempt)) => {
+                        let (of, bd_seq) = *number.lock().unwrap_or_else(PoisonError::into_inner);
+                        // Else that connection has ended already.
+                        if of == attempt.number {
+                            self.connection = Some(attempt.number);
+                            self.node.handle_connected(bd_seq);
+                            self.look();
+                            self.look_at_lines();
+                        }
+                    }
+                    Some(Event::Disconnected) => {
+                        self.connection = None;
+                        self.node.handle_disconnected();
+                    }
+                    Some(Event::Message(arrived)) => self.hear(&arrived),
+                    None => return events,
+                },
+                Some((drive, last)) = told.recv() => self.tell_outcome(&drive, last),
+                received = fleet_events.recv(), if !is_over => match received {
+                    // A trip, a loss: at once.
+                    Received::Event(_) | Received::Missed(_) => self.look(),
+                    Received::End => is_over = true,
+                },
+                _ = looks.tick() => self.look(),
+                _ = lines.tick() => self.look_at_lines(),
+                () = until(again) => {}
+                _ = &mut leaves => {
+                    self.node.leave();
+                    self.carry_out();
+                    return events;
+                }
+            }
+            has_more = self.carry_out();
+        }
+    }
+
+    /// Carries out what the node has to say. True: the broker takes no more of it now.
+    fn carry_out(&mut self) -> bool {
+        let Some(connection) = self.connection else { return false };
+        loop {
+            if self.broker.counts().waiting >= QUEUE / 2 {
+                return true;
+            }
+            match self.node.poll(now()) {
+                None => return false,
+                Some(Action::Publish(publication)) => {
+                    if !self.broker.publish(message(publication), Kept::OfConnection(connection)) {
+                        // Without it the numbers would have a gap: the session is over, and begins anew.
+                        self.part();
+                        return false;
+                    }
+                }
+                Some(Action::Disconnect { .. }) => {
+                    self.part();
+                    return false;
+                }
+            }
+        }
+    }
+
+    /// Ends the connection, after what it has been given.
+    fn part(&mut self) {
+        self.connection = None;
+        self.node.handle_disconnected();
+        self.broker.leave(Goodbye::WithWill);
+    }
+
+    /// What somebody has published for this node.
+    fn hear(&mut self, arrived: &Arrived) {
+        match self.node.handle_message(&arrived.topic, &arrived.payload, arrived.retain, now()) {
+            Some(Heard::Command(command)) => {
+                self.commanding.handle(command, arrived, self.node.is_alive());
+            }
+            Some(Heard::RebirthAsked) => tracing::debug!("Sparkplug: a host asks for the births"),
+            Some(Heard::HostOnline) => tracing::info!("Sparkplug: the primary host is online"),
+            Some(Heard::HostOffline) => tracing::warn!("Sparkplug: the primary host is offline"),
+            // A broker may send anything.
+            Some(Heard::Ignored(why)) => tracing::debug!("Sparkplug: {}: {why}", arrived.topic),
+            None => {}
+        }
+    }
+
+    /// Sets what became of a command, and says it before anything else becomes of it.
+    fn tell_outcome(&mut self, drive: &str, last: Json) {
+        if let Some(seen) = self.drives.get_mut(drive) {
+            seen.last = last;
+            seen.snapshot = None;
+            self.look();
+            self.carry_out();
+        }
+    }
+
+    /// Sets what the drives are like.
+    fn look(&mut self) {
+        let fleet = self.plant.fleet();
+        let mut there = BTreeSet::new();
+        for (line, _) in fleet.lines() {
+            for drive in fleet.drives_on(&line) {
+                there.insert(drive.name().to_string());
+                self.look_at(&line, &drive);
+            }
+        }
+        let gone: Vec<String> = self.drives.keys().filter(|name| !there.contains(*name)).cloned().collect();
+        for name in gone {
+            self.drives.remove(&name);
+            self.node.remove_device(&name);
+        }
+    }
+
+    fn look_at(&mut self, line: &str, drive: &DriveHandle) {
+        let (name, snapshot, at) = (drive.name(), drive.snapshot(), Instant::now());
+        if !self.drives.contains_key(&**name) {
+            self.drives.insert(name.to_string(), Seen::default());
+            if let Err(error) = self.node.add_device(name, metrics::of_a_drive(), now()) {
+                tracing::error!("Sparkplug: {error}");
+            }
+        }
+        let Some(seen) = self.drives.get_mut(&**name) else { return };
+        let freshness = Some((snapshot.freshness(at), snapshot.measurements_freshness(at)));
+        let is_same = seen.snapshot.as_ref().is_some_and(|known| Arc::ptr_eq(known, &snapshot));
+        if is_same && seen.freshness == freshness {
+            return;
+        }
+        let mut object = json!(DriveView::of(line, drive));
+        object["fault"]["present"] = snapshot.present_trip().is_some().into();
+        object["last"] = seen.last.clone();
+        for (metric, reading) in metrics::read_drive(&object, unix(at)) {
+            // A device that was refused has no metrics; that has been said.
+            let _ = self.node.set_device(name, metric, reading);
+        }
+        self.node.set_present(name, snapshot.link == Link::Connected);
+        (seen.snapshot, seen.freshness) = (Some(snapshot), freshness);
+    }
+
+    /// Sets what the daemon and its lines are like. Lines that have come or gone are told by births.
+    fn look_at_lines(&mut self) {
+        let (lines, at) = (self.plant.lines(), now());
+        let names: BTreeSet<String> = lines.iter().map(|line| line.name.clone()).collect();
+        if names != self.lines {
+            let definitions = metrics::of_the_node(&names.iter().cloned().collect::<Vec<_>>());
+            match self.node.define(definitions, at) {
+                Ok(()) => self.lines = names,
+                Err(error) => tracing::error!("Sparkplug: {error}"),
+            }
+        }
+        for line in &lines {
+            for (metric, reading) in metrics::read_line(&json!(line), at.unix_ms) {
+                let _ = self.node.set_node(&metric, reading);
+            }
+        }
+        let version = json!({ "version": env!("CARGO_PKG_VERSION") });
+        for (metric, reading) in metrics::read_daemon(&version, at.unix_ms) {
+            let _ = self.node.set_node(metric, reading);
+        }
+    }
+}
+
+/// Waits until a time, or for ever.
+async fn until(at: Option<Instant>) {
+    match at {
+        Some(at) => tokio::time::sleep_until(at).await,
+        None => std::future::pending().await,
+    }
+}
+
+fn now() -> Now {
+    let now = Instant::now();
+    Now { at: now.into_std(), unix_ms: unix(now) }
+}
+
+fn message(publication: drive_sparkplug::Publication) -> Message {
+    let qos = if publication.qos == 0 { Qos::AtMostOnce } else { Qos::AtLeastOnce };
+    Message { qos, ..Message::new(publication.topic, publication.payload) }
+}
+
+/// Lets other tasks of this thread go on elsewhere while a disk is waited for.
+fn without_blocking<T>(wait: impl FnOnce() -> T) -> T {
+    match tokio::runtime::Handle::current().runtime_flavor() {
+        tokio::runtime::RuntimeFlavor::MultiThread => block_in_place(wait),
+        _ => wait(),
+    }
+}

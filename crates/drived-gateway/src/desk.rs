@@ -1,0 +1,318 @@
+//! What becomes of a request: to whom it goes, whether it may, and what answers it.
+
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    net::IpAddr,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use drive_core::{
+    Port as _, PortError, Terms,
+    tokio_modbus::{ExceptionCode, Response, client::Client as _},
+};
+use drive_families::Options;
+use drive_fleet::{DriveHandle, LineBudget};
+use futures_util::{
+    FutureExt as _,
+    future::{BoxFuture, Shared, WeakShared},
+};
+use tokio::time::{Instant, sleep_until, timeout_at};
+
+use super::{
+    clients::Clients,
+    counters::{Counters, Result as Counted},
+    framing::Frame,
+    kept::Kept,
+    pdu::{self, Ask},
+    share::Share,
+    virtual_unit::{self, Outcomes},
+    writes::Stop,
+};
+use crate::config::{GatewayConfig, Units};
+use drived_doors::audit::Audit;
+use drived_plant::plant::Plant;
+
+/// What the daemon keeps of a line for itself, besides what it has planned, in percent.
+const RESERVE: u32 = 5;
+
+/// What a client wants.
+pub(super) struct Asked {
+    arrived: Instant,
+    unit: u8,
+    function: u8,
+    ask: Result<Ask, ExceptionCode>,
+    /// It goes ahead of everything.
+    pub(super) stop: Option<Stop>,
+}
+
+/// The PDU of an answer, or the exception instead.
+pub(super) type Answer = Result<Vec<u8>, ExceptionCode>;
+
+/// An exchange that several clients wait for.
+type Exchange = BoxFuture<'static, Answer>;
+
+/// Reads by the name of their drive.
+type UnderWay = HashMap<(Arc<str>, Ask), WeakShared<Exchange>>;
+
+/// The turns of the clients on one line.
+struct Turns {
+    /// Whoever waits for his turn stands in this row. Each client stands there once, so that all come round.
+    row: tokio::sync::Mutex<()>,
+    share: Mutex<Share>,
+}
+
+impl Turns {
+    fn new() -> Self {
+        Self { row: tokio::sync::Mutex::default(), share: Mutex::new(Share::new(Instant::now())) }
+    }
+
+    /// Waits for a turn of this length.
+    async fn take(&self, takes: Duration, percent: u32) {
+        let _first = self.row.lock().await;
+        loop {
+            let now = Instant::now();
+            let free_at = lock(&self.share).free_at(now);
+            if free_at <= now {
+                return self.charge(takes, percent);
+            }
+            sleep_until(free_at).await;
+        }
+    }
+
+    fn charge(&self, used: Duration, percent: u32) {
+        lock(&self.share).charge(Instant::now(), used, percent);
+    }
+}
+
+/// What all clients of a gateway share.
+pub(super) struct Desk {
+    pub(super) config: GatewayConfig,
+    pub(super) counters: Arc<Counters>,
+    pub(super) plant: Plant,
+    pub(super) audit: Audit,
+    pub(super) clients: Clients,
+    pub(super) kept: Kept,
+    /// What the virtual unit tells of the last commands.
+    pub(super) outcomes: Outcomes,
+    /// What the configuration says of each drive that the bus cannot tell.
+    pub(super) options: HashMap<String, Options>,
+    /// By the name of the line.
+    turns: Mutex<BTreeMap<Arc<str>, Arc<Turns>>>,
+    /// Reads that are not answered yet.
+    under_way: Mutex<UnderWay>,
+}
+
+impl Desk {
+    pub(super) fn new(
+        config: GatewayConfig,
+        plant: Plant,
+        audit: Audit,
+        options: HashMap<String, Options>,
+    ) -> Arc<Self> {
+        let (counters, clients, kept, outcomes, turns, under_way) = Default::default();
+        Arc::new(Self { config, counters, plant, audit, clients, kept, outcomes, options, turns, under_way })
+    }
+
+    /// The PDU that answers a request; `None`: silence.
+    pub(super) async fn answer(self: &Arc<Self>, peer: IpAddr, asked: Asked) -> Option<Vec<u8>> {
+        let Asked { arrived, unit, function, ask, stop } = asked;
+        let answer = match ask {
+            Err(code) if self.config.virtual_unit == Some(unit) => Err(code),
+            Err(code) => self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable).and(Err(code)),
+            Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop).await,
+            Ok(ask) => self.look_up(arrived, unit, ask).await,
+        };
+        let (counted, pdu) = match answer {
+            Ok(pdu) => (Counted::Answered, Some(pdu)),
+            Err(ExceptionCode::GatewayTargetDevice) if self.config.silent => (Counted::Silence, None),
+            Err(code) => (Counted::Exception(code.into()), Some(pdu::exception(function, code))),
+        };
+        self.counters.answer(function, counted, arrived.elapsed());
+        pdu
+    }
+
+    /// What a frame asks, and whether it may not wait.
+    pub(super) fn look_at(&self, arrived: Instant, frame: &Frame) -> Asked {
+        let Frame { unit, ref pdu, .. } = *frame;
+        let ask = Ask::of(pdu);
+        let stop = ask.as_ref().ok().and_then(|ask| self.stop_in(unit, ask));
+        Asked { arrived, unit, function: pdu.first().copied().unwrap_or_default(), ask, stop }
+    }
+
+    /// The PDU of a refusal that needs no look at the plant.
+    pub(super) fn refuse(&self, function: u8, code: ExceptionCode) -> Vec<u8> {
+        self.counters.answer(function, Counted::Exception(code.into()), Duration::ZERO);
+        pdu::exception(function, code)
+    }
+
+    async fn look_up(self: &Arc<Self>, arrived: Instant, unit: u8, ask: Ask) -> Answer {
+        if self.config.virtual_unit == Some(unit) {
+            let Ask::Read { function, address, count } = ask else {
+                return Err(ExceptionCode::IllegalFunction);
+            };
+            let drives = self.plant.fleet().drives();
+            let words = virtual_unit::read(&drives, &self.outcomes, address, count);
+            let words = words.ok_or(ExceptionCode::IllegalDataAddress)?;
+            return Ok(pdu::words(function, &words));
+        }
+        let drive = self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable)?;
+        let capabilities = drive.capabilities();
+        if !capabilities.functions.contains(&ask.function()) {
+            return Err(ExceptionCode::IllegalFunction);
+        }
+        let mut unmapped = ask.registers().filter(|address| {
+            !capabilities.rows.iter().any(|row| row.address == *address && row.access.is_readable())
+        });
+        if self.config.mapped_only && unmapped.next().is_some() {
+            return Err(ExceptionCode::IllegalDataAddress);
+        }
+        if let Some(words) = self.kept.of(drive.name(), &ask, Instant::now(), self.config.max_age) {
+            self.counters.keep();
+            return Ok(pdu::words(ask.function(), &words));
+        }
+        self.read(&drive, ask, arrived).await
+    }
+
+    /// All drives behind its units.
+    pub(super) fn drives(&self) -> Vec<DriveHandle> {
+        let fleet = self.plant.fleet();
+        match &self.config.units {
+            Units::OfLine(line) => fleet.drives_on(line),
+            Units::Table(units) => {
+                let names: BTreeSet<&String> = units.values().collect();
+                names.into_iter().filter_map(|name| fleet.drive(name)).collect()
+            }
+        }
+    }
+
+    /// The drive behind a unit.
+    pub(super) fn drive(&self, unit: u8) -> Option<DriveHandle> {
+        let fleet = self.plant.fleet();
+        match &self.config.units {
+            Units::Table(units) => fleet.drive(units.get(&unit)?),
+            Units::OfLine(line) => {
+                fleet.drives_on(line).into_iter().find(|drive| drive.slave().number() == unit)
+            }
+        }
+    }
+
+    /// Reads, or waits with those who have asked for the same and are not answered yet: nothing that they get is older than
+    /// the request, because a line carries one exchange at a time.
+    async fn read(self: &Arc<Self>, drive: &DriveHandle, ask: Ask, arrived: Instant) -> Answer {
+        loop {
+            let (exchange, is_own) = self.exchange_of(drive, &ask, arrived);
+            let answer = exchange.await;
+            // Another's patience ends before one's own.
+            let again = !is_own && answer == Err(ExceptionCode::ServerDeviceBusy);
+            if !again || Instant::now() >= arrived + self.config.patience {
+                return answer;
+            }
+        }
+    }
+
+    /// The exchange for a read, and whether it is a new one.
+    fn exchange_of(
+        self: &Arc<Self>,
+        drive: &DriveHandle,
+        ask: &Ask,
+        arrived: Instant,
+    ) -> (Shared<Exchange>, bool) {
+        let mut under_way = lock(&self.under_way);
+        under_way.retain(|_, exchange| exchange.upgrade().is_some_and(|exchange| exchange.peek().is_none()));
+        let key = (Arc::clone(drive.name()), ask.clone());
+        if let Some(exchange) = under_way.get(&key).and_then(WeakShared::upgrade) {
+            self.counters.join();
+            return (exchange, false);
+        }
+        let (desk, drive, ask) = (Arc::clone(self), drive.clone(), ask.clone());
+        let exchange = async move {
+            let terms = Terms::of(desk.config.reads);
+            desk.exchange(&drive, &ask, terms, arrived).await
+        };
+        let exchange = exchange.boxed().shared();
+        if let Some(weak) = exchange.downgrade() {
+            under_way.insert(key, weak);
+        }
+        (exchange, true)
+    }
+
+    /// One exchange with a drive's slave, within the share of its line and the client's patience.
+    pub(super) async fn exchange(
+        &self,
+        drive: &DriveHandle,
+        ask: &Ask,
+        terms: Terms,
+        arrived: Instant,
+    ) -> Answer {
+        let deadline = arrived + self.config.patience;
+        let (name, line) = drive.line();
+        let budget = LineBudget::of(&line.config());
+        let lost = budget.lost_slot();
+        let answered = budget.serial.map_or(budget.response, |serial| {
+            let (request, answer) = ask.lengths();
+            budget.protocol.exchange_time(serial, request, answer) + budget.response * budget.protocol.turns()
+        });
+        let percent = self.percent_of(name);
+        let turns = self.turns_of(name);
+        let turn = timeout_at(deadline, turns.take(answered, percent)).await;
+        turn.map_err(|_| ExceptionCode::ServerDeviceBusy)?;
+        // What is sent at the last moment has the time of an answer, where the patience is long enough for that.
+        let left = deadline.saturating_duration_since(Instant::now());
+        let lifetime = left.saturating_sub(lost).max(left / 2);
+        let mut slave = line.slave(drive.slave().number()).with_terms(terms.within(lifetime));
+        let outcome = timeout_at(deadline, slave.call(ask.request())).await;
+        let (code, was_lost) = match outcome {
+            Ok(Ok(Ok(response))) => {
+                if let Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) = &response
+                {
+                    let at = slave.asked_at().unwrap_or_else(Instant::now);
+                    self.kept.keep(drive.name(), ask, words, at, self.config.max_age);
+                }
+                return Ok(pdu::answer(ask, response));
+            }
+            Ok(Ok(Err(exception))) => return Err(exception),
+            Ok(Err(error)) => code_of(&PortError::from_modbus(error)),
+            Err(_) => (ExceptionCode::GatewayTargetDevice, true),
+        };
+        if was_lost {
+            turns.charge(lost.saturating_sub(answered), percent);
+        }
+        Err(code)
+    }
+
+    /// How much of a line may be used: the share of the configuration, as far as the daemon's own plan leaves it.
+    fn percent_of(&self, line: &str) -> u32 {
+        let planned = self.plant.fleet().plan(line).map_or(0, |plan| plan.utilisation_ppm / 10_000);
+        let left = 100_u32.saturating_sub(u32::try_from(planned).unwrap_or(100)).saturating_sub(RESERVE);
+        u32::from(self.config.share).min(left).max(1)
+    }
+
+    fn turns_of(&self, line: &Arc<str>) -> Arc<Turns> {
+        let mut turns = lock(&self.turns);
+        Arc::clone(turns.entry(Arc::clone(line)).or_insert_with(|| Arc::new(Turns::new())))
+    }
+}
+
+/// The exception for what the line says, and whether an exchange was in vain.
+fn code_of(error: &PortError) -> (ExceptionCode, bool) {
+    match error {
+        PortError::Timeout { .. }
+        | PortError::Damaged(_)
+        | PortError::Mismatch(_)
+        | PortError::OutcomeUnknown(_) => (ExceptionCode::GatewayTargetDevice, true),
+        PortError::Offline { .. } => (ExceptionCode::GatewayTargetDevice, false),
+        PortError::LineDown(_) | PortError::Closed => (ExceptionCode::GatewayPathUnavailable, false),
+        PortError::NotCarried(_) => (ExceptionCode::IllegalFunction, false),
+        PortError::Expired
+        | PortError::Superseded
+        | PortError::QueueFull(_)
+        | PortError::Busy(_)
+        | PortError::NeverQuiet { .. } => (ExceptionCode::ServerDeviceBusy, false),
+        _ => (ExceptionCode::GatewayTargetDevice, false),
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,160 @@
+//! Doors for the SCADA that speaks Modbus TCP: it shares the lines by their schedules.
+//!
+//! A gateway answers each request once, under its transaction and unit. Reads go over the line behind what the daemon has to
+//! do, within a [share](share::Share) of it. Nothing that a client does or leaves undone holds up a line or another client.
+
+#![forbid(unsafe_code)]
+#![allow(
+    missing_docs,
+    missing_copy_implementations,
+    reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
+)]
+
+mod client;
+mod clients;
+pub mod config;
+pub mod counters;
+mod desk;
+mod framing;
+mod kept;
+mod pdu;
+mod share;
+#[cfg(test)]
+mod tests;
+pub mod virtual_unit;
+mod writes;
+
+use std::{collections::HashMap, sync::Arc, time::Duration};
+
+use tokio::{
+    net::{TcpListener, TcpStream},
+    sync::watch,
+    time::{Instant, sleep},
+};
+
+use self::{
+    config::GatewayConfig,
+    counters::{Counted, Ended},
+    desk::Desk,
+};
+use drived_config::config::LinePart;
+use drived_doors::{
+    TRIED_AGAIN,
+    audit::Audit,
+    crowd::{Crowd, Limits},
+    listen,
+};
+use drived_plant::{counts::Source, plant::Plant};
+
+/// The gateways of a daemon. Dropped, they are closed: nobody is let in any more, and every connection ends.
+pub struct Gateways {
+    _end: watch::Sender<()>,
+    desks: Vec<Arc<Desk>>,
+}
+
+impl Gateways {
+    /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
+    pub fn open(gateways: &[GatewayConfig], lines: &[LinePart], plant: &Plant, audit: &Audit) -> Self {
+        let (end, ended) = watch::channel(());
+        let drives = lines.iter().flat_map(|line| &line.drives);
+        let options: HashMap<_, _> =
+            drives.map(|drive| (drive.settings.name.clone(), drive.options.values)).collect();
+        let desk =
+            |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), options.clone());
+        let desks: Vec<_> = gateways.iter().map(desk).collect();
+        for desk in desks.iter().cloned() {
+            let mut ended = ended.clone();
+            if desk.config.virtual_unit.is_some() {
+                tokio::spawn(desk.outcomes.clone().follow(plant.fleet().events()));
+            }
+            tokio::spawn(async move {
+                let listener = tokio::select! {
+                    listener = listen(desk.config.listen) => listener,
+                    _ = ended.changed() => return,
+                };
+                tracing::info!("gateway {} is at {}", desk.config.name, desk.config.listen);
+                tokio::join!(accept_all(&listener, &desk, ended.clone()), until(desk.watch_silence(), ended));
+            });
+        }
+        Self { _end: end, desks }
+    }
+
+    /// What each counts, for a metrics store.
+    pub fn sources(&self) -> impl Iterator<Item = Arc<dyn Source>> + '_ {
+        self.desks.iter().map(|desk| {
+            let counted = Counted { name: desk.config.name.clone(), counters: Arc::clone(&desk.counters) };
+            Arc::new(counted) as Arc<dyn Source>
+        })
+    }
+
+    /// Says in the log what each has counted.
+    pub fn tell(&self) {
+        for desk in &self.desks {
+            tracing::info!("gateway {}: {}", desk.config.name, desk.counters.in_words());
+        }
+    }
+}
+
+async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<()>) {
+    tokio::select! {
+        () = work => {}
+        _ = ended.changed() => {}
+    }
+}
+
+/// Accepts clients until the end, and serves each on a task of its own. When the system has no room for one more, such as
+/// no file descriptor, it is tried again a little later.
+async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::Receiver<()>) {
+    let places = Crowd::new(Limits::of_gateway(desk.config.clients));
+    let (name, mut failed) = (&desk.config.name, 0_u64);
+    loop {
+        let (stream, peer) = tokio::select! {
+            accepted = listener.accept() => match accepted {
+                Ok((stream, peer)) => (stream, peer.ip().to_canonical()),
+                Err(error) => {
+                    failed += 1;
+                    if failed.is_power_of_two() {
+                        tracing::warn!("gateway {name} cannot accept a connection, {failed} in all: {error}");
+                    }
+                    sleep(TRIED_AGAIN).await;
+                    continue;
+                }
+            },
+            _ = ended.changed() => return,
+        };
+        let allow = &desk.config.allow;
+        let place = match allow.is_empty() || allow.iter().any(|network| network.has(peer)) {
+            true => places.enter(Some(peer), Instant::now()).ok_or(Ended::Full),
+            false => Err(Ended::NotAllowed),
+        };
+        let place = match place {
+            Ok(place) => place,
+            Err(why) => {
+                let count = desk.counters.end(why);
+                if count.is_power_of_two() {
+                    let why = why.name();
+                    tracing::warn!("gateway {name}: {peer} was turned away ({why}), {count} of these in all");
+                }
+                continue;
+            }
+        };
+        hurry(&stream);
+        let (desk, mut ended) = (Arc::clone(desk), ended.clone());
+        tokio::spawn(async move {
+            let _present = desk.counters.enter();
+            tokio::select! {
+                () = client::serve(stream, peer, Arc::clone(&desk), &place) => {}
+                // Somebody who speaks needs the place of one who does not.
+                () = place.wanted() => drop(desk.counters.end(Ended::Idle)),
+                _ = ended.changed() => {}
+            }
+        });
+    }
+}
+
+/// An answer is written at once, and a far end that is gone is noticed. A connection that refuses is gone already.
+fn hurry(stream: &TcpStream) {
+    let _ = stream.set_nodelay(true);
+    let alive = socket2::TcpKeepalive::new().with_time(Duration::from_secs(30));
+    let _ = socket2::SockRef::from(stream).set_tcp_keepalive(&alive);
+}

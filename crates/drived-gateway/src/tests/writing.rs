@@ -1,0 +1,294 @@
+//! Writes that would move a motor, and those that would not.
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::StopMode;
+use tokio::time::{Instant, sleep, timeout};
+
+use super::{ETA, Peer, plant, read};
+use crate::{config::GatewayConfig, desk::Desk};
+use drived_doors::{Caller, Rights, Role};
+use drived_plant::plant::{
+    commands::{Action, Request, Target},
+    testing::TestPlant,
+};
+
+/// CMD, LFr and CMI: BBV51701 p. 19 and 20. ACC: p. 37.
+const CMD: u16 = 8_501;
+const LFR: u16 = 8_502;
+const CMI: u16 = 8_504;
+const ACC: u16 = 9_001;
+
+fn write(register: u16, word: u16) -> Vec<u8> {
+    [&[0x06][..], &register.to_be_bytes(), &word.to_be_bytes()].concat()
+}
+
+fn write_two(register: u16, words: [u16; 2]) -> Vec<u8> {
+    let [one, other] = words.map(u16::to_be_bytes);
+    [&[0x10][..], &register.to_be_bytes(), &[0, 2, 4], &one, &other].concat()
+}
+
+async fn operated(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlant, Arc<Desk>) {
+    plant(drives, |config| {
+        config.rights = Role::Operate.rights();
+        config.patience = Duration::from_secs(3);
+        change(config);
+    })
+    .await
+}
+
+/// What ETA shows under the mask of the chart, 006Fh (p. 10).
+async fn state(peer: &mut Peer, unit: u8) -> u16 {
+    match peer.ask(unit, &read(ETA, 1)).await[..] {
+        [0x03, 2, high, low] => u16::from_be_bytes([high, low]) & 0x006F,
+        ref refused => panic!("{refused:02X?}"),
+    }
+}
+
+/// As a SCADA does it by the manual (p. 12): disable voltage, shut down, switch on, each once the drive shows it.
+async fn climb(peer: &mut Peer, unit: u8) {
+    for (word, shown) in [(0x0000, 0x0040), (0x0006, 0x0021), (0x0007, 0x0023)] {
+        assert_eq!(peer.ask(unit, &write(CMD, word)).await, write(CMD, word));
+        assert_eq!(state(peer, unit).await, shown, "after {word:04X}h");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_scada_that_walks_the_ladder_sees_each_step_and_its_motor_runs_and_stops() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert!(!plant.machines[0].observe().running);
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    assert!(plant.machines[0].observe().running);
+    assert_eq!(state(&mut peer, 1).await, 0x0027);
+    sleep(Duration::from_secs(10)).await;
+    // The word again, as one who writes cyclically does: it is confirmed, and changes nothing.
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    let drive = plant.plant.fleet().drive("pump 1").unwrap();
+    assert!(drive.snapshot().started_here(), "so that the policies of the exit hold for it");
+    assert_eq!(peer.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
+    sleep(Duration::from_secs(10)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn setpoint_and_run_command_in_one_write_are_one_order() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    let run = write_two(CMD, [0x000F, 250]);
+    assert_eq!(peer.ask(1, &run).await, [0x90, 0x04], "no word without run has come yet");
+    assert_eq!(peer.ask(1, &write(CMD, 0x0006)).await, write(CMD, 0x0006));
+    assert_eq!(peer.ask(1, &run).await[..5], run[..5]);
+    sleep(Duration::from_secs(10)).await;
+    assert_eq!(plant.machines[0].observe().output_frequency, 2_500);
+    let stop = write_two(CMD, [0x0007, 200]);
+    assert_eq!(peer.ask(1, &stop).await, [0x90, 0x04], "a setpoint while the motor comes down");
+    sleep(Duration::from_secs(10)).await;
+    assert!(!plant.machines[0].observe().running, "the stop was carried out all the same");
+    assert_eq!(peer.ask(1, &stop).await[..5], stop[..5], "and at standstill both are");
+    assert_eq!(plant.machines[0].peek(LFR), Some(200));
+}
+
+fn stop_of_all(arrived: Instant) -> (Caller, Request) {
+    let caller = Caller::new("page", "page", Rights::ALL);
+    let (target, action, lifetime) =
+        (Target::All, Action::Stop(StopMode::Ramp.into()), Duration::from_secs(1));
+    (caller, Request { id: None, target, action, lifetime, arrived })
+}
+
+/// A run command that somebody writes cyclically is no wish to start again.
+#[tokio::test(start_paused = true)]
+async fn a_run_command_that_goes_on_restarts_nothing_after_a_stop_a_trip_or_on_another_connection() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    let run = write(CMD, 0x000F);
+    let refused = [0x86, 0x04];
+    assert_eq!(peer.ask(1, &run).await, refused, "as after a restart of this program");
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert_eq!(peer.ask(1, &run).await, run);
+    let (caller, request) = stop_of_all(Instant::now());
+    plant.plant.command(&caller, request, Duration::from_secs(30)).await.unwrap();
+    for _ in 0..10 {
+        sleep(Duration::from_secs(1)).await;
+        assert_eq!(peer.ask(1, &run).await, refused);
+        assert_eq!(Peer::of(&desk).ask(1, &run).await, refused);
+    }
+    assert!(!plant.machines[0].observe().running);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &run).await, run, "a word without run makes it a new one");
+    plant.machines[0].trip(9);
+    sleep(Duration::from_secs(2)).await;
+    assert_eq!(peer.ask(1, &run).await, refused);
+    assert_eq!(peer.ask(1, &write(CMD, 0x0080)).await, write(CMD, 0x0080), "the fault is reset");
+    assert_eq!(state(&mut peer, 1).await, 0x0040);
+    assert!(!plant.machines[0].observe().running);
+}
+
+/// Nothing is acknowledged that is not carried out.
+#[tokio::test(start_paused = true)]
+async fn what_a_rule_forbids_is_refused_by_04_and_nothing_is_written() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    let before = plant.machines[0].requests(0x06) + plant.machines[0].requests(0x10);
+    for (pdu, why) in [
+        (write(CMD, 0x001F), "a run command with a reserved bit"),
+        (write(CMD, 0x800F), "with one that acts as it was assigned"),
+        (write(LFR, 0xFED4), "a negative reference turns the direction round"),
+        (write(CMI, 0x0002), "CMI bit 1 saves to the EEPROM"),
+        (write(ACC, 100), "a parameter, and raw_writes is not set"),
+        (write(400, 0x000F), "CMD by its address of the Altivar 28"),
+        (write_two(LFR, [300, 0]), "a setpoint beside the PI reference"),
+    ] {
+        assert_eq!(peer.ask(1, &pdu).await, [pdu[0] | 0x80, 0x04], "{why}");
+    }
+    let after = plant.machines[0].requests(0x06) + plant.machines[0].requests(0x10);
+    assert_eq!(after, before);
+    let setpoint = peer.ask(1, &write(LFR, 9_000)).await;
+    assert_eq!(setpoint, [0x86, 0x04], "above HSP");
+}
+
+#[tokio::test(start_paused = true)]
+async fn parameters_are_written_where_allowed_and_never_by_an_address_that_is_not_in_the_list() {
+    let (plant, desk) = operated(1, |config| config.raw_writes = true).await;
+    let mut peer = Peer::of(&desk);
+    assert_eq!(peer.ask(1, &write(ACC, 77)).await, write(ACC, 77));
+    assert_eq!(plant.machines[0].peek(ACC), Some(77));
+    assert_eq!(peer.ask(1, &write(400, 0x000F)).await, [0x86, 0x02]);
+    assert_eq!(peer.ask(1, &write(CMI, 0x0002)).await, [0x86, 0x04]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_only_read_or_another_commanders_is_not_moved() {
+    let (_plant, desk) = plant(1, |config| config.rights = Role::Stop.rights()).await;
+    let mut peer = Peer::of(&desk);
+    assert_eq!(peer.ask(1, &write(CMD, 0x0006)).await, [0x86, 0x04], "this gateway only stops");
+    assert_eq!(peer.ask(1, &write(CMD, 0x0000)).await, write(CMD, 0x0000), "and does so");
+    let others = TestPlant::with(1, |name| {
+        let commanders = drive_fleet::Commanders::Only(vec!["operator".to_owned()]);
+        drive_fleet::DriveSettings { commanders, ..drive_fleet::DriveSettings::controlled(name) }
+    })
+    .await;
+    let mut config = super::config();
+    config.rights = Role::Operate.rights();
+    let desk = Desk::new(config, others.plant.clone(), Default::default(), Default::default());
+    let mut peer = Peer::of(&desk);
+    assert_eq!(peer.ask(1, &write(CMD, 0x0006)).await, [0x86, 0x04]);
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, [0x86, 0x04]);
+    assert_eq!(peer.ask(1, &write(CMD, 0x0000)).await, write(CMD, 0x0000), "anybody may stop it");
+}
+
+/// A stop goes ahead of what its own client has asked before, and what waits to start does not start after it.
+#[tokio::test(start_paused = true)]
+async fn a_stop_waits_for_no_queue_and_no_share_and_no_start_comes_after_it() {
+    let (plant, desk) = operated(2, |config| config.share = 1).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    let mut other = Peer::of(&desk);
+    // Reads that use up the share of a minute, and those of the client itself.
+    for count in 1..=7 {
+        other.send(2, &read(ETA, count)).await;
+        peer.send(2, &read(ETA + 1, count)).await;
+    }
+    let stop = peer.send(1, &write(CMD, 0x0007)).await;
+    let sent = Instant::now();
+    let bound = plant.plant.fleet().lines()[0].1.worst_case_stop();
+    while plant.machines[0].peek(CMD) == Some(0x000F) {
+        sleep(Duration::from_millis(1)).await;
+    }
+    assert!(sent.elapsed() <= bound + Duration::from_millis(20), "{:?} of {bound:?}", sent.elapsed());
+    let mut answers = Vec::new();
+    loop {
+        let (transaction, pdu) = timeout(Duration::from_secs(10), peer.answer()).await.unwrap();
+        answers.push(transaction);
+        if transaction == stop {
+            assert_eq!(pdu, write(CMD, 0x0007));
+            break;
+        }
+    }
+    assert!(answers.len() < 7, "ahead of reads that were sent before it: {answers:?}");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_that_waits_in_its_queue_is_not_begun_after_a_stop_of_another_face() {
+    let (plant, desk) = operated(1, |config| config.share = 1).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    plant.machines[0].set_turnaround(Some(Duration::from_millis(100)));
+    peer.send(1, &read(ETA, 7)).await;
+    let start = peer.send(1, &write(CMD, 0x000F)).await;
+    sleep(Duration::from_millis(20)).await;
+    let (caller, request) = stop_of_all(Instant::now());
+    plant.plant.command(&caller, request, Duration::from_secs(30)).await.unwrap();
+    let mut pdu = Vec::new();
+    while !pdu.starts_with(&[0x86]) {
+        let (transaction, answer) = peer.answer().await;
+        if transaction == start {
+            pdu = answer;
+        }
+    }
+    assert_eq!(pdu, [0x86, 0x04]);
+    sleep(Duration::from_secs(5)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn unit_0_stops_all_where_allowed_and_nothing_else() {
+    let (plant, desk) = operated(2, |config| config.broadcast = true).await;
+    let mut peer = Peer::of(&desk);
+    for unit in [1, 2] {
+        climb(&mut peer, unit).await;
+        assert_eq!(peer.ask(unit, &write(LFR, 300)).await, write(LFR, 300));
+        assert_eq!(peer.ask(unit, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    }
+    assert_eq!(peer.ask(0, &write(CMD, 0x000F)).await, [0x86, 0x04]);
+    assert_eq!(peer.ask(0, &write(LFR, 400)).await, [0x86, 0x04]);
+    assert_eq!(peer.ask(0, &read(ETA, 1)).await, [0x83, 0x0A]);
+    assert_eq!(peer.ask(0, &write(CMD, 0x0000)).await, write(CMD, 0x0000));
+    sleep(Duration::from_secs(5)).await;
+    assert!(plant.machines.iter().all(|machine| !machine.observe().running));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
+    for stops in [false, true] {
+        let (plant, desk) = operated(1, |config| {
+            config.client_timeout = Some(Duration::from_secs(5));
+            config.stops_when_silent = stops;
+        })
+        .await;
+        let watched = Arc::clone(&desk);
+        tokio::spawn(async move { watched.watch_silence().await });
+        let mut peer = Peer::of(&desk);
+        climb(&mut peer, 1).await;
+        assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+        assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+        for _ in 0..10 {
+            sleep(Duration::from_secs(4)).await;
+            peer.ask(1, &read(ETA, 1)).await;
+        }
+        assert!(plant.machines[0].observe().running, "it is heard");
+        drop(peer);
+        sleep(Duration::from_secs(15)).await;
+        assert_eq!(plant.machines[0].observe().running, !stops);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_to_a_drive_that_does_not_answer_is_told_by_0b() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    plant.machines[0].mute();
+    sleep(Duration::from_secs(10)).await;
+    for word in [0x0006, 0x0000] {
+        assert_eq!(peer.ask(1, &write(CMD, word)).await, [0x86, 0x0B], "{word:04X}h");
+    }
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, [0x86, 0x0B]);
+}

@@ -1,0 +1,520 @@
+//! Writes: judged as commands of the fleet are, carried out by it, and confirmed once they are in force.
+
+use std::{net::IpAddr, time::Duration};
+
+use drive_core::{
+    Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, registers::Storage,
+    tokio_modbus::ExceptionCode,
+};
+use drive_families::Family;
+use drive_fleet::{DriveHandle, Link, Until};
+use futures_util::{FutureExt as _, future::join_all};
+use tokio::time::{Instant, timeout_at};
+
+use super::{
+    clients::Word,
+    desk::{Answer, Desk},
+    pdu::Ask,
+};
+use drived_doors::{
+    Caller,
+    audit::{Kind, Record},
+};
+use drived_plant::plant::{
+    commands::{Action, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target},
+    revisions::Subject,
+};
+
+/// Why a write is not carried out: the exception, and the reason in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Refusal {
+    pub(super) code: ExceptionCode,
+    pub(super) why: String,
+}
+
+impl Refusal {
+    fn new(code: ExceptionCode, why: impl Into<String>) -> Self {
+        Self { code, why: why.into() }
+    }
+
+    /// By a rule of motion.
+    fn rule(why: impl Into<String>) -> Self {
+        Self::new(ExceptionCode::ServerDeviceFailure, why)
+    }
+}
+
+/// What a write asks of the motor, taken together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Wanted {
+    command: Option<Intent>,
+    setpoint: Option<Setpoint>,
+}
+
+/// A stop that waits for nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stop(StopMode);
+
+impl Desk {
+    /// Whether a write stops the motor, so that it goes ahead of what waits: a word that is a stop; or one without a run
+    /// command, unless the motor is known to stand and nothing is about to start it.
+    pub(super) fn stop_in(&self, unit: u8, ask: &Ask) -> Option<Stop> {
+        let Ask::Write { .. } = ask else { return None };
+        if unit == 0 && self.config.broadcast {
+            return self.broadcast_stop(ask);
+        }
+        let drive = self.drive(unit).filter(|_| self.config.rights.stop)?;
+        let stop = self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
+            Intent::Stop(mode) => Some(mode),
+            Intent::Prepare(mode) if !stands(&drive) => Some(mode),
+            Intent::ResetFaults(mode) if !stands(&drive) && !shows_fault(&drive) => Some(mode),
+            _ => None,
+        });
+        stop.map(Stop)
+    }
+
+    /// Carries out a write.
+    pub(super) async fn write(
+        &self,
+        peer: IpAddr,
+        arrived: Instant,
+        unit: u8,
+        ask: &Ask,
+        stop: Option<Stop>,
+    ) -> Answer {
+        if !self.config.rights.stop || self.config.virtual_unit == Some(unit) {
+            return Err(ExceptionCode::IllegalFunction);
+        }
+        let drives = match self.drive(unit) {
+            None if unit == 0 && self.config.broadcast => self.drives(),
+            None => return Err(ExceptionCode::GatewayPathUnavailable),
+            Some(drive) => vec![drive],
+        };
+        let caller = self.caller(peer);
+        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
+        let written = match (stop, &drives[..]) {
+            (Some(stop), [drive]) => {
+                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                let stopped = self.stop(&caller, drive, stop.0, arrived).await;
+                match stopped {
+                    Ok(()) => self.setpoint_beside(&caller, drive, ask, arrived).await,
+                    refused => refused,
+                }
+            }
+            (Some(stop), drives) => {
+                let stops = drives.iter().map(|drive| {
+                    self.clients.write(peer, drive.name(), Word::WithoutRun);
+                    self.stop(&caller, drive, stop.0, arrived)
+                });
+                join_all(stops).await.into_iter().collect()
+            }
+            (None, [drive]) if unit != 0 || self.drive(0).is_some() => {
+                self.command(peer, &caller, drive, ask, arrived).await
+            }
+            (None, _) => Err(Refusal::rule("to all units at once only a stop is carried out")),
+        };
+        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
+        written.map(|()| ask.confirmation()).map_err(|refusal| {
+            self.tell_refusal(&caller, unit, ask, &refusal);
+            refusal.code
+        })
+    }
+
+    fn caller(&self, peer: IpAddr) -> Caller {
+        Caller::new(self.config.name.clone(), format!("modbus {peer}"), self.config.rights)
+    }
+
+    /// What each word of a write asks, as far as that needs no exchange.
+    fn intents_without_reading(
+        &self,
+        drive: &DriveHandle,
+        ask: &Ask,
+    ) -> impl Iterator<Item = Intent> + use<> {
+        let mut speaker = self.speaker(drive);
+        let words: Vec<(u16, u16)> = ask.writes().collect();
+        words.into_iter().filter_map(move |(register, word)| {
+            speaker.as_mut()?.intent(register, word).now_or_never()?.ok().flatten()
+        })
+    }
+
+    /// The drive of the family that knows its words, on the same line. It reads units; it writes nothing.
+    fn speaker(&self, drive: &DriveHandle) -> Option<Box<dyn Drive>> {
+        let family: Family = drive.capabilities().key.parse().ok()?;
+        let (_, line) = drive.line();
+        let options = self.options.get(&**drive.name()).copied().unwrap_or_default();
+        Some(family.open_with(line.slave(drive.slave().number()), drive.slave(), &options))
+    }
+
+    /// Whether the word of a broadcast stops every drive of this gateway; the mode is that of the first.
+    fn broadcast_stop(&self, ask: &Ask) -> Option<Stop> {
+        let modes = self.drives().into_iter().map(|drive| {
+            let mut intents = self.intents_without_reading(&drive, ask);
+            intents.find_map(Intent::stops)
+        });
+        let modes: Option<Vec<StopMode>> = modes.collect();
+        modes?.first().copied().map(Stop)
+    }
+
+    /// Stops a motor. Confirmed when the drive shows that no run command is in force any more; it may still come down.
+    async fn stop(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        mode: StopMode,
+        arrived: Instant,
+    ) -> Result<(), Refusal> {
+        let request = Request {
+            id: None,
+            target: Target::Drive(drive.name().to_string()),
+            action: Action::Stop(mode.into()),
+            lifetime: LONGEST_LIFETIME,
+            arrived,
+        };
+        self.record(caller, drive, &request).whenever();
+        let left = (arrived + self.config.patience).saturating_duration_since(Instant::now());
+        let settled = self.plant.command(caller, request, left);
+        let taken = drive.wait_until(|snapshot| snapshot.stop.is_some_and(|stop| stop.taken));
+        // It is on its way before anything is looked at, and goes on whoever waits.
+        tokio::select! {
+            biased;
+            view = settled => match view {
+                Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
+                Err(rejected) => Err(Refusal::rule(rejected.to_string())),
+            },
+            _ = taken => Ok(()),
+        }
+    }
+
+    /// The setpoint that was written together with a stop.
+    async fn setpoint_beside(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        ask: &Ask,
+        arrived: Instant,
+    ) -> Result<(), Refusal> {
+        if ask.writes().count() == 1 {
+            return Ok(());
+        }
+        let deadline = arrived + self.config.patience;
+        let wanted = timeout_at(deadline, self.wanted(drive, ask)).await.map_err(|_| busy())??;
+        match wanted.and_then(|wanted| wanted.setpoint) {
+            Some(setpoint) if drive.snapshot().setpoint != Some(setpoint) => {
+                let action = Action::Setpoint { setpoint, until: Until::InForce };
+                let given = self.order(caller, drive, action, arrived, deadline).await;
+                given.map_err(|Refusal { code, why }| {
+                    Refusal::new(code, format!("it stops; its setpoint: {why}"))
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What a write asks of the motor; `None` where it commands nothing. Words that are not understood, and commands among
+    /// other registers, are refused as a whole.
+    async fn wanted(&self, drive: &DriveHandle, ask: &Ask) -> Result<Option<Wanted>, Refusal> {
+        let Some(mut speaker) = self.speaker(drive) else {
+            return Err(Refusal::rule("its family is not known here"));
+        };
+        let (mut wanted, mut commands, mut others) = (Wanted::default(), 0, 0);
+        for (register, word) in ask.writes() {
+            let intent = speaker.intent(register, word).await.map_err(|error| match error {
+                Error::Unsupported { .. } => {
+                    Refusal::rule(format!("register {register}, word {word:04X}h: {error}"))
+                }
+                error => Refusal::new(ExceptionCode::GatewayTargetDevice, error.to_string()),
+            })?;
+            match intent {
+                None => others += 1,
+                Some(Intent::Setpoint(setpoint)) => {
+                    commands += 1;
+                    let before = wanted.setpoint.replace(setpoint);
+                    if before.is_some_and(|before| before != setpoint) {
+                        return Err(Refusal::rule("two setpoints in one write"));
+                    }
+                }
+                Some(command) => {
+                    commands += 1;
+                    let before = wanted.command.replace(command);
+                    if before.is_some_and(|before| before != command) {
+                        return Err(Refusal::rule("two commands in one write"));
+                    }
+                }
+            }
+        }
+        match (commands, others) {
+            (0, _) => Ok(None),
+            (_, 0) => Ok(Some(wanted)),
+            _ => Err(Refusal::rule("a command among other registers in one write")),
+        }
+    }
+
+    /// Carries out a write that is no stop.
+    async fn command(
+        &self,
+        peer: IpAddr,
+        caller: &Caller,
+        drive: &DriveHandle,
+        ask: &Ask,
+        arrived: Instant,
+    ) -> Result<(), Refusal> {
+        if !self.config.rights.operate {
+            return Err(Refusal::rule("this gateway only stops: writes = \"stop\""));
+        }
+        let deadline = arrived + self.config.patience;
+        let wanted = timeout_at(deadline, self.wanted(drive, ask)).await.map_err(|_| busy())??;
+        let Some(Wanted { command, setpoint }) = wanted else {
+            return self.parameters(caller, drive, ask, deadline).await;
+        };
+        let give = |setpoint| Action::Setpoint { setpoint, until: Until::InForce };
+        match command {
+            None => match setpoint {
+                Some(setpoint) => self.order(caller, drive, give(setpoint), arrived, deadline).await,
+                None => Ok(()),
+            },
+            Some(Intent::Start(direction)) => {
+                let action = Action::Start { direction, setpoint, until: Until::InForce };
+                self.start(peer, caller, drive, (direction, setpoint), action, (arrived, deadline)).await
+            }
+            Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
+                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                self.order(caller, drive, Action::Reset, arrived, deadline).await
+            }
+            Some(step) => {
+                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                match step.stops().filter(|_| !stands(drive)) {
+                    // It was started while this waited.
+                    Some(mode) => self.stop(caller, drive, mode, arrived).await?,
+                    None => self.prepare(drive, ask, arrived).await?,
+                }
+                match setpoint.filter(|setpoint| drive.snapshot().setpoint != Some(*setpoint)) {
+                    Some(setpoint) => self.order(caller, drive, give(setpoint), arrived, deadline).await,
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+
+    /// A run command. The same word again starts nothing: where the motor runs it is confirmed, and where it was stopped
+    /// meanwhile, tripped or never started, a word without run has to come first from this client.
+    async fn start(
+        &self,
+        peer: IpAddr,
+        caller: &Caller,
+        drive: &DriveHandle,
+        (direction, setpoint): (Direction, Option<Setpoint>),
+        action: Action,
+        (arrived, deadline): (Instant, Instant),
+    ) -> Result<(), Refusal> {
+        let before = self.clients.write(peer, drive.name(), Word::Run);
+        let snapshot = drive.snapshot();
+        let status = snapshot.fresh_status(Instant::now());
+        let ours = status.and_then(|status| status.verdict).is_some_and(|verdict| verdict.is_in_force());
+        let runs = snapshot.stop.is_none() && ours;
+        let same_way = status.is_some_and(|status| status.direction.is_none_or(|way| way == direction));
+        if runs && same_way {
+            return match setpoint.filter(|setpoint| snapshot.setpoint != Some(*setpoint)) {
+                Some(setpoint) => {
+                    let action = Action::Setpoint { setpoint, until: Until::InForce };
+                    self.order(caller, drive, action, arrived, deadline).await
+                }
+                None => Ok(()),
+            };
+        }
+        if before != Some(Word::WithoutRun) && !runs {
+            return Err(Refusal::rule(
+                "nothing starts by a run command that only goes on: write one without run first",
+            ));
+        }
+        self.clients.start(peer, drive.name(), Instant::now());
+        self.order(caller, drive, action, arrived, deadline).await
+    }
+
+    /// A step of the ladder is written as it is, so that the drive shows it. The motor stands, or it would be a stop.
+    async fn prepare(&self, drive: &DriveHandle, ask: &Ask, arrived: Instant) -> Result<(), Refusal> {
+        let settings = drive.settings();
+        if !settings.control || !settings.commanders.allow(&self.config.name) {
+            return Err(Refusal::rule(format!("{} may not command this drive", self.config.name)));
+        }
+        let Some(mut speaker) = self.speaker(drive) else { return Ok(()) };
+        for (address, word) in ask.writes() {
+            // A reset has nothing to reset here, and a setpoint is given behind it.
+            if let Some(Ok(Some(Intent::Prepare(_)))) = speaker.intent(address, word).now_or_never() {
+                let step = Ask::Write { function: 0x06, address, words: vec![word] };
+                let written = self.exchange(drive, &step, Terms::of(Class::Command).edge(), arrived).await;
+                written.map_err(|code| Refusal::new(code, "the step was not confirmed by the drive"))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Parameters: each is a row of the family that may be written, all are judged before the first is, and each is read back.
+    async fn parameters(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        ask: &Ask,
+        deadline: Instant,
+    ) -> Result<(), Refusal> {
+        if !self.config.raw_writes {
+            return Err(Refusal::rule("it is no command, and raw_writes is not set"));
+        }
+        let rows = drive.capabilities().rows;
+        let mut writes: Vec<(&'static Row, u16)> = Vec::new();
+        for (register, word) in ask.writes() {
+            let row = rows.iter().find(|row| row.address == register && row.access.is_writable());
+            let Some(row) = row else {
+                let why = format!("register {register} is no parameter of the family's list");
+                return Err(Refusal::new(ExceptionCode::IllegalDataAddress, why));
+            };
+            let wears = matches!(row.storage, Storage::Eeprom | Storage::Unknown);
+            if wears && !self.config.eeprom_writes {
+                let why = format!("{} may be written to the EEPROM, and eeprom_writes is not set", row.code);
+                return Err(Refusal::rule(why));
+            }
+            writes.push((row, word));
+        }
+        let drive = drive.commanded_by(&*self.config.name);
+        for (row, word) in writes {
+            let what = format!("{}: {} = {word}", drive.name(), row.code);
+            let record = self.audit.record(Record::new(Kind::Command, caller, what));
+            record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
+            let written = timeout_at(deadline, drive.write_parameter(row, word)).await;
+            let written = written.map_err(|_| pending(&drive))?;
+            written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
+        }
+        Ok(())
+    }
+
+    /// Gives an order to the fleet, and waits for what becomes of it as long as the client does.
+    async fn order(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        action: Action,
+        arrived: Instant,
+        deadline: Instant,
+    ) -> Result<(), Refusal> {
+        let left = || deadline.saturating_duration_since(Instant::now());
+        let lifetime = deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME);
+        let target = Target::Drive(drive.name().to_string());
+        let request = Request { id: None, target, action, lifetime, arrived };
+        let record = self.record(caller, drive, &request);
+        record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
+        match self.plant.command(caller, request, left()).await {
+            Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
+            Err(Rejected::NoDrive(name)) => Err(Refusal::new(
+                ExceptionCode::GatewayPathUnavailable,
+                format!("there is no drive {name:?}"),
+            )),
+            Err(rejected) => Err(Refusal::rule(rejected.to_string())),
+        }
+    }
+
+    /// What an outcome is to a client.
+    fn judged(&self, drive: &DriveHandle, outcome: OutcomeWord, text: Option<&str>) -> Result<(), Refusal> {
+        let why = text.unwrap_or("its outcome is not known yet");
+        let is_gone = drive.snapshot().link != Link::Connected;
+        match outcome {
+            OutcomeWord::Confirmed => Ok(()),
+            OutcomeWord::Expired => Err(Refusal::new(ExceptionCode::ServerDeviceBusy, why)),
+            OutcomeWord::Pending if !is_gone => Err(pending(drive)),
+            OutcomeWord::Refused | OutcomeWord::NotConfirmed | OutcomeWord::Superseded if !is_gone => {
+                Err(Refusal::rule(why))
+            }
+            _ => Err(Refusal::new(ExceptionCode::GatewayTargetDevice, why)),
+        }
+    }
+
+    fn record(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        request: &Request,
+    ) -> drived_doors::audit::Written {
+        self.audit.record(Record::new(
+            Kind::Command,
+            caller,
+            format!("{}: {}", drive.name(), request.action.text()),
+        ))
+    }
+
+    /// A write that is not carried out is told: in the log, in the audit log, and to those who read events along.
+    fn tell_refusal(&self, caller: &Caller, unit: u8, ask: &Ask, refusal: &Refusal) {
+        let drive = self.drive(unit).map(|drive| drive.name().to_string());
+        let writes: Vec<String> =
+            ask.writes().map(|(register, word)| format!("{register} = {word}")).collect();
+        let what = format!("unit {unit}: write {}", writes.join(", "));
+        let Refusal { code, why } = refusal;
+        let code = u8::from(*code);
+        let count = self.counters.refuse(refusal.code.into());
+        if count.is_power_of_two() {
+            let Caller { name, origin, .. } = caller;
+            tracing::warn!("gateway {name}: {origin}: {what}: {why} ({code:02X}h), {count} of these in all");
+        }
+        let record =
+            Record { outcome: Some(format!("refused: {why}")), ..Record::new(Kind::Answer, caller, what) };
+        self.audit.record(record).whenever();
+        let event = serde_json::json!({
+            "time_unix_ms": drived_words::json::unix(Instant::now()),
+            "drive": drive,
+            "event": "write_refused",
+            "alarm": false,
+            "text": format!("{}, {}: {why}", caller.name, caller.origin),
+        });
+        self.plant.revisions().push(Subject::Event, &event);
+    }
+
+    /// Looks after clients that have started a motor and are silent, for ever.
+    pub(super) async fn watch_silence(&self) {
+        let Some(limit) = self.config.client_timeout else { return };
+        let mut looks = tokio::time::interval(Duration::from_millis(500).min(limit));
+        loop {
+            looks.tick().await;
+            for (peer, name) in self.clients.silent(Instant::now(), limit) {
+                let Some(drive) = self.drives().into_iter().find(|drive| **drive.name() == *name) else {
+                    continue;
+                };
+                if !drive.snapshot().started_here() {
+                    continue;
+                }
+                let text = format!("{peer} started it and has been silent for {limit:?}");
+                tracing::warn!("gateway {}: {name}: {text}", self.config.name);
+                let event = serde_json::json!({
+                    "time_unix_ms": drived_words::json::unix(Instant::now()),
+                    "drive": name,
+                    "event": "client_silent",
+                    "alarm": true,
+                    "text": text,
+                });
+                self.plant.revisions().push(Subject::Event, &event);
+                if self.config.stops_when_silent {
+                    let caller = self.caller(peer);
+                    // Whoever waits for it, the fleet repeats it until it is confirmed.
+                    let _ = self.stop(&caller, &drive, StopMode::Ramp, Instant::now()).await;
+                }
+            }
+        }
+    }
+}
+
+fn busy() -> Refusal {
+    Refusal::new(ExceptionCode::ServerDeviceBusy, "the line had no room in time")
+}
+
+/// It is on its way, and its outcome is told elsewhere.
+fn pending(drive: &DriveHandle) -> Refusal {
+    let why = format!("{} has not shown it yet: it goes on", drive.name());
+    Refusal::new(ExceptionCode::Acknowledge, why)
+}
+
+/// Whether the motor is known to stand, and this fleet has nothing under way that moves it.
+fn stands(drive: &DriveHandle) -> bool {
+    let snapshot = drive.snapshot();
+    let status = snapshot.fresh_status(Instant::now());
+    status.is_some_and(drive_core::Status::is_undriven) && snapshot.stop.is_none() && !snapshot.started_here()
+}
+
+fn shows_fault(drive: &DriveHandle) -> bool {
+    let snapshot = drive.snapshot();
+    snapshot.fresh_status(Instant::now()).is_some_and(drive_core::Status::is_fault)
+}

@@ -1,0 +1,126 @@
+//! Commands, and what is answered.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::{
+    Json,
+    extract::State,
+    http::{
+        StatusCode,
+        header::{CACHE_CONTROL, LOCATION},
+    },
+    response::{IntoResponse, Response},
+};
+use drive_core::StopMode;
+use tokio::time::Instant;
+
+use super::{
+    ask::{Arrived, By, Named, Sent, Stopping, Viewer, Wait},
+    problem::Problem,
+};
+use drived_doors::Caller;
+use drived_plant::plant::{
+    Plant,
+    commands::{Action, Asks, LIFETIME, OutcomeWord, Request, Said, Target},
+    views::CommandView,
+};
+
+/// A command to a drive.
+pub(super) async fn to_drive<B: Asks>(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Sent(body): Sent<B>,
+) -> Result<Response, Problem> {
+    let request = request(Target::Drive(name), body, arrived)?;
+    carry_out(&plant, &caller, request, wait).await
+}
+
+/// A command to a group.
+pub(super) async fn to_group<B: Asks>(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Sent(body): Sent<B>,
+) -> Result<Response, Problem> {
+    let request = request(Target::Group(name), body, arrived)?;
+    carry_out(&plant, &caller, request, wait).await
+}
+
+/// A stop of a drive.
+pub(super) async fn stop_drive(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Stopping(said): Stopping,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::Drive(name), said, arrived), wait).await
+}
+
+/// A stop of a group.
+pub(super) async fn stop_group(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Named(name): Named,
+    Stopping(said): Stopping,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::Group(name), said, arrived), wait).await
+}
+
+/// A stop of all drives.
+pub(super) async fn stop_all(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Stopping(said): Stopping,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::All, said, arrived), wait).await
+}
+
+/// What became of a command.
+pub(super) async fn command(
+    State(plant): State<Plant>,
+    Viewer(_): Viewer,
+    Wait(wait): Wait,
+    Named(id): Named,
+) -> Result<Json<Arc<CommandView>>, Problem> {
+    let command = plant.command_of(&id, wait).await;
+    command.map(Json).ok_or_else(|| Problem::not_found(format!("there is no command {id:?} any more")))
+}
+
+fn request(target: Target, body: impl Asks, arrived: Instant) -> Result<Request, Problem> {
+    body.asked().of(target, arrived).map_err(Problem::unprocessable)
+}
+
+fn stop(target: Target, said: Said, arrived: Instant) -> Request {
+    let action = Action::Stop(said.stops().unwrap_or(StopMode::Ramp.into()));
+    Request { id: said.id, target, action, lifetime: LIFETIME, arrived }
+}
+
+async fn carry_out(
+    plant: &Plant,
+    caller: &Caller,
+    request: Request,
+    wait: Duration,
+) -> Result<Response, Problem> {
+    let command = plant.command(caller, request, wait).await;
+    let command = command.map_err(|rejected| Problem::rejected(&rejected, caller))?;
+    let no_store = [(CACHE_CONTROL, "no-store")];
+    match command.outcome {
+        OutcomeWord::Confirmed => Ok((no_store, Json(command)).into_response()),
+        OutcomeWord::Pending => {
+            let location = [(LOCATION, format!("/api/v1/commands/{}", command.id))];
+            Ok((StatusCode::ACCEPTED, no_store, location, Json(command)).into_response())
+        }
+        _ => Err(Problem::of_command(&command)),
+    }
+}

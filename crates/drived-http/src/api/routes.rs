@@ -1,0 +1,370 @@
+//! The table of routes: what the router serves and what the document describes, in one place, so that they are the same.
+
+use axum::{
+    handler::Handler,
+    http::Method,
+    routing::{MethodFilter, MethodRouter, on},
+};
+use drive_core::Faults;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+
+use super::{
+    capture, command, demo, health,
+    parameter::{self, NewValue},
+    read, reload, stream,
+};
+use drived_doors::{
+    LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, Rotation, SessionView, TOKENS, TokensView,
+};
+use drived_plant::plant::{
+    Plant,
+    commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    history::HistoryView,
+    parameters::{ParameterView, WrittenView},
+    recent::RecentView,
+    views::{CommandView, DriveView, LineDetailView, LineView, SettingsView, StateView},
+};
+
+/// How the schema of a type is made.
+pub(super) type Describe = fn(&mut SchemaGenerator) -> Schema;
+
+/// One method at one address.
+pub(super) struct Route {
+    pub(super) path: &'static str,
+    pub(super) method: Method,
+    /// `None`: it is served by somebody else, at the doors or beside the plant.
+    pub(super) handler: Option<MethodRouter<Plant>>,
+    /// What it is for.
+    pub(super) about: &'static str,
+    /// What may stand behind a question mark.
+    pub(super) query: Vec<Parameter>,
+    pub(super) body: Option<Describe>,
+    pub(super) answers: Vec<Answer>,
+    /// The statuses of its problem documents.
+    pub(super) problems: Vec<u16>,
+}
+
+/// What may be said in the address.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parameter {
+    pub(super) name: &'static str,
+    pub(super) about: &'static str,
+    pub(super) kind: &'static str,
+}
+
+/// What is answered when nothing is wrong.
+pub(super) struct Answer {
+    pub(super) status: u16,
+    pub(super) about: &'static str,
+    pub(super) content: &'static str,
+    pub(super) describe: Option<Describe>,
+}
+
+const JSON: &str = "application/json";
+const WAIT: Parameter = Parameter {
+    name: "wait",
+    about: "how long the outcome is waited for: 0 to 30s, 2s unless it is said",
+    kind: "string",
+};
+const SECONDS: Parameter =
+    Parameter { name: "seconds", about: "how long: 1 to 600, 10 unless it is said", kind: "integer" };
+const DRY_RUN: Parameter =
+    Parameter { name: "dry_run", about: "only say what would change", kind: "boolean" };
+const SINCE: Parameter =
+    Parameter { name: "since", about: "the revision that the reader has", kind: "integer" };
+const SINCE_TIME: Parameter = Parameter {
+    name: "since_unix_ms",
+    about: "the time of the last sample that the reader has: what came later is told",
+    kind: "integer",
+};
+
+impl Route {
+    fn new<H, T>(method: Method, path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let filter = MethodFilter::try_from(method.clone()).unwrap_or(MethodFilter::GET);
+        Self { handler: Some(on(filter, handler)), ..Self::elsewhere(method, path, about) }
+    }
+
+    /// One that is described here and served elsewhere.
+    fn elsewhere(method: Method, path: &'static str, about: &'static str) -> Self {
+        let (query, answers) = (Vec::new(), Vec::new());
+        Self { path, method, handler: None, about, query, body: None, answers, problems: vec![400, 401, 403] }
+    }
+
+    fn get<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let route = Self::new(Method::GET, path, handler, about);
+        if path.contains('{') { route.or_problem(404) } else { route }
+    }
+
+    /// A command: its body in JSON, and an answer for each outcome.
+    fn command<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let mut route = Self::new(Method::POST, path, handler, about)
+            .answers::<CommandView>(200, "it is confirmed")
+            .answers::<CommandView>(202, "it is not settled yet; Location says where it will be told");
+        route.query.push(WAIT);
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([404, 409, 410, 413, 415, 422, 504]);
+        route
+    }
+
+    fn write<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let route = Self::new(Method::PUT, path, handler, about);
+        let mut route = route.answers::<WrittenView>(200, "it holds the value");
+        route.body = Some(SchemaGenerator::subschema_for::<NewValue>);
+        route.problems.extend([404, 409, 413, 415, 422, 504]);
+        route
+    }
+
+    /// Something that is done at once and has nothing to say.
+    fn deed<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let done = Answer { status: 204, about: "it is done", content: "", describe: None };
+        let mut route = Self::new(Method::POST, path, handler, about).answer(done);
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([404, 413, 415, 422]);
+        route
+    }
+
+    fn answers<A: JsonSchema>(self, status: u16, about: &'static str) -> Self {
+        self.answer(Answer {
+            status,
+            about,
+            content: JSON,
+            describe: Some(SchemaGenerator::subschema_for::<A>),
+        })
+    }
+
+    fn answer(mut self, answer: Answer) -> Self {
+        self.answers.push(answer);
+        self
+    }
+
+    fn or_problem(mut self, status: u16) -> Self {
+        self.problems.push(status);
+        self
+    }
+
+    fn with_query(mut self, parameter: Parameter) -> Self {
+        self.query.push(parameter);
+        self
+    }
+}
+
+/// What a demonstration has besides.
+pub(super) fn demo_routes() -> Vec<Route> {
+    vec![
+        Route::deed::<_, _, demo::Trip>("/api/v1/demo/trip", demo::trip, "Trips a simulated drive"),
+        Route::deed::<_, _, demo::Cable>("/api/v1/demo/cable", demo::cable, "Pulls or plugs in a cable"),
+    ]
+}
+
+/// What the doors serve themselves.
+pub(super) fn door_routes() -> Vec<Route> {
+    let post = |path, about| {
+        let mut route =
+            Route::elsewhere(Method::POST, path, about).answers::<SessionView>(200, "who the caller is now");
+        route.problems.extend([413, 415]);
+        route
+    };
+    let mut login = post(LOGIN, "Begins a session by a token; the answer sets its cookie")
+        .or_problem(429)
+        .or_problem(503);
+    login.body = Some(SchemaGenerator::subschema_for::<LoginBody>);
+    let on_socket = |mut route: Route| {
+        route.problems.extend([404, 413, 415, 422, 503]);
+        route
+    };
+    let mut new = on_socket(
+        Route::elsewhere(Method::POST, TOKENS, "Makes a token, over the control socket")
+            .answers::<MadeToken>(200, "what it is, told this once"),
+    );
+    new.body = Some(SchemaGenerator::subschema_for::<NewToken>);
+    let removed = "/api/v1/tokens/{name}";
+    let mut other = on_socket(
+        Route::elsewhere(
+            Method::PUT,
+            removed,
+            "Replaces a token by another of its name, over the control socket",
+        )
+        .answers::<MadeToken>(200, "the other one, told this once"),
+    );
+    other.body = Some(SchemaGenerator::subschema_for::<Rotation>);
+    vec![
+        login,
+        other,
+        post(LOGOUT, "Ends the session of the cookie"),
+        on_socket(
+            Route::elsewhere(Method::GET, TOKENS, "All tokens, over the control socket")
+                .answers::<TokensView>(200, "their names and roles"),
+        ),
+        new,
+        on_socket(
+            Route::elsewhere(Method::DELETE, removed, "Removes a token, over the control socket")
+                .answers::<RemovedToken>(200, "it is no more"),
+        ),
+    ]
+}
+
+/// What a program with a configuration has besides.
+pub(super) fn reload_routes() -> Vec<Route> {
+    let mut route =
+        Route::elsewhere(Method::POST, reload::PATH, "Reads the configuration again, for engineers")
+            .answers::<reload::Changes>(200, "what was done, or would be")
+            .with_query(DRY_RUN);
+    route.problems.extend([413, 415, 422, 500]);
+    vec![route]
+}
+
+/// All of them.
+pub(super) fn routes() -> Vec<Route> {
+    let mut routes = reads();
+    routes.extend(commands());
+    routes
+}
+
+fn reads() -> Vec<Route> {
+    let events = Answer {
+        status: 200,
+        about: "server-sent events: `drive`, `line`, `command`, `event`, `tick`, and `reset` when the state must be read anew",
+        content: "text/event-stream",
+        describe: None,
+    };
+    vec![
+        Route::get("/api/v1/state", read::state, "Everything at one moment")
+            .answers::<StateView>(200, "the state"),
+        Route::get("/api/v1/drives", read::drives, "All drives").answers::<Vec<DriveView>>(200, "the drives"),
+        Route::get("/api/v1/drives/{name}", read::drive, "One drive").answers::<DriveView>(200, "the drive"),
+        Route::get("/api/v1/drives/{name}/settings", read::settings, "What the program was told of a drive")
+            .answers::<SettingsView>(
+            200,
+            "its periods, times, limits, alarms and policies, and what the plan makes of them",
+        ),
+        Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
+            .with_query(SINCE_TIME)
+            .answers::<HistoryView>(200, "the history"),
+        Route::get("/api/v1/drives/{name}/faults", parameter::faults, "What a drive says of its faults")
+            .answers::<Faults>(200, "the present faults, the alarms and the history")
+            .or_problem(409)
+            .or_problem(504),
+        Route::get("/api/v1/drives/{name}/parameters", parameter::parameters, "The registers of a drive")
+            .with_query(WAIT)
+            .answers::<Vec<ParameterView>>(200, "every register, with what could be read in time"),
+        Route::get(
+            "/api/v1/drives/{name}/parameters/{register}",
+            parameter::parameter,
+            "One register, read now",
+        )
+        .answers::<ParameterView>(200, "the register")
+        .or_problem(409)
+        .or_problem(504),
+        Route::get("/api/v1/lines/{name}/capture", capture::capture, "What is on the line from now on")
+            .with_query(SECONDS)
+            .answer(Answer {
+                status: 200,
+                about: "a pcapng file",
+                content: "application/x-pcapng",
+                describe: None,
+            })
+            .or_problem(503),
+        Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
+        Route::get(
+            "/api/v1/lines/{name}",
+            read::line,
+            "One line: its plan, what was measured on it, and what was on it lately",
+        )
+        .answers::<LineDetailView>(200, "the line, its plan, the measured and its last 100 exchanges"),
+        Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
+            .with_query(WAIT)
+            .answers::<CommandView>(200, "the command, whatever its outcome"),
+        Route::get("/api/v1/events", stream::events, "What happens, as it happens")
+            .with_query(SINCE)
+            .answer(events),
+        Route::get("/api/v1/events/recent", read::recent, "What has happened lately")
+            .answers::<Vec<RecentView>>(200, "the last 500 commands and events, the newest last"),
+        Route::get("/healthz", health::lives, "Whether the program lives")
+            .answers::<health::Health>(200, "it does"),
+        Route::get("/readyz", health::ready, "Whether every line makes progress")
+            .answers::<health::Health>(200, "they do")
+            .or_problem(503),
+    ]
+}
+
+fn commands() -> Vec<Route> {
+    vec![
+        Route::command::<_, _, Start>(
+            "/api/v1/drives/{name}/start",
+            command::to_drive::<Start>,
+            "Starts a motor",
+        ),
+        Route::command::<_, _, Stop>("/api/v1/drives/{name}/stop", command::stop_drive, "Stops a motor"),
+        Route::command::<_, _, NewSetpoint>(
+            "/api/v1/drives/{name}/setpoint",
+            command::to_drive::<NewSetpoint>,
+            "Changes the setpoint of a drive",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/reset",
+            command::to_drive::<Reset>,
+            "Resets the present fault of a drive",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/release",
+            command::to_drive::<Release>,
+            "Gives control of a drive back to its panel or terminals",
+        ),
+        Route::command::<_, _, Start>(
+            "/api/v1/groups/{name}/start",
+            command::to_group::<Start>,
+            "Starts every drive of a group, or none",
+        ),
+        Route::command::<_, _, Stop>(
+            "/api/v1/groups/{name}/stop",
+            command::stop_group,
+            "Stops every drive of a group",
+        ),
+        Route::command::<_, _, NewSetpoint>(
+            "/api/v1/groups/{name}/setpoint",
+            command::to_group::<NewSetpoint>,
+            "Changes the setpoint of every drive of a group",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/groups/{name}/reset",
+            command::to_group::<Reset>,
+            "Resets the present faults of a group",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/groups/{name}/release",
+            command::to_group::<Release>,
+            "Gives control of a group back to panels or terminals",
+        ),
+        Route::command::<_, _, Plain>(
+            "/api/v1/drives/{name}/save",
+            command::to_drive::<Save>,
+            "Saves the parameters of a drive to its EEPROM",
+        ),
+        Route::write(
+            "/api/v1/drives/{name}/parameters/{register}",
+            parameter::write,
+            "Writes a register, unless it holds the value, and reads it back",
+        ),
+        Route::command::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
+    ]
+}

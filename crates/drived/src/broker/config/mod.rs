@@ -1,9 +1,0 @@
-//! `[mqtt]` and `[mqtt.sparkplug]`: the brokers, and what is told and taken there.
-
-mod mqtt;
-mod sparkplug;
-
-pub(crate) use self::{
-    mqtt::{Address, Discovery, MqttConfig, MqttEntry, topic_id},
-    sparkplug::SparkplugConfig,
-};
