@@ -34,7 +34,13 @@ fn no_tool_looks_anything_up_by_its_key_but_reads_it_as_what_it_is() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("crates");
     let mut found =
         vec![folder.join("drived-words/src/values.rs"), folder.join("drived-doors/src/audit/show.rs")];
-    for of_tools in ["drived-client/src", "drived/src/commands", "drived/src/run", "drived-screen/src/row"] {
+    for of_tools in [
+        "drived-client/src",
+        "drived-daemon/src/run",
+        "drived/src/commands",
+        "drived-tools/src",
+        "drived-screen/src/row",
+    ] {
         sources(&folder.join(of_tools), &mut found);
     }
     found.retain(|path| {

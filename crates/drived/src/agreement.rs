@@ -24,20 +24,17 @@ use tokio::{
 };
 use tower::ServiceExt as _;
 
-use crate::{
-    api,
-    client::{self, Target},
-    commands::{monitor, report},
-    doors::{Caller, Rights},
-    metrics,
-    plant::{
-        self,
-        commands::{Action, LIFETIME, Request as Asked},
-        testing::{TestPlant, every_pair_of_troubles},
-        views::{DriveView, StateView},
-    },
-    run,
+use drived_client::{self as client, Target};
+use drived_daemon::run;
+use drived_doors::{Caller, Rights};
+use drived_http::{api, metrics};
+use drived_plant::plant::{
+    self,
+    commands::{Action, LIFETIME, Request as Asked},
+    testing::{TestPlant, every_pair_of_troubles},
+    views::{DriveView, StateView},
 };
+use drived_tools::commands::{monitor, report};
 
 /// Every face that shows the drives in text says of the only one of a state what it does and the worst that troubles it.
 fn every_face_tells(state: &StateView) {

@@ -5,15 +5,14 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
-use crate::{
-    commands::{
-        audit, capture, check, completions, demo, doctor, explain, export, families, faults, init, monitor,
-        param, plan, poll, release, reload, replay, report, reset, scan, setpoint, sim, start, status, stop,
-        token, watch,
-    },
-    failure::Failure,
-    output, run,
+use crate::commands::{audit, check, completions, export, token};
+use drived_daemon::demo;
+use drived_daemon::run;
+use drived_tools::commands::{
+    capture, doctor, explain, families, faults, init, monitor, param, plan, poll, release, reload, replay,
+    report, reset, scan, setpoint, sim, start, status, stop, watch,
 };
+use drived_words::{failure::Failure, output};
 
 /// A map of the subcommands, and what holds for all of them.
 const NOTES: &str = "\
@@ -177,7 +176,8 @@ fn one_line(message: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{commands::export::ENVIRONMENT, failure::EXIT_CODES};
+    use crate::commands::export::ENVIRONMENT;
+    use drived_words::failure::EXIT_CODES;
 
     #[test]
     fn the_command_line_is_well_formed() {

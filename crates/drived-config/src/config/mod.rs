@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use drive_bus::LineConfig;
 use drive_families::Options;
-use drive_fleet::{Demand, DriveSettings, LineBudget};
+use drive_fleet::{Demand, DriveSettings, FleetBuilder, Left, LineBudget};
 use toml::Spanned;
 
 pub use self::line::ROOM_PPM;
@@ -75,4 +75,13 @@ impl LinePart {
 /// What a table of the file has, if there is one.
 pub fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
     said.as_ref().map(Spanned::get_ref)
+}
+
+/// Adds a drive of a line, of which a run before has left this.
+pub fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left) -> FleetBuilder {
+    let DrivePart { name, settings, options } = drive;
+    let settings = settings.clone().after(left);
+    builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
+        name.family.open_with(port, slave, &options.values)
+    })
 }

@@ -6,8 +6,8 @@ use chrono::{DateTime, Days, Local, NaiveDateTime, NaiveTime, TimeZone as _};
 use serde_json::json;
 
 use super::token::ConfigArgs;
-use crate::{
-    doors::audit::{Filter, Found, Verdict, shown, verify_since},
+use drived_doors::audit::{Filter, Found, Verdict, shown, verify_since};
+use drived_words::{
     failure::Failure,
     output::{self, JsonArgs, Table},
 };

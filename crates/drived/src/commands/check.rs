@@ -9,16 +9,18 @@ use drive_fleet::DriveSettings;
 use drive_sparkplug::NodeName;
 use serde_json::{Map, Value, json};
 
-use crate::{
+use drived_broker::{
     broker::config::{MqttConfig, SparkplugConfig},
-    config::{DrivePart, LinePart, drive_keys},
-    config_file::Config,
-    doors::{Rights, Role},
+    mqtt::Mqtt,
+};
+use drived_config::config::{DrivePart, LinePart, drive_keys};
+use drived_doors::{Rights, Role};
+use drived_file::Config;
+use drived_gateway::config::{GatewayConfig, Units};
+use drived_words::{
     drive_spec::{self, DriveName},
     failure::Failure,
-    gateway::config::{GatewayConfig, Units},
     line_spec,
-    mqtt::Mqtt,
     output::{self, JsonArgs, Table},
 };
 

@@ -4,16 +4,18 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use crate::{
-    client::Daemon,
-    config_file::Config,
-    doors::config::DoorsConfig,
-    doors::{
+use drived_client::Daemon;
+use drived_doors::{
+    config::DoorsConfig,
+    {
         Caller, MadeToken, RemovedToken, Rights, Role, Scope, TOKENS, TokensView, added,
         audit::{self, Kind, Record},
         of_days, of_hours, replaced,
         tokens::{TokenView, Tokens},
     },
+};
+use drived_file::Config;
+use drived_words::{
     failure::Failure,
     output::{self, JsonArgs, Table},
 };

@@ -10,11 +10,9 @@ use drive_families::Family;
 use tokio::time::timeout;
 
 use super::place::Place;
-use crate::{
-    client::Daemon,
-    config_file::Config,
-    plant::views::{DriveView, StateView},
-};
+use drived_client::Daemon;
+use drived_file::Config;
+use drived_plant::plant::views::{DriveView, StateView};
 
 /// Who presses the tab key waits no longer than this.
 const WITHIN: Duration = Duration::from_millis(500);

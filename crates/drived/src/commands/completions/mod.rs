@@ -15,7 +15,7 @@ use self::{
     place::Place,
     words::{Word, quoted},
 };
-use crate::{failure::Failure, output};
+use drived_words::{failure::Failure, output};
 
 // The text has brackets that a doc comment would take for links.
 const ABOUT: &str = "\

@@ -5,8 +5,8 @@ use std::{fs, io, path::Path};
 use clap::{Arg, Command};
 use roff::{Inline, Roff, bold, italic, roman};
 
-use crate::{
-    config_file,
+use drived_file as config_file;
+use drived_words::{
     failure::{EXIT_CODES, Failure},
     output,
 };

@@ -6,7 +6,10 @@ use std::path::PathBuf;
 
 #[cfg(test)]
 pub(crate) use self::man::ENVIRONMENT;
-use crate::{config_file::Config, failure::Failure, gateway::virtual_unit, metrics, output};
+use drived_file::Config;
+use drived_gateway::virtual_unit;
+use drived_http::metrics;
+use drived_words::{failure::Failure, output};
 
 /// Print the alert rules for Prometheus, the board for Grafana, or the map of a gateway's virtual unit; write the man pages
 ///

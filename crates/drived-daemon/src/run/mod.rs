@@ -1,0 +1,251 @@
+//! `drived run`: the fleet as a daemon.
+
+mod descriptors;
+mod eeprom;
+mod exit;
+mod json;
+mod notify;
+mod picture;
+mod reload;
+mod report;
+mod runs;
+mod watchdogs;
+
+use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
+
+use drive_bus::Line;
+use drive_fleet::{Fleet, FleetBuilder, Left};
+use drived_words::closing;
+use futures_util::future::OptionFuture;
+use tokio::sync::mpsc;
+
+use self::{
+    notify::Notify,
+    picture::Picture,
+    reload::Reloader,
+    report::{Form, Report},
+};
+use drived_broker::{mqtt::Mqtt, sparkplug::Sparkplug};
+use drived_config::{
+    config::{LinePart, add},
+    records::{self, Records, in_folder},
+};
+use drived_doors::{
+    config::Http,
+    {
+        Doors,
+        audit::{Audit, Kind, Record},
+    },
+};
+use drived_file::{Config, ledger};
+use drived_gateway::Gateways;
+use drived_http::{
+    api::{self, Reload as _},
+    metrics, page,
+};
+use drived_plant::{findings, journal, plant::Plant};
+use drived_screen::screen::Screen;
+use drived_words::{
+    failure::Failure,
+    logging,
+    signals::{Ending, Wish, Wishes},
+};
+
+/// How long the disk has for the last records of the audit log.
+const AUDITED_WITHIN: Duration = Duration::from_secs(2);
+
+/// Watch and command the drives of a configuration
+///
+/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
+/// a table with the log below it; where only stdout is one, it has a line for each drive whose state has changed. Ctrl-C and SIGTERM end it: each drive's
+/// policy acts, and what was done is told. A second Ctrl-C ends it at once. Exit code 1 when a motor may turn that no policy
+/// leaves turning. A stdout that nobody reads any more ends nothing: the drives are watched on.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The configuration, in TOML
+    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
+    config: PathBuf,
+    /// Where the page and the API are served: an address and a port, or off; by default as the configuration says
+    #[arg(long, value_name = "ADDRESS")]
+    http: Option<Http>,
+    /// Where the control socket is, for the commands without a line
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// Print JSON objects on a terminal too
+    #[arg(long)]
+    json: bool,
+}
+
+pub async fn run(args: Args) -> Result<(), Failure> {
+    let config = Config::load_workable(&args.config)?;
+    descriptors::check(config.lines.len())?;
+    // What is wrong with the doors is told before a drive is spoken to.
+    let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
+    let sparkplug = match (&config.mqtt, &config.sparkplug) {
+        (Some(mqtt), Some(sparkplug)) => Some(Sparkplug::prepared(mqtt, sparkplug)?),
+        _ => None,
+    };
+    let mqtt = config.mqtt.clone().map(Mqtt::prepare).transpose()?;
+    let mut ending = Ending::listen()?;
+    let notify = Notify::start();
+    let mut wishes = Wishes::listen()?;
+    let lines = start_lines(&config)?;
+    let state = &config.doors.state;
+    let watchdogs = Records::open(state.watchdogs.as_deref(), watchdogs::LOSS);
+    let started = Records::open(in_folder(state.folder.as_deref(), runs::FILE).as_deref(), runs::LOSS);
+    let eeproms = Records::open(in_folder(state.folder.as_deref(), ledger::FILE).as_deref(), ledger::LOSS);
+    let before = |drive: &str| Left {
+        identity: None,
+        watchdog: watchdogs.of(drive).cloned(),
+        run: started.of(drive).cloned(),
+        eeprom: eeproms.of(drive).cloned(),
+    };
+    let (tell_runs, told_runs) = mpsc::unbounded_channel();
+    let builder = build(&config, &lines, before).keep_runs(tell_runs);
+    let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+    let kept = runs::follow(started, told_runs);
+    // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
+    let with_table = !args.json && logging::may_be_shown();
+    let form = match with_table {
+        true => Form::Table,
+        false if args.json || !std::io::stdout().is_terminal() => Form::Json,
+        false => Form::Text,
+    };
+    let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
+    let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
+    let watchdogs = records::follow(watchdogs, fleet.events(), watchdogs::note);
+    let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
+    let findings = tokio::spawn(findings::follow(fleet.clone()));
+    let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
+    let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit());
+    let shutdown = config.shutdown;
+    let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
+    let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
+    let mut sources: Vec<Arc<dyn drived_plant::counts::Source>> = vec![Arc::new(reloader.clone())];
+    let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
+    sources.extend(mqtt.iter().map(Mqtt::source));
+    sources.extend(gateways.sources());
+    let sparkplug = sparkplug.map(|sparkplug| sparkplug.open(plant.clone(), doors.audit()));
+    sources.extend(sparkplug.iter().map(Sparkplug::source));
+    let doors = doors.open(metrics::serve(router, plant.clone(), sources));
+    plant.follow_audit(doors.audit().failing());
+    let audited = doors.follow(fleet.events());
+    let watching = notify.watch(fleet.clone(), doors.listening());
+    let screen = with_table.then(|| table(plant.clone())).flatten();
+    let mut read = None;
+    loop {
+        tokio::select! {
+            () = ending.asked() => break,
+            wish = wishes.next() => match wish {
+                Wish::Reload => drop(tokio::spawn(told(reloader.clone(), doors.audit()))),
+                Wish::State => {
+                    tell_state(&fleet);
+                    gateways.tell();
+                }
+                Wish::End => {
+                    tracing::warn!("the terminal is closed: the program ends by each drive's policy");
+                    break;
+                }
+            },
+            result = report.ended(), if read.is_none() => {
+                // Without this program the drives' watchdogs would stop their motors.
+                tracing::warn!("nobody reads stdout any more: the drives are watched on, Ctrl-C ends it");
+                read = Some(result);
+            }
+        }
+    }
+    drop(watching);
+    findings.abort();
+    // What becomes of the motors is told in words.
+    let screen = OptionFuture::from(screen.map(Screen::close));
+    let screen = tokio::spawn(screen);
+    let stopping = notify.stopping(fleet.clone());
+    drop(gateways);
+    if let Some(mqtt) = &mqtt {
+        mqtt.closing();
+    }
+    if let Some(sparkplug) = &sparkplug {
+        sparkplug.closing();
+    }
+    // No motor waits for a reader of the page.
+    let closed = tokio::spawn(doors.close());
+    let ended = exit::end(&fleet, shutdown, &mut ending).await;
+    let _ = screen.await;
+    drop(stopping);
+    // It ends with the fleet, and what it says last is not lost.
+    let _ = journal.await;
+    let _ = watchdogs.await;
+    let _ = eeproms.await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, kept).await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
+    if read.is_none() {
+        report.finish().await;
+    }
+    let _ = closed.await;
+    // Whoever reads along sees the motors stop first.
+    let told = OptionFuture::from(mqtt.map(Mqtt::close));
+    tokio::join!(told, OptionFuture::from(sparkplug.map(Sparkplug::close)));
+    for (_, line) in fleet.lines() {
+        closing::close(&line).await;
+    }
+    ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Shows the drives and the lines as a table, and the log below it.
+fn table(plant: Plant) -> Option<Screen> {
+    Screen::open(move |frame| Picture::of(&plant, logging::shown()).draw(frame))
+}
+
+/// Reads the configuration again and says what became of it.
+async fn told(reloader: Reloader, audit: Audit) {
+    let reloaded = reloader.reload(false).await;
+    let text = match &reloaded {
+        Ok(done) => done.join("; "),
+        Err(failure) => failure.to_string(),
+    };
+    audit.record(Record::of_program(Kind::Configuration, format!("read again: {text}"))).whenever();
+    match reloaded {
+        Ok(done) if done.is_empty() => tracing::info!("configuration read again: nothing has changed"),
+        Ok(done) => tracing::info!("configuration read again: {}", done.join("; ")),
+        Err(failure @ Failure::Drive(_)) => tracing::error!("configuration read again: {failure}"),
+        Err(failure) => tracing::error!("the old configuration holds on: {failure}"),
+    }
+}
+
+/// Says in the log how each drive is.
+fn tell_state(fleet: &Fleet) {
+    for (line, _) in fleet.lines() {
+        for drive in fleet.drives_on(&line) {
+            tracing::info!("{line}: {}: {}", drive.name(), report::text(&drive.snapshot()));
+        }
+    }
+}
+
+/// Starts every line. One whose port cannot be opened is tried again; its drives are lost meanwhile, and the others run.
+fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
+    let start = |part: &LinePart| Line::start(part.config.clone());
+    let lines = config.lines.iter().map(start).collect::<Result<_, _>>();
+    lines.map_err(|error| Failure::Input(error.to_string()))
+}
+
+fn build(config: &Config, lines: &[Line], before: impl Fn(&str) -> Left) -> FleetBuilder {
+    let mut builder = Fleet::builder();
+    for (part, line) in config.lines.iter().zip(lines) {
+        builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
+        builder = part
+            .drives
+            .iter()
+            .fold(builder, |builder, drive| add(builder, part, drive, before(&drive.settings.name)));
+    }
+    builder
+}
+
+/// The picture of `run` of these drives, on a wide terminal.
+#[cfg(any(test, feature = "testing"))]
+pub fn screen_of(drives: &[drived_plant::plant::views::DriveView]) -> String {
+    let backend = ratatui::backend::TestBackend::new(400, 24);
+    let mut terminal = ratatui::Terminal::new(backend).expect("it has a size");
+    let picture = Picture::with(drives.to_vec(), Vec::new(), Vec::new());
+    terminal.draw(|frame| picture.draw(frame)).expect("it is drawn");
+    terminal.backend().to_string()
+}

@@ -1,0 +1,270 @@
+//! A configuration that is read again while the daemon runs: only what is different changes.
+
+mod changes;
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, PoisonError},
+};
+
+use drive_bus::{Endpoint, Line};
+use drive_fleet::{Fleet, FleetError, Left, LineBudget};
+use drived_words::closing;
+use tokio::{sync::Mutex, time::Instant};
+
+use self::changes::{Change, changes};
+use super::notify::Notify;
+use drived_config::config::{DrivePart, add};
+use drived_file::Config;
+use drived_http::api::Reload;
+use drived_plant::{
+    counts::{Id, Samples, Source},
+    plant::{Plant, views::NoticeView},
+};
+use drived_words::{drive_spec::DriveName, failure::Failure, json::unix};
+
+/// Reads the configuration again. Cheap to clone; one reload at a time.
+#[derive(Clone)]
+pub(super) struct Reloader(Arc<Inner>);
+
+struct Inner {
+    plant: Plant,
+    notify: Notify,
+    file: PathBuf,
+    /// What holds now.
+    config: Mutex<Config>,
+    /// Whether what was read last holds, and when what holds was read.
+    last: std::sync::Mutex<(bool, u64)>,
+    /// What is left of drives that were taken out.
+    leavings: std::sync::Mutex<Leavings>,
+}
+
+impl Reloader {
+    pub(super) fn new(plant: Plant, notify: Notify, file: PathBuf, config: Config) -> Self {
+        let last = std::sync::Mutex::new((true, unix(Instant::now())));
+        Self(Arc::new(Inner {
+            plant,
+            notify,
+            file,
+            config: Mutex::new(config),
+            last,
+            leavings: std::sync::Mutex::default(),
+        }))
+    }
+
+    /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
+    async fn carry_out(&self, config: &mut Config, mut new: Config) -> Result<Done, Failure> {
+        let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+        let (plant, changes) = (&self.0.plant, changes(config, &new));
+        let fleet = plant.fleet();
+        // What can fail without anything being done comes first.
+        let mut lines = Vec::new();
+        for part in new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name))) {
+            let line = Line::start(part.config.clone()).map_err(|error| input(&error))?;
+            lines.push((part.name.clone(), part.budget, line));
+        }
+        let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
+        let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
+        let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
+        let gone: Vec<_> = gone.collect();
+        let actions = fleet.remove(&leaving, config.shutdown).await;
+        let mut leavings =
+            std::mem::take(&mut *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner));
+        leavings.retain(|(left, _)| gone.iter().all(|(place, _)| place != left));
+        leavings.extend(gone.into_iter().map(|(place, handle)| (place, handle.left())));
+        let turning = actions.iter().filter(|(_, action)| action.is_alarm());
+        let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
+        for name in changes.iter().filter_map(Change::closed_line) {
+            if let Some(line) = fleet.remove_line(name) {
+                closing::close(&line).await;
+            }
+        }
+        for line in &mut config.lines {
+            line.drives.retain(|drive| !leaving.contains(&&*drive.settings.name));
+        }
+        config.lines.retain(|line| !changes.iter().any(|change| change.closed_line() == Some(&line.name)));
+        // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
+        config.groups = std::mem::take(&mut new.groups);
+        plant.set_groups(config.groups.clone());
+        let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
+            .map(|()| settle(&fleet, config, &mut new, &changes));
+        *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
+        if !changes.is_empty() {
+            plant.revisions().begin_anew();
+        }
+        let made = made.map_err(|error| (error.to_string(), halves(&changes)));
+        match made.and_then(|refused| refused.map_or(Ok(()), Err)) {
+            Ok(()) => Ok(Done { changes, turning }),
+            Err((why, half)) => {
+                let told = format!("ONLY IN PART ({why}): {}", half.join("; "));
+                let parts = (!turning.is_empty()).then(|| may_turn(&turning)).into_iter().chain([told]);
+                Err(Failure::Drive(parts.collect::<Vec<_>>().join("; ")))
+            }
+        }
+    }
+}
+
+impl Reload for Reloader {
+    /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
+    /// whole file is read and checked first.
+    ///
+    /// A drive whose settings alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
+    /// line, address, family or options have changed, ends by its policy, as at the exit.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
+    /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
+    async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+        let mut config = self.0.config.lock().await;
+        let file = self.0.file.clone();
+        // A name of a server may have to be looked up.
+        let read = tokio::task::spawn_blocking(move || Config::load_workable(&file)).await;
+        let read = read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())));
+        if dry_run {
+            let changes = changes(&config, &read?);
+            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
+        }
+        let reloaded = match read {
+            Ok(new) => {
+                self.0.notify.reloading();
+                let done = self.carry_out(&mut config, new).await;
+                self.0.notify.reloaded();
+                done
+            }
+            Err(wrong) => Err(wrong),
+        };
+        let mut last = self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = match &reloaded {
+            Ok(_) => (true, unix(Instant::now())),
+            Err(_) => (false, last.1),
+        };
+        drop(last);
+        let notice = match &reloaded {
+            Ok(done) if done.changes.is_empty() => None,
+            Ok(Done { changes, turning }) => {
+                let all: Vec<String> = changes.iter().map(ToString::to_string).collect();
+                let text = format!("the configuration was read again: {}", all.join("; "));
+                Some(NoticeView::new("reload", !turning.is_empty(), text))
+            }
+            Err(failure) => {
+                let text = format!("the configuration could not be read again: {failure}");
+                Some(NoticeView::new("reload", true, text))
+            }
+        };
+        notice.into_iter().for_each(|notice| self.0.plant.tell_notice(notice));
+        let Done { changes, turning } = reloaded?;
+        match turning.is_empty() {
+            true => Ok(changes.iter().map(ToString::to_string).collect()),
+            false => Err(Failure::Drive(may_turn(&turning))),
+        }
+    }
+}
+
+/// What a reload has done.
+struct Done {
+    changes: Vec<Change>,
+    /// Who was removed and may turn.
+    turning: Vec<String>,
+}
+
+fn may_turn(turning: &[String]) -> String {
+    format!("THE MOTOR MAY TURN: {}", turning.join("; "))
+}
+
+/// Adds lines and drives, all of them or none.
+fn add_all(
+    fleet: &Fleet,
+    changes: &[Change],
+    new: &Config,
+    lines: &[(String, LineBudget, Line)],
+    leavings: &mut Leavings,
+) -> Result<(), FleetError> {
+    fleet.extend(|mut builder| {
+        for (name, budget, line) in lines {
+            builder = builder.line_with(&**name, line.clone(), |_| *budget);
+        }
+        for part in &new.lines {
+            let is_added = |drive: &&DrivePart| {
+                changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
+            };
+            builder = part.drives.iter().filter(is_added).fold(builder, |builder, drive| {
+                let left = taken(leavings, new, &drive.settings.name);
+                add(builder, part, drive, left)
+            });
+        }
+        // The file was planned as a whole.
+        builder.whatever_the_plan()
+    })
+}
+
+/// Gives the drives their new settings, and makes the lines of `config` those that there are now. What holds from the next
+/// start on stays in it as it was. Gives why settings were not taken, and by whom.
+fn settle(
+    fleet: &Fleet,
+    config: &mut Config,
+    new: &mut Config,
+    changes: &[Change],
+) -> Option<(String, Vec<String>)> {
+    let mut refused: Vec<(String, FleetError)> = Vec::new();
+    for settings in changes.iter().filter_map(Change::settings) {
+        if let Err(error) = fleet.reconfigure(settings.clone()) {
+            refused.push((settings.name.clone(), error));
+        }
+    }
+    let mut before = std::mem::replace(&mut config.lines, std::mem::take(&mut new.lines));
+    for line in &mut config.lines {
+        let Some(old) = before.iter_mut().find(|old| old.name == line.name) else { continue };
+        line.budget = old.budget;
+        for drive in &mut line.drives {
+            if refused.iter().any(|(name, _)| *name == drive.settings.name)
+                && let Some(old) = old.drives.iter().find(|old| old.settings.name == drive.settings.name)
+            {
+                drive.settings = old.settings.clone();
+            }
+        }
+    }
+    let (_, why) = refused.first()?;
+    let half = |change: &Change| match change.settings() {
+        Some(settings) if refused.iter().any(|(name, _)| *name == settings.name) => change.half(),
+        _ => Some(change.to_string()),
+    };
+    Some((why.to_string(), changes.iter().filter_map(half).collect()))
+}
+
+/// What holds when lines and drives could not be added.
+fn halves(changes: &[Change]) -> Vec<String> {
+    changes.iter().filter_map(Change::half).collect()
+}
+
+impl Source for Reloader {
+    fn collect(&self, samples: &mut Samples) {
+        let (is_successful, at) = *self.0.last.lock().unwrap_or_else(PoisonError::into_inner);
+        samples.add(Id::ReloadSuccessful, &[], f64::from(u8::from(is_successful)));
+        samples.add(Id::ReloadTime, &[], at as f64 / 1_000.0);
+    }
+}
+
+/// Where a drive is, whatever it and its line are called: its port, its address and its family.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Place(Endpoint, DriveName);
+
+/// The places of the drives of a configuration, by their names.
+fn places(config: &Config) -> impl Iterator<Item = (&str, Place)> {
+    config.lines.iter().flat_map(|line| {
+        let place = |drive: &DrivePart| Place(line.config.endpoint.clone(), drive.name);
+        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), place(drive)))
+    })
+}
+
+/// What is left of drives that are not in the fleet any more, for when they are taken up again, by whatever name.
+type Leavings = Vec<(Place, Left)>;
+
+/// Takes what is left of a drive.
+fn taken(leavings: &mut Leavings, config: &Config, name: &str) -> Left {
+    let place = places(config).find_map(|(other, place)| (other == name).then_some(place));
+    let at = leavings.iter().position(|(left, _)| Some(left) == place.as_ref());
+    at.map(|at| leavings.swap_remove(at).1).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,184 @@
+//! What is different between two configurations: a pure comparison.
+
+use std::{collections::BTreeMap, fmt};
+
+use drive_bus::LineConfig;
+use drive_fleet::{DriveSettings, Fleet};
+
+use drived_config::config::{DrivePart, LinePart};
+use drived_file::Config;
+
+/// What a reload does, in the order in which it is told.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Change {
+    LineAdded(String),
+    LineRemoved(String),
+    /// Its port or its times are others: it is closed and opened anew.
+    LineChanged(String),
+    DriveAdded(String),
+    DriveRemoved(String),
+    /// Its line, address, family or options are others, or it comes under control no more: it ends by its policy and begins
+    /// anew.
+    DriveExchanged(String, &'static str),
+    /// Its settings are others.
+    DriveChanged(Box<DriveSettings>),
+    Groups,
+    /// It holds from the next start on.
+    Later(&'static str),
+}
+
+impl Change {
+    /// Whether it opens this line.
+    pub(super) fn opens(&self, line: &str) -> bool {
+        matches!(self, Self::LineAdded(name) | Self::LineChanged(name) if name == line)
+    }
+
+    pub(super) fn closed_line(&self) -> Option<&str> {
+        match self {
+            Self::LineRemoved(name) | Self::LineChanged(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    pub(super) fn removed_drive(&self) -> Option<&str> {
+        match self {
+            Self::DriveRemoved(name) | Self::DriveExchanged(name, _) => Some(name),
+            _ => None,
+        }
+    }
+
+    pub(super) fn added_drive(&self) -> Option<&str> {
+        match self {
+            Self::DriveAdded(name) | Self::DriveExchanged(name, _) => Some(name),
+            _ => None,
+        }
+    }
+
+    pub(super) fn settings(&self) -> Option<&DriveSettings> {
+        match self {
+            Self::DriveChanged(settings) => Some(settings),
+            _ => None,
+        }
+    }
+
+    /// What has become of it where nothing could be added: lines and drives that had to go are gone.
+    pub(super) fn half(&self) -> Option<String> {
+        Some(match self {
+            Self::LineAdded(name) => format!("line {name} NOT added"),
+            Self::LineChanged(name) => format!("line {name} closed and NOT opened anew"),
+            Self::DriveAdded(name) => format!("{name} NOT added"),
+            Self::DriveExchanged(name, _) => {
+                format!("{name} ended by its policy of the exit and NOT begun anew")
+            }
+            Self::DriveChanged(settings) => format!("{} goes on with its OLD settings", settings.name),
+            Self::LineRemoved(_) | Self::DriveRemoved(_) | Self::Groups => self.to_string(),
+            Self::Later(_) => return None,
+        })
+    }
+
+    /// What it would be, with what the drive does now where it ends by its policy.
+    pub(super) fn would_be(&self, fleet: &Fleet) -> String {
+        let drive = self.removed_drive().and_then(|name| fleet.drive(name));
+        let status = drive.and_then(|drive| drive.snapshot().status.clone());
+        match status {
+            Some(status) if !status.value.is_undriven() => format!("{self}: it shows {}", status.value),
+            _ => self.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LineAdded(name) => write!(f, "line {name} added"),
+            Self::LineRemoved(name) => write!(f, "line {name} removed"),
+            Self::LineChanged(name) => write!(f, "line {name} closed and opened anew"),
+            Self::DriveAdded(name) => write!(f, "{name} added"),
+            Self::DriveRemoved(name) => write!(f, "{name} removed, by its policy of the exit"),
+            Self::DriveExchanged(name, why) => {
+                write!(f, "{name} ended by its policy of the exit and begun anew, because {why}")
+            }
+            Self::DriveChanged(settings) => write!(f, "{} has other settings and goes on", settings.name),
+            Self::Groups => write!(f, "groups changed"),
+            Self::Later(what) => write!(f, "{what}: from the next start on"),
+        }
+    }
+}
+
+/// What is different.
+pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let line = |config: &'_ Config, name: &str| config.lines.iter().position(|line| line.name == name);
+    for part in &old.lines {
+        match line(new, &part.name).and_then(|at| new.lines.get(at)) {
+            None => changes.push(Change::LineRemoved(part.name.clone())),
+            Some(other) if is_other(&part.config, &other.config) => {
+                changes.push(Change::LineChanged(part.name.clone()));
+            }
+            Some(_) => {}
+        }
+    }
+    let added = new.lines.iter().filter(|part| line(old, &part.name).is_none());
+    changes.extend(added.map(|part| Change::LineAdded(part.name.clone())));
+    let (before, after) = (drives(old), drives(new));
+    for (name, (line, drive)) in &before {
+        let Some((other_line, other)) = after.get(name) else {
+            changes.push(Change::DriveRemoved((*name).to_owned()));
+            continue;
+        };
+        let exchanged = match () {
+            () if line.name != other_line.name => Some("it is on another line"),
+            () if changes.iter().any(|change| change.closed_line() == Some(&line.name)) => {
+                Some("its line has changed")
+            }
+            () if drive.name != other.name => Some("its family or address has changed"),
+            () if drive.options != other.options => Some("its options have changed"),
+            () if drive.settings.control && !other.settings.control => Some("it is only read from now on"),
+            () => None,
+        };
+        match exchanged {
+            Some(why) => changes.push(Change::DriveExchanged((*name).to_owned(), why)),
+            None if drive.settings != other.settings => {
+                changes.push(Change::DriveChanged(Box::new(other.settings.clone())));
+            }
+            None => {}
+        }
+    }
+    let added = after.keys().filter(|name| !before.contains_key(*name));
+    changes.extend(added.map(|name| Change::DriveAdded((*name).to_owned())));
+    let budgets = |config: &Config| -> BTreeMap<String, _> {
+        config.lines.iter().map(|line| (line.name.clone(), line.budget)).collect()
+    };
+    let (planned, kept) = (budgets(new), budgets(old));
+    changes.extend((old.groups != new.groups).then_some(Change::Groups));
+    for (is_other, what) in [
+        (old.snapshots != new.snapshots, "snapshots"),
+        (old.shutdown != new.shutdown, "shutdown"),
+        (old.doors.http != new.doors.http, "[http]"),
+        (old.doors.socket != new.doors.socket, "[socket]"),
+        (old.doors.state.watchdogs != new.doors.state.watchdogs, "another file of watchdogs"),
+        (old.doors.state.tokens != new.doors.state.tokens, "another file of tokens"),
+        (old.doors.state.audit != new.doors.state.audit, "another audit log"),
+        (old.gateways != new.gateways, "gateways"),
+        (old.mqtt != new.mqtt || old.sparkplug != new.sparkplug, "mqtt"),
+        (
+            kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
+            "response and segments of lines",
+        ),
+    ] {
+        changes.extend(is_other.then_some(Change::Later(what)));
+    }
+    changes
+}
+
+/// Whether a line has to be opened anew. The pauses of its drives come and go with them.
+fn is_other(old: &LineConfig, new: &LineConfig) -> bool {
+    let bare = |config: &LineConfig| LineConfig { slaves: BTreeMap::new(), ..config.clone() };
+    bare(old) != bare(new)
+}
+
+fn drives(config: &Config) -> BTreeMap<&str, (&LinePart, &DrivePart)> {
+    let on = |line| move |drive| (line, drive);
+    let all = config.lines.iter().flat_map(|line| line.drives.iter().map(on(line)));
+    all.map(|(line, drive): (&LinePart, &DrivePart)| (drive.settings.name.as_str(), (line, drive))).collect()
+}

@@ -1,0 +1,92 @@
+//! What holds when a reload fails.
+
+use std::{fs, time::Duration};
+
+use drive_families::Family;
+use drive_fleet::DriveSettings;
+use http_body_util::BodyExt as _;
+use tower::ServiceExt as _;
+
+use super::*;
+use drived_doors::{Caller, Rights};
+use drived_http::api::testing::validate;
+use drived_simulated as simulated;
+
+/// Lines whose port is nowhere, with watched drives by line, address and name.
+fn text(drives: &[(&str, u8, &str)]) -> String {
+    let lines =
+        "[lines.north]\nport = \"tcp://192.0.2.1:502\"\n[lines.south]\nport = \"tcp://192.0.2.2:502\"\n";
+    let drive = |(line, address, name): &(&str, u8, &str)| {
+        format!("[[drives]]\nline = \"{line}\"\ndrive = \"atv312@{address}\"\nname = \"{name}\"\n")
+    };
+    drives.iter().map(drive).fold(lines.to_owned(), |text, drive| text + &drive)
+}
+
+/// The route answers what the document of the API says.
+async fn answers_as_described(reloader: Reloader) {
+    let rights = Rights { engineer: true, ..Rights::NONE };
+    let caller = Caller::new("chief", "test", rights);
+    let router = drived_http::api::reload_router(reloader).layer(axum::Extension(caller));
+    let document = drived_http::api::described();
+    for (path, status, kind) in [
+        ("/api/v1/reload?dry_run=true", 200, "application/json"),
+        ("/api/v1/reload", 200, "application/json"),
+        ("/api/v1/reload?dry_run=perhaps", 400, "application/problem+json"),
+    ] {
+        let request = axum::http::Request::post(path).body(axum::body::Body::empty()).unwrap();
+        let answer = router.clone().oneshot(request).await.unwrap();
+        assert_eq!(
+            (answer.status().as_u16(), answer.headers()["content-type"].to_str().unwrap()),
+            (status, kind)
+        );
+        let body = answer.into_body().collect().await.unwrap().to_bytes();
+        let described = &document["paths"]["/api/v1/reload"]["post"]["responses"][status.to_string()];
+        let schema = &described["content"][kind]["schema"];
+        assert!(schema.is_object(), "{path} {status} is not described");
+        validate(&document, schema, &serde_json::from_slice(&body).unwrap(), path);
+    }
+}
+
+#[tokio::test]
+async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
+    let file = std::env::temp_dir().join(format!("drived-halfway-{}.toml", std::process::id()));
+    let write = |drives: &[(&str, u8, &str)]| fs::write(&file, text(drives)).unwrap();
+    write(&[("north", 1, "one"), ("north", 2, "two"), ("south", 1, "three")]);
+    let config = Config::load_workable(&file).unwrap();
+    let lines: Vec<Line> =
+        config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
+    let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
+    let plant = Plant::start(fleet.clone(), Vec::new(), false);
+    let reloader = Reloader::new(plant, Notify::start(), file.clone(), config);
+    // Somebody else in the program has taken a name that the file does not know yet.
+    let family = Family::Atv312;
+    let stranger = DriveSettings::watched("four".to_owned());
+    let options = simulated::options();
+    fleet
+        .extend(|builder| {
+            builder
+                .whatever_the_plan()
+                .drive("south", 9, stranger, |port, slave| family.open_with(port, slave, &options))
+        })
+        .unwrap();
+    write(&[("north", 1, "one"), ("north", 3, "two"), ("south", 4, "four")]);
+    let Err(Failure::Drive(told)) = reloader.reload(false).await else { panic!("it fails") };
+    for part in [
+        "ONLY IN PART",
+        "two ended by its policy of the exit and NOT begun anew",
+        "three removed, by its policy of the exit",
+        "four NOT added",
+    ] {
+        assert!(told.contains(part), "{told}");
+    }
+    let names =
+        |fleet: &Fleet| fleet.drives().iter().map(|drive| drive.name().to_string()).collect::<Vec<_>>();
+    assert_eq!(names(&fleet), ["one", "four"]);
+    let again = reloader.reload(true).await.unwrap();
+    assert_eq!(again, ["four added", "two added"], "what it believes is what there is");
+    let _ = fleet.remove(&["four"], Duration::from_secs(1)).await;
+    assert_eq!(reloader.reload(false).await.unwrap(), ["four added", "two added"]);
+    assert_eq!(reloader.reload(true).await.unwrap(), Vec::<String>::new());
+    answers_as_described(reloader).await;
+    fs::remove_file(&file).unwrap();
+}

@@ -1,0 +1,163 @@
+//! What one table alone does not show: that two lines share a port, that a file is none.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::Read as _,
+    net::{SocketAddr, ToSocketAddrs as _},
+    path::Path,
+};
+
+use drive_bus::Endpoint;
+
+use super::file;
+use drived_config::config::{ConfigError, Entry as _, LinePart, Source};
+
+/// A configuration that is longer is no configuration.
+const LONGEST_FILE: u64 = 1 << 20;
+
+/// The text of a configuration. A pipe or a device would never end.
+pub(super) fn read_file(path: &Path) -> Result<String, String> {
+    let metadata = fs::metadata(path).map_err(|error| error.to_string())?;
+    if !metadata.is_file() {
+        return Err("it is no ordinary file: expected a text file".to_owned());
+    }
+    let mut text = String::new();
+    let mut file = File::open(path).map_err(|error| error.to_string())?.take(LONGEST_FILE + 1);
+    file.read_to_string(&mut text).map_err(|error| error.to_string())?;
+    match file.limit() {
+        0 => Err(format!("it is longer than {} KiB: expected a configuration", LONGEST_FILE >> 10)),
+        _ => Ok(text),
+    }
+}
+
+/// Two lines over one port would talk into each other. A gateway for Modbus TCP keeps its connections apart, but not two
+/// masters of one unit.
+pub(super) fn ports(source: Source<'_>, raw: &file::File, lines: &[LinePart]) -> Result<(), ConfigError> {
+    let mut taken: BTreeMap<Wire, &str> = BTreeMap::new();
+    let mut hosts = Hosts::default();
+    for line in lines {
+        let entry = raw.lines().find(|(name, _)| *name.get_ref() == line.name);
+        let span = entry.and_then(|(_, entry)| entry.place("port")).unwrap_or_default();
+        let wires = match &line.config.endpoint {
+            Endpoint::Serial(path) => {
+                terminal(path).map_err(|problem| source.error(span.clone(), problem))?;
+                vec![Wire::serial(path)]
+            }
+            Endpoint::Tcp(address) if line.config.protocol.is_paced() => {
+                vec![Wire::Server(hosts.of(address))]
+            }
+            Endpoint::Tcp(address) => {
+                let host = hosts.of(address);
+                line.drives.iter().map(|drive| Wire::Unit(host.clone(), drive.name.slave.number())).collect()
+            }
+            _ => continue,
+        };
+        for wire in wires {
+            let unit = if let Wire::Unit(_, unit) = &wire { Some(*unit) } else { None };
+            if let Some(other) = taken.insert(wire, &line.name).filter(|other| *other != line.name) {
+                let problem = match unit {
+                    Some(unit) => {
+                        format!("its unit {unit} is on line {other:?} too: expected it on one line")
+                    }
+                    None => {
+                        format!("it is the port of line {other:?} too: expected all its drives on one line")
+                    }
+                };
+                return Err(source.error(span, problem));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What only one line can have.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Wire {
+    /// A serial port that is not there now, by its name.
+    Named(String),
+    /// A serial port, by the device behind its names.
+    Device(u64),
+    Server(Host),
+    Unit(Host, u8),
+}
+
+impl Wire {
+    #[cfg(unix)]
+    fn serial(path: &Path) -> Self {
+        use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
+        match fs::metadata(path) {
+            Ok(metadata) if metadata.file_type().is_char_device() => Self::Device(metadata.rdev()),
+            _ => Self::Named(path.display().to_string()),
+        }
+    }
+
+    #[cfg(not(unix))]
+    fn serial(path: &Path) -> Self {
+        Self::Named(path.display().to_string().to_ascii_lowercase())
+    }
+}
+
+/// A path that is there and cannot be a serial port. One that is not there may come.
+#[cfg(unix)]
+fn terminal(path: &Path) -> Result<(), String> {
+    use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
+    /// `/dev/null`, `/dev/zero` and the like.
+    const MEMORY: u64 = 1;
+    match fs::metadata(path) {
+        Ok(metadata) if !metadata.file_type().is_char_device() || metadata.rdev() >> 8 & 0xFFF == MEMORY => {
+            Err(format!("{} is no terminal: expected a serial port, such as /dev/ttyUSB0", path.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn terminal(_: &Path) -> Result<(), String> {
+    Ok(())
+}
+
+/// A server: by its addresses where its name had to be looked up, else by its name.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Host {
+    port: String,
+    name: String,
+}
+
+/// The servers so far.
+#[derive(Default)]
+struct Hosts(Vec<(Host, Vec<SocketAddr>)>);
+
+impl Hosts {
+    /// The server of `HOST:PORT`, the same for each of its names. Names are looked up only where two of them have one port.
+    fn of(&mut self, address: &str) -> Host {
+        let (name, port) = address.rsplit_once(':').unwrap_or((address, ""));
+        let name = name.trim_end_matches('.').to_ascii_lowercase();
+        let host = Host { port: port.to_owned(), name };
+        if let Some((known, _)) = self.0.iter().find(|(known, _)| *known == host) {
+            return known.clone();
+        }
+        let others = self.0.iter_mut().filter(|(other, _)| other.port == host.port);
+        let look_up = |host: &Host| -> Vec<SocketAddr> {
+            // A name that nobody knows now is nobody's second name.
+            format!("{}:{}", host.name, host.port)
+                .to_socket_addrs()
+                .map(Iterator::collect)
+                .unwrap_or_default()
+        };
+        let mut addresses = Vec::new();
+        for (other, known) in others {
+            if addresses.is_empty() {
+                addresses = look_up(&host);
+            }
+            if known.is_empty() {
+                *known = look_up(other);
+            }
+            if known.iter().any(|address| addresses.contains(address)) {
+                return other.clone();
+            }
+        }
+        self.0.push((host.clone(), addresses));
+        host
+    }
+}

@@ -1,0 +1,327 @@
+//! The one drive that a subcommand commands: a fleet of one, so that it is commanded by the same rules as a plant's.
+
+use std::{fmt, time::Duration};
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{Error, ErrorKind, PortError, Status, StopMode};
+use drive_families::Options;
+use drive_fleet::{
+    DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
+    Refused, Started, StopModes, StopOrder, Times, Unknown,
+};
+use tokio::time::{Instant, interval_at, timeout};
+
+use drived_client::own_line;
+use drived_words::{drive_spec::DriveName, failure::Failure, output, signals::Ending};
+
+/// What whoever waits for a stop has to know.
+pub const UNCONFIRMED: &str = "STOP NOT CONFIRMED, the motor may turn: use the emergency stop";
+
+/// How long a drive may take to answer for the first time, over a line that is disturbed or comes and goes.
+const CONNECTED_WITHIN: Duration = Duration::from_secs(5);
+
+/// How long a command may take to show: a drive that restarts by its reset is mute for a while.
+const RESTART: Duration = Duration::from_secs(10);
+
+/// From the call of a stop until its lack of a confirmation is an alarm.
+const STOP_TIME: Duration = Duration::from_secs(5);
+
+/// Between two words about a stop that is not confirmed.
+const SECOND: Duration = Duration::from_secs(1);
+
+/// From one status to the next, so that the motor is watched while it is commanded.
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// The fleet of one drive.
+pub struct Commanded {
+    pub name: DriveName,
+    handle: DriveHandle,
+    events: Events,
+    config: LineConfig,
+    line: Line,
+    ending: Ending,
+    /// Nobody is told on stdout how it goes, because that is for an object.
+    pub is_quiet: bool,
+}
+
+impl Commanded {
+    /// A drive on an open line. `accepted`: the settings by which it may start again by itself.
+    pub fn over(
+        name: DriveName,
+        line: Line,
+        config: LineConfig,
+        options: &Options,
+        accepted: Vec<String>,
+    ) -> Result<Self, Failure> {
+        let ending = Ending::listen()?;
+        let settings = DriveSettings {
+            accept_self_restart: accepted,
+            periods: Periods { running: PERIOD, rest: PERIOD, slow: Duration::ZERO, ..Periods::default() },
+            times: Times {
+                lifetime: CONNECTED_WITHIN,
+                effect: RESTART,
+                stop_alarm: STOP_TIME,
+                ..Times::default()
+            },
+            ..DriveSettings::controlled(name.to_string())
+        };
+        let input = |error: &dyn fmt::Display| Failure::Input(error.to_string());
+        let builder = Fleet::builder().line("line", line.clone()).whatever_the_plan();
+        let fleet = builder
+            .drive("line", name.slave.number(), settings, |port, slave| {
+                name.family.open_with(port, slave, options)
+            })
+            .start()
+            .map_err(|error| input(&error))?;
+        let Some(handle) = fleet.drives().pop() else { return Err(input(&"the fleet has no drive")) };
+        Ok(Self { name, handle, events: fleet.events(), config, line, ending, is_quiet: false })
+    }
+
+    /// What is known of the drive now.
+    pub fn status(&self) -> Status {
+        let snapshot = self.handle.snapshot();
+        snapshot.status.as_ref().map(|status| Status::clone(&status.value)).unwrap_or_default()
+    }
+
+    /// Waits until the drive has answered, and then for what becomes of a command.
+    pub async fn command(
+        &mut self,
+        command: impl AsyncFn(DriveHandle) -> Outcome,
+    ) -> Result<Outcome, Failure> {
+        self.connected().await?;
+        own_line::told(self.name, &mut self.ending, undisturbed(&self.handle, command)).await
+    }
+
+    /// The same for a start: whoever asks the program to end before it is confirmed wants a motor that stands.
+    pub async fn start(
+        &mut self,
+        command: impl AsyncFn(DriveHandle) -> Outcome,
+    ) -> Result<(Started, Status), Failure> {
+        self.connected().await?;
+        let outcome = tokio::select! {
+            biased;
+            outcome = undisturbed(&self.handle, command) => Some(outcome),
+            () = self.ending.asked() => None,
+        };
+        let why = match outcome {
+            Some(Outcome::Started(started)) => return Ok((started, self.status())),
+            Some(outcome @ (Outcome::Refused(_) | Outcome::Expired)) => return Err(self.failure(&outcome)),
+            Some(outcome) => format!("the start is {outcome}"),
+            None => "asked to end before the start was confirmed".to_owned(),
+        };
+        let (_, stopped) = self.stop(StopMode::Ramp).await.map_err(|failure| {
+            Failure::Drive(format!("{failure}; it was to be stopped again, because {why}"))
+        })?;
+        Err(Failure::Drive(format!(
+            "{}: {why}, so it was stopped again: the drive shows {stopped}",
+            self.name
+        )))
+    }
+
+    /// Stops the motor and tells how that goes. Gives how it was stopped, and the status at standstill.
+    ///
+    /// A verdict comes in its time, whatever line and port do.
+    pub async fn stop(&mut self, order: impl Into<StopOrder>) -> Result<(StopModes, Status), Failure> {
+        let name = self.name;
+        let stop = self.handle.stop(order);
+        let mut watch = self.handle.watch();
+        let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
+        let (mut waited, mut taken) = (0, false);
+        let outcome = loop {
+            tokio::select! {
+                biased;
+                outcome = stop.finished() => break outcome,
+                () = self.ending.asked() => {
+                    return Err(Failure::Drive(match taken {
+                        true => format!(
+                            "{name}: asked to end while the motor came to its stop: the drive showed {}", self.status()
+                        ),
+                        false => format!("{UNCONFIRMED}. {name}: asked to end before it was confirmed"),
+                    }));
+                }
+                Ok(()) = watch.changed() => {
+                    let Some(pending) = watch.borrow_and_update().stop else { continue };
+                    let first = pending.taken && !std::mem::replace(&mut taken, pending.taken);
+                    if first {
+                        self.tell_what_it_took().await;
+                        // A reader who went away ends no stop.
+                        let _ = self.say(format_args!(
+                            "{name} is stopping ({} stop): the drive shows {}", pending.mode, self.status()
+                        ));
+                    }
+                }
+                _ = seconds.tick(), if !taken => {
+                    waited += 1;
+                    let sent = match self.handle.snapshot().stop.map_or(0, |stop| stop.attempts) {
+                        0 => "no attempt has ended yet".to_owned(),
+                        1 => "sent 1 time".to_owned(),
+                        times => format!("sent {times} times"),
+                    };
+                    let _ = self.say(format_args!(
+                        "{name} has not confirmed the stop after {waited} s, {sent}: it goes on"
+                    ));
+                }
+            }
+        };
+        self.tell_what_it_took().await;
+        match outcome {
+            Outcome::Stopped(modes) => Ok((modes, self.status())),
+            outcome @ Outcome::NotConfirmed(_) if taken => {
+                Err(Failure::Drive(format!("{name} has taken the stop and does not stand: {outcome}")))
+            }
+            outcome => Err(Failure::Drive(format!("{UNCONFIRMED}. {}", self.failure(&outcome)))),
+        }
+    }
+
+    /// Whether nothing can be sent.
+    pub fn is_unsent(&self) -> bool {
+        self.handle.snapshot().error.as_ref().is_some_and(|error| error.kind() == ErrorKind::NotSent)
+    }
+
+    /// Tells what a stop has taken besides: another mode's place, or the command from somebody else.
+    async fn tell_what_it_took(&mut self) {
+        while let Ok(Received::Event(Event { kind, .. })) = timeout(Duration::ZERO, self.events.recv()).await
+        {
+            if matches!(kind, EventKind::StopModeReplaced { .. } | EventKind::StopTookCommand(_)) {
+                let _ = self.say(format_args!("{}: {kind}", self.name));
+            }
+        }
+    }
+
+    fn say(&self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
+        match self.is_quiet {
+            true => output::complain(text),
+            false => output::say(text)?,
+        }
+        Ok(())
+    }
+
+    async fn connected(&mut self) -> Result<(), Failure> {
+        let answered = self.handle.wait_until(|snapshot| {
+            snapshot.link == Link::Connected
+                || snapshot
+                    .error
+                    .as_ref()
+                    .is_some_and(|error| error.kind() != ErrorKind::NotSent && !is_disturbed(error))
+        });
+        let snapshot = tokio::select! {
+            snapshot = timeout(CONNECTED_WITHIN, answered) => snapshot.unwrap_or_else(|_| self.handle.snapshot()),
+            () = self.ending.asked() => {
+                return Err(Failure::Drive(format!("{}: asked to end, and nothing was sent", self.name)));
+            }
+        };
+        if snapshot.link == Link::Connected {
+            return Ok(());
+        }
+        Err(Failure::Drive(match &snapshot.error {
+            Some(error) => own_line::words(self.name, &self.config, error),
+            None => format!("{} does not answer", self.name),
+        }))
+    }
+
+    /// What a person reads of a command that is not confirmed.
+    pub fn failure(&self, outcome: &Outcome) -> Failure {
+        let (name, config) = (self.name, &self.config);
+        Failure::Drive(match outcome {
+            Outcome::Refused(Refused::Drive(error)) => own_line::words(name, config, error),
+            Outcome::OutcomeUnknown(Unknown { error: Some(error), last, .. }) => {
+                format!("{}{}", own_line::words(name, config, error), seen(last.as_ref()))
+            }
+            outcome => format!("{name}: {outcome}"),
+        })
+    }
+
+    /// Closes the port, if it lets itself be closed.
+    pub async fn close(self) {
+        own_line::close(&self.line).await;
+    }
+}
+
+/// What becomes of a command. One that is refused because an answer was damaged, or in doubt because this host was away for a
+/// moment, is given again for as long as a drive has to answer: nothing was sent.
+async fn undisturbed(handle: &DriveHandle, command: impl AsyncFn(DriveHandle) -> Outcome) -> Outcome {
+    let until = Instant::now() + CONNECTED_WITHIN;
+    loop {
+        match command(handle.clone()).await {
+            Outcome::Refused(Refused::Drive(error)) if is_disturbed(&error) && Instant::now() < until => {}
+            outcome => return outcome,
+        }
+    }
+}
+
+/// Whether somebody answered, and not so that it can be believed.
+const fn is_disturbed(error: &Error) -> bool {
+    matches!(error, Error::Port { problem: PortError::Damaged(_) | PortError::Mismatch(_), .. })
+}
+
+fn seen(last: Option<&LastSeen>) -> String {
+    last.map_or_else(String::new, |last| format!("; it was last seen {last}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
+    use drive_families::Family;
+    use drive_sim::{SimLine, Wiring};
+    use tokio::time::sleep;
+
+    use super::*;
+    use drived_simulated::{self as simulated, SetUp};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_start_that_is_given_up_at_any_moment_leaves_no_motor_running() {
+        for family in Family::ALL {
+            let mut taken_back = 0;
+            for after in (0..1_500).step_by(50).map(Duration::from_millis) {
+                let settings: SerialSettings = family.capabilities().factory;
+                let simulated = SimLine::new(Wiring::rtu(settings));
+                let machine = simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+                let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+                let line = Line::over(simulated.in_memory(), config.clone());
+                let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
+                let options = simulated::options();
+                let mut one = Commanded::over(name, line, config, &options, Vec::new()).unwrap();
+                let setpoint = Frequency::from_hertz(20);
+                let held = one.command(async |drive| drive.set_setpoint(setpoint).await).await.unwrap();
+                assert!(held.is_confirmed(), "{family}: {held}");
+                one.ending.at(Instant::now() + after);
+                let started = one.start(async |drive| drive.start(Direction::Forward).await).await;
+                taken_back += usize::from(
+                    started
+                        .as_ref()
+                        .is_err_and(|failure| failure.to_string().contains("so it was stopped again")),
+                );
+                sleep(Duration::from_secs(10)).await;
+                assert_eq!(
+                    machine.observe().running,
+                    started.is_ok(),
+                    "{family} after {after:?}: {started:?}"
+                );
+            }
+            assert!(taken_back > 0, "{family}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_trip_of_every_family_is_read_as_a_fault_and_reset() {
+        for family in Family::ALL {
+            let settings = family.capabilities().factory;
+            let wire = SimLine::new(Wiring::rtu(settings));
+            let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+            let machine = wire.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            let line = Line::over(wire.in_memory(), config.clone());
+            let slave = SlaveAddress::try_from(1).unwrap();
+            let mut drive = family.open_with(line.slave(1), slave, &simulated::options());
+            assert!(!drive.status().await.unwrap().is_fault(), "{family}");
+            machine.trip(simulated::trip_code(family));
+            assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
+            assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
+            let name = DriveName { family, slave };
+            let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
+            // Where any word of the bus takes the command, a stop takes it: a reset is no way to.
+            one.stop(drive_core::StopMode::Ramp).await.unwrap();
+            let outcome = one.command(async |drive| drive.reset_faults().await).await.unwrap();
+            assert!(outcome.is_confirmed() && !one.status().is_fault(), "{family}: {outcome}");
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! `drived explain`: what goes over a line, frame by frame, in words.
+
+use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+
+use drive_core::SerialSettings;
+use drive_families::Family;
+use serde_json::json;
+use tokio::time::{Instant, sleep};
+
+use super::frames::Frames;
+use crate::explain::{Counts, Explained, Explainer, Known};
+use drived_client::DaemonArgs;
+use drived_file::Config;
+use drived_words::{
+    drive_spec::{DriveName, DriveSpec, on_one_line},
+    failure::Failure,
+    json,
+    line_spec::{self, LineSpec, SerialSpec, describe},
+    output::{self, counted, milliseconds},
+    signals::Ending,
+};
+
+/// For how long a line of the daemon is captured, unless it is said.
+const SECONDS: u64 = 10;
+
+/// Put what goes over a line into words: each frame, which drive, which register, which bit has changed, which silence was too short
+///
+/// From a capture, a pcapng file as drived writes it; from a line of the running daemon; or from a port that is only
+/// listened to, to which nothing is ever written: frame by frame as they are heard, until Ctrl-C. Without the drives'
+/// families registers have numbers alone. Times are seconds since the first frame.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The capture
+    #[arg(value_name = "FILE", required_unless_present_any = ["from", "line"], conflicts_with_all = ["from", "line"])]
+    file: Option<PathBuf>,
+    /// A line of the running daemon, by its name
+    #[arg(long, value_name = "LINE", conflicts_with = "line")]
+    from: Option<String>,
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "PORT", help = line_spec::TO_LISTEN_TO, conflicts_with = "serial")]
+    line: Option<LineSpec>,
+    /// For how many seconds; 10 of the daemon, until Ctrl-C from a port
+    #[arg(long, value_name = "SECONDS", conflicts_with = "file", value_parser = clap::value_parser!(u64).range(1..))]
+    seconds: Option<u64>,
+    /// Which drives are on the line
+    #[arg(long, value_name = "FAMILY@ADDRESSES")]
+    drive: Vec<DriveSpec>,
+    /// Speed and format of the line, by which the silences are judged, such as 19200,8E1
+    #[arg(long, value_name = "BAUD[,FORMAT]")]
+    serial: Option<SerialSpec>,
+    /// The configuration that has the line: its drives, speed and format
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["drive", "serial"])]
+    config: Option<PathBuf>,
+    /// Which of its lines, if it has several
+    #[arg(long, value_name = "NAME", requires = "config")]
+    name: Option<String>,
+    /// Show only what is wrong
+    #[arg(long)]
+    trouble: bool,
+    #[command(flatten)]
+    daemon: DaemonArgs,
+}
+
+pub async fn run(args: Args) -> Result<(), Failure> {
+    let mut ending = Ending::listen()?;
+    let drives = on_one_line(&args.drive).map_err(|error| Failure::Input(error.to_string()))?;
+    let (mut frames, known) = open(&args, &drives).await?;
+    let known = match (&args.config, known) {
+        (Some(file), _) => of_config(file, args.name.as_deref())?,
+        (None, Some(known)) => known,
+        (None, None) => of_options(args.serial, &drives)?,
+    };
+    let mut explainer = Explainer::new(Known { late: frames.late(), ..known });
+    let until =
+        args.line.as_ref().and(args.seconds).map(|seconds| Instant::now() + Duration::from_secs(seconds));
+    let mut began = None;
+    loop {
+        let frame = tokio::select! {
+            biased;
+            () = ending.asked() => break,
+            () = passed(until) => break,
+            frame = frames.next() => frame?,
+        };
+        let Some(frame) = frame else { break };
+        let explained = explainer.explain(frames.dissector(), &frame);
+        let began = *began.get_or_insert(frame.at);
+        if args.trouble && explained.trouble.is_empty() {
+            continue;
+        }
+        if args.daemon.is_json() {
+            output::say_as_it_is(json::line(&explained))?;
+        } else {
+            say(&explained, began, explainer.late())?;
+        }
+    }
+    let counts = explainer.counts();
+    if args.daemon.is_json() {
+        return output::say_as_it_is(json!({ "counts": counts }));
+    }
+    say_counts(counts, explainer.late())
+}
+
+/// The frames that are asked for, and what is known of their line without the other options.
+async fn open(args: &Args, drives: &[DriveName]) -> Result<(Frames, Option<Known>), Failure> {
+    match (&args.file, &args.from, &args.line) {
+        (Some(file), ..) => Ok((Frames::of_file(file)?, None)),
+        (_, Some(line), _) => {
+            let seconds = args.seconds.unwrap_or(SECONDS);
+            let (frames, known) = Frames::of_daemon(&args.daemon, line, seconds).await?;
+            Ok((frames, Some(known).filter(|_| drives.is_empty() && args.serial.is_none())))
+        }
+        (.., Some(port)) => {
+            let config = port.config(drives).map_err(|error| Failure::Input(error.to_string()))?;
+            let frames = Frames::of_port(&config).await?;
+            if !args.daemon.is_json() {
+                let port = describe(&config);
+                output::say(format_args!("listening to {port}; nothing is ever written (Ctrl-C ends it)"))?;
+            }
+            let known = Known { serial: Some(config.serial), late: None, drives: named(drives) };
+            Ok((frames, Some(known)))
+        }
+        _ => Err(Failure::Input("expected FILE, --from LINE or --line PORT".to_owned())),
+    }
+}
+
+async fn passed(until: Option<Instant>) {
+    match until {
+        Some(until) => sleep(until.saturating_duration_since(Instant::now())).await,
+        None => std::future::pending().await,
+    }
+}
+
+fn say(explained: &Explained, began: Duration, late: Option<Duration>) -> Result<(), Failure> {
+    let Explained { at, sent, slave, drive, text, details, trouble, after, .. } = explained;
+    let since = at.saturating_sub(began).as_micros();
+    let way = match sent {
+        Some(true) => ">",
+        Some(false) => "<",
+        None => "?",
+    };
+    let who = match (slave, drive) {
+        (_, Some(name)) => format!("{name}: "),
+        (Some(0), None) => "all: ".to_owned(),
+        (Some(slave), None) => format!("slave {slave}: "),
+        (None, None) => String::new(),
+    };
+    let after = after.map(|after| match late {
+        Some(_) => format!(", after about {} ms", after.as_millis()),
+        None => format!(", after {}", milliseconds(after)),
+    });
+    let after = after.unwrap_or_default();
+    let (seconds, rest) = (since / 1_000_000, since % 1_000_000 / 10);
+    output::say_behind(&format!("{seconds:>4}.{rest:05} {way} "), &format!("{who}{text}{after}"))?;
+    for detail in details {
+        output::say_behind("             ", detail)?;
+    }
+    for what in trouble {
+        output::say_behind("           ! ", what)?;
+    }
+    Ok(())
+}
+
+fn say_counts(counts: Counts, late: Option<Duration>) -> Result<(), Failure> {
+    let Counts { requests, answers, exceptions, unanswered, damaged, silences_broken, silences_doubtful } =
+        counts;
+    let told = format!(
+        "{requests} requests, {answers} answers, {exceptions} exceptions, {unanswered} without an answer, \
+         {damaged} damaged, {silences_broken} silences too short"
+    );
+    let Some(late) = late else { return output::say(told) };
+    let doubtful = counted(usize::try_from(silences_doubtful).unwrap_or(usize::MAX), "silence", "silences");
+    output::say(format_args!(
+        "{told}; {doubtful} too close to call: frames are heard up to {} late",
+        milliseconds(late)
+    ))
+}
+
+/// What the options say of the line.
+fn of_options(serial: Option<SerialSpec>, drives: &[DriveName]) -> Result<Known, Failure> {
+    let serial = serial.map(|serial| serial.settings(drives)).transpose();
+    let serial = serial.map_err(|error| Failure::Input(error.to_string()))?;
+    Ok(Known { serial, late: None, drives: named(drives) })
+}
+
+/// The drives by their addresses.
+pub(super) fn named(drives: &[DriveName]) -> BTreeMap<u8, (Family, String)> {
+    drives.iter().map(|drive| (drive.slave.number(), (drive.family, drive.to_string()))).collect()
+}
+
+/// What a configuration says of the line.
+fn of_config(file: &std::path::Path, name: Option<&str>) -> Result<Known, Failure> {
+    let config = Config::load(file).map_err(|error| Failure::Input(error.to_string()))?;
+    let mut found = config.lines.iter().filter(|line| name.is_none_or(|name| line.name == name));
+    let (Some(line), None) = (found.next(), found.next()) else {
+        let names: Vec<&str> = config.lines.iter().map(|line| line.name.as_str()).collect();
+        return Err(Failure::Input(format!("expected --name with one of the lines: {}", names.join(", "))));
+    };
+    let drives: BTreeMap<u8, (Family, String)> = line
+        .drives
+        .iter()
+        .map(|drive| (drive.name.slave.number(), (drive.name.family, drive.settings.name.clone())))
+        .collect();
+    let serial: Option<SerialSettings> = line.config.protocol.is_paced().then_some(line.config.serial);
+    Ok(Known { serial, late: None, drives })
+}

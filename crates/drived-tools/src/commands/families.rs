@@ -1,0 +1,120 @@
+//! `drived families`: the families of drives, and what their owner can say of one.
+
+use drive_core::{Capabilities, WatchdogCapability};
+use drive_families::{Family, OPTIONS, Options};
+use serde_json::{Value, json};
+
+use drived_words::{
+    failure::Failure,
+    output::{self, JsonArgs, Table},
+};
+
+/// List the families of drives; for one of them, what it can do and its options
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// One family, such as 3g3ev
+    #[arg(value_name = "FAMILY")]
+    family: Option<Family>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    match args.family {
+        Some(family) => args.json.say(|| object(family), || one(family)),
+        None if args.json.is_json() => {
+            Family::ALL.into_iter().try_for_each(|family| output::say_as_it_is(object(family)))
+        }
+        None => all(),
+    }
+}
+
+/// What a family can do, for a program.
+fn object(family: Family) -> Value {
+    let capabilities = family.capabilities();
+    let texts = |all: &[&str]| all.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let options = OPTIONS.iter().filter(|option| option.family == family);
+    let options = options
+        .map(|option| json!({ "name": option.name, "meaning": option.meaning, "value": option.value }));
+    json!({
+        "family": family.to_string(),
+        "name": capabilities.name,
+        "highest_address": capabilities.highest_address,
+        "speeds": capabilities.speeds,
+        "formats": capabilities.formats.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "protocols": texts(capabilities.protocols),
+        "factory": capabilities.factory.to_string(),
+        "stop_modes": capabilities.stop_modes.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "fault_reset": capabilities.fault_reset,
+        "stations": capabilities.stations,
+        "watchdog": watchdogs(family),
+        "identification": capabilities.identification,
+        "persist": capabilities.persist,
+        "options": options.collect::<Vec<_>>(),
+    })
+}
+
+fn all() -> Result<(), Failure> {
+    let mut table = Table::new(["family", "drive", "addresses", "speeds", "protocols"]);
+    for family in Family::ALL {
+        let Capabilities { name, highest_address, speeds, .. } = family.capabilities();
+        table.row([
+            family.to_string(),
+            (*name).to_owned(),
+            format!("1-{highest_address}"),
+            list(speeds),
+            list(family.capabilities().protocols),
+        ]);
+    }
+    output::say_table(table)
+}
+
+fn one(family: Family) -> Result<(), Failure> {
+    let capabilities = family.capabilities();
+    output::say(format_args!("{family}: {}", capabilities.name))?;
+    let mut facts = Table::texts();
+    let mut fact = |label: &str, value: String| facts.row([format!("  {label}"), value]);
+    fact("addresses", format!("1 to {}", capabilities.highest_address));
+    fact("speeds", list(capabilities.speeds));
+    fact("formats", list(capabilities.formats));
+    fact("protocols", list(family.capabilities().protocols));
+    fact("factory setting", capabilities.factory.to_string());
+    fact("stop modes", list(capabilities.stop_modes));
+    fact("fault reset", capabilities.fault_reset.to_owned());
+    fact("stations on a segment", capabilities.stations.to_string());
+    fact("watchdog", watchdogs(family));
+    fact("identification", capabilities.identification.unwrap_or("none").to_owned());
+    fact("save to EEPROM", capabilities.persist.unwrap_or("no command").to_owned());
+    output::say_table(facts)?;
+    let mut options = Table::new(["  --option", "what it says", "value"]);
+    for option in OPTIONS.iter().filter(|option| option.family == family) {
+        options.row([format!("  {}", option.name), option.meaning.to_owned(), option.value.to_owned()]);
+    }
+    if options.is_empty() { output::say("  no options") } else { output::say_table(options) }
+}
+
+/// The watchdog on each of the family's protocols.
+fn watchdogs(family: Family) -> String {
+    let on = |ascii| watchdog(family.watchdog(ascii, &Options::default()));
+    match on(false) == on(true) {
+        true => on(false),
+        false => format!("{}; in ASCII {}", on(false), on(true)),
+    }
+}
+
+fn watchdog(capability: Option<WatchdogCapability>) -> String {
+    let Some(watchdog) = capability else { return "none that the bus can read or set".to_owned() };
+    let time = match watchdog.min == watchdog.max {
+        true => format!("{:?}", watchdog.min),
+        false => format!("{:?} to {:?}", watchdog.min, watchdog.max),
+    };
+    let by = if watchdog.settable { "set over the bus" } else { "not settable over the bus" };
+    match watchdog.reactions {
+        [] => format!("{time}, {by}"),
+        reactions => format!("{time}, {by}; {}", list(reactions)),
+    }
+}
+
+fn list<T: ToString>(values: &[T]) -> String {
+    values.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}

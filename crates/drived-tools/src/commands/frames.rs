@@ -1,0 +1,131 @@
+//! Frames of a line as they come: from a capture, from a port that is only listened to, from a line of the running daemon.
+
+use std::{collections::VecDeque, fs, path::Path, time::Duration};
+
+use drive_bus::{
+    LineConfig,
+    capture::{self, Captured, Dissector, Reader},
+    listen::Listener,
+};
+use http_body_util::BodyExt as _;
+use hyper::body::Incoming;
+
+use crate::explain::Known;
+use drived_client::{DaemonArgs, path_of};
+use drived_plant::plant::views::{LineView, StateView};
+use drived_words::{failure::Failure, line_spec::LineSpec};
+
+/// The longest capture that is read.
+const LONGEST: u64 = 256 << 20;
+
+/// Where frames come from.
+pub(super) struct Frames {
+    source: Source,
+    dissector: Dissector,
+    late: Option<Duration>,
+}
+
+enum Source {
+    File(VecDeque<Captured>),
+    Port(Listener),
+    Daemon(Box<(Incoming, Reader)>),
+}
+
+impl Frames {
+    /// Those of a capture.
+    pub(super) fn of_file(file: &Path) -> Result<Self, Failure> {
+        let failed = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", file.display()));
+        let found = fs::metadata(file).map_err(|error| failed(&error))?;
+        if !found.is_file() || found.len() > LONGEST {
+            return Err(failed(&format_args!("expected a file of at most {} MiB", LONGEST >> 20)));
+        }
+        let bytes = fs::read(file).map_err(|error| failed(&error))?;
+        let recording = capture::read(&bytes).map_err(|error| failed(&error))?;
+        let (dissector, late) = (recording.dissector, recording.late);
+        Ok(Self { source: Source::File(recording.frames.into()), dissector, late })
+    }
+
+    /// Those that are heard on a port from now on.
+    pub(super) async fn of_port(config: &LineConfig) -> Result<Self, Failure> {
+        let listener = Listener::open(config).await.map_err(|error| Failure::Input(error.to_string()))?;
+        let late = Some(listener.late());
+        Ok(Self { source: Source::Port(listener), dissector: Dissector::of(config), late })
+    }
+
+    /// Those of a line of the running daemon from now on, for so many seconds, and what it knows of the line.
+    pub(super) async fn of_daemon(
+        args: &DaemonArgs,
+        line: &str,
+        seconds: u64,
+    ) -> Result<(Self, Known), Failure> {
+        let mut daemon = args.connect().await?;
+        let state = daemon.state().await?;
+        let Some(found) = state.lines.iter().find(|known| known.name == *line) else {
+            let names: Vec<&str> = state.lines.iter().map(|line| line.name.as_str()).collect();
+            let names = names.join(", ");
+            return Err(Failure::Input(format!("there is no line {line:?}: expected one of {names}")));
+        };
+        let known = known(&state, found);
+        let path = format!("{}/capture?seconds={seconds}", path_of(&["lines", line]));
+        let answer = daemon.send("GET", &path, None).await?;
+        if !answer.status().is_success() {
+            return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
+        }
+        let source = Source::Daemon(Box::new((answer.into_body(), Reader::default())));
+        Ok((Self { source, dissector: Dissector::Data, late: None }, known))
+    }
+
+    /// What the line speaks, as far as the frames that came have told it.
+    pub(super) const fn dissector(&self) -> Dissector {
+        self.dissector
+    }
+
+    /// How late a frame is handed over at the most, where the line is only listened to.
+    pub(super) const fn late(&self) -> Option<Duration> {
+        self.late
+    }
+
+    /// The next frame; `None` when there are no more. Safe to drop.
+    pub(super) async fn next(&mut self) -> Result<Option<Captured>, Failure> {
+        match &mut self.source {
+            Source::File(frames) => Ok(frames.pop_front()),
+            Source::Port(listener) => {
+                let heard = listener.next().await;
+                let heard = heard.map_err(|error| Failure::Drive(format!("the port is gone: {error}")))?;
+                match heard {
+                    Some(heard) => Ok(Some(heard.captured())),
+                    None => Err(Failure::Drive("the port is gone".to_owned())),
+                }
+            }
+            Source::Daemon(daemon) => {
+                let (body, reader) = &mut **daemon;
+                let failed = |error: &dyn std::fmt::Display| {
+                    Failure::Drive(format!("the capture of the daemon broke off: {error}"))
+                };
+                loop {
+                    if let Some(frame) = reader.next_frame().map_err(|error| failed(&error))? {
+                        self.dissector = reader.dissector();
+                        return Ok(Some(frame));
+                    }
+                    match body.frame().await {
+                        Some(piece) => {
+                            let piece = piece.map_err(|error| failed(&error))?;
+                            reader.push(piece.data_ref().map_or(&[][..], |data| data));
+                        }
+                        None => return Ok(None),
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What the daemon's state says of a line.
+fn known(state: &StateView, line: &LineView) -> Known {
+    let drives = state.drives.iter().filter(|drive| drive.line == line.name);
+    let drives =
+        drives.filter_map(|drive| Some((drive.slave, (drive.family.parse().ok()?, drive.name().to_owned()))));
+    let config = line.port.parse::<LineSpec>().ok().and_then(|port| port.config(&[]).ok());
+    let serial = config.filter(|config| config.protocol.is_paced()).map(|config| config.serial);
+    Known { serial, late: None, drives: drives.collect() }
+}

@@ -1,0 +1,19 @@
+//! What the API says in one word, in plain words: those of the page.
+
+use drived_plant::plant::commands::OutcomeWord;
+
+/// What became of a command.
+pub(super) fn outcome(word: OutcomeWord) -> String {
+    match word {
+        OutcomeWord::NotConfirmed => "NOT confirmed".to_owned(),
+        OutcomeWord::Unknown => "outcome unknown".to_owned(),
+        OutcomeWord::Superseded => "superseded by a later command".to_owned(),
+        word => word.to_string(),
+    }
+}
+
+/// A moment on the wall's clock.
+pub(super) fn clock(unix_ms: u64) -> String {
+    let at = i64::try_from(unix_ms).ok().and_then(chrono::DateTime::from_timestamp_millis);
+    at.map_or_else(|| "-".to_owned(), |at| at.with_timezone(&chrono::Local).format("%H:%M:%S").to_string())
+}

@@ -1,0 +1,340 @@
+//! `drived param restore`: what a file has kept goes back into a drive.
+
+mod carry;
+mod plan;
+
+use std::path::{Path, PathBuf};
+
+use drive_core::registers::{Change, Part, Restoring};
+use serde_json::{Map, Value, json};
+
+use self::{
+    carry::{Carried, carry},
+    plan::Plan,
+};
+use super::{
+    diff::Comparison,
+    file::Backup,
+    source::{Source, SourceArgs},
+};
+use drived_file::ledger::LedgerArgs;
+use drived_words::{failure::Failure, output, signals::Ending};
+
+/// Put parameters from a file back into a drive, in the order that its manual wants; without --write it is only said what would
+/// be written
+///
+/// Only what differs is written, each at standstill and read back, up to the first that is refused; running it again goes on
+/// from there. Through the daemon it needs the right to change parameters.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Files that drived param backup has kept, or a folder of them
+    #[arg(value_name = "FILE|FOLDER", required = true)]
+    files: Vec<PathBuf>,
+    /// The drive, if it is not the one that the file names
+    #[arg(long, value_name = "DRIVE")]
+    to: Option<String>,
+    /// Write
+    #[arg(long)]
+    write: bool,
+    /// Then save the drive's parameters to its EEPROM, where they are kept in RAM until then
+    #[arg(long, requires = "write")]
+    save: bool,
+    /// Write also address, speed and format of the line, last: the drive is not found where it was then
+    #[arg(long)]
+    with_communication: bool,
+    /// Write the rest also where a macro configuration (CFG of an Altivar 312) is another one than in the file: it is only set at
+    /// the drive, and puts the rest back when it is
+    #[arg(long)]
+    other_macro: bool,
+    /// Write also to a drive of another model or rating of the same family
+    #[arg(long)]
+    other_model: bool,
+    #[command(flatten)]
+    source: SourceArgs,
+    #[command(flatten)]
+    ledger: LedgerArgs,
+}
+
+/// What became of one file.
+struct Told {
+    text: Vec<String>,
+    json: Map<String, Value>,
+    failure: Option<Failure>,
+}
+
+pub(super) async fn run(args: Args) -> Result<(), Failure> {
+    let files = files(&args.files)?;
+    if args.to.is_some() && files.len() > 1 {
+        return Err(Failure::Input(
+            "--to is for one file: several go to the drives that they name".to_owned(),
+        ));
+    }
+    // Whatever is wrong with a file is said before anything is written to any drive.
+    let files = files.iter().map(|path| Ok((path, Backup::read(path)?)));
+    let files: Vec<(&PathBuf, Backup)> = files.collect::<Result<_, Failure>>()?;
+    let mut ending = Ending::listen()?;
+    let mut told = Vec::new();
+    let mut result = Ok(());
+    for (path, file) in &files {
+        let named = match &args.to {
+            Some(word) => args.source.one(word).await,
+            None => args.source.of_file(&file.head),
+        };
+        let mut source = args.source.open(&named?).await?;
+        let one = restore(&args, path, file, &mut source, &mut ending).await;
+        source.close().await;
+        let Told { text, json, failure } = match one {
+            Ok(one) => one,
+            Err(failure) => {
+                result = Err(failure);
+                break;
+            }
+        };
+        if !args.source.daemon.is_json() {
+            text.iter().try_for_each(output::say)?;
+        }
+        told.push(Value::Object(json));
+        if let Some(failure) = failure {
+            result = Err(failure);
+            break;
+        }
+    }
+    if args.source.daemon.is_json() {
+        output::say_as_it_is(json!({ "restored": told }))?;
+    }
+    let left: Vec<_> = files.iter().skip(told.len()).map(|(_, file)| file.head.name.as_str()).collect();
+    match result {
+        Err(Failure::Drive(why)) if !left.is_empty() => {
+            Err(Failure::Drive(format!("{why}; nothing was written to {}", left.join(", "))))
+        }
+        result => result,
+    }
+}
+
+/// The files, those of a folder in the order of their names.
+fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let failed = |error: std::io::Error| Failure::Input(format!("{}: {error}", path.display()));
+        let found = std::fs::read_dir(path).map_err(failed)?;
+        let found = found.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();
+        let mut found = found.map_err(failed)?;
+        found.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+        found.sort();
+        if found.is_empty() {
+            return Err(Failure::Input(format!("{} has no files *.toml", path.display())));
+        }
+        files.extend(found);
+    }
+    Ok(files)
+}
+
+async fn restore(
+    args: &Args,
+    path: &Path,
+    file: &Backup,
+    source: &mut Source,
+    ending: &mut Ending,
+) -> Result<Told, Failure> {
+    let name = source.name();
+    let (family, of) = (source.family()?, file.head.family);
+    if family != of {
+        return Err(Failure::Input(format!(
+            "{}: the file is of the family {of}, and {name} is of {family}",
+            path.display()
+        )));
+    }
+    let now = source.keep().await?;
+    let other = other_model(file, &now);
+    if let Some(why) = other.as_ref().filter(|_| !args.other_model) {
+        return Err(Failure::Input(format!(
+            "{name} is another model than that of {}: {why}; --other-model writes all the same",
+            path.display()
+        )));
+    }
+    let plan = Plan::of(file, &now, args.with_communication)?;
+    let by_hand = plan.by_hand(file, &now);
+    if let Some(why) = by_hand.as_ref().filter(|_| args.write && !args.other_macro) {
+        return Err(Failure::Input(format!(
+            "{name}: nothing was written: {why}; --other-macro writes the rest all the same"
+        )));
+    }
+    let mut json = Map::new();
+    json.insert("drive".to_owned(), json!(name));
+    json.insert("file".to_owned(), json!(path));
+    json.extend(plan.json(file, &now).map(|(key, value)| (key.to_owned(), value)));
+    let mut text = Vec::new();
+    if plan.changes.is_empty() {
+        text.push(format!("{name}: nothing to write, it holds what {} has", path.display()));
+    } else {
+        let differ = output::counted(plan.changes.len(), "parameter differs", "parameters differ");
+        text.push(format!("{name}: {differ} from {}", path.display()));
+        text.push(plan.table(file, &now).on_terminal().to_string());
+    }
+    text.extend(other.map(|why| format!("another model: {why}")));
+    text.extend(plan.skipped.iter().map(|(row, why)| format!("not written: {}: {why}", row.code)));
+    text.extend(by_hand.map(|why| format!("before anything is written: {why}")));
+    if !args.write {
+        if !plan.changes.is_empty() {
+            text.push("nothing has been written: --write does it, in this order".to_owned());
+        }
+        return Ok(Told { text, json, failure: None });
+    }
+    if !args.source.daemon.is_json() {
+        text.drain(..).try_for_each(output::say)?;
+    }
+    source.ready_for_writing(&args.ledger).await?;
+    let mut carried = carry(&plan, source, ending).await;
+    let mut failure =
+        carried.stopped.as_ref().map(|stopped| Failure::Drive(stopped.in_words(&name, &carried)));
+    // The line itself may be another one then, and nobody answers where the drive was.
+    let cuts = |change: &Change| of.capabilities().restoring.part(change.row) == Part::Communication;
+    let is_cut = carried.written.iter().any(cuts);
+    if failure.is_none() && !is_cut {
+        failure = verify(file, source, args.with_communication, &plan, &mut carried).await;
+    }
+    let mut saved = false;
+    if failure.is_none() {
+        match keep(args, source, &carried).await {
+            Ok((is_saved, how)) => {
+                saved = is_saved;
+                text.extend(how);
+            }
+            Err(why) => failure = Some(Failure::Drive(format!("all is written, and not saved: {why}"))),
+        }
+    }
+    if !carried.written.is_empty() {
+        let written = output::counted(carried.written.len(), "parameter was", "parameters were");
+        let by_itself = plan.changes.len().saturating_sub(carried.written.len());
+        let more = match by_itself {
+            1.. if failure.is_none() => format!("; {by_itself} more came right by these"),
+            _ => String::new(),
+        };
+        text.insert(0, format!("{name}: {written} written and read back{more}"));
+    }
+    text.extend(later(&of.capabilities().restoring, &carried));
+    json.extend([
+        ("written".to_owned(), carried.written.iter().map(|change| change.row.code).collect()),
+        ("not_written".to_owned(), carried.left.iter().map(|row| row.code).collect()),
+        ("unknown".to_owned(), json!(carried.unknown())),
+        ("eeprom_writes".to_owned(), json!(carried.eeprom_writes())),
+        ("saved".to_owned(), json!(saved)),
+        ("error".to_owned(), json!(failure.as_ref().map(ToString::to_string))),
+    ]);
+    Ok(Told { text, json, failure })
+}
+
+/// What has been written and does not act yet, by what it needs.
+fn later(restoring: &Restoring, carried: &Carried) -> Vec<String> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for Change { row, .. } in &carried.written {
+        let Some(needs) = restoring.acts_later(row.address) else { continue };
+        match all.iter_mut().find(|(known, _)| *known == needs) {
+            Some((_, codes)) => codes.push(row.code),
+            None => all.push((needs, vec![row.code])),
+        }
+    }
+    all.into_iter().map(|(needs, codes)| format!("{}: {needs}", codes.join(", "))).collect()
+}
+
+/// In what the drive is another one than that of the file.
+fn other_model(file: &Backup, now: &Backup) -> Option<String> {
+    let restoring = file.head.family.capabilities().restoring;
+    let mut ratings = file.entries.iter().filter(|entry| restoring.part(entry.row) == Part::Rating);
+    let rating = ratings.find_map(|entry| {
+        let (row, word) = (entry.row, *entry.held.as_ref().ok()?);
+        let held = now.word(row.address).filter(|held| *held != word)?;
+        Some(format!("{} is {} and was {}", row.code, now.text(row, held), file.text(row, word)))
+    });
+    rating.or_else(|| match (&file.head.model, &now.head.model) {
+        (Some(was), Some(is)) if was != is => {
+            Some(format!("it says that it is {is}, and the file is of {was}"))
+        }
+        _ => None,
+    })
+}
+
+/// Reads everything again: what a later write has put back is no success.
+async fn verify(
+    file: &Backup,
+    source: &mut Source,
+    with_communication: bool,
+    plan: &Plan,
+    carried: &mut Carried,
+) -> Option<Failure> {
+    let now = match source.keep().await {
+        Ok(now) => now,
+        Err(failure) => {
+            return Some(Failure::Drive(format!("all is written, and not read once more: {failure}")));
+        }
+    };
+    let differences = Comparison::of(file, &now, with_communication).differences;
+    let is_skipped =
+        |row: &drive_core::Row| plan.skipped.iter().any(|(skipped, _)| skipped.address == row.address);
+    let has = |row: &drive_core::Row| file.word(row.address).is_some();
+    let rows = differences.iter().map(|difference| difference.row);
+    carried.left = rows.filter(|row| has(row) && !is_skipped(row)).collect();
+    if carried.left.is_empty() {
+        return None;
+    }
+    let codes: Vec<_> = carried.left.iter().map(|row| row.code).collect();
+    Some(Failure::Drive(format!(
+        "{}: all was written, and the drive has put back {}: run it again, or see what excludes them",
+        source.name(),
+        codes.join(", ")
+    )))
+}
+
+/// Saves where that is asked for and is a step of its own, and says where the values are kept.
+async fn keep(args: &Args, source: &mut Source, carried: &Carried) -> Result<(bool, Vec<String>), Failure> {
+    let capabilities = source.family()?.capabilities();
+    let written = carried.written.len();
+    let Some(by) = capabilities.persist else {
+        let writes = output::counted(carried.eeprom_writes(), "write", "writes");
+        let text = format!("each write is kept by itself: {writes} to EEPROM, or to be taken for that");
+        return Ok((false, if written > 0 || args.save { vec![text] } else { Vec::new() }));
+    };
+    if args.save {
+        let told = source.save().await?;
+        return Ok((true, vec![format!("saved to EEPROM by {by}{told}")]));
+    }
+    let mut text = "kept in RAM, lost at power-off: drived param save saves it, once".to_owned();
+    if carried.eeprom_writes() > 0 {
+        let writes = output::counted(carried.eeprom_writes(), "write", "writes");
+        text.push_str(&format!("; {writes} may have gone to EEPROM by itself"));
+    }
+    Ok((false, if written > 0 { vec![text] } else { Vec::new() }))
+}
+
+impl Carried {
+    fn unknown(&self) -> Option<&'static str> {
+        self.stopped.as_ref().filter(|stopped| stopped.is_unknown).map(|stopped| stopped.at.code)
+    }
+}
+
+impl carry::Stopped {
+    /// What has been done, what is unknown, what has not, and how to go on.
+    fn in_words(&self, name: &str, carried: &Carried) -> String {
+        let listed = |rows: &mut dyn Iterator<Item = &'static str>| {
+            let codes: Vec<_> = rows.collect();
+            if codes.is_empty() { "none".to_owned() } else { codes.join(", ") }
+        };
+        let written = listed(&mut carried.written.iter().map(|change| change.row.code));
+        let left = listed(&mut carried.left.iter().map(|row| row.code));
+        let unknown = match self.is_unknown {
+            true => format!("; unknown whether written: {}", self.at.code),
+            false => String::new(),
+        };
+        format!(
+            "{name}: stopped at {}: {}; written: {written}{unknown}; not written: {left}; the same command goes on from here",
+            self.at.code, self.why
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;

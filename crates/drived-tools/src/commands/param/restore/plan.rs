@@ -1,0 +1,127 @@
+//! What a restore would write, in which order, and what it leaves alone: decided before anything is written.
+
+use drive_core::{
+    Row,
+    registers::{Change, Part, in_order},
+};
+use serde_json::{Value, json};
+
+use crate::commands::param::file::{Backup, Entry};
+use drived_words::{failure::Failure, output::Table, registers::range};
+
+/// What is to be done to one drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Plan {
+    /// Settings that the file has, in the order in which they are written, those of one step together.
+    pub(super) steps: Vec<Vec<Wanted>>,
+    /// What differs now, in that order. Writing some may change others, which are written again when their turn comes.
+    pub(super) changes: Vec<Change>,
+    /// What differs, or may, and is not written, with the reason.
+    pub(super) skipped: Vec<(&'static Row, String)>,
+}
+
+/// A word that the file has for a register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Wanted {
+    pub(super) row: &'static Row,
+    pub(super) word: u16,
+}
+
+impl Plan {
+    /// How a drive that holds `now` comes to hold what the file says.
+    pub(super) fn of(file: &Backup, now: &Backup, with_communication: bool) -> Result<Self, Failure> {
+        let capabilities = file.head.family.capabilities();
+        let mut skipped = Vec::new();
+        for Entry { row, held } in &file.entries {
+            let differs = held.as_ref().ok().copied() != now.word(row.address);
+            let why = match (capabilities.restoring.part(row), held) {
+                (Part::Rating | Part::Passing, _) => continue,
+                (_, Err(why)) => format!("could not be read when it was kept: {why}"),
+                (Part::Left(why) | Part::ByHand(why), Ok(_)) if differs => why.to_owned(),
+                (Part::Communication, Ok(_)) if differs && !with_communication => {
+                    "it changes the line itself: --with-communication writes it, last".to_owned()
+                }
+                (Part::Setting | Part::Communication, Ok(_)) if now.word(row.address).is_none() => {
+                    "the drive does not tell what it holds".to_owned()
+                }
+                _ => continue,
+            };
+            skipped.push((*row, why));
+        }
+        let wanted = |row: &'static Row| {
+            let is_wanted = !skipped.iter().any(|(skipped, _)| skipped.address == row.address);
+            file.word(row.address).filter(|_| is_wanted).map(|word| Wanted { row, word })
+        };
+        let is_line = |row: &&Row| capabilities.restoring.part(row) == Part::Communication;
+        let steps = capabilities.restoring.steps(capabilities.rows).into_iter().map(|step| {
+            let rows = step.into_iter().filter(|row| with_communication || !is_line(row));
+            rows.filter_map(wanted).collect::<Vec<_>>()
+        });
+        let steps: Vec<Vec<Wanted>> = steps.filter(|step| !step.is_empty()).collect();
+        let changes: Vec<Change> =
+            steps.iter().flat_map(|step| ordered(step, &|row| now.word(row.address))).collect();
+        for Change { row, wanted, .. } in &changes {
+            if !row.range.allows(row.unit.number(*wanted)) {
+                let shown = file.row(row);
+                return Err(Failure::Input(format!(
+                    "{} ({}): {} is not allowed, expected: {}",
+                    row.code,
+                    row.address,
+                    shown.show(*wanted),
+                    range(&shown)
+                )));
+            }
+        }
+        Ok(Self { steps, changes, skipped })
+    }
+
+    /// What has to be set at the drive before anything is written: it would load other values over them.
+    pub(super) fn by_hand(&self, file: &Backup, now: &Backup) -> Option<String> {
+        let restoring = file.head.family.capabilities().restoring;
+        self.skipped.iter().find_map(|(row, _)| {
+            let Part::ByHand(why) = restoring.part(row) else { return None };
+            let (was, is) = (file.word(row.address)?, now.word(row.address)?);
+            Some(format!("{} was {} and is {}: {why}", row.code, file.text(row, was), now.text(row, is)))
+        })
+    }
+
+    /// What would be written, and what not, as a person reads it.
+    pub(super) fn table(&self, file: &Backup, now: &Backup) -> Table {
+        let mut table = Table::new(["", "parameter", "now", "from the file", "what it is, and why here"]);
+        for (index, Change { row, held, wanted }) in self.changes.iter().enumerate() {
+            let why = file.head.family.capabilities().restoring.why(row.address);
+            let name = why.map_or_else(|| row.name.to_owned(), |why| format!("{}: {why}", row.name));
+            let later = file.head.family.capabilities().restoring.acts_later(row.address);
+            let name = later.map_or_else(|| name.clone(), |needs| format!("{name}; {needs}"));
+            table.row([
+                (index + 1).to_string(),
+                row.code.to_owned(),
+                now.text(row, *held),
+                file.text(row, *wanted),
+                name,
+            ]);
+        }
+        table
+    }
+
+    pub(super) fn json(&self, file: &Backup, now: &Backup) -> [(&'static str, Value); 2] {
+        let changes = self.changes.iter().map(|Change { row, held, wanted }| {
+            json!({
+                "mnemonic": row.code,
+                "address": row.address,
+                "now": { "value": now.text(row, *held), "raw": held },
+                "from_file": { "value": file.text(row, *wanted), "raw": wanted },
+                "acts_later": file.head.family.capabilities().restoring.acts_later(row.address),
+                "why_here": file.head.family.capabilities().restoring.why(row.address),
+            })
+        });
+        let skipped = self.skipped.iter().map(|(row, why)| json!({ "mnemonic": row.code, "why": why }));
+        [("changes", changes.collect()), ("skipped", skipped.collect())]
+    }
+}
+
+/// The changes of one step, in the order in which they are written.
+pub(super) fn ordered(step: &[Wanted], held: &dyn Fn(&Row) -> Option<u16>) -> Vec<Change> {
+    let change = |Wanted { row, word }: &Wanted| Some(Change { row, held: held(row)?, wanted: *word });
+    in_order(&step.iter().filter_map(change).collect::<Vec<_>>())
+}

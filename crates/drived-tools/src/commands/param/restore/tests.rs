@@ -1,0 +1,447 @@
+//! Each family on the simulator in virtual time: kept, replaced by a drive in factory setting, restored.
+
+use std::time::Duration;
+
+use clap::Parser;
+use drive_core::{Direction, Frequency};
+use drive_families::Family;
+use drive_sim::SimSlave;
+use tokio::time::sleep;
+
+use super::*;
+use crate::commands::param::testing::Bench;
+use drived_simulated::SetUp;
+
+impl Bench {
+    /// The drive that is kept, as somebody has set it up.
+    async fn kept(family: Family) -> Backup {
+        let mut bench = Self::of(family, SetUp::ForTheBus);
+        for &(register, word) in settings(family) {
+            assert!(bench.machine.poke(register, word), "{family} {register}");
+        }
+        let file = bench.source.keep().await.unwrap();
+        assert!(file.entries.iter().all(|entry| entry.held.is_ok()), "{family}");
+        // As it comes back from its file.
+        Backup::parse(Path::new("kept.toml"), &file.to_string()).unwrap()
+    }
+
+    async fn plan(&mut self, file: &Backup) -> Plan {
+        Plan::of(file, &self.source.keep().await.unwrap(), false).unwrap()
+    }
+
+    async fn carry(&mut self, plan: &Plan) -> Carried {
+        carry(plan, &mut self.source, &mut Ending::listen().unwrap()).await
+    }
+
+    async fn differences(&mut self, file: &Backup) -> Vec<&'static str> {
+        let now = self.source.keep().await.unwrap();
+        let differences = Comparison::of(file, &now, false).differences;
+        differences.iter().map(|difference| difference.row.code).collect()
+    }
+
+    async fn run(&mut self) {
+        let Source::OnLine(one) = &mut self.source else { panic!("it is on a line") };
+        one.drive.set_setpoint(Frequency::from_hertz(20).into()).await.unwrap();
+        one.drive.start(Direction::Forward).await.unwrap();
+    }
+}
+
+/// What somebody has set, by the addresses of the manuals: another unit of the ramps, other limits, another wiring, PI
+/// instead of preset speeds, another motor.
+fn settings(family: Family) -> &'static [(u16, u16)] {
+    match family {
+        Family::Atv312 => &[
+            // Inr = 0.01, ACC 12.34 s, dEC 2.50 s.
+            (9020, 0),
+            (9001, 1_234),
+            (9002, 250),
+            // LSP 10, HSP 40, tFr 70 Hz.
+            (3105, 100),
+            (3104, 400),
+            (3103, 700),
+            // UFt = P, UFr.
+            (9607, 1),
+            (9623, 33),
+            // tCC = 3C, rrS, JOG.
+            (11_101, 1),
+            (11_105, 132),
+            (11_110, 0),
+            // PIF = AI1, SA2; tCC = 3C leaves PS2 and PS4 without an input.
+            (11_901, 1),
+            (11_801, 0),
+            (11_401, 0),
+            (11_402, 0),
+            // UnS 230 V, FrS 60 Hz, nSP.
+            (9601, 230),
+            (9602, 600),
+            (9604, 1_745),
+            // SLL = rMP.
+            (7010, 6),
+            // Add.
+            (6001, 9),
+        ],
+        Family::Atv28 => {
+            &[(40, 1), (251, 100), (250, 650), (52, 700), (252, 50), (53, 550), (264, 77), (6, 1)]
+        }
+        Family::Atv58 => &[(252, 789), (253, 100)],
+        // ACC, DEC, F603, F803, F111, CMOD, FMOD.
+        Family::Atv21 => &[(0x0009, 55), (0x0010, 77), (0x0603, 1), (0x0803, 10), (0x0003, 2), (0x0004, 4)],
+        Family::Omron3g3ev => &[
+            (0x0114, 20),
+            (0x0129, 600),
+            (0x012A, 500),
+            (0x0138, 300),
+            (0x0139, 200),
+            (0x013A, 100),
+            (0x0128, 1),
+        ],
+    }
+}
+
+/// Of so many cuts one is followed by the next run: `DRIVED_ONE_IN`, 1 for all of them.
+fn one_in() -> u64 {
+    let given = std::env::var("DRIVED_ONE_IN").map_or(Ok(8), |one_in| one_in.parse());
+    given.expect("DRIVED_ONE_IN is a number")
+}
+
+/// Which register the manual wants before which other one.
+fn orders(family: Family) -> &'static [(&'static str, &'static str, &'static str)] {
+    match family {
+        Family::Atv312 => &[
+            ("LAC", "Fr1", "BBV51701 p. 35: L3 puts Fr1 back"),
+            ("LAC", "CHCF", "p. 36: CHCF is active with L3"),
+            ("LAC", "tCC", "p. 35: L3 puts tCC back"),
+            ("tCC", "rrS", "p. 33: tCC puts rrS back"),
+            ("tCC", "FSt", "p. 33: and every function of an input"),
+            ("CHCF", "Cd1", "p. 37: Cd1 is active with CHCF = SEP"),
+            ("Inr", "ACC", "p. 38: Inr changes the ramps"),
+            ("Inr", "dEC", "p. 38"),
+            ("UFt", "UFr", "p. 27: UFt puts UFr back"),
+            ("tFr", "Fr1", "limits before what uses them"),
+            ("SA2", "PIF", "p. 45: PI is blocked by a summing input"),
+            ("ACC", "UnS", "the ratings of the motor last"),
+            ("SLL", "UnS", "the ratings of the motor last"),
+            ("UnS", "FrS", ""),
+            ("nSP", "Cd1", "who commands after everything"),
+        ],
+        Family::Atv28 => &[
+            ("tCC", "bFr", "what puts others back comes first"),
+            ("bFr", "HSP", "BBV51701 p. 28: bFr changes HSP"),
+            ("bFr", "tFr", "p. 28: and tFr"),
+            ("bFr", "FrS", "p. 28: and FrS"),
+            ("tFr", "HSP", "p. 27: HSP at most tFr"),
+            ("HSP", "LSP", "p. 27: LSP at most HSP"),
+            ("SP2", "FrS", "the ratings of the motor last"),
+        ],
+        Family::Atv58 => &[],
+        Family::Atv21 => &[("F603", "F803", "§6.4: F803 acts at once"), ("ACC", "CMOD", "§6.2")],
+        Family::Omron3g3ev => &[
+            ("n41", "n42", "§5.3 OP4: n41 ≥ n42"),
+            ("n56", "n57", "§5.3 OP5: n56 ≥ n57"),
+            ("n57", "n58", "§5.3 OP5: n57 ≥ n58"),
+        ],
+    }
+}
+
+fn codes(changes: &[Change]) -> Vec<&'static str> {
+    changes.iter().map(|change| change.row.code).collect()
+}
+
+/// The registers that the machine was written, as the wire has it.
+fn seen(machine: &SimSlave) -> Vec<u16> {
+    let received = machine.received();
+    let writes = received.iter().filter(|request| matches!(request.pdu.first(), Some(0x06 | 0x10)));
+    writes.map(|request| u16::from_be_bytes([request.pdu[1], request.pdu[2]])).collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_in_factory_setting_is_restored_to_no_difference_in_the_order_of_its_manual() {
+    for family in Family::ALL {
+        let file = Bench::kept(family).await;
+        let mut new = Bench::of(family, SetUp::Factory);
+        assert!(!new.differences(&file).await.is_empty(), "{family}");
+        let plan = new.plan(&file).await;
+        let carried = new.carry(&plan).await;
+        assert_eq!(carried.stopped, None, "{family}");
+        assert_eq!(new.differences(&file).await, [""; 0], "{family}");
+
+        let written = codes(&carried.written);
+        let wire = seen(&new.machine);
+        let said: Vec<u16> = carried.written.iter().map(|change| change.row.address).collect();
+        assert!(said.ends_with(&wire) && !wire.is_empty(), "{family}: {said:?} {wire:?}");
+        let place = |code: &str| written.iter().position(|written| *written == code);
+        for (before, after, why) in orders(family) {
+            match (place(before), place(after)) {
+                (Some(before), Some(after)) if before < after => {}
+                _ => panic!("{family}: {before} and {after} ({why}) in {written:?}"),
+            }
+        }
+        for never in ["Add", "SMIL", "SMAL", "SPAL", "tUn", "COd", "CMD", "F802", "n67"] {
+            assert!(!written.contains(&never), "{family} {never}");
+        }
+
+        let again = new.plan(&file).await;
+        assert_eq!(codes(&again.changes), [""; 0], "{family}");
+        let before = new.machine.requests(0x06) + new.machine.requests(0x10);
+        assert_eq!(new.carry(&again).await.written, [], "{family}");
+        assert_eq!(new.machine.requests(0x06) + new.machine.requests(0x10), before, "{family}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn whenever_the_line_is_cut_it_is_told_what_was_written_and_the_next_run_goes_on() {
+    for family in Family::ALL {
+        let file = Bench::kept(family).await;
+        let mut whole = Bench::of(family, SetUp::Factory);
+        let plan = whole.plan(&file).await;
+        let begun = whole.machine.all_requests();
+        whole.carry(&plan).await;
+        let exchanges = whole.machine.all_requests() - begun;
+        let mut unknown = 0;
+        for cut in 1..exchanges {
+            let mut new = Bench::of(family, SetUp::Factory);
+            let begun = new.machine.all_requests();
+            let machine = new.machine.clone();
+            let cutting = tokio::spawn(async move {
+                machine.wait_for_requests(begun + cut).await;
+                machine.mute();
+            });
+            let carried = new.carry(&plan).await;
+            cutting.await.unwrap();
+            let Some(stopped) = &carried.stopped else { panic!("{family}, cut after {cut}: not stopped") };
+            unknown += usize::from(stopped.is_unknown);
+            let told = stopped.in_words("pump", &carried);
+            for Change { row, wanted, .. } in &plan.changes {
+                let (address, code) = (row.address, row.code);
+                let is_written = carried.written.iter().any(|done| done.row.address == address);
+                let is_unknown = stopped.is_unknown && stopped.at.address == address;
+                let is_left = carried.left.iter().any(|left| left.address == address);
+                let holds = new.machine.peek(address) == Some(*wanted);
+                let one = [is_written, is_unknown, is_left].iter().filter(|is_so| **is_so).count();
+                assert_eq!(one, 1, "{family}, cut after {cut}: {code}: {told}");
+                assert!(!is_written || holds, "{family}, cut after {cut}: {code} is not written: {told}");
+                // Another write may have changed it: that is what the manual says of some.
+                let is_sent = seen(&new.machine).contains(&address);
+                assert!(!is_left || !is_sent, "{family}, cut after {cut}: {code} was sent: {told}");
+                assert!(told.contains(code), "{code}: {told}");
+            }
+            // Each of the cuts is told; of so many the next run is looked at too.
+            if cut.is_multiple_of(one_in()) {
+                new.machine.unmute();
+                let plan = new.plan(&file).await;
+                assert_eq!(new.carry(&plan).await.stopped, None, "{family}, cut after {cut}");
+                assert_eq!(new.differences(&file).await, [""; 0], "{family}, cut after {cut}");
+            }
+        }
+        assert!(unknown > 0, "{family}: no cut left a write unknown");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn functions_that_exclude_each_other_are_taken_away_before_others_are_given() {
+    let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+    let presets = bench.source.keep().await.unwrap();
+    let mut pi = presets.clone();
+    for (code, word) in [("PIF", 1), ("SA2", 0), ("PS2", 0), ("PS4", 0)] {
+        pi.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
+    }
+    // BBV51701 p. 43: PS4 only with PS2; p. 45: PIF not with SA2 or PS2.
+    for (file, now, order) in
+        [(&pi, &presets, ["SA2", "PS4", "PS2", "PIF"]), (&presets, &pi, ["PIF", "PS2", "PS4", "SA2"])]
+    {
+        assert_eq!(codes(&Plan::of(file, now, false).unwrap().changes), order);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_written() {
+    let file = Bench::kept(Family::Atv312).await;
+    // BBV51701 p. 35: from L3 back to L1 only by a factory setting.
+    for (code, word, set_up) in [("LAC", 0, SetUp::ForTheBus)] {
+        let mut file = file.clone();
+        file.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
+        let mut new = Bench::of(Family::Atv312, set_up);
+        let plan = new.plan(&file).await;
+        let carried = new.carry(&plan).await;
+        let stopped = carried.stopped.as_ref().unwrap_or_else(|| panic!("{code} was written"));
+        assert_eq!((stopped.at.code, stopped.is_unknown), (code, false), "{}", stopped.why);
+        assert_eq!((carried.written.len(), carried.left.len()), (0, plan.changes.len()));
+        let told = stopped.in_words("pump 1", &carried);
+        assert!(
+            told.contains("written: none; not written: ") && told.contains("goes on from here"),
+            "{told}"
+        );
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_line_itself_is_changed_only_if_that_is_asked_for_and_last() {
+    let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+    let now = bench.source.keep().await.unwrap();
+    let file = Bench::kept(Family::Atv312).await;
+    let without = Plan::of(&file, &now, false).unwrap();
+    assert!(!codes(&without.changes).contains(&"Add"));
+    let skipped = without.skipped.iter().find(|(row, _)| row.code == "Add").unwrap();
+    assert!(skipped.1.contains("--with-communication"), "{}", skipped.1);
+    let with = Plan::of(&file, &now, true).unwrap();
+    assert_eq!(codes(&with.changes).last(), Some(&"Add"));
+}
+
+/// What the command line says, for a file and a bench.
+async fn say(bench: &mut Bench, file: &Backup, more: &[&str]) -> Result<Told, Failure> {
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+    let line = Line::parse_from(["restore", "kept.toml", "--json"].iter().chain(more));
+    let mut ending = Ending::listen().unwrap();
+    restore(&line.args, Path::new("kept.toml"), file, &mut bench.source, &mut ending).await
+}
+
+#[tokio::test(start_paused = true)]
+async fn nothing_is_written_without_write_to_another_family_or_to_another_rating() {
+    let file = Bench::kept(Family::Atv312).await;
+    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    let told = say(&mut new, &file, &[]).await.unwrap();
+    assert!(told.failure.is_none() && told.text.iter().any(|text| text.contains("nothing has been written")));
+    let mut other = Bench::of(Family::Atv28, SetUp::Factory);
+    let Err(Failure::Input(why)) = say(&mut other, &file, &["--write"]).await else { panic!("taken") };
+    assert!(why.contains("the file is of the family atv312"), "{why}");
+
+    // INV, the nominal current of the drive (BBV51701 p. 26).
+    let mut larger = file.clone();
+    let inv = larger.entries.iter_mut().find(|entry| entry.row.code == "INV").unwrap();
+    inv.held = inv.held.clone().map(|word| word + 1);
+    let Err(Failure::Input(why)) = say(&mut new, &larger, &["--write"]).await else { panic!("taken") };
+    assert!(why.contains("INV is") && why.contains("--other-model"), "{why}");
+    for machine in [&new.machine, &other.machine] {
+        assert_eq!(seen(machine), [0_u16; 0], "something was written");
+    }
+    let told = say(&mut new, &larger, &["--write", "--other-model"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_macro_configuration_of_another_drive_is_said_before_anything_is_written_and_set_by_hand() {
+    let mut file = Bench::kept(Family::Atv312).await;
+    // BBV51701 p. 32: CFG, 0 = StS, 1 = Std, which is its factory setting; a write loads that configuration at once.
+    file.entries.iter_mut().find(|entry| entry.row.code == "CFG").unwrap().held = Ok(0);
+    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    assert!(new.differences(&file).await.contains(&"CFG"), "diff shows it");
+    let told = say(&mut new, &file, &[]).await.unwrap();
+    let first =
+        told.text.iter().find(|text| text.starts_with("before anything is written: CFG was StS and is Std"));
+    assert!(first.is_some_and(|text| text.contains("p. 32")), "{:?}", told.text);
+    let Err(Failure::Input(why)) = say(&mut new, &file, &["--write"]).await else { panic!("written") };
+    assert!(
+        why.contains("nothing was written: CFG was StS and is Std") && why.contains("--other-macro"),
+        "{why}"
+    );
+    assert_eq!(seen(&new.machine), [0_u16; 0]);
+    // Somebody sets it at the keypad; then it is restored as any other file.
+    assert!(new.machine.poke(3_052, 0));
+    let told = say(&mut new, &file, &["--write"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+    assert_eq!(new.differences(&file).await, [""; 0]);
+    // Without that the rest is written if it is asked for, and CFG never.
+    let mut other = Bench::of(Family::Atv312, SetUp::Factory);
+    let told = say(&mut other, &file, &["--write", "--other-macro"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+    assert_eq!(other.differences(&file).await, ["CFG"]);
+    assert!(!seen(&other.machine).contains(&3_052));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_acts_only_after_a_power_cycle_is_said_before_and_after_it_is_written() {
+    // 3G3EV §2.1, note 3: n02, n39, n40 and n63 to n67 need a power cycle; §2.1: n39 is 0 from the factory.
+    let mut bench = Bench::of(Family::Omron3g3ev, SetUp::Factory);
+    let mut file = bench.source.keep().await.unwrap();
+    file.entries.iter_mut().find(|entry| entry.row.code == "n39").unwrap().held = Ok(1);
+    let told = say(&mut bench, &file, &[]).await.unwrap();
+    let needs = "after the next power-up";
+    assert!(told.text.iter().any(|text| text.contains(needs)), "{:?}", told.text);
+    assert!(told.json["changes"][0]["acts_later"].as_str().is_some_and(|said| said.contains(needs)));
+    let told = say(&mut bench, &file, &["--write"]).await.unwrap();
+    assert!(
+        told.text.iter().any(|text| text.starts_with("n39: ") && text.contains(needs)),
+        "{:?}",
+        told.text
+    );
+    // What acts at once is not said to act later: n19, the acceleration.
+    let of = |family: Family, address| family.capabilities().restoring.acts_later(address).is_some();
+    assert!(of(Family::Omron3g3ev, 0x0102) && !of(Family::Omron3g3ev, 0x0114));
+    // Altivar 21 §6.1: protocol, speed and parity after a reset, the address at once; §6.3: the blocks after a reset.
+    for (address, later) in [
+        (0x0829, true),
+        (0x0800, true),
+        (0x0801, true),
+        (0x0802, false),
+        (0x0870, true),
+        (0x0875, true),
+        (0x0803, false),
+    ] {
+        assert_eq!(of(Family::Atv21, address), later, "{address:04X}h");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_value_that_the_manual_does_not_allow_is_refused_before_anything_is_written() {
+    let mut file = Bench::kept(Family::Atv312).await;
+    // JGF, 0 to 10 Hz (BBV51701 p. 45).
+    file.entries.iter_mut().find(|entry| entry.row.code == "JGF").unwrap().held = Ok(101);
+    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    let Err(Failure::Input(why)) = say(&mut new, &file, &["--write"]).await else { panic!("taken") };
+    assert!(why.contains("JGF") && why.contains("10.1 Hz is not allowed"), "{why}");
+    assert_eq!(seen(&new.machine), [0_u16; 0]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn nothing_is_written_to_a_drive_whose_motor_runs() {
+    for family in [Family::Atv21, Family::Atv28, Family::Atv312, Family::Omron3g3ev] {
+        let file = Bench::kept(family).await;
+        let mut running = Bench::of(family, SetUp::ForTheBus);
+        running.run().await;
+        sleep(Duration::from_secs(1)).await;
+        let plan = running.plan(&file).await;
+        let before = running.machine.requests(0x06) + running.machine.requests(0x10);
+        let carried = running.carry(&plan).await;
+        let stopped = carried.stopped.unwrap_or_else(|| panic!("{family}: written while it runs"));
+        assert!(stopped.why.contains("at standstill") && !stopped.is_unknown, "{family}: {}", stopped.why);
+        assert_eq!(running.machine.requests(0x06) + running.machine.requests(0x10), before, "{family}");
+        assert!(running.machine.observe().running, "{family}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_eeprom_is_written_only_where_it_is_asked_for_or_the_drive_does_it_by_itself() {
+    for family in Family::ALL {
+        let file = Bench::kept(family).await;
+        for save in [false, true] {
+            let mut new = Bench::of(family, SetUp::Factory);
+            let before = new.machine.observe().eeprom_writes;
+            let more: &[&str] = if save { &["--write", "--save"] } else { &["--write"] };
+            let told = say(&mut new, &file, more).await.unwrap();
+            assert_eq!(told.failure, None, "{family}");
+            let written = told.json["written"].as_array().unwrap().len();
+            let writes = new.machine.observe().eeprom_writes - before;
+            let expected = match family {
+                // A save is one write of all (BBV51701 p. 20; 3G3EV §4.5). That of SLL, which no power-off changes, is one
+                // by itself (BBV51701 p. 9).
+                Family::Atv312 => u32::from(save) + 1,
+                Family::Omron3g3ev => u32::from(save),
+                // Each write is one (Altivar 21 Modbus §8.1); not known of the other two, so each counts.
+                _ => writes,
+            };
+            assert_eq!(writes, expected, "{family} {save}: {:?}", told.text);
+            if family == Family::Atv21 {
+                assert_eq!(usize::try_from(writes).unwrap(), written, "{:?}", told.text);
+            }
+            if matches!(family, Family::Atv312 | Family::Omron3g3ev) {
+                new.machine.power_cycle();
+                sleep(Duration::from_secs(5)).await;
+                assert_eq!(new.differences(&file).await.is_empty(), save, "{family}");
+            }
+        }
+    }
+}

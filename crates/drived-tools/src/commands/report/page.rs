@@ -1,0 +1,105 @@
+//! The document: its head, what needs somebody, the drives, the lines, the program, and how it is to be read.
+
+use chrono::{DateTime, FixedOffset};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::{
+    drive,
+    gather::Gathered,
+    line, program, summary,
+    words::{facts, moment, unread},
+};
+use drived_words::output;
+
+/// How it looks, on a screen and on A4.
+const STYLE: &str = include_str!("report.css");
+
+/// A report, before it is written down.
+#[derive(Debug)]
+pub(super) struct Page<'a> {
+    pub(super) title: &'a str,
+    pub(super) notes: &'a [String],
+    /// Who answered.
+    pub(super) source: &'a str,
+    pub(super) written: DateTime<FixedOffset>,
+    pub(super) gathered: &'a Gathered,
+}
+
+impl Page<'_> {
+    /// The whole document. Whatever a drive, a file or the command line says is escaped.
+    pub(super) fn html(&self) -> Markup {
+        let Gathered { lines, drives, events, .. } = self.gathered;
+        let names: Vec<&str> = drives.iter().map(super::gather::DriveTold::name).collect();
+        html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light";
+                    title { (self.title) }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    header { h1 { (self.title) } (self.head()) }
+                    main {
+                        section { h2 { "What needs attention" } (summary::attention(self.gathered)) }
+                        section { h2 { "The drives at a glance" } (summary::overview(self.gathered)) }
+                        h2.new { "Lines" }
+                        @for told in lines {
+                            @match told {
+                                Ok(line) => (line::chapter(line, drives)),
+                                Err(why) => p { (unread(why)) },
+                            }
+                        }
+                        h2.new { "Drives" }
+                        @for told in drives { (drive::chapter(told)) }
+                        section { h2.new { "Alarms" } (program::alarms(events, &names)) }
+                        section { h2 { "Settings of the program" } (program::settings(drives)) }
+                        section { h2 { "How this report is to be read" } (reading()) }
+                    }
+                }
+            }
+        }
+    }
+
+    fn head(&self) -> Markup {
+        let daemon = &self.gathered.state.daemon;
+        let drives = self.gathered.drives.len();
+        let silent = self.gathered.silent().len();
+        let mut rows = vec![
+            ("written".to_owned(), html! { (self.written.format("%Y-%m-%d %H:%M:%S %:z")) }),
+            (
+                "told by".to_owned(),
+                html! { (self.source) @if daemon.demo { ", " strong { "whose drives are simulated" } } },
+            ),
+            (
+                "running since".to_owned(),
+                html! { (moment(daemon.started_unix_ms)) ", drived " (daemon.version) },
+            ),
+            (
+                "drives".to_owned(),
+                html! {
+                    (output::counted(drives, "drive", "drives")) " on " (output::counted(self.gathered.lines.len(), "line", "lines"))
+                    @if silent > 0 { ", " strong { (silent) " of them without an answer" } }
+                },
+            ),
+        ];
+        rows.extend(self.notes.iter().map(|note| ("note".to_owned(), html! { (note) })));
+        facts(rows)
+    }
+}
+
+fn reading() -> Markup {
+    html! {
+        ul {
+            li { "Counts begin when the daemon began, or when the line was opened; hours and energy are the drive's own." }
+            li { "“not read” says that something was asked for and did not come, with the reason; “not told by this family” that "
+                "its manual has no such value; “–” that there is nothing to count yet." }
+            li { "Factory settings are those of the manuals. A parameter for which the manual prints a rule instead of a number "
+                "cannot be judged, and stands in a list of its own." }
+            li { "A figure of the plan is the longest there can be while no commands are given. “as the line has been” is the "
+                "same with the answer times that were measured." }
+        }
+    }
+}

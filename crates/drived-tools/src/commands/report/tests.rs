@@ -1,0 +1,204 @@
+//! Reports of simulated lines in virtual time. What is expected stands in the manuals or was set at the simulator.
+
+use std::time::Duration;
+
+use chrono::Local;
+use drive_bus::{Line, LineConfig};
+use drive_core::{
+    Identity, SlaveAddress,
+    serial::{CharacterFormat, SerialSettings},
+};
+use drive_families::Family;
+use drive_fleet::{IdentityCheck, Periods, WatchdogCheck};
+use drive_sim::{SimLine, SimSlave, Wiring};
+
+use super::{
+    gather::Gathered,
+    own::{LINE, Own},
+    page::Page,
+};
+use drived_config::config::LinePart;
+use drived_plant::plant::views::LineLink;
+use drived_simulated::{self as simulated, SetUp};
+use drived_words::drive_spec::DriveName;
+
+/// The functions that write (Modbus Application Protocol V1.1b3, section 6).
+const WRITES: [u8; 6] = [0x05, 0x06, 0x0F, 0x10, 0x16, 0x17];
+
+/// The five families at addresses 1 to 5 of one line.
+struct Bench {
+    line: SimLine,
+    machines: Vec<(DriveName, SimSlave)>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).unwrap();
+        let line = SimLine::new(Wiring::rtu(settings));
+        let machines = Family::ALL.into_iter().zip(1..).map(|(family, slave)| {
+            let machine = line.add_boxed(slave, simulated::model(family, SetUp::Factory)).unwrap();
+            (DriveName { family, slave: SlaveAddress::try_from(slave).unwrap() }, machine)
+        });
+        let machines = machines.collect();
+        Self { line, machines }
+    }
+
+    fn machine(&self, family: Family) -> &SimSlave {
+        &self.machines.iter().find(|(name, _)| name.family == family).unwrap().1
+    }
+
+    async fn read(&self, with_parameters: bool) -> Gathered {
+        let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).unwrap();
+        let names: Vec<DriveName> = self.machines.iter().map(|(name, _)| *name).collect();
+        let config = LineConfig::stream(settings);
+        let part = LinePart::watched(LINE, config, &names, &simulated::options(), Periods::default());
+        let line = Line::over(self.line.in_memory(), part.config.clone());
+        let own = Own::over(line, &part, Duration::from_secs(10)).await.unwrap();
+        Gathered::read(&own.way, &[], with_parameters).await.unwrap()
+    }
+}
+
+fn html(gathered: &Gathered) -> String {
+    let notes = ["order <4711> & \"more\"".to_owned()];
+    let written = Local::now().fixed_offset();
+    Page { title: "Hall 3", notes: &notes, source: "a test", written, gathered }.html().into_string()
+}
+
+/// The chapter of a drive, without its tags: its texts, one a line.
+fn chapter(html: &str, name: &str) -> String {
+    let begin = html.find(&format!("<h3>{name}</h3>")).unwrap_or_else(|| panic!("{name} has no chapter"));
+    let end = html[begin..].find("</section>").unwrap() + begin;
+    texts(&html[begin..end])
+}
+
+fn texts(html: &str) -> String {
+    let mut text = String::new();
+    for part in html.split('<') {
+        let (_, said) = part.split_once('>').unwrap_or(("", part));
+        text.push_str(said.trim());
+        text.push('\n');
+    }
+    text
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_report_of_five_families_with_one_tripped_and_one_dead_says_so_and_writes_to_none() {
+    let bench = Bench::new();
+    // BBV51701, LFT: 9 is OCF.
+    bench.machine(Family::Atv312).trip(9);
+    bench.machine(Family::Atv28).mute();
+    let gathered = bench.read(true).await;
+    let html = html(&gathered);
+    for (name, machine) in &bench.machines {
+        for function in WRITES {
+            assert_eq!(machine.requests(function), 0, "{name}: function {function}");
+        }
+        let chapter = chapter(&html, &name.to_string());
+        assert!(chapter.contains(name.family.capabilities().name), "{chapter}");
+    }
+    assert_eq!(bench.line.violations(), []);
+    let tripped = chapter(&html, "atv312@4");
+    assert!(tripped.contains("Tripped: 9 OCF: ") && tripped.contains("What to do: "), "{tripped}");
+    assert!(!tripped.contains("No fault is present"), "{tripped}");
+    let dead = chapter(&html, "atv28@2");
+    assert!(dead.contains("not read: the drive did not answer"), "{dead}");
+    assert!(!dead.contains("No fault is present") && !dead.contains("\nNone.\n"), "{dead}");
+    let attention =
+        texts(&html[html.find("What needs attention").unwrap()..html.find("at a glance").unwrap()]);
+    assert!(attention.contains("\ndoes not answer\n: "), "{attention}");
+    assert!(attention.contains("\ntripped\n: 9 OCF"), "{attention}");
+    assert_eq!(gathered.silent(), ["atv28@2"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_differs_from_factory_stands_there_in_its_unit_and_what_cannot_be_judged_apart() {
+    let bench = Bench::new();
+    // BBV51701 p. 39: ACC, 3.0 s from the factory, in tenths.
+    assert!(bench.machine(Family::Atv312).poke(9_001, 125));
+    let html = html(&bench.read(true).await);
+    let chapter = chapter(&html, "atv312@4");
+    let ramp = chapter.split_once("\nACC\n").map(|(_, row)| row.lines().take(6).collect::<Vec<_>>()).unwrap();
+    assert_eq!((ramp[3], ramp[5]), ("12.5 s", "3.0 s"), "{ramp:?}");
+    let (judged, unjudged) = chapter.split_once("cannot be judged").unwrap();
+    // p. 30: the nominal current depends on the drive's rating, so no number is printed.
+    assert!(unjudged.contains("\nnCr\n") && !judged.contains("\nnCr\n"), "{chapter}");
+    assert!(unjudged.contains("the manual has a rule") || unjudged.contains("prints no factory setting"));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_was_not_asked_for_is_said_to_be_left_out_and_never_looks_like_no_difference() {
+    let bench = Bench::new();
+    let gathered = bench.read(false).await;
+    let html = html(&gathered);
+    for (name, _) in &bench.machines {
+        let chapter = chapter(&html, &name.to_string());
+        assert!(chapter.contains("not read: left out, as was asked"), "{chapter}");
+        assert!(!chapter.contains("\nNone.\n"), "{chapter}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn answer_times_are_those_of_the_simulator_and_each_slave_has_its_picture() {
+    let bench = Bench::new();
+    for (_, machine) in &bench.machines {
+        machine.set_turnaround(Some(Duration::from_millis(25)));
+    }
+    bench.machine(Family::Atv21).mute();
+    let gathered = bench.read(false).await;
+    let line = gathered.lines[0].as_ref().unwrap();
+    for slave in line.line.slaves.iter().filter(|slave| slave.slave != 1) {
+        let half = slave.answer_ms.unwrap().p50;
+        assert!((25.0..28.2).contains(&half), "{slave:?}");
+    }
+    let html = html(&gathered);
+    let answers = &html[html.find("How long answers took").unwrap()..html.find("Errors by kind").unwrap()];
+    assert_eq!((answers.matches("<svg").count(), answers.matches("has not answered").count()), (4, 1));
+    assert!(
+        answers.contains(">20</text>") && answers.contains(">50</text>"),
+        "the axis is labelled: {answers}"
+    );
+    let errors = &html[html.find("Errors by kind").unwrap()..html.find("Availability").unwrap()];
+    assert!(errors.contains("class=\"no_answer\""), "{errors}");
+    let texts = texts(&html[html.find("Plan against measured").unwrap()..html.find("How long").unwrap()]);
+    // Modbus over serial line V1.02, 2.5.1.1: 3.5 characters of 10 bits at 19200 bit/s.
+    assert!(texts.contains("1.82 ms are needed"), "{texts}");
+    assert!(texts.contains("\nno stop was sent\n"), "{texts}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
+    let bench = Bench::new();
+    let mut gathered = bench.read(false).await;
+    let name = "<script>alert(1)</script>\"><img src=x onerror=alert(2)>";
+    for drive in &mut gathered.drives {
+        let known = &mut drive.view.snapshot;
+        known.name = name.into();
+        known.error = Some(name.to_owned());
+        let identity = Identity { model: Some(name.to_owned()), ..Identity::default() };
+        known.identity = IdentityCheck::Same(identity.into());
+        known.watchdog = WatchdogCheck::Broken(name.to_owned());
+        drive.faults = Err(name.to_owned());
+        let settings = &mut drive.settings.as_mut().unwrap().settings;
+        settings.commanders = drive_fleet::Commanders::Only(vec![name.to_owned()]);
+    }
+    let line = gathered.lines[0].as_mut().unwrap();
+    line.line.name = name.to_owned();
+    line.line.slaves[0].drive = Some(name.to_owned());
+    line.line.error = Some(name.to_owned());
+    line.line.link = LineLink::Away;
+    let event = serde_json::json!([{"kind": "event", "revision": 1, "time_unix_ms": 1, "drive": name,
+        "event": "lost", "silent_for_ms": 1, "order": 1, "cause": {"by": "drive"}, "alarm": true, "text": name}]);
+    gathered.events = Ok(serde_json::from_value(event).unwrap());
+    let notes = [name.to_owned()];
+    let written = Local::now().fixed_offset();
+    let page = Page { title: name, notes: &notes, source: name, written, gathered: &gathered };
+    let html = page.html().into_string();
+    assert!(html.matches("&lt;script&gt;").count() > 10, "it is shown");
+    for tag in ["<script", "<img", "onerror=alert(2)>\"", "http://", "https://", "url(", "@import"] {
+        assert!(!html.contains(tag), "{tag}");
+    }
+    // Inside a tag nothing of it stands but between quotes.
+    let tags = html.split('<').filter_map(|part| Some(part.split_once('>')?.0));
+    let bare = tags.flat_map(|tag| tag.split('"').step_by(2).collect::<Vec<_>>());
+    assert!(bare.into_iter().all(|outside| !outside.contains("onerror")));
+}

@@ -1,0 +1,138 @@
+//! What is at an address, and in which words it is told.
+
+use drive_core::{Capabilities, Identity};
+use drive_families::Family;
+use serde_json::{Value, json};
+
+/// What is at an address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// Something answers that cannot be understood.
+    Damaged(String),
+    /// Something answers, and it could be a drive of these families.
+    Slave(Vec<Likeness>),
+    /// Two slaves answer.
+    Two {
+        /// What one of them could be, as far as its answers come intact.
+        alike: Vec<Likeness>,
+        /// How that shows.
+        why: String,
+    },
+}
+
+/// A family that a slave could be of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Likeness {
+    pub family: Family,
+    /// Whether it says so itself, by its name.
+    pub certain: bool,
+    /// What it says it is.
+    pub identity: Option<Identity>,
+}
+
+impl Likeness {
+    /// Vendor, model, firmware, and of what registers tell the rated power and current.
+    pub(super) fn says(&self) -> Option<String> {
+        let Identity { vendor, model, version, codes } = self.identity.as_ref()?;
+        let names = [vendor, model, version].into_iter().flatten().map(|text| text.trim().to_owned());
+        let Capabilities { rows, .. } = self.family.capabilities();
+        let rating = codes.iter().filter_map(|code| {
+            let row = rows.iter().find(|row| row.address == code.address)?;
+            let told = row
+                .choice(code.value)
+                .map_or_else(|| row.show(code.value), |choice| choice.meaning.to_owned());
+            [" kW", " A"].iter().any(|unit| told.ends_with(unit)).then_some(told)
+        });
+        let names: Vec<String> = names.filter(|word| !word.is_empty()).collect();
+        let parts: Vec<String> =
+            [names.join(" ")].into_iter().filter(|names| !names.is_empty()).chain(rating).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    fn object(&self) -> Value {
+        json!({ "family": self.family.to_string(), "certain": self.certain, "identity": self.identity })
+    }
+}
+
+impl Answer {
+    /// The family of a drive that is the only likely one.
+    pub(super) fn only(&self) -> Option<Family> {
+        match self {
+            Self::Slave(alike) => match &alike[..] {
+                [only] => Some(only.family),
+                _ => None,
+            },
+            Self::Damaged(_) | Self::Two { .. } => None,
+        }
+    }
+
+    /// For a person.
+    pub(super) fn words(&self) -> String {
+        match self {
+            Self::Damaged(why) => {
+                format!("{why}: something else is sending, or speed, format or protocol are others")
+            }
+            Self::Slave(alike) => described(alike),
+            Self::Two { alike, why } => {
+                let seen =
+                    if alike.is_empty() { String::new() } else { format!(", one {}", described(alike)) };
+                format!(
+                    "TWO DRIVES SEEM TO HAVE THIS ADDRESS{seen}: {why}. Switch one off, give the other another address, \
+                     and scan again; with one alone there, see its cable"
+                )
+            }
+        }
+    }
+
+    /// For a program.
+    pub(super) fn object(&self) -> Value {
+        let (verdict, alike, why) = match self {
+            Self::Damaged(why) => ("damaged", &[][..], Some(why)),
+            Self::Slave(alike) if alike.is_empty() => ("unknown_slave", &[][..], None),
+            Self::Slave(alike) => ("drive", &alike[..], None),
+            Self::Two { alike, why } => ("two_at_one_address", &alike[..], Some(why)),
+        };
+        let families: Vec<Value> = alike.iter().map(Likeness::object).collect();
+        let mut object = json!({ "verdict": verdict, "families": families });
+        if let (Some(why), Some(object)) = (why, object.as_object_mut()) {
+            object.insert("why".to_owned(), json!(why));
+        }
+        object
+    }
+}
+
+/// A slave by what it looks like.
+pub(super) fn described(alike: &[Likeness]) -> String {
+    let one = |likeness: &Likeness| match likeness.says() {
+        Some(says) => format!("{} ({says})", likeness.family),
+        None => likeness.family.to_string(),
+    };
+    match alike {
+        [] => "a Modbus slave, and no drive of a family that is known here".to_owned(),
+        [only] if only.certain => format!("{}, by its own words", one(only)),
+        _ => {
+            let families: Vec<String> = alike.iter().map(one).collect();
+            format!("likely {}, by its registers", families.join(" or "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn like(family: Family, certain: bool, model: Option<&str>) -> Likeness {
+        let identity = model.map(|model| Identity { model: Some(model.to_owned()), ..Identity::default() });
+        Likeness { family, certain, identity }
+    }
+
+    #[test]
+    fn what_a_drive_says_of_itself_is_told_from_what_its_registers_look_like() {
+        let sure = like(Family::Atv312, true, Some("ATV312HU15N4"));
+        assert_eq!(described(&[sure]), "atv312 (ATV312HU15N4), by its own words");
+        let (one, other) = (like(Family::Atv28, false, None), like(Family::Atv58, false, None));
+        assert_eq!(described(std::slice::from_ref(&one)), "likely atv28, by its registers");
+        assert_eq!(described(&[one, other]), "likely atv28 or atv58, by its registers");
+        assert!(described(&[]).contains("no drive of a family"));
+    }
+}

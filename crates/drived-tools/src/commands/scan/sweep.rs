@@ -1,0 +1,254 @@
+//! The task that asks: each step of a plan in its order, and whom it has found again and again, each at his own settings.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, SlaveSettings};
+use drive_families::Family;
+use tokio::time::Instant;
+
+use super::{
+    answer::{Answer, Likeness},
+    feeding::{Feeding, interval},
+    look::{self, Heard, Looks},
+    plan::{Found, Plan, Step},
+};
+use drived_client::own_line;
+use drived_words::{drive_spec::DriveName, failure::Failure, line_spec};
+
+/// How long one look at a slave takes at the slowest settings: some watchdogs are not much longer.
+const LOOK: Duration = Duration::from_millis(600);
+
+/// The function by which a drive tells its name (Modbus Application Protocol V1.1b3, section 6.21).
+const IDENTIFICATION: u8 = 0x2B;
+
+/// How much longer one is waited for whose answer came too late.
+const SLOWER: u32 = 10;
+
+/// The scan of a line.
+pub(super) struct Sweep<'a, Open> {
+    plan: &'a Plan,
+    base: LineConfig,
+    wait: Duration,
+    open: Open,
+    /// The line as it is open now, and at which of the trials.
+    at: Option<(usize, Line)>,
+    feeding: Feeding,
+    began: Instant,
+}
+
+/// Somebody who was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Find {
+    pub step: Step,
+    pub answer: Answer,
+    /// What it has taken, for the time that the plan takes.
+    pub found: Found,
+}
+
+impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
+    pub(super) fn new(plan: &'a Plan, line: LineConfig, wait: Duration, open: Open) -> Self {
+        Self {
+            plan,
+            base: patient(line),
+            wait,
+            open,
+            at: None,
+            feeding: Feeding::default(),
+            began: Instant::now(),
+        }
+    }
+
+    /// Asks at every step that is wanted, by it and the trial at which somebody was found first, and tells who answers.
+    pub(super) async fn run(
+        &mut self,
+        mut is_wanted: impl FnMut(Step, Option<usize>) -> bool,
+        mut tell: impl FnMut(Told) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let mut found: Option<usize> = None;
+        for (done, &step) in self.plan.steps.iter().enumerate() {
+            if !is_wanted(step, found) {
+                continue;
+            }
+            tell(Told::At { done, step })?;
+            if let Some(find) = self.ask(step).await? {
+                found = found.or(Some(step.trial));
+                tell(Told::Found(find))?;
+            }
+        }
+        self.ask_slow(tell).await
+    }
+
+    /// Asks those once more, and waits longer, whose answer came when another was asked.
+    async fn ask_slow(&mut self, mut tell: impl FnMut(Told) -> Result<(), Failure>) -> Result<(), Failure> {
+        let Some((trial, line)) = self.at.clone() else { return Ok(()) };
+        let is_late = |slave: u8| line.stats().slaves.get(&slave).is_some_and(|stats| stats.late > 0);
+        let steps: Vec<Step> = self
+            .plan
+            .steps
+            .iter()
+            .filter(|step| step.trial == trial && is_late(step.slave.number()) && !self.feeding.has(**step))
+            .copied()
+            .collect();
+        for step in steps {
+            let config = line.config();
+            let kept = config.slaves.get(&step.slave.number()).copied().unwrap_or_default();
+            line.configure_slave(
+                step.slave.number(),
+                SlaveSettings { response_timeout: Some(self.wait * SLOWER), ..kept },
+            );
+            if let Some(find) = self.ask(step).await? {
+                tell(Told::Found(find))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What is wrong with the line by what was heard, and what its far end was seen to be like.
+    pub(super) fn findings(&self) -> Vec<String> {
+        let Some((_, line)) = &self.at else { return Vec::new() };
+        // What is wrong with one address is told of that.
+        let of_line = line.findings().into_iter().filter(|finding| finding.slave.is_none());
+        let told = of_line.map(|finding| {
+            let next = finding.next().first().map_or_else(String::new, |next| format!(": {next}"));
+            format!("{finding}{next}")
+        });
+        let proposal = line_spec::proposal(&line.config(), &line.stats());
+        told.chain(proposal).collect()
+    }
+
+    /// Lets the port go.
+    pub(super) async fn close(&mut self) {
+        if let Some((_, line)) = self.at.take() {
+            own_line::close(&line).await;
+        }
+    }
+
+    async fn ask(&mut self, step: Step) -> Result<Option<Find>, Failure> {
+        let line = self.fed_line(step).await?;
+        let heard = look::ask(&line, step.slave, self.wait).await?;
+        let (answer, interval) = match heard {
+            Heard::Nothing => return Ok(None),
+            Heard::Damaged(answer @ Answer::Damaged(_)) => (answer, None),
+            Heard::Damaged(answer) => (answer, Some(Duration::from_secs(1))),
+            Heard::Somebody => self.recognise(step).await?,
+        };
+        if let Some(interval) = interval {
+            self.feeding.add(step, answer.only(), interval, self.began.elapsed());
+        }
+        let line = self.line(step.trial).await?;
+        let asked = line.stats().slaves.get(&step.slave.number()).map_or(0, |slave| slave.sent);
+        let exchanges = u32::try_from(asked).unwrap_or(u32::MAX);
+        Ok(Some(Find { step, answer, found: Found { step, exchanges, interval } }))
+    }
+
+    /// Reads whoever answers as each family that can be set so, and says how often he is to be fed.
+    async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
+        let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
+        let mut longest = 0;
+        // Those that tell their names come first: whoever has told his is asked for no other's words.
+        let mut families = Family::ALL;
+        families.sort_by_key(|family| !family.capabilities().functions.contains(&IDENTIFICATION));
+        for family in families {
+            if alike.iter().any(|likeness: &Likeness| likeness.certain) {
+                break;
+            }
+            let line = self.line_fed_for(step, LOOK).await?;
+            let config = line.config();
+            if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
+                continue;
+            }
+            let looks = look::status(&line, family, step.slave).await;
+            longest = longest.max(look::longest_read(&line, step.slave));
+            match looks {
+                Looks::Like(()) => {}
+                Looks::Unlike => continue,
+                Looks::Damaged => {
+                    is_damaged = true;
+                    continue;
+                }
+            }
+            let line = self.line_fed_for(step, LOOK).await?;
+            if let Looks::Like((likeness, watchdog)) = look::identity(&line, family, step.slave).await {
+                intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
+                alike.push(likeness);
+            } else {
+                is_damaged = true;
+            }
+            let line = self.line_fed_for(step, LOOK).await?;
+            is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;
+        }
+        let named = alike.iter().any(|likeness| likeness.certain);
+        alike.retain(|likeness| match named {
+            true => likeness.certain,
+            false => longest <= likeness.family.capabilities().read_words,
+        });
+        intervals.retain(|(family, _)| alike.iter().any(|likeness| likeness.family == *family));
+        let unknown = alike.is_empty().then_some(Duration::from_secs(1));
+        let interval = intervals.into_iter().filter_map(|(_, interval)| interval).chain(unknown).min();
+        let line = self.line(step.trial).await?;
+        if let Some(cut) = look::cut(&line, step.slave).filter(|_| is_damaged) {
+            return Ok((Answer::Damaged(cut), interval));
+        }
+        if is_damaged {
+            let why = "short answers come intact, longer ones are damaged every time".to_owned();
+            return Ok((Answer::Two { alike, why }, interval));
+        }
+        Ok((Answer::Slave(alike), interval))
+    }
+
+    /// The line at a step's settings, after those were fed who could not wait.
+    async fn fed_line(&mut self, step: Step) -> Result<Line, Failure> {
+        let ahead = self.plan.trials.get(step.trial).map(|trial| trial.silent(self.wait)).unwrap_or_default();
+        self.line_fed_for(step, ahead).await
+    }
+
+    /// The same before something that takes longer than to ask once.
+    async fn line_fed_for(&mut self, step: Step, ahead: Duration) -> Result<Line, Failure> {
+        for _ in 0..self.feeding.len() {
+            let at = self.at.as_ref().map(|(trial, _)| *trial);
+            let Some(fed) = self.feeding.next(self.began.elapsed(), ahead, at) else { break };
+            let line = self.line(fed.step.trial).await?;
+            look::feed(&line, fed.family, fed.step.slave).await;
+            self.feeding.fed(fed.step, self.began.elapsed());
+        }
+        self.line(step.trial).await
+    }
+
+    /// The line at the settings of a trial.
+    async fn line(&mut self, trial: usize) -> Result<Line, Failure> {
+        if let Some((at, line)) = &self.at
+            && *at == trial
+        {
+            return Ok(line.clone());
+        }
+        self.close().await;
+        let settings = self.plan.trials.get(trial);
+        let config =
+            settings.map_or_else(|| self.base.clone(), |trial| trial.config(self.base.clone(), self.wait));
+        let line = (self.open)(config).await?;
+        self.at = Some((trial, line.clone()));
+        Ok(line)
+    }
+}
+
+/// How a scan goes on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Told {
+    /// It asks there now, after so many steps.
+    At {
+        done: usize,
+        step: Step,
+    },
+    Found(Find),
+}
+
+/// Each address is asked once, however many are silent.
+/// Who answers is not known yet, so whoever has answered gets the longest pause that a family needs.
+fn patient(line: LineConfig) -> LineConfig {
+    let pauses = Family::ALL.map(|family| family.capabilities().turnaround);
+    let turnaround = pauses.into_iter().max().unwrap_or_default();
+    let patient = LineConfig { offline_after: 0, retries: 0, ..line };
+    (1..=247).fold(patient, |config, address| {
+        config.slave(address, SlaveSettings { turnaround, ..SlaveSettings::default() })
+    })
+}

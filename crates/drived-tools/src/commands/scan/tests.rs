@@ -1,0 +1,314 @@
+//! Scans of simulated lines, in virtual time.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig, Protocol};
+use drive_core::{SerialSettings, SlaveAddress};
+use drive_families::Family;
+use drive_sim::{ALWAYS, Dialect, Fault, SimLine, SimSlave, Wiring};
+use tokio::time::Instant;
+
+use super::{
+    answer::{Answer, Likeness},
+    plan::{Others, Plan, Trial},
+    sweep::{Find, Sweep, Told},
+};
+use drived_simulated::{self as simulated, SetUp};
+
+const WAIT: Duration = Duration::from_millis(100);
+/// What changes something in a slave: functions of Modbus, and requests of UNI-TE (writing a word, words, the specific request,
+/// clearing counters).
+const WRITES: [u8; 6] = [0x05, 0x06, 0x0F, 0x10, 0x16, 0x17];
+const UNITE_WRITES: [u8; 4] = [0x14, 0x37, 0xF2, 0xA4];
+
+fn serial(text: &str) -> SerialSettings {
+    text.parse().unwrap()
+}
+
+fn addresses(numbers: impl IntoIterator<Item = u8>) -> Vec<SlaveAddress> {
+    numbers.into_iter().map(|number| number.try_into().unwrap()).collect()
+}
+
+fn at_one(settings: &str, numbers: impl IntoIterator<Item = u8>) -> Plan {
+    Plan::new(vec![Trial::named(serial(settings), Protocol::Rtu)], &addresses(numbers), WAIT)
+}
+
+async fn scanned(simulated: &SimLine, plan: &Plan) -> Vec<Find> {
+    let open = async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
+    let mut sweep = Sweep::new(plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open);
+    let mut finds = Vec::new();
+    let told = |told| {
+        finds.extend(match told {
+            Told::Found(find) => Some(find),
+            Told::At { .. } => None,
+        });
+        Ok(())
+    };
+    sweep.run(|_, _| true, told).await.unwrap();
+    sweep.close().await;
+    finds
+}
+
+fn assert_only_read(machines: &[SimSlave]) {
+    assert_none(machines, &WRITES);
+}
+
+fn assert_none(machines: &[SimSlave], functions: &[u8]) {
+    for machine in machines {
+        for &write in functions {
+            assert_eq!(machine.requests(write), 0, "{}: function {write}", machine.name());
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn every_family_is_known_again_and_nothing_is_written_to_it() {
+    let mut most = 0;
+    for set_up in [SetUp::Factory, SetUp::ForTheBus] {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        let mut machines = Vec::new();
+        for (family, number) in Family::ALL.into_iter().zip(1..) {
+            machines.push(simulated.add_boxed(number, simulated::model(family, set_up)).unwrap());
+        }
+        let finds = scanned(&simulated, &at_one("19200 8N1", 1..=7)).await;
+        assert_eq!(finds.len(), 5);
+        for (find, family) in finds.iter().zip(Family::ALL) {
+            let Answer::Slave(alike) = &find.answer else { panic!("{find:?}") };
+            let [Likeness { family: seen, certain, .. }] = alike[..] else { panic!("{alike:?}") };
+            assert_eq!(seen, family);
+            assert_eq!(certain, matches!(family, Family::Atv312 | Family::Atv21), "{alike:?}");
+            most = most.max(find.found.exchanges);
+        }
+        assert_only_read(&machines);
+        assert_eq!(simulated.violations(), []);
+    }
+    assert_eq!(most, super::plan::LOOKS);
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_answer_that_cannot_be_understood_is_told_from_silence() {
+    let simulated = SimLine::default();
+    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    simulated.set_fault(Fault::Flipped, ALWAYS);
+    let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
+    assert!(
+        matches!(&finds[..], [Find { answer: Answer::Damaged(_) | Answer::Two { .. }, .. }]),
+        "{finds:?}"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stray_byte_before_each_answer_is_no_second_drive() {
+    let simulated = SimLine::default();
+    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    simulated.set_fault(Fault::Noise, ALWAYS);
+    let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
+    let [Find { answer: Answer::Slave(alike), .. }] = &finds[..] else { panic!("{finds:?}") };
+    assert!(matches!(&alike[..], [Likeness { family: Family::Atv312, certain: true, .. }]), "{alike:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_slower_than_the_scan_waits_is_found_and_nobody_else() {
+    let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+    let slow = simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    slow.set_turnaround(Some(Duration::from_millis(180)));
+    let finds = scanned(&simulated, &at_one("19200 8N1", 4..=8)).await;
+    let [Find { step, answer: Answer::Slave(_), .. }] = &finds[..] else { panic!("{finds:?}") };
+    assert_eq!(step.slave.number(), 5);
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_read_of_a_watchdog_that_fails_is_no_watchdog_of_a_tenth_of_a_second() {
+    for seed in 0..20 {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Lost, ALWAYS / 20));
+        simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+        let finds = scanned(&simulated, &at_one("19200 8N1", [5])).await;
+        for find in finds {
+            assert!(
+                find.found.interval.is_none_or(|every| every >= Duration::from_millis(500)),
+                "{seed}: {find:?}"
+            );
+        }
+    }
+}
+
+/// Five families at speeds, formats and protocols of their own, on one line.
+fn mixed(simulated: &SimLine) -> Vec<(SimSlave, Family, Dialect)> {
+    let rtu = |text| Dialect { settings: serial(text), protocol: drive_sim::Protocol::Rtu };
+    let of = |text, protocol| Dialect { settings: serial(text), protocol };
+    let drives = [
+        (1, Family::Atv312, rtu("19200 8E1")),
+        (2, Family::Atv312, rtu("4800 8O1")),
+        (200, Family::Atv312, rtu("9600 8N2")),
+        (1, Family::Atv28, rtu("9600 8N1")),
+        (28, Family::Atv28, rtu("19200 8N1")),
+        (3, Family::Omron3g3ev, rtu("9600 8E1")),
+        (4, Family::Omron3g3ev, rtu("2400 8O1")),
+        (247, Family::Atv21, rtu("19200 8O1")),
+        (5, Family::Atv58, rtu("4800 8N1")),
+        (6, Family::Atv58, of("9600 7E1", drive_sim::Protocol::Ascii)),
+        (7, Family::Atv58, of("19200 7O2", drive_sim::Protocol::Ascii)),
+        (8, Family::Atv58, of("19200 8O1", drive_sim::Protocol::UniTelway)),
+        (9, Family::Atv58, of("4800 8O1", drive_sim::Protocol::UniTelway)),
+    ];
+    let add = |(address, family, dialect)| {
+        let machine = simulated.add_beside(address, simulated::model(family, SetUp::ForTheBus)).unwrap();
+        machine.set_dialect(dialect);
+        (machine, family, dialect)
+    };
+    drives.into_iter().map(add).collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn all_addresses_at_all_settings_find_every_drive_in_the_time_that_was_told_and_write_nothing() {
+    let simulated = SimLine::default();
+    let machines = mixed(&simulated);
+    let plan = Plan::new(Others::default().trials(None), &addresses(1..=247), WAIT);
+    let began = Instant::now();
+    let finds = scanned(&simulated, &plan).await;
+    let taken = began.elapsed();
+    for (machine, family, dialect) in &machines {
+        let found = finds.iter().find(|find| {
+            let trial = &plan.trials[find.step.trial];
+            let [is, should] = [trial.serial, dialect.settings]
+                .map(|serial| (serial.baud(), serial.format().data_bits(), serial.format().parity()));
+            is == should
+                && simulated::protocol(trial.protocol) == dialect.protocol
+                && find.step.slave.number() == machine.address()
+        });
+        let Some(Find { answer: Answer::Slave(alike), .. }) = found else {
+            panic!("{family} {dialect:?}: {found:?}")
+        };
+        assert!(alike.iter().any(|likeness| likeness.family == *family), "{family} {dialect:?}: {alike:?}");
+        if dialect.protocol == drive_sim::Protocol::UniTelway {
+            assert!(alike[0].certain && alike[0].says().unwrap().contains("ATV"), "{alike:?}");
+        }
+        assert_eq!(machine.observe().trip, None, "{family} {dialect:?}");
+    }
+    assert_eq!(finds.len(), machines.len(), "{finds:?}");
+    let (unite, modbus): (Vec<_>, Vec<_>) =
+        machines.into_iter().partition(|(.., dialect)| dialect.protocol == drive_sim::Protocol::UniTelway);
+    let of = |machines: Vec<(SimSlave, _, _)>| {
+        machines.into_iter().map(|(machine, ..)| machine).collect::<Vec<_>>()
+    };
+    assert_only_read(&of(modbus));
+    assert_none(&of(unite), &UNITE_WRITES);
+    let silent = plan.time();
+    let told = plan.time_with(&finds.iter().map(|find| find.found).collect::<Vec<_>>());
+    println!(
+        "{} settings, {} questions: {:.1} s if nobody answers, {:.1} s with those who do, {:.1} s taken",
+        plan.trials.len(),
+        plan.steps.len(),
+        silent.as_secs_f64(),
+        told.as_secs_f64(),
+        taken.as_secs_f64()
+    );
+    assert!(taken.abs_diff(told) < told / 10, "{taken:?} {told:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn silence_takes_the_time_that_was_told_at_every_setting() {
+    let simulated = SimLine::default();
+    for trial in Others::default().trials(None) {
+        let plan = Plan::new(vec![trial], &addresses(1..=20), WAIT);
+        let began = Instant::now();
+        assert_eq!(scanned(&simulated, &plan).await, []);
+        let (taken, told) = (began.elapsed(), plan.time());
+        assert!(taken.abs_diff(told) < told / 20, "{trial:?}: {taken:?} {told:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() {
+    let simulated = SimLine::default();
+    // n40 is 0 from the factory: after 2 s without a message it trips (§2.1).
+    let drive = simulated.add_boxed(1, simulated::model(Family::Omron3g3ev, SetUp::Factory)).unwrap();
+    drive.set_dialect(Dialect { settings: serial("9600 8E1"), ..Dialect::default() });
+    // ttO of a second and SLL, which trips.
+    let other = simulated.add_boxed(2, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    let rows = Family::Atv312.capabilities().rows;
+    let tto = rows.iter().find(|row| row.code == "ttO").unwrap();
+    assert!(other.poke(tto.address, 10));
+    let plan = Plan::new(Others::default().trials(None), &addresses(1..=31), WAIT);
+    assert!(plan.time() > Duration::from_secs(60));
+    let finds = scanned(&simulated, &plan).await;
+    assert_eq!(finds.len(), 2);
+    assert_eq!([&drive, &other].map(|machine| machine.observe().trip), [None, None]);
+    // The watchdogs are armed indeed.
+    tokio::time::sleep(Duration::from_secs(5)).await;
+    assert!([&drive, &other].into_iter().all(|machine| machine.observe().trip.is_some()));
+    assert_only_read(&[drive, other]);
+}
+
+mod two_at_one_address {
+    use super::*;
+
+    async fn verdict(simulated: &SimLine) -> Answer {
+        let mut finds = scanned(simulated, &at_one("19200 8N1", 3..=7)).await;
+        assert_eq!(finds.len(), 1, "{finds:?}");
+        finds.remove(0).answer
+    }
+
+    fn two(one: Family, other: Family) -> (SimLine, SimSlave, SimSlave) {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        let [one, other] = [one, other]
+            .map(|family| simulated.add_beside(5, simulated::model(family, SetUp::ForTheBus)).unwrap());
+        let turnaround = Some(Duration::from_millis(5));
+        one.set_turnaround(turnaround);
+        other.set_turnaround(turnaround);
+        (simulated, one, other)
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn two_of_one_family_are_known_by_what_they_differ_in() {
+        let (simulated, one, _) = two(Family::Atv312, Family::Atv312);
+        // The version of their firmware (UdP, W3302).
+        assert!(one.poke(3_302, 0x1305));
+        let answer = verdict(&simulated).await;
+        assert!(
+            matches!(&answer, Answer::Two { why, .. } if why.contains("longer ones are damaged")),
+            "{answer:?}"
+        );
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn two_that_say_the_same_at_the_same_moment_cannot_be_told_from_one() {
+        let (simulated, ..) = two(Family::Atv312, Family::Atv312);
+        assert!(matches!(verdict(&simulated).await, Answer::Slave(alike) if alike.len() == 1));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn two_of_different_families_are_known() {
+        for (one, other) in [
+            (Family::Atv312, Family::Atv21),
+            (Family::Atv28, Family::Omron3g3ev),
+            (Family::Atv58, Family::Atv28),
+        ] {
+            let (simulated, ..) = two(one, other);
+            let answer = verdict(&simulated).await;
+            assert!(matches!(answer, Answer::Two { .. }), "{one} {other}: {answer:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_second_answer_after_the_first_or_into_it_is_known() {
+        for millis in [6, 8, 15, 40, 90] {
+            let (simulated, _, other) = two(Family::Atv312, Family::Atv312);
+            other.set_turnaround(Some(Duration::from_millis(millis)));
+            let answer = verdict(&simulated).await;
+            assert!(matches!(answer, Answer::Two { .. }), "{millis} ms: {answer:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn noise_that_damages_one_answer_in_ten_is_not_taken_for_two_drives() {
+        for seed in 0..20 {
+            let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+            simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, ALWAYS / 10));
+            simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+            let answer = verdict(&simulated).await;
+            assert!(matches!(&answer, Answer::Slave(alike) if alike.len() == 1), "{seed}: {answer:?}");
+        }
+    }
+}
