@@ -1,13 +1,12 @@
 //! By what somebody was let in. It is looked at again for as long as he is answered.
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use tokio::{
     sync::watch,
     time::{MissedTickBehavior, interval},
 };
 
-use super::gate::Gate;
 use drived_config::rights::Role;
 
 /// From one look to the next, beside those that a change in this program brings: another program changes the file of tokens.
@@ -26,14 +25,14 @@ pub(super) enum Authority {
 
 impl Authority {
     /// Waits until it does not hold any more: the token is removed or has another role, the session is ended or is over, or
-    /// nobody can tell. Safe to drop.
-    pub(super) async fn ends(self, gate: Arc<Gate>, mut changes: watch::Receiver<()>) {
+    /// nobody can tell, as `holds` says. Safe to drop.
+    pub(super) async fn ends(self, holds: impl Fn(&Self) -> bool, mut changes: watch::Receiver<()>) {
         if self == Self::Freely {
             return std::future::pending().await;
         }
         let mut looks = interval(LOOKED_AT_EVERY);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        while gate.holds(&self) {
+        while holds(&self) {
             tokio::select! {
                 _ = looks.tick() => {}
                 // Where nobody could tell a change any more, the gate has gone.

@@ -186,7 +186,8 @@ impl Gate {
         }
         // An answer that is made as it goes, such as an event stream or a capture.
         let goes_on = answer.status().is_success() && answer.body().size_hint().exact().is_none();
-        let authority = authority.ends(Arc::clone(self), self.changes.subscribe());
+        let gate = Arc::clone(self);
+        let authority = authority.ends(move |authority| gate.holds(authority), self.changes.subscribe());
         protect(answer.headers_mut(), of_api, door.encrypted);
         answer.map(|body| {
             Body::new(match goes_on {

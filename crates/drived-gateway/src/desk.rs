@@ -1,5 +1,7 @@
 //! What becomes of a request: to whom it goes, whether it may, and what answers it.
 
+mod writes;
+
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
     net::IpAddr,
@@ -19,6 +21,7 @@ use futures_util::{
 };
 use tokio::time::{Instant, sleep_until, timeout_at};
 
+pub(crate) use self::writes::Stop;
 use super::{
     clients::Clients,
     counters::{Counters, Result as Counted},
@@ -27,7 +30,6 @@ use super::{
     pdu::{self, Ask},
     share::Share,
     virtual_unit::{self, Outcomes},
-    writes::Stop,
 };
 use crate::config::{GatewayConfig, Units};
 use drived_doors::audit::Audit;

@@ -22,7 +22,6 @@ mod share;
 #[cfg(test)]
 mod tests;
 pub mod virtual_unit;
-mod writes;
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
 

@@ -11,11 +11,8 @@ use drive_fleet::{DriveHandle, Link, Until};
 use futures_util::{FutureExt as _, future::join_all};
 use tokio::time::{Instant, timeout_at};
 
-use super::{
-    clients::Word,
-    desk::{Answer, Desk},
-    pdu::Ask,
-};
+use super::{Answer, Desk};
+use crate::{clients::Word, pdu::Ask};
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
@@ -27,9 +24,9 @@ use drived_plant::plant::{
 
 /// Why a write is not carried out: the exception, and the reason in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Refusal {
-    pub(super) code: ExceptionCode,
-    pub(super) why: String,
+pub(crate) struct Refusal {
+    pub(crate) code: ExceptionCode,
+    pub(crate) why: String,
 }
 
 impl Refusal {
@@ -52,12 +49,12 @@ struct Wanted {
 
 /// A stop that waits for nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stop(StopMode);
+pub(crate) struct Stop(StopMode);
 
 impl Desk {
     /// Whether a write stops the motor, so that it goes ahead of what waits: a word that is a stop; or one without a run
     /// command, unless the motor is known to stand and nothing is about to start it.
-    pub(super) fn stop_in(&self, unit: u8, ask: &Ask) -> Option<Stop> {
+    pub(crate) fn stop_in(&self, unit: u8, ask: &Ask) -> Option<Stop> {
         let Ask::Write { .. } = ask else { return None };
         if unit == 0 && self.config.broadcast {
             return self.broadcast_stop(ask);
@@ -73,7 +70,7 @@ impl Desk {
     }
 
     /// Carries out a write.
-    pub(super) async fn write(
+    pub(crate) async fn write(
         &self,
         peer: IpAddr,
         arrived: Instant,
@@ -465,7 +462,7 @@ impl Desk {
     }
 
     /// Looks after clients that have started a motor and are silent, for ever.
-    pub(super) async fn watch_silence(&self) {
+    pub(crate) async fn watch_silence(&self) {
         let Some(limit) = self.config.client_timeout else { return };
         let mut looks = tokio::time::interval(Duration::from_millis(500).min(limit));
         loop {
