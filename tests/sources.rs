@@ -144,9 +144,8 @@ impl Modules {
         let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
         let below =
             if ["lib", "main", "mod"].contains(&stem) { folder.to_owned() } else { folder.join(stem) };
-        let mut lines = code.lines().map(str::trim);
         let mut placed = None;
-        while let Some(line) = lines.next() {
+        for line in code.lines().map(str::trim) {
             if let Some(place) = line.strip_prefix("#[path = \"") {
                 placed = place.split('"').next().map(|place| folder.join(place));
             }

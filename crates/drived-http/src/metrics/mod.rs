@@ -68,7 +68,7 @@ struct Metrics {
 
 impl Metrics {
     fn samples(&self) -> Samples {
-        let mut samples = Samples::new();
+        let mut samples = Samples::default();
         samples.add(Id::BuildInfo, &[env!("CARGO_PKG_VERSION")], 1.0);
         let (wall, steady) = self.began;
         let drift = unix(Instant::now()) as f64 - wall as f64 - steady.elapsed().as_millis() as f64;

@@ -35,11 +35,13 @@ impl Format {
 /// The samples of one scrape: those of each metric together, whoever gave them.
 pub struct Samples(Vec<String>);
 
-impl Samples {
-    pub fn new() -> Self {
+impl Default for Samples {
+    fn default() -> Self {
         Self(vec![String::new(); TABLE.len()])
     }
+}
 
+impl Samples {
     /// Adds a sample; the values of the labels in the order of the table.
     pub fn add(&mut self, id: Id, labels: &[&str], value: f64) {
         self.line(id, "", labels, None, value);

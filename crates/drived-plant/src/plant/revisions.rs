@@ -71,7 +71,7 @@ pub enum Next {
 impl Revisions {
     /// An empty ring. Numbers go on from the time, so that those of an earlier run of the program are not taken for
     /// numbers of this one.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let last = unix(Instant::now());
         let ring = Ring { last, frames: VecDeque::new(), bytes: 0 };
         Self { ring: Mutex::new(ring), last: watch::Sender::new(last) }
