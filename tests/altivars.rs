@@ -11,7 +11,7 @@ use drive_core::{
 };
 use drive_families::Family;
 use drive_testing::{bench, rig::Rig, truth::contradiction};
-use support::drives;
+use support::drives::{self, Five, five};
 use tokio::time::sleep;
 
 const ALTIVARS: [Family; 3] = [Family::Atv28, Family::Atv58, Family::Atv312];
@@ -28,10 +28,10 @@ struct Registers {
     hsp: u16,
 }
 
-const fn registers(family: Family) -> Registers {
-    match family {
-        Family::Atv312 => Registers { cmd: 8501, lfr: 8502, lfrd: Some(8602), hsp: 3104 },
-        Family::Atv28 => Registers { cmd: 400, lfr: 401, lfrd: Some(603), hsp: 250 },
+fn registers(family: Family) -> Registers {
+    match five(family) {
+        Five::Atv312 => Registers { cmd: 8501, lfr: 8502, lfrd: Some(8602), hsp: 3104 },
+        Five::Atv28 => Registers { cmd: 400, lfr: 401, lfrd: Some(603), hsp: 250 },
         _ => Registers { cmd: 400, lfr: 401, lfrd: None, hsp: 250 },
     }
 }
@@ -296,9 +296,9 @@ async fn no_stop_is_told_at_rest_before_the_shaft_stands() {
                     last = status.motion;
                     sleep(Duration::from_millis(50)).await;
                 }
-                let ends_as = match (mode, family) {
+                let ends_as = match (mode, five(family)) {
                     (StopMode::Freewheel, _) => Motion::Coasting,
-                    (StopMode::DcInjection, Family::Atv28 | Family::Atv312) => Motion::Held,
+                    (StopMode::DcInjection, Five::Atv28 | Five::Atv312) => Motion::Held,
                     _ => Motion::AtRest,
                 };
                 assert_eq!(last, ends_as, "{family}, {mode}");

@@ -8,6 +8,7 @@ use drive_core::{
 use drive_families::{Family, Options};
 use drive_sim::{SimLine, SimSlave, Wiring, models};
 use futures_util::FutureExt as _;
+use support::drives::{Five, five};
 
 use Intent::{Prepare, ResetFaults, Setpoint, Start, Stop};
 use StopMode::{DcInjection, Fast, Freewheel, Ramp};
@@ -15,12 +16,12 @@ use StopMode::{DcInjection, Fast, Freewheel, Ramp};
 fn drive(family: Family) -> (SimSlave, Box<dyn Drive>) {
     let settings = family.capabilities().factory;
     let simulated = SimLine::new(Wiring::rtu(settings));
-    let machine = match family {
-        Family::Atv21 => simulated.add(1, models::atv21::Atv21::new()),
-        Family::Atv28 => simulated.add(1, models::atv28::Atv28::new()),
-        Family::Atv58 => simulated.add(1, models::atv58::Atv58::new()),
-        Family::Atv312 => simulated.add(1, models::atv312::Atv312::new()),
-        Family::Omron3g3ev => simulated.add(1, models::drive_3g3ev::Drive3g3ev::new()),
+    let machine = match five(family) {
+        Five::Atv21 => simulated.add(1, models::atv21::Atv21::new()),
+        Five::Atv28 => simulated.add(1, models::atv28::Atv28::new()),
+        Five::Atv58 => simulated.add(1, models::atv58::Atv58::new()),
+        Five::Atv312 => simulated.add(1, models::atv312::Atv312::new()),
+        Five::Omron3g3ev => simulated.add(1, models::drive_3g3ev::Drive3g3ev::new()),
     };
     let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
     let slave = 1.try_into().unwrap();

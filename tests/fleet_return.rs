@@ -28,30 +28,30 @@ enum Away {
 
 impl Away {
     /// What is set at the drive so that it can be.
-    const fn settings(self, family: Family) -> &'static [&'static str] {
-        match (self, family) {
+    fn settings(self, family: Family) -> &'static [&'static str] {
+        match (self, drives::five(family)) {
             // §8.4 p. 31: R forces local.
-            (Self::Control, Family::Atv21) => &["set F112 48"],
+            (Self::Control, drives::Five::Atv21) => &["set F112 48"],
             // BBV51701 p. 44: LI5 forces local, the terminals' channel.
-            (Self::Control, Family::Atv312) => &["set FLO 133", "set FLOC 1"],
+            (Self::Control, drives::Five::Atv312) => &["set FLO 133", "set FLOC 1"],
             _ => &[],
         }
     }
 
-    const fn comes(self, family: Family) -> &'static str {
-        match (self, family) {
-            (Self::Control, Family::Atv21) => "terminal R on",
-            (Self::Control, Family::Atv312) => "terminal LI5 on",
+    fn comes(self, family: Family) -> &'static str {
+        match (self, drives::five(family)) {
+            (Self::Control, drives::Five::Atv21) => "terminal R on",
+            (Self::Control, drives::Five::Atv312) => "terminal LI5 on",
             (Self::Control, _) => "panel takes",
             (Self::Cable, _) => "line cut",
             (Self::Power, _) => "power off",
         }
     }
 
-    const fn goes(self, family: Family) -> &'static str {
-        match (self, family) {
-            (Self::Control, Family::Atv21) => "terminal R off",
-            (Self::Control, Family::Atv312) => "terminal LI5 off",
+    fn goes(self, family: Family) -> &'static str {
+        match (self, drives::five(family)) {
+            (Self::Control, drives::Five::Atv21) => "terminal R off",
+            (Self::Control, drives::Five::Atv312) => "terminal LI5 off",
             (Self::Control, _) => "panel releases",
             (Self::Cable, _) => "line join",
             (Self::Power, _) => "power on",
@@ -127,8 +127,8 @@ async fn a_run_command_is_withdrawn_when_somebody_else_takes_control_or_is_an_al
             })
             .await;
         // The Altivar 58's manual names no word that ends its run command and nothing else.
-        match family {
-            Family::Atv58 => assert!(withdrawn.is_alarm(), "{family}: {withdrawn}"),
+        match drives::five(family) {
+            drives::Five::Atv58 => assert!(withdrawn.is_alarm(), "{family}: {withdrawn}"),
             _ => assert!(
                 matches!(withdrawn, EventKind::Command { outcome: Outcome::Confirmed, .. }),
                 "{family}: {withdrawn}"

@@ -23,12 +23,12 @@ const MANY: usize = 100;
 const A_RAMP: Duration = Duration::from_secs(20);
 
 /// The register of the control word, a run command, and the bits that tell it from the other words.
-const fn run_command(family: Family) -> (u16, u16, u16) {
-    match family {
-        Family::Atv21 => (0xFA00, 0xC400, 0x0400),
-        Family::Atv28 | Family::Atv58 => (400, 0x000F, 0x700F),
-        Family::Atv312 => (8501, 0x000F, 0x700F),
-        Family::Omron3g3ev => (0x0001, 0x0001, 0x0001),
+fn run_command(family: Family) -> (u16, u16, u16) {
+    match drives::five(family) {
+        drives::Five::Atv21 => (0xFA00, 0xC400, 0x0400),
+        drives::Five::Atv28 | drives::Five::Atv58 => (400, 0x000F, 0x700F),
+        drives::Five::Atv312 => (8501, 0x000F, 0x700F),
+        drives::Five::Omron3g3ev => (0x0001, 0x0001, 0x0001),
     }
 }
 
@@ -174,8 +174,8 @@ async fn a_stop_is_not_confirmed_while_a_start_that_came_late_runs_the_motor() {
         for exchanges in 1..MANY {
             let (mut rig, mut drive, port) = ready(family).await;
             drive.start(Direction::Forward).await.expect("it starts");
-            let late = match family {
-                Family::Omron3g3ev => Request::WriteMultipleRegisters(register, vec![run].into()),
+            let late = match drives::five(family) {
+                drives::Five::Omron3g3ev => Request::WriteMultipleRegisters(register, vec![run].into()),
                 _ => Request::WriteSingleRegister(register, run),
             };
             port.after(exchanges, Event::Late(late));

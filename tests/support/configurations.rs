@@ -1,16 +1,12 @@
 //! Who may decide what a motor does: the control configurations of the five manuals, as settings made at the drive, what other
 //! masters do, and the referee of each.
 
-use drive_atv21::Authority;
 use drive_core::registers::{Range, Row};
 use drive_families::{Family, Options};
 use drive_sim::{Model, SimSlave, models};
-use drive_testing::{
-    referee,
-    worlds::{ByManual, Configuration, Event, Judge, Surrounded, Values},
-};
+use drive_testing::worlds::{ByManual, Configuration, Event, Judge, Surrounded, Values};
 
-use crate::drives;
+use crate::drives::{self, Five, five};
 
 /// A way in which a manual lets a drive be commanded: what it is in a few words, the drive before the settings, and what is set at
 /// it, as lines of the simulator's text.
@@ -120,10 +116,9 @@ pub struct Around(pub Family);
 impl Around {
     /// What an owner may say of his drive.
     fn owners(&self) -> Vec<(String, Options)> {
-        let says = |authority| Options { authority: Some(authority), ..drives::options(self.0) };
-        match self.0 {
-            Family::Atv21 => [Authority::Priority, Authority::Settings]
-                .map(|authority| (format!(", {authority:?}"), says(authority)))
+        match five(self.0) {
+            Five::Atv21 => ["priority", "settings"]
+                .map(|authority| (format!(", {authority}"), drives::said("authority", authority)))
                 .to_vec(),
             _ => vec![(String::new(), drives::options(self.0))],
         }
@@ -132,18 +127,18 @@ impl Around {
 
 impl Surrounded for Around {
     fn configurations(&self) -> Vec<Configuration> {
-        let ways = match self.0 {
-            Family::Atv21 => ATV21,
-            Family::Atv28 => ATV28,
-            Family::Atv58 => ATV58,
-            Family::Atv312 => ATV312,
-            Family::Omron3g3ev => OMRON,
+        let ways = match five(self.0) {
+            Five::Atv21 => ATV21,
+            Five::Atv28 => ATV28,
+            Five::Atv58 => ATV58,
+            Five::Atv312 => ATV312,
+            Five::Omron3g3ev => OMRON,
         };
         let family = self.0;
         let owners = self.owners();
         let of_owner = owners.iter().flat_map(|(owner, options)| {
             ways.iter().map(move |&(name, machine, settings)| {
-                let options = *options;
+                let options = options.clone();
                 Configuration {
                     name: format!("{name}{owner}"),
                     open: Box::new(move |port, slave| family.open_with(port, slave, &options)),
@@ -157,15 +152,15 @@ impl Surrounded for Around {
 
     /// His run command and his stops, a reference of his own, one the other way round, and no way back: he stays.
     fn other_masters(&self) -> Vec<Event> {
-        let deeds: &[&str] = match self.0 {
+        let deeds: &[&str] = match five(self.0) {
             // Another reference, a preset speed, reverse, a stop, and what gives control back (§8.4, §8.5).
-            Family::Atv21 => &["FA01 3000", "FA00 C401h", "FA00 C600h", "FA00 C000h", "FA00 0000h"],
+            Five::Atv21 => &["FA01 3000", "FA00 C401h", "FA00 C600h", "FA00 C000h", "FA00 0000h"],
             // §5.1.
-            Family::Omron3g3ev => &["0002h 300", "0001h 3", "0001h 0"],
-            Family::Atv58 => {
+            Five::Omron3g3ev => &["0002h 300", "0001h 3", "0001h 0"],
+            Five::Atv58 => {
                 &["W401 300", "W401 FF38h", "CMD 000Fh", "CMD 080Fh", "CMD 100Fh", "CMD 0002h", "CMD 0000h"]
             }
-            Family::Atv28 | Family::Atv312 => {
+            Five::Atv28 | Five::Atv312 => {
                 &["LFr 30", "LFr -20", "CMD 000Fh", "CMD 080Fh", "CMD 100Fh", "CMD 0002h", "CMD 0000h"]
             }
         };
@@ -173,14 +168,7 @@ impl Surrounded for Around {
     }
 
     fn judge(&self, machine: &SimSlave) -> Option<Box<dyn Judge>> {
-        let manual = match self.0 {
-            Family::Atv21 => referee::Family::Atv21,
-            Family::Atv28 => referee::Family::Atv28,
-            Family::Atv58 => referee::Family::Atv58,
-            Family::Atv312 => referee::Family::Atv312,
-            Family::Omron3g3ev => referee::Family::Omron3g3ev,
-        };
-        Some(Box::new(ByManual::new(manual, self.0.capabilities().rows, machine.clone())))
+        Some(Box::new(ByManual::new(five(self.0), self.0.capabilities().rows, machine.clone())))
     }
 
     fn parameter(&self) -> Option<(&'static str, u16)> {

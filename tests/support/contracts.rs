@@ -9,7 +9,10 @@ use drive_testing::{
     contract::{ControlWord, StatusWord},
 };
 
-use crate::{configurations::Around, drives};
+use crate::{
+    configurations::Around,
+    drives::{self, Five, five},
+};
 
 /// The contract of a family.
 #[must_use]
@@ -35,17 +38,17 @@ pub fn contract(family: Family) -> Contract {
 
 /// The control word, and words that are plausible somewhere: the words of the chart, and 080Fh, reverse (BBV51701 p. 12, 19;
 /// VVDED397054 p. 21/45).
-const fn control(family: Family) -> (ControlWord, &'static [u16]) {
+fn control(family: Family) -> (ControlWord, &'static [u16]) {
     /// `ETA` of the chart's states, `ETI` with the bus in control, 0 and small numbers.
     const CHART: &[u16] = &[0x0240, 0x0221, 0x0223, 0x0227, 0x0227, 0x4000, 0, 0, 0, 1, 2, 0x0208];
     const fn control(register: u16, words: &'static [u16]) -> ControlWord {
         ControlWord { register, words, others: |_| 0, unseen: &[] }
     }
-    match family {
+    match five(family) {
         // Guide d'exploitation §8.4: the priorities, as far as CMOD and FMOD do not give the bus command, with run, reverse,
         // freewheel, DC braking, fault reset; 0 to release. Bits that belong to others are kept as they were read; no run
         // command, edge or reserved bit is among them.
-        Family::Atv21 => {
+        Five::Atv21 => {
             let words = &[
                 0x0000, 0xC000, 0xC080, 0xC400, 0xC600, 0xC800, 0x2000, 0x6000, 0xA000, 0xE000, 0x0400,
                 0x0600, 0x4400, 0x4600, 0x8400, 0x8600,
@@ -56,22 +59,22 @@ const fn control(family: Family) -> (ControlWord, &'static [u16]) {
             let unseen = &[0x0600, 0x4600, 0x8600];
             (ControlWord { others, unseen, ..control(0xFA00, words) }, plausible)
         }
-        Family::Atv28 => {
+        Five::Atv28 => {
             let words = &[0x0000, 0x0006, 0x0007, 0x000F, 0x0080, 0x080F, 0x100F, 0x200F, 0x400F];
             (control(400, words), CHART)
         }
-        Family::Atv58 => {
+        Five::Atv58 => {
             let words = &[0x0000, 0x0002, 0x0006, 0x0007, 0x000F, 0x0080, 0x080F];
             (control(400, words), CHART)
         }
         // No Altivar 312 whose settings are any words is started: one of them always decides something instead.
-        Family::Atv312 => {
+        Five::Atv312 => {
             let words = &[0x0000, 0x0002, 0x0006, 0x0007, 0x000F, 0x0080, 0x080F, 0x100F, 0x200F, 0x400F];
             let unseen = &[0x0006, 0x0007, 0x000F, 0x080F];
             (ControlWord { others: |_| 0xF800, unseen, ..control(8501, words) }, CHART)
         }
         // §5.1: run, reverse, and a pulse of the inputs of n06 to n08.
-        Family::Omron3g3ev => {
+        Five::Omron3g3ev => {
             let words = &[0x0000, 0x0001, 0x0003, 0x0010, 0x0020, 0x0040];
             let plausible = &[0x0004, 0x0005, 0x0142, 0x0041, 0x0065, 0, 0, 0, 1, 5, drives::RESET_FUNCTION];
             (ControlWord { others: |_| 0x0070, ..control(0x0001, words) }, plausible)
@@ -80,20 +83,20 @@ const fn control(family: Family) -> (ControlWord, &'static [u16]) {
 }
 
 /// The status word, what else a drive holds that stands ready at zero speed under the bus, and what tells a trip.
-const fn status(family: Family) -> StatusWord {
+fn status(family: Family) -> StatusWord {
     const CHART: fn(u16) -> bool = |word| matches!(word & 0x006F, 0x0008 | 0x0028 | 0x000F | 0x002F);
-    match family {
-        Family::Atv21 => StatusWord {
+    match five(family) {
+        Five::Atv21 => StatusWord {
             register: 0xFD01,
             others: &[(0x0003, 2), (0x0004, 4)],
             is_tripped: |word| word & 0x0002 != 0,
         },
-        Family::Atv28 | Family::Atv58 => {
+        Five::Atv28 | Five::Atv58 => {
             StatusWord { register: 458, others: &[(459, 0x4002)], is_tripped: CHART }
         }
-        Family::Atv312 => StatusWord { register: 3201, others: &[(3206, 0x4002)], is_tripped: CHART },
+        Five::Atv312 => StatusWord { register: 3201, others: &[(3206, 0x4002)], is_tripped: CHART },
         // Bit E, "major fault, incl. communication" (§5.2).
-        Family::Omron3g3ev => StatusWord {
+        Five::Omron3g3ev => StatusWord {
             register: 0x002C,
             others: &[(0x0020, 0x0004), (0x0102, 5)],
             is_tripped: |word| word & 0x4000 != 0,
@@ -101,11 +104,11 @@ const fn status(family: Family) -> StatusWord {
     }
 }
 
-const fn exceptions(family: Family) -> &'static [(u8, ExceptionMeaning)] {
-    match family {
-        Family::Atv21 => &[(1, NoSuchFunction), (2, NoSuchRegister), (3, ValueRefused), (4, NotNow)],
+fn exceptions(family: Family) -> &'static [(u8, ExceptionMeaning)] {
+    match five(family) {
+        Five::Atv21 => &[(1, NoSuchFunction), (2, NoSuchRegister), (3, ValueRefused), (4, NotNow)],
         // Their manuals list 1 to 4 as the Modbus specification has them; 5 and 6 are the specification's.
-        Family::Atv28 | Family::Atv58 | Family::Atv312 => &[
+        Five::Atv28 | Five::Atv58 | Five::Atv312 => &[
             (1, NoSuchFunction),
             (2, NoSuchRegister),
             (3, ValueRefused),
@@ -113,7 +116,7 @@ const fn exceptions(family: Family) -> &'static [(u8, ExceptionMeaning)] {
             (5, Accepted),
             (6, Busy),
         ],
-        Family::Omron3g3ev => &[
+        Five::Omron3g3ev => &[
             (1, NoSuchFunction),
             (2, NoSuchRegister),
             (3, ValueRefused),

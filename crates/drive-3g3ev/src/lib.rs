@@ -23,8 +23,9 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Reaction, Registers,
-    Row, SerialSettings, SlaveAddress, StopMode, Watch, WatchdogCapability, serial::CharacterFormat,
+    Absent, AnswerDelay, BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Reaction,
+    Registers, Row, SerialSettings, SlaveAddress, StopMode, Watch, WatchdogCapability,
+    serial::CharacterFormat,
 };
 
 pub use crate::{
@@ -68,6 +69,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     persist: Some("ENTER, a write to 0900h"),
     broadcast_stops: &[StopMode::Ramp],
     turnaround: turnaround(2_400),
+    answer_delay: Some(AnswerDelay {
+        code: "n65",
+        longest: Duration::from_millis(40),
+        bits: 24,
+        source: "§2.1, p. 6",
+    }),
     status_exchanges: 2,
     measurement_exchanges: 2,
     ..Capabilities::least("3g3ev", "Omron 3G3EV")

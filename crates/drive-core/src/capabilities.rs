@@ -74,12 +74,38 @@ pub struct Capabilities {
     pub fault_history: u8,
     /// The silence that a slave of this family needs after its answer before the next request, above t3.5.
     pub turnaround: Duration,
+    /// The setting by which it waits before it answers, where it has one.
+    pub answer_delay: Option<AnswerDelay>,
     /// Exchanges of one [`Drive::status`](crate::Drive::status) of a drive that stands or runs, at the most, once what is
     /// read only once is known: what a plan counts, whatever is configured in the drive. One that is stopping or has
     /// tripped may take one more.
     pub status_exchanges: u8,
     /// Exchanges of one [`Drive::measurements`](crate::Drive::measurements).
     pub measurement_exchanges: u8,
+}
+
+/// A setting by which a drive waits before it answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AnswerDelay {
+    /// The manual's mnemonic of its register, which counts milliseconds.
+    pub code: &'static str,
+    /// What it can be set to at the most.
+    pub longest: Duration,
+    /// Bits of the line that a drive waits besides.
+    pub bits: u32,
+    /// Where the manual says so.
+    pub source: &'static str,
+}
+
+impl AnswerDelay {
+    /// How long a drive may take before it answers, on this line, whose register holds so many milliseconds; as long as it can be
+    /// where that is not known.
+    #[must_use]
+    pub fn of(&self, serial: SerialSettings, milliseconds: Option<u16>) -> Duration {
+        let set =
+            milliseconds.map_or(self.longest, |milliseconds| Duration::from_millis(milliseconds.into()));
+        serial.bits(self.bits) + set
+    }
 }
 
 impl Capabilities {
@@ -129,6 +155,7 @@ impl Capabilities {
             broadcast_stops: &[],
             fault_history: 0,
             turnaround: Duration::ZERO,
+            answer_delay: None,
             status_exchanges: 1,
             measurement_exchanges: 1,
         }

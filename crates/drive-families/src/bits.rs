@@ -22,30 +22,31 @@ impl Family {
     ///
     /// ```
     /// # use drive_families::Family;
-    /// let bits = Family::Atv312.bits(3201);
+    /// let bits = Family::ATV312.bits(3201);
     /// assert_eq!((bits[0].mask, bits[0].name), (1, "READY"));
     /// ```
     #[must_use]
     pub fn bits(self, address: u16) -> Vec<Bit> {
-        match self {
-            Self::Atv21 => of_atv21(address),
-            Self::Atv28 => match address {
-                400 | 601 => named::<drivecom::ControlWord>(),
-                458 | 602 => named::<drivecom::StatusWord>(),
-                459 => named::<drivecom::ExtendedStatus>(),
-                478 => named::<Atv28Io>(),
-                _ => Vec::new(),
-            },
-            // What else its words hold is not public.
-            Self::Atv58 if address == 400 => named::<drivecom::ControlWord>(),
-            Self::Atv58 => Vec::new(),
-            Self::Atv312 => of_atv312(address),
-            Self::Omron3g3ev => of_3g3ev(address),
-        }
+        (self.0.bits)(address)
     }
 }
 
-fn of_atv21(address: u16) -> Vec<Bit> {
+pub(crate) fn of_atv28(address: u16) -> Vec<Bit> {
+    match address {
+        400 | 601 => named::<drivecom::ControlWord>(),
+        458 | 602 => named::<drivecom::StatusWord>(),
+        459 => named::<drivecom::ExtendedStatus>(),
+        478 => named::<Atv28Io>(),
+        _ => Vec::new(),
+    }
+}
+
+/// What else its words hold is not public.
+pub(crate) fn of_atv58(address: u16) -> Vec<Bit> {
+    if address == 400 { named::<drivecom::ControlWord>() } else { Vec::new() }
+}
+
+pub(crate) fn of_atv21(address: u16) -> Vec<Bit> {
     match address {
         0xFA00 => named::<drive_atv21::CommandWord>(),
         0xFA20 => named::<drive_atv21::CommandWord2>(),
@@ -60,7 +61,7 @@ fn of_atv21(address: u16) -> Vec<Bit> {
     }
 }
 
-fn of_atv312(address: u16) -> Vec<Bit> {
+pub(crate) fn of_atv312(address: u16) -> Vec<Bit> {
     match address {
         8501 | 8601 => named::<drivecom::ControlWord>(),
         8504 | 8541 | 8542 => named::<atv312::ExtendedControl>(),
@@ -74,7 +75,7 @@ fn of_atv312(address: u16) -> Vec<Bit> {
     }
 }
 
-fn of_3g3ev(address: u16) -> Vec<Bit> {
+pub(crate) fn of_3g3ev(address: u16) -> Vec<Bit> {
     match address {
         0x01 => named::<omron::Command>(),
         0x09 => named::<omron::Outputs>(),
@@ -100,7 +101,7 @@ mod tests {
 
     #[test]
     fn only_words_of_bits_of_the_families_own_registers_have_names_of_bits() {
-        for family in Family::ALL {
+        for family in Family::BUILT_IN {
             let rows = family.capabilities().rows;
             let mut named = 0;
             for address in 0..=u16::MAX {

@@ -8,55 +8,129 @@
 //! assert_eq!(family.capabilities().name, "Schneider Altivar 312");
 //! # Ok::<(), drive_families::UnknownFamily>(())
 //! ```
+//!
+//! Five are built in. One from outside is a [`Definition`] too, and known by its name once it was [added](Family::add).
 
 #![forbid(unsafe_code)]
 
 mod bits;
+mod definition;
+mod five;
 mod nowhere;
 mod options;
+mod texts;
+#[cfg(feature = "sim")]
+mod twin;
 
-use std::{fmt, str::FromStr};
+use std::{
+    cmp::Ordering,
+    fmt,
+    hash::{Hash, Hasher},
+    str::FromStr,
+    sync::{PoisonError, RwLock},
+};
 
-use drive_3g3ev::Drive3g3ev;
-use drive_atv21::Atv21;
-use drive_atv28::Atv28;
-use drive_atv58::Atv58;
-use drive_atv312::Atv312;
 use drive_core::{Capabilities, Drive, Port, SlaveAddress, WatchdogCapability};
 
-pub use crate::bits::Bit;
-use crate::nowhere::Nowhere;
-pub use crate::options::{OPTIONS, OptionEntry, OptionError, Options};
+#[cfg(feature = "sim")]
+pub use crate::twin::{SetUp, Twin};
+pub use crate::{
+    bits::Bit,
+    definition::{Definition, Open},
+    options::{OptionEntry, OptionError, Options},
+};
+use crate::{
+    five::{atv21, atv28, atv58, atv312, omron_3g3ev},
+    nowhere::Nowhere,
+};
 
-/// A family of drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Family {
-    /// Schneider Altivar 21.
-    Atv21,
-    /// Schneider Altivar 28.
-    Atv28,
-    /// Schneider Altivar 58 with its communication card.
-    Atv58,
-    /// Schneider Altivar 312.
-    Atv312,
-    /// Omron 3G3EV.
-    Omron3g3ev,
-}
+/// A family of drives: a handle of its [`Definition`]. Two are the same where their [names](Capabilities::key) are.
+#[derive(Clone, Copy)]
+pub struct Family(pub(crate) &'static Definition);
+
+/// Families from outside that a program knows by name.
+static ADDED: RwLock<Vec<Family>> = RwLock::new(Vec::new());
 
 impl Family {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Atv21, Self::Atv28, Self::Atv58, Self::Atv312, Self::Omron3g3ev];
+    /// Schneider Altivar 21.
+    pub const ATV21: Self = Self(atv21::DEFINITION);
+    /// Schneider Altivar 28.
+    pub const ATV28: Self = Self(atv28::DEFINITION);
+    /// Schneider Altivar 58 with its communication card.
+    pub const ATV58: Self = Self(atv58::DEFINITION);
+    /// Schneider Altivar 312.
+    pub const ATV312: Self = Self(atv312::DEFINITION);
+    /// Omron 3G3EV.
+    pub const OMRON_3G3EV: Self = Self(omron_3g3ev::DEFINITION);
+
+    // The names of before, until all callers have the new ones.
+    #[allow(missing_docs, non_upper_case_globals)]
+    #[doc(hidden)]
+    pub const Atv21: Self = Self::ATV21;
+    #[allow(missing_docs, non_upper_case_globals)]
+    #[doc(hidden)]
+    pub const Atv28: Self = Self::ATV28;
+    #[allow(missing_docs, non_upper_case_globals)]
+    #[doc(hidden)]
+    pub const Atv58: Self = Self::ATV58;
+    #[allow(missing_docs, non_upper_case_globals)]
+    #[doc(hidden)]
+    pub const Atv312: Self = Self::ATV312;
+    #[allow(missing_docs, non_upper_case_globals)]
+    #[doc(hidden)]
+    pub const Omron3g3ev: Self = Self::OMRON_3G3EV;
+    #[doc(hidden)]
+    pub const ALL: [Self; 5] = Self::BUILT_IN;
+
+    /// Those that every program knows.
+    pub const BUILT_IN: [Self; 5] = [Self::ATV21, Self::ATV28, Self::ATV58, Self::ATV312, Self::OMRON_3G3EV];
+
+    /// The family of this definition. By name it is known once it was [added](Self::add).
+    #[must_use]
+    pub const fn new(definition: &'static Definition) -> Self {
+        Self(definition)
+    }
+
+    /// Makes it known by its name to everything in this program that chooses drives by name: configurations, command lines, `scan`.
+    /// For the beginning of a program; there is no way back.
+    ///
+    /// # Errors
+    /// A family of this name is known already, or it is no name: `@`, a space and what is not ASCII stand in none.
+    pub fn add(self) -> Result<(), NameTaken> {
+        let key = self.capabilities().key;
+        let is_name = !key.is_empty() && key.bytes().all(|byte| byte.is_ascii_graphic() && byte != b'@');
+        let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+        let mut known = Self::BUILT_IN.iter().chain(&*added);
+        if !is_name || known.any(|family| family.capabilities().key.eq_ignore_ascii_case(key)) {
+            return Err(NameTaken(key));
+        }
+        added.push(self);
+        Ok(())
+    }
+
+    /// All that this program knows by name: those that are [built in](Self::BUILT_IN), then those that were added.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
+        Self::BUILT_IN.iter().chain(&*added).copied().collect()
+    }
 
     /// What it can do.
     #[must_use]
     pub const fn capabilities(self) -> &'static Capabilities {
-        match self {
-            Self::Atv21 => &drive_atv21::CAPABILITIES,
-            Self::Atv28 => &drive_atv28::CAPABILITIES,
-            Self::Atv58 => &drive_atv58::CAPABILITIES,
-            Self::Atv312 => &drive_atv312::CAPABILITIES,
-            Self::Omron3g3ev => &drive_3g3ev::CAPABILITIES,
-        }
+        self.0.capabilities
+    }
+
+    /// What only the owner of such a drive knows of it.
+    #[must_use]
+    pub const fn options(self) -> &'static [OptionEntry] {
+        self.0.options
+    }
+
+    /// Whether this is the name of one of its options.
+    #[must_use]
+    pub fn has_option(self, name: &str) -> bool {
+        self.0.options.iter().any(|entry| entry.name == name)
     }
 
     /// A drive of this family behind a port. Nothing is sent by it.
@@ -74,21 +148,7 @@ impl Family {
         slave: SlaveAddress,
         options: &Options,
     ) -> Box<dyn Drive> {
-        match self {
-            Self::Atv21 => {
-                Box::new(Atv21::new(port, slave).with_authority(options.authority.unwrap_or_default()))
-            }
-            Self::Atv28 => Box::new(Atv28::new(port, slave)),
-            Self::Atv58 => Box::new(Atv58::with_map(port, slave, options.map.unwrap_or_default())),
-            Self::Atv312 => Box::new(Atv312::new(port, slave)),
-            Self::Omron3g3ev => {
-                let drive = Drive3g3ev::new(port, slave).with_saves(options.saves.unwrap_or_default());
-                Box::new(match options.fault_reset_function {
-                    Some(number) => drive.with_fault_reset_function(number),
-                    None => drive,
-                })
-            }
-        }
+        (self.0.open)(Box::new(port), slave, options)
     }
 
     /// The communication watchdog of a drive of this family on its line, of which those of the options hold that are the
@@ -100,6 +160,38 @@ impl Family {
     }
 }
 
+impl PartialEq for Family {
+    fn eq(&self, other: &Self) -> bool {
+        self.capabilities().key == other.capabilities().key
+    }
+}
+
+impl Eq for Family {}
+
+impl Ord for Family {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.capabilities().key.cmp(other.capabilities().key)
+    }
+}
+
+impl PartialOrd for Family {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Hash for Family {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.capabilities().key.hash(state);
+    }
+}
+
+impl fmt::Debug for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Family({})", self.capabilities().key)
+    }
+}
+
 /// Prints the name that configurations use, [`Capabilities::key`].
 impl fmt::Display for Family {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -107,16 +199,26 @@ impl fmt::Display for Family {
     }
 }
 
+/// A family cannot be known by this name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no family can be added by the name {0:?}: another has it, or it is none")]
+pub struct NameTaken(pub &'static str);
+
 /// A name that is no family's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a family of drives: expected one of {keys}", keys = Family::ALL.map(|family| family.to_string()).join(", "))]
+#[error("{0:?} is not a family of drives: expected one of {keys}", keys = keys())]
 pub struct UnknownFamily(pub String);
+
+fn keys() -> String {
+    Family::all().iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
 
 impl FromStr for Family {
     type Err = UnknownFamily;
 
     fn from_str(text: &str) -> Result<Self, UnknownFamily> {
-        let found = Self::ALL.into_iter().find(|family| family.capabilities().key.eq_ignore_ascii_case(text));
+        let mut all = Self::all().into_iter();
+        let found = all.find(|family| family.capabilities().key.eq_ignore_ascii_case(text));
         found.ok_or_else(|| UnknownFamily(text.to_owned()))
     }
 }
@@ -127,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_family_is_found_by_the_name_that_it_prints() {
-        for family in Family::ALL {
+        for family in Family::BUILT_IN {
             assert_eq!(family.to_string().parse(), Ok(family));
             assert_eq!(family.to_string().to_uppercase().parse(), Ok(family));
         }
@@ -137,8 +239,20 @@ mod tests {
     fn an_unknown_name_is_answered_with_the_names_that_exist() {
         let error = "atv999".parse::<Family>().unwrap_err().to_string();
         assert!(error.starts_with("\"atv999\" is not a family of drives"), "{error}");
-        for family in Family::ALL {
+        for family in Family::BUILT_IN {
             assert!(error.contains(family.capabilities().key), "{error}");
         }
+    }
+
+    #[test]
+    fn a_name_that_is_taken_or_is_none_is_no_new_family() {
+        static TAKEN: Capabilities = Capabilities::least("ATV312", "somebody else's");
+        static BROKEN: Capabilities = Capabilities::least("fan@1", "one whose name is no name");
+        static EMPTY: Capabilities = Capabilities::least("", "nobody");
+        for capabilities in [&TAKEN, &BROKEN, &EMPTY] {
+            let definition = Box::leak(Box::new(Definition::new(capabilities, atv312::DEFINITION.open)));
+            assert_eq!(Family::new(definition).add(), Err(NameTaken(capabilities.key)));
+        }
+        assert_eq!(Family::all(), Family::BUILT_IN);
     }
 }

@@ -1,40 +1,48 @@
 //! What only its owner knows of a drive: options that one family has and the bus cannot tell.
 
-mod entries;
+use std::collections::BTreeMap;
 
-use drive_atv21::Authority;
-use drive_atv58::Atv58Map;
-
-pub use self::entries::{OPTIONS, OptionEntry};
 use crate::Family;
 
-/// What the owner of a drive says about it, for [`Family::open_with`]. An option that is not given keeps the family's
-/// default; each belongs to one family, and no other is opened with it.
-///
-/// In a program they are fields; from a configuration or a command line they are names and texts, [`OPTIONS`]:
+/// One option of a family.
+#[derive(Debug, Clone, Copy)]
+pub struct OptionEntry {
+    /// Its name.
+    pub name: &'static str,
+    /// The texts that are values of it.
+    pub value: &'static str,
+    /// What it says of the drive, and its default.
+    pub meaning: &'static str,
+    is_value: fn(&str) -> bool,
+}
+
+impl OptionEntry {
+    /// An option of this name, with the texts that are values of it, in words and as a check, and what it says of the drive.
+    #[must_use]
+    pub const fn new(
+        name: &'static str,
+        value: &'static str,
+        meaning: &'static str,
+        is_value: fn(&str) -> bool,
+    ) -> Self {
+        Self { name, value, meaning, is_value }
+    }
+}
+
+/// What the owner of a drive says about it, for [`Family::open_with`]: names and texts, as a configuration or a command line has
+/// them. An option that is not given keeps the family's default; each belongs to a family, and no other is opened with it.
 ///
 /// ```
 /// use drive_families::{Family, Options};
 ///
 /// let mut options = Options::default();
 /// options.set("fault-reset-function", "5")?;
-/// assert_eq!(options, Options { fault_reset_function: Some(5), ..Options::default() });
-/// assert!(options.check(Family::Omron3g3ev).is_ok());
-/// assert!(options.check(Family::Atv312).is_err());
+/// assert!(options.check(Family::OMRON_3G3EV).is_ok());
+/// assert!(options.check(Family::ATV312).is_err());
 /// # Ok::<(), drive_families::OptionError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Options {
-    /// Altivar 21: by what right the bus commands it.
-    pub authority: Option<Authority>,
-    /// Altivar 58: which word is what, where its card's manual is silent.
-    pub map: Option<Atv58Map>,
-    /// 3G3EV: the number of "fault reset" in n06 to n08, see
-    /// [`with_fault_reset_function`](drive_3g3ev::Drive3g3ev::with_fault_reset_function).
-    pub fault_reset_function: Option<u16>,
-    /// 3G3EV: how often its EEPROM was saved before, see [`with_saves`](drive_3g3ev::Drive3g3ev::with_saves).
-    pub saves: Option<u32>,
-}
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Options(BTreeMap<&'static str, String>);
 
 impl Options {
     /// Sets the option of this name from a text.
@@ -42,56 +50,89 @@ impl Options {
     /// # Errors
     /// [`OptionError::Unknown`] and [`OptionError::Value`]; nothing is set then.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), OptionError> {
-        let entry = OptionEntry::find(name)?;
-        (entry.set)(self, value.trim()).ok_or_else(|| OptionError::Value {
-            name: entry.name,
-            value: value.to_owned(),
-            expected: entry.value,
+        let (name, text) = (name.trim(), value.trim());
+        let mut has_it = None;
+        for (_, entry) in all().filter(|(_, entry)| entry.name == name) {
+            if (entry.is_value)(text) {
+                self.keep(entry.name, text);
+                return Ok(());
+            }
+            has_it = Some(entry);
+        }
+        Err(match has_it {
+            Some(entry) => {
+                OptionError::Value { name: entry.name, value: value.to_owned(), expected: entry.value }
+            }
+            None => OptionError::Unknown(name.to_owned()),
         })
+    }
+
+    pub(crate) fn keep(&mut self, name: &'static str, text: &str) {
+        self.0.insert(name, text.to_owned());
+    }
+
+    /// Takes what others say beside it.
+    pub fn extend(&mut self, others: Self) {
+        self.0.extend(others.0);
+    }
+
+    /// What is said by the option of this name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&str> {
+        self.0.get(name).map(String::as_str)
+    }
+
+    /// Each that is given, and its text.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        self.0.iter().map(|(name, text)| (*name, text.as_str()))
     }
 
     /// Those of them that are this family's: for a list that holds options of several.
     #[must_use]
     pub fn of(&self, family: Family) -> Self {
-        let none = Self::default();
-        match family {
-            Family::Atv21 => Self { authority: self.authority, ..none },
-            Family::Atv58 => Self { map: self.map, ..none },
-            Family::Omron3g3ev => {
-                Self { fault_reset_function: self.fault_reset_function, saves: self.saves, ..none }
-            }
-            Family::Atv28 | Family::Atv312 => none,
-        }
+        let own = self.0.iter().filter(|(name, _)| family.has_option(name));
+        Self(own.map(|(name, text)| (*name, text.clone())).collect())
     }
 
     /// Whether a drive of this family can be opened with them.
     ///
     /// # Errors
-    /// [`OptionError::Family`] with the first one that is another family's.
+    /// [`OptionError::Family`] with the first one that is another family's, [`OptionError::Value`] with the first one whose text is
+    /// no value of this family's.
     pub fn check(&self, family: Family) -> Result<(), OptionError> {
-        let Self { authority, map, fault_reset_function, saves } = self;
-        let given = [
-            ("authority", Family::Atv21, authority.is_some()),
-            ("the map of the words", Family::Atv58, map.is_some()),
-            ("fault-reset-function", Family::Omron3g3ev, fault_reset_function.is_some()),
-            ("saves", Family::Omron3g3ev, saves.is_some()),
-        ];
-        match given.into_iter().find(|&(_, owner, is_given)| is_given && owner != family) {
-            Some((name, owner, _)) => Err(OptionError::Family { name, owner, family }),
-            None => Ok(()),
+        for (name, text) in &self.0 {
+            match family.options().iter().find(|entry| entry.name == *name) {
+                Some(entry) if (entry.is_value)(text) => {}
+                Some(entry) => {
+                    return Err(OptionError::Value { name, value: text.clone(), expected: entry.value });
+                }
+                None => {
+                    let owner = all().find(|(_, entry)| entry.name == *name);
+                    let owner = owner.map_or(family, |(owner, _)| owner);
+                    return Err(OptionError::Family { name, owner, family });
+                }
+            }
         }
+        Ok(())
     }
+}
 
-    fn map_mut(&mut self) -> &mut Atv58Map {
-        self.map.get_or_insert_default()
-    }
+/// Every option of every family.
+fn all() -> impl Iterator<Item = (Family, &'static OptionEntry)> {
+    Family::all().into_iter().flat_map(|family| family.options().iter().map(move |entry| (family, entry)))
+}
+
+fn names(options: impl Iterator<Item = &'static OptionEntry>) -> String {
+    let names: Vec<&str> = options.map(|entry| entry.name).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// An option that cannot be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OptionError {
     /// No family has it.
-    #[error("{0:?} is not an option of a drive: expected one of {names}", names = entries::names())]
+    #[error("{0:?} is not an option of a drive: expected one of {names}", names = names(all().map(|(_, entry)| entry)))]
     Unknown(String),
     /// A text that is no value of it.
     #[error("option {name}: {value:?} is not a value of it: expected {expected}")]
@@ -104,7 +145,7 @@ pub enum OptionError {
         expected: &'static str,
     },
     /// It belongs to another family.
-    #[error("option {name} belongs to the {owner}: the {family} has {own}", own = entries::names_of(*family))]
+    #[error("option {name} belongs to the {owner}: the {family} has {own}", own = names(family.options().iter()))]
     Family {
         /// The option.
         name: &'static str,
@@ -117,8 +158,6 @@ pub enum OptionError {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     fn set(name: &str, value: &str) -> Result<Options, OptionError> {
@@ -127,8 +166,8 @@ mod tests {
     }
 
     #[test]
-    fn every_option_changes_what_it_names_and_belongs_to_its_family_alone() {
-        for entry in OPTIONS {
+    fn every_option_belongs_to_its_family_alone() {
+        for (owner, entry) in all() {
             let value = match entry.name {
                 "authority" => "settings",
                 "speed-limits" => "1,2",
@@ -138,12 +177,9 @@ mod tests {
                 _ => "007Bh",
             };
             let options = set(entry.name, value).unwrap();
-            assert_ne!(options, Options::default(), "{}", entry.name);
-            if entry.family == Family::Atv58 {
-                assert_ne!(options.map, Some(Atv58Map::default()), "{}", entry.name);
-            }
-            for family in Family::ALL {
-                let own = family == entry.family;
+            assert_eq!(options.get(entry.name), Some(value));
+            for family in Family::BUILT_IN {
+                let own = family == owner;
                 assert_eq!(options.check(family).is_ok(), own, "{} {family}", entry.name);
                 assert_eq!(options.of(family) == options, own, "{} {family}", entry.name);
                 assert!(options.of(family).check(family).is_ok());
@@ -153,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_text_that_is_no_value_is_refused_with_what_was_expected_and_nothing_is_set() {
-        for entry in OPTIONS {
+        for (_, entry) in all() {
             for value in ["", "?", "-1", "99999999999", "word"] {
                 let mut options = Options::default();
                 let error = options.set(entry.name, value).unwrap_err().to_string();
@@ -164,28 +200,11 @@ mod tests {
     }
 
     #[test]
-    fn words_of_the_altivar_58_are_given_one_by_one() {
-        let mut options = Options::default();
-        options.set("status-word", "1CBh").unwrap();
-        options.set("reverse-command", "none").unwrap();
-        options.set("speed-limits", "251, 249").unwrap();
-        options.set("message-watch", "1500ms").unwrap();
-        let map = Atv58Map {
-            status: 0x01CB,
-            reverse_command: 0,
-            speed_limits: Some((251, 249)),
-            message_watch: Duration::from_millis(1_500),
-            ..Atv58Map::default()
-        };
-        assert_eq!(options.map, Some(map));
-    }
-
-    #[test]
     fn a_wrong_family_is_told_whose_the_option_is_and_what_it_has_itself() {
         let options = set("saves", "7").unwrap();
-        let error = options.check(Family::Atv21).unwrap_err().to_string();
+        let error = options.check(Family::ATV21).unwrap_err().to_string();
         assert_eq!(error, "option saves belongs to the 3g3ev: the atv21 has authority");
-        let error = options.check(Family::Atv312).unwrap_err().to_string();
+        let error = options.check(Family::ATV312).unwrap_err().to_string();
         assert_eq!(error, "option saves belongs to the 3g3ev: the atv312 has none");
         let error = set("save", "7").unwrap_err().to_string();
         assert!(

@@ -57,7 +57,7 @@ impl Gateways {
         let (end, ended) = watch::channel(());
         let drives = lines.iter().flat_map(|line| &line.drives);
         let options: HashMap<_, _> =
-            drives.map(|drive| (drive.settings.name.clone(), drive.options.values)).collect();
+            drives.map(|drive| (drive.settings.name.clone(), drive.options.clone())).collect();
         let desk =
             |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), options.clone());
         let desks: Vec<_> = gateways.iter().map(desk).collect();

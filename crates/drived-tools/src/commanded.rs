@@ -275,7 +275,8 @@ mod tests {
             for after in (0..1_500).step_by(50).map(Duration::from_millis) {
                 let settings: SerialSettings = family.capabilities().factory;
                 let simulated = SimLine::new(Wiring::rtu(settings));
-                let machine = simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+                let machine =
+                    simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
                 let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
                 let line = Line::over(simulated.in_memory(), config.clone());
                 let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
@@ -308,12 +309,12 @@ mod tests {
             let settings = family.capabilities().factory;
             let wire = SimLine::new(Wiring::rtu(settings));
             let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
-            let machine = wire.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            let machine = wire.add_boxed(1, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
             let line = Line::over(wire.in_memory(), config.clone());
             let slave = SlaveAddress::try_from(1).unwrap();
             let mut drive = family.open_with(line.slave(1), slave, &simulated::options());
             assert!(!drive.status().await.unwrap().is_fault(), "{family}");
-            machine.trip(simulated::trip_code(family));
+            machine.trip(family.simulated_trip().unwrap());
             assert_eq!(drive.status().await.unwrap().state, State::Fault, "{family}");
             assert_eq!(drive.faults().await.unwrap().present.len(), 1, "{family}");
             let name = DriveName { family, slave };

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use drive_families::{Family, OPTIONS, OptionEntry, OptionError, Options};
+use drive_families::{Family, OptionError, Options};
 
 use crate::{drive_spec::DriveName, failure::Failure};
 
@@ -19,15 +19,14 @@ impl OptionArgs {
     /// The options of these drives; each must belong to one of them.
     pub fn of(&self, drives: &[DriveName]) -> Result<Options, Failure> {
         let mut options = Options::default();
-        for (index, OptionSpec { entry, value }) in self.options.iter().enumerate() {
-            let mut given = self.options.iter().take(index);
-            if given.any(|other| other.entry.name == entry.name) {
-                return Err(Failure::Input(format!("option {} is given twice", entry.name)));
+        for OptionSpec { name, value } in &self.options {
+            if options.get(name).is_some() {
+                return Err(Failure::Input(format!("option {name} is given twice")));
             }
-            let set = options.set(entry.name, value);
+            let set = options.set(name, value);
             set.map_err(|error| Failure::Input(error.to_string()))?;
             if let Some(first) = drives.first()
-                && drives.iter().all(|name| name.family != entry.family)
+                && drives.iter().all(|drive| !drive.family.has_option(name))
             {
                 let foreign = options.check(first.family);
                 foreign.map_err(|error| Failure::Input(format!("{first}: {error}")))?;
@@ -39,8 +38,7 @@ impl OptionArgs {
 
 /// The names of a family's options, after an error that one of them might mend.
 pub fn hint(family: Family) -> String {
-    let own = OPTIONS.iter().filter(|entry| entry.family == family).map(|entry| entry.name);
-    let own: Vec<&str> = own.collect();
+    let own: Vec<&str> = family.options().iter().map(|entry| entry.name).collect();
     match own.is_empty() {
         true => String::new(),
         false => format!("; what you know of the drive can be said by --option: {}", own.join(", ")),
@@ -50,7 +48,7 @@ pub fn hint(family: Family) -> String {
 /// One option as it is written.
 #[derive(Debug, Clone)]
 struct OptionSpec {
-    entry: &'static OptionEntry,
+    name: String,
     value: String,
 }
 
@@ -69,7 +67,7 @@ impl FromStr for OptionSpec {
     fn from_str(text: &str) -> Result<Self, OptionSpecError> {
         let (name, value) = text.split_once('=').ok_or(OptionSpecError::Form)?;
         Options::default().set(name, value)?;
-        Ok(Self { entry: OptionEntry::find(name)?, value: value.to_owned() })
+        Ok(Self { name: name.trim().to_owned(), value: value.to_owned() })
     }
 }
 
@@ -90,8 +88,8 @@ mod tests {
     fn options_of_several_families_are_given_to_drives_of_several() {
         let options =
             read(&["3g3ev@1-2", "atv21@3"], &["fault-reset-function=5", "authority=settings"]).unwrap();
-        assert_eq!(options.of(Family::Omron3g3ev).fault_reset_function, Some(5));
-        assert_eq!(options.of(Family::Atv28), Options::default());
+        assert_eq!(options.of(Family::OMRON_3G3EV).get("fault-reset-function"), Some("5"));
+        assert_eq!(options.of(Family::ATV28), Options::default());
     }
 
     #[test]

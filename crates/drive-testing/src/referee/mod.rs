@@ -50,6 +50,21 @@ pub enum Family {
 }
 
 impl Family {
+    /// The family that is called so, by its [key](drive_core::Capabilities::key); `None`: no manual here is of it.
+    #[must_use]
+    pub fn by_key(key: &str) -> Option<Self> {
+        Some(match key {
+            "atv21" => Self::Atv21,
+            "atv28" => Self::Atv28,
+            "atv58" => Self::Atv58,
+            "atv312" => Self::Atv312,
+            "3g3ev" => Self::Omron3g3ev,
+            _ => return None,
+        })
+    }
+}
+
+impl Family {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Atv21, Self::Atv28, Self::Atv58, Self::Atv312, Self::Omron3g3ev];
 

@@ -1,13 +1,11 @@
 //! A line that the command line describes: its drives are only read, as often as suits the line.
 
-use std::collections::BTreeMap;
-
 use drive_bus::LineConfig;
 use drive_families::Options;
 use drive_fleet::{DriveSettings, LineBudget, Periods};
 
 use super::{
-    DrivePart, LinePart, SaidOptions,
+    DrivePart, LinePart,
     line::{Member, fitting_stretch},
 };
 use drived_words::drive_spec::DriveName;
@@ -25,7 +23,7 @@ impl LinePart {
         let member = |&drive: &DriveName| Member {
             drive,
             settings: DriveSettings { periods, ..DriveSettings::watched(drive.to_string()) },
-            options: SaidOptions { values: options.of(drive.family), texts: BTreeMap::new() },
+            options: options.of(drive.family),
             has_own_periods: false,
         };
         let members: Vec<Member> = drives.iter().map(member).collect();

@@ -5,14 +5,14 @@ mod told;
 use std::{collections::BTreeMap, ops::Range};
 
 use drive_core::{StopMode, WatchdogCapability};
-use drive_families::{OptionEntry, Options};
+use drive_families::Options;
 use drive_fleet::{
     Commanders, DriveSettings, OnExit, OnExitAdopted, OnFault, OnLoss, WatchdogContract, check_settings,
 };
 use toml::Spanned;
 
 use super::{
-    ConfigError, SaidOptions,
+    ConfigError,
     place::Source,
     table::{Entry, settings},
     values::{
@@ -248,7 +248,7 @@ pub(super) fn options(
     entry: &DriveEntry,
     defaults: &DriveEntry,
     drive: DriveName,
-) -> Result<SaidOptions, ConfigError> {
+) -> Result<Options, ConfigError> {
     let mut own = Options::default();
     for (name, value) in entry.options() {
         let set = own.set(name.get_ref(), &value.get_ref().0);
@@ -256,16 +256,12 @@ pub(super) fn options(
         let checked = own.check(drive.family);
         checked.map_err(|error| source.error(name.span(), format_args!("{drive}: {error}")))?;
     }
-    let mut said = SaidOptions::default();
-    for (name, value) in defaults.options().chain(entry.options()) {
-        let text = &value.get_ref().0;
-        let set = said.values.set(name.get_ref(), text);
-        let entry = set.and_then(|()| OptionEntry::find(name.get_ref()));
-        let entry = entry.map_err(|error| source.error(value.span(), error))?;
-        if entry.family == drive.family {
-            said.texts.insert(entry.name, text.clone());
-        }
+    let mut said = Options::default();
+    for (name, value) in defaults.options() {
+        let set = said.set(name.get_ref(), &value.get_ref().0);
+        set.map_err(|error| source.error(value.span(), error))?;
     }
-    said.values = said.values.of(drive.family);
+    said = said.of(drive.family);
+    said.extend(own);
     Ok(said)
 }

@@ -3,11 +3,12 @@
 use std::{collections::BTreeMap, ops::Range, time::Duration};
 
 use drive_bus::{Gateway, LineConfig, Protocol};
+use drive_families::Options;
 use drive_fleet::{Demand, DriveSettings, LineBudget, Periods, plan};
 use toml::Spanned;
 
 use super::{
-    ConfigError, DrivePart, LinePart, SaidOptions,
+    ConfigError, DrivePart, LinePart,
     drive::{self, DriveEntry},
     of,
     place::Source,
@@ -102,7 +103,7 @@ pub struct Members(BTreeMap<String, Vec<Member>>);
 pub(super) struct Member {
     pub(super) drive: DriveName,
     pub(super) settings: DriveSettings,
-    pub(super) options: SaidOptions,
+    pub(super) options: Options,
     /// Whether the file says how often it is asked.
     pub(super) has_own_periods: bool,
 }
@@ -142,7 +143,7 @@ impl Members {
             for name in &named {
                 let place = entry.name.as_ref().map_or(drive.span(), Spanned::span);
                 let options = drive::options(source, entry, defaults, *name)?;
-                let watchdog = line_spec::watchdog(*name, &options.values, protocol);
+                let watchdog = line_spec::watchdog(*name, &options, protocol);
                 let settings = drive::settings(source, entry, defaults, *name, named.len(), watchdog)?;
                 if names.insert(settings.name.clone(), *name).is_some() {
                     let problem = format_args!("two drives are named {:?}", settings.name);
@@ -227,13 +228,13 @@ pub(super) fn fitting_stretch(budget: LineBudget, group: &[Member]) -> u32 {
 pub(super) fn demand(
     drive: DriveName,
     settings: &DriveSettings,
-    options: &SaidOptions,
+    options: &Options,
     protocol: Protocol,
 ) -> Demand {
     Demand {
         drive: settings.name.clone(),
         capabilities: drive.family.capabilities(),
-        watchdog_capability: line_spec::watchdog(drive, &options.values, protocol),
+        watchdog_capability: line_spec::watchdog(drive, options, protocol),
         periods: settings.periods,
         watchdog: settings.watchdog,
     }

@@ -10,8 +10,6 @@ mod state;
 mod table;
 pub mod values;
 
-use std::collections::BTreeMap;
-
 use drive_bus::LineConfig;
 use drive_families::Options;
 use drive_fleet::{Demand, DriveSettings, FleetBuilder, Left, LineBudget};
@@ -51,14 +49,7 @@ pub struct LinePart {
 pub struct DrivePart {
     pub name: DriveName,
     pub settings: DriveSettings,
-    pub options: SaidOptions,
-}
-
-/// The options of a drive, and the texts by which the file says them.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct SaidOptions {
-    pub values: Options,
-    pub texts: BTreeMap<&'static str, String>,
+    pub options: Options,
 }
 
 impl LinePart {
@@ -82,6 +73,6 @@ pub fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left
     let DrivePart { name, settings, options } = drive;
     let settings = settings.clone().after(left);
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
-        name.family.open_with(port, slave, &options.values)
+        name.family.open_with(port, slave, options)
     })
 }

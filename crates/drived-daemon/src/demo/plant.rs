@@ -64,6 +64,7 @@ impl Plant {
             let first = members.len();
             for name in &names {
                 let model = simulated::model(name.family, SetUp::ForTheBus);
+                let model = model.map_err(|error| Failure::Input(error.to_string()))?;
                 let machine = simulated.add_boxed(name.slave.number(), model);
                 members.push((*name, machine.map_err(|error| Failure::Input(error.to_string()))?));
             }
@@ -94,12 +95,12 @@ impl Plant {
     /// What can be tripped and pulled by hand.
     pub(super) fn stage(&self) -> Stage {
         let machine = |unit: &Unit| {
-            let code = simulated::trip_code(unit.name.family);
-            (unit.name.to_string(), (unit.machine.clone(), code))
+            let code = unit.name.family.simulated_trip()?;
+            Some((unit.name.to_string(), (unit.machine.clone(), code)))
         };
         let line = |line: &PlantLine| (line.settings.to_string(), line.simulated.clone());
         Stage {
-            machines: self.units.iter().map(machine).collect(),
+            machines: self.units.iter().filter_map(machine).collect(),
             lines: self.lines.iter().map(line).collect(),
         }
     }
@@ -110,7 +111,7 @@ impl Plant {
             let units = self.units.iter().filter(|unit| unit.name.family == family);
             Group { name: format!("all {family}"), drives: units.map(|unit| unit.name.to_string()).collect() }
         };
-        Family::ALL.into_iter().map(of).collect()
+        Family::all().into_iter().map(of).collect()
     }
 
     /// Ends the story and stops every motor that it has started.
@@ -130,7 +131,7 @@ impl Plant {
 fn layout() -> Vec<(SerialSettings, Vec<DriveName>)> {
     let mut lines = vec![(SerialSettings::MODBUS_DEFAULT, Vec::new())];
     let mut address = 0;
-    for family in Family::ALL {
+    for family in Family::all() {
         for _ in 0..EACH {
             address += 1;
             let Ok(slave) = SlaveAddress::try_from(address) else { continue };
@@ -161,7 +162,7 @@ mod tests {
     fn every_family_has_its_drives_on_a_line_that_they_can_have() {
         let lines = layout();
         assert_eq!(lines[0].0, SerialSettings::MODBUS_DEFAULT);
-        for family in Family::ALL {
+        for family in Family::all() {
             let of_family = |(_, names): &(_, Vec<DriveName>)| names.iter().any(|name| name.family == family);
             assert!(lines.iter().any(of_family), "{family}");
         }

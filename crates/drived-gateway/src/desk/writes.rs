@@ -137,7 +137,7 @@ impl Desk {
     fn speaker(&self, drive: &DriveHandle) -> Option<Box<dyn Drive>> {
         let family: Family = drive.capabilities().key.parse().ok()?;
         let (_, line) = drive.line();
-        let options = self.options.get(&**drive.name()).copied().unwrap_or_default();
+        let options = self.options.get(&**drive.name()).cloned().unwrap_or_default();
         Some(family.open_with(line.slave(drive.slave().number()), drive.slave(), &options))
     }
 

@@ -309,7 +309,7 @@ async fn three_thousand_drives_are_scraped_and_what_that_costs_is_printed() {
         let settings = family.capabilities().factory;
         let (line, name) = (SimLine::new(Wiring::rtu(settings)), format!("line {number}"));
         for slave in 1..=31 {
-            line.add_boxed(slave, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            line.add_boxed(slave, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
         }
         builder = builder.line(&*name, Line::over(line.in_memory(), LineConfig::stream(settings)));
         for slave in 1..=31 {

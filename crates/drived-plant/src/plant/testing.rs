@@ -45,7 +45,8 @@ impl TestPlant {
         };
         let mut machines = Vec::new();
         for slave in 1..=drives {
-            machines.push(line.add_boxed(slave, simulated::model(family, SetUp::ForTheBus)).unwrap());
+            machines
+                .push(line.add_boxed(slave, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap());
         }
         let port = Line::over(line.in_memory(), config);
         let mut builder = Fleet::builder().whatever_the_plan().line("north", port);

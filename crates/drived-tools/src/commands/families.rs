@@ -1,7 +1,7 @@
 //! `drived families`: the families of drives, and what their owner can say of one.
 
 use drive_core::{Capabilities, WatchdogCapability};
-use drive_families::{Family, OPTIONS, Options};
+use drive_families::{Family, Options};
 use serde_json::{Value, json};
 
 use drived_words::{
@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     match args.family {
         Some(family) => args.json.say(|| object(family), || one(family)),
         None if args.json.is_json() => {
-            Family::ALL.into_iter().try_for_each(|family| output::say_as_it_is(object(family)))
+            Family::all().into_iter().try_for_each(|family| output::say_as_it_is(object(family)))
         }
         None => all(),
     }
@@ -33,8 +33,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn object(family: Family) -> Value {
     let capabilities = family.capabilities();
     let texts = |all: &[&str]| all.iter().map(ToString::to_string).collect::<Vec<_>>();
-    let options = OPTIONS.iter().filter(|option| option.family == family);
-    let options = options
+    let options = family
+        .options()
+        .iter()
         .map(|option| json!({ "name": option.name, "meaning": option.meaning, "value": option.value }));
     json!({
         "family": family.to_string(),
@@ -56,7 +57,7 @@ fn object(family: Family) -> Value {
 
 fn all() -> Result<(), Failure> {
     let mut table = Table::new(["family", "drive", "addresses", "speeds", "protocols"]);
-    for family in Family::ALL {
+    for family in Family::all() {
         let Capabilities { name, highest_address, speeds, .. } = family.capabilities();
         table.row([
             family.to_string(),
@@ -87,7 +88,7 @@ fn one(family: Family) -> Result<(), Failure> {
     fact("save to EEPROM", capabilities.persist.unwrap_or("no command").to_owned());
     output::say_table(facts)?;
     let mut options = Table::new(["  --option", "what it says", "value"]);
-    for option in OPTIONS.iter().filter(|option| option.family == family) {
+    for option in family.options() {
         options.row([format!("  {}", option.name), option.meaning.to_owned(), option.value.to_owned()]);
     }
     if options.is_empty() { output::say("  no options") } else { output::say_table(options) }

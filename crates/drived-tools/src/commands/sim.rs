@@ -54,7 +54,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let line = SimLine::new(Wiring { protocol: simulated::protocol(protocol), ..Wiring::rtu(settings) });
     let set_up = if args.factory { SetUp::Factory } else { SetUp::ForTheBus };
     for name in &drives {
-        let model = simulated::model(name.family, set_up);
+        let model = simulated::model(name.family, set_up).map_err(|error| input(&error))?;
         line.add_boxed(name.slave.number(), model).map_err(|error| input(&error))?;
     }
     let served = serve(&line, &args.pty);
@@ -109,7 +109,7 @@ pub(super) fn serve(_: &SimLine, _: &Path) -> io::Result<Serving> {
 fn describe(name: &DriveName, set_up: SetUp) -> String {
     let options =
         if set_up == SetUp::ForTheBus { simulated::options().of(name.family) } else { Options::default() };
-    let reset =
-        options.fault_reset_function.map(|number| format!(" (--option fault-reset-function={number})"));
-    format!("  {name:<12} {}{}", name.family.capabilities().name, reset.unwrap_or_default())
+    let told: Vec<String> = options.iter().map(|(name, text)| format!("--option {name}={text}")).collect();
+    let told = if told.is_empty() { String::new() } else { format!(" ({})", told.join(" ")) };
+    format!("  {name:<12} {}{told}", name.family.capabilities().name)
 }

@@ -134,7 +134,7 @@ pub(super) fn injection(drive: &DrivePart) -> Option<String> {
 }
 
 pub(super) fn options(drive: &DrivePart) -> Option<String> {
-    listed(drive.options.texts.iter().map(|(name, text)| format!("{name} = {text}")))
+    listed(drive.options.iter().map(|(name, text)| format!("{name} = {text}")))
 }
 
 fn listed(all: impl Iterator<Item = String>) -> Option<String> {

@@ -25,8 +25,8 @@ pub(super) struct Observations {
     /// What was heard at other speeds and formats, where what was heard at the given one made no sense.
     pub(super) elsewhere: Vec<(SerialSettings, Listened)>,
     pub(super) asked: Vec<Asked>,
-    /// How long a 3G3EV waits before it answers, by its n65.
-    pub(super) own_waits: Vec<(u8, Duration)>,
+    /// The words of the settings by which drives wait before they answer.
+    pub(super) own_waits: Vec<(u8, u16)>,
     /// Slaves whose answers came after the time of their question, how often.
     pub(super) overdue: Vec<(u8, u64)>,
     /// Whether a question could not be sent because the line was never quiet.

@@ -157,11 +157,12 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_line_of_its_own_is_only_read_whatever_its_drives_do_until_somebody_stops_them() {
-        for family in Family::ALL {
+        for family in Family::all() {
             let settings = family.capabilities().factory;
             let simulated = SimLine::new(Wiring::rtu(settings));
-            let machines = [1, 2]
-                .map(|slave| simulated.add_boxed(slave, simulated::model(family, SetUp::ForTheBus)).unwrap());
+            let machines = [1, 2].map(|slave| {
+                simulated.add_boxed(slave, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap()
+            });
             let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
             let names =
                 [1, 2].map(|slave| DriveName { family, slave: SlaveAddress::try_from(slave).unwrap() });
@@ -186,7 +187,7 @@ mod tests {
             sleep(Duration::from_secs(60)).await;
             let [one, two] = &machines;
             assert!(one.observe().running && two.observe().running, "{family}: their watchdogs are fed");
-            two.trip(simulated::trip_code(family));
+            two.trip(family.simulated_trip().unwrap());
             sleep(Duration::from_secs(60)).await;
             let mut daemon = source.way.connect().await.unwrap();
             let start = format!("/api/v1/drives/{}/start", names[0]);

@@ -20,7 +20,7 @@ impl Bench {
     pub(super) fn of(family: Family, set_up: SetUp) -> Self {
         let settings = family.capabilities().factory;
         let simulated = SimLine::new(Wiring::rtu(settings));
-        let machine = simulated.add_boxed(1, simulated::model(family, set_up)).unwrap();
+        let machine = simulated.add_boxed(1, simulated::model(family, set_up).unwrap()).unwrap();
         let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
         let line = Line::over(simulated.in_memory(), config.clone());
         let turnaround = family.capabilities().turnaround;

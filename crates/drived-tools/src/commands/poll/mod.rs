@@ -255,7 +255,8 @@ mod tests {
         ] {
             let settings = family.capabilities().factory;
             let simulated = SimLine::new(Wiring { protocol: wired, ..Wiring::rtu(settings) });
-            let machine = simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus)).unwrap();
+            let machine =
+                simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
             let config = LineConfig { protocol, ..LineConfig::stream(settings) };
             let line = Line::over(simulated.in_memory(), config);
             let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };

@@ -51,14 +51,14 @@ async fn program(line: &Line, family: Family) -> Vec<String> {
 async fn captured(family: Family, protocol: &str, settings: SerialSettings) -> (Vec<String>, Recording) {
     let wiring = Wiring { protocol: simulated::protocol(protocol.parse().unwrap()), ..Wiring::rtu(settings) };
     let simulated = SimLine::new(wiring);
-    let machine = simulated.add_boxed(3, simulated::model(family, SetUp::ForTheBus)).unwrap();
+    let machine = simulated.add_boxed(3, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
     let line = Line::over(simulated.in_memory(), config(protocol, settings));
     let sink = Sink::default();
     let writing = line.capture(sink.clone()).unwrap();
     // In the middle of what the program looks at.
     let trip = async {
         tokio::time::sleep(std::time::Duration::from_secs(1)).await;
-        machine.trip(simulated::trip_code(family));
+        machine.trip(family.simulated_trip().unwrap());
     };
     let (seen, ()) = tokio::join!(program(&line, family), trip);
     assert!(seen.iter().any(|seen| seen.starts_with("Fault")) && !seen[1].starts_with("Fault"), "{seen:?}");

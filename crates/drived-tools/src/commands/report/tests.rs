@@ -36,7 +36,7 @@ impl Bench {
         let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).unwrap();
         let line = SimLine::new(Wiring::rtu(settings));
         let machines = Family::ALL.into_iter().zip(1..).map(|(family, slave)| {
-            let machine = line.add_boxed(slave, simulated::model(family, SetUp::Factory)).unwrap();
+            let machine = line.add_boxed(slave, simulated::model(family, SetUp::Factory).unwrap()).unwrap();
             (DriveName { family, slave: SlaveAddress::try_from(slave).unwrap() }, machine)
         });
         let machines = machines.collect();

@@ -87,7 +87,7 @@ impl Others {
     /// families can be set to.
     pub(super) fn trials(&self, named: Option<Trial>) -> Vec<Trial> {
         let mut others: Vec<(Trial, usize)> = Vec::new();
-        for family in Family::ALL {
+        for family in Family::all() {
             for trial in self.of(family) {
                 match others.iter_mut().find(|(other, _)| other.hears(&trial)) {
                     Some((other, families)) => {
@@ -99,7 +99,7 @@ impl Others {
             }
         }
         let rank = |(trial, families): &(Trial, usize)| {
-            let factory = Family::ALL.iter().position(|family| {
+            let factory = Family::all().iter().position(|family| {
                 family.capabilities().factory == trial.serial && trial.protocol == Protocol::Rtu
             });
             let spoken = trial.protocol != Protocol::Rtu;

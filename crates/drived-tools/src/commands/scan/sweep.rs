@@ -146,7 +146,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
         let mut longest = 0;
         // Those that tell their names come first: whoever has told his is asked for no other's words.
-        let mut families = Family::ALL;
+        let mut families = Family::all();
         families.sort_by_key(|family| !family.capabilities().functions.contains(&IDENTIFICATION));
         for family in families {
             if alike.iter().any(|likeness: &Likeness| likeness.certain) {
@@ -245,8 +245,8 @@ pub(super) enum Told {
 /// Each address is asked once, however many are silent.
 /// Who answers is not known yet, so whoever has answered gets the longest pause that a family needs.
 fn patient(line: LineConfig) -> LineConfig {
-    let pauses = Family::ALL.map(|family| family.capabilities().turnaround);
-    let turnaround = pauses.into_iter().max().unwrap_or_default();
+    let pauses = Family::all().into_iter().map(|family| family.capabilities().turnaround);
+    let turnaround = pauses.max().unwrap_or_default();
     let patient = LineConfig { offline_after: 0, retries: 0, ..line };
     (1..=247).fold(patient, |config, address| {
         config.slave(address, SlaveSettings { turnaround, ..SlaveSettings::default() })

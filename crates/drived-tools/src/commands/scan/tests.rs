@@ -68,7 +68,7 @@ async fn every_family_is_known_again_and_nothing_is_written_to_it() {
         let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
         let mut machines = Vec::new();
         for (family, number) in Family::ALL.into_iter().zip(1..) {
-            machines.push(simulated.add_boxed(number, simulated::model(family, set_up)).unwrap());
+            machines.push(simulated.add_boxed(number, simulated::model(family, set_up).unwrap()).unwrap());
         }
         let finds = scanned(&simulated, &at_one("19200 8N1", 1..=7)).await;
         assert_eq!(finds.len(), 5);
@@ -76,7 +76,7 @@ async fn every_family_is_known_again_and_nothing_is_written_to_it() {
             let Answer::Slave(alike) = &find.answer else { panic!("{find:?}") };
             let [Likeness { family: seen, certain, .. }] = alike[..] else { panic!("{alike:?}") };
             assert_eq!(seen, family);
-            assert_eq!(certain, matches!(family, Family::Atv312 | Family::Atv21), "{alike:?}");
+            assert_eq!(certain, [Family::Atv312, Family::Atv21].contains(&family), "{alike:?}");
             most = most.max(find.found.exchanges);
         }
         assert_only_read(&machines);
@@ -88,7 +88,7 @@ async fn every_family_is_known_again_and_nothing_is_written_to_it() {
 #[tokio::test(start_paused = true)]
 async fn an_answer_that_cannot_be_understood_is_told_from_silence() {
     let simulated = SimLine::default();
-    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
     simulated.set_fault(Fault::Flipped, ALWAYS);
     let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
     assert!(
@@ -100,17 +100,20 @@ async fn an_answer_that_cannot_be_understood_is_told_from_silence() {
 #[tokio::test(start_paused = true)]
 async fn a_stray_byte_before_each_answer_is_no_second_drive() {
     let simulated = SimLine::default();
-    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
     simulated.set_fault(Fault::Noise, ALWAYS);
     let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
     let [Find { answer: Answer::Slave(alike), .. }] = &finds[..] else { panic!("{finds:?}") };
-    assert!(matches!(&alike[..], [Likeness { family: Family::Atv312, certain: true, .. }]), "{alike:?}");
+    assert!(
+        matches!(&alike[..], [Likeness { family, certain: true, .. }] if *family == Family::Atv312),
+        "{alike:?}"
+    );
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_is_slower_than_the_scan_waits_is_found_and_nobody_else() {
     let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
-    let slow = simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    let slow = simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
     slow.set_turnaround(Some(Duration::from_millis(180)));
     let finds = scanned(&simulated, &at_one("19200 8N1", 4..=8)).await;
     let [Find { step, answer: Answer::Slave(_), .. }] = &finds[..] else { panic!("{finds:?}") };
@@ -122,7 +125,7 @@ async fn one_read_of_a_watchdog_that_fails_is_no_watchdog_of_a_tenth_of_a_second
     for seed in 0..20 {
         let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
         simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Lost, ALWAYS / 20));
-        simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+        simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
         let finds = scanned(&simulated, &at_one("19200 8N1", [5])).await;
         for find in finds {
             assert!(
@@ -153,7 +156,8 @@ fn mixed(simulated: &SimLine) -> Vec<(SimSlave, Family, Dialect)> {
         (9, Family::Atv58, of("4800 8O1", drive_sim::Protocol::UniTelway)),
     ];
     let add = |(address, family, dialect)| {
-        let machine = simulated.add_beside(address, simulated::model(family, SetUp::ForTheBus)).unwrap();
+        let machine =
+            simulated.add_beside(address, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
         machine.set_dialect(dialect);
         (machine, family, dialect)
     };
@@ -223,10 +227,11 @@ async fn silence_takes_the_time_that_was_told_at_every_setting() {
 async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() {
     let simulated = SimLine::default();
     // n40 is 0 from the factory: after 2 s without a message it trips (§2.1).
-    let drive = simulated.add_boxed(1, simulated::model(Family::Omron3g3ev, SetUp::Factory)).unwrap();
+    let drive =
+        simulated.add_boxed(1, simulated::model(Family::Omron3g3ev, SetUp::Factory).unwrap()).unwrap();
     drive.set_dialect(Dialect { settings: serial("9600 8E1"), ..Dialect::default() });
     // ttO of a second and SLL, which trips.
-    let other = simulated.add_boxed(2, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+    let other = simulated.add_boxed(2, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
     let rows = Family::Atv312.capabilities().rows;
     let tto = rows.iter().find(|row| row.code == "ttO").unwrap();
     assert!(other.poke(tto.address, 10));
@@ -252,8 +257,9 @@ mod two_at_one_address {
 
     fn two(one: Family, other: Family) -> (SimLine, SimSlave, SimSlave) {
         let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
-        let [one, other] = [one, other]
-            .map(|family| simulated.add_beside(5, simulated::model(family, SetUp::ForTheBus)).unwrap());
+        let [one, other] = [one, other].map(|family| {
+            simulated.add_beside(5, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap()
+        });
         let turnaround = Some(Duration::from_millis(5));
         one.set_turnaround(turnaround);
         other.set_turnaround(turnaround);
@@ -306,7 +312,7 @@ mod two_at_one_address {
         for seed in 0..20 {
             let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
             simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, ALWAYS / 10));
-            simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus)).unwrap();
+            simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
             let answer = verdict(&simulated).await;
             assert!(matches!(&answer, Answer::Slave(alike) if alike.len() == 1), "{seed}: {answer:?}");
         }

@@ -2,7 +2,7 @@
 
 use clap::{Arg, Command};
 use drive_core::{Row, StopMode};
-use drive_families::{Family, OPTIONS};
+use drive_families::Family;
 
 use super::{
     known::Known,
@@ -129,8 +129,11 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
     let drives = || Offers::of(known.drives.iter().map(|drive| whole(&drive.name, &drive.place)));
     let groups = || Offers::of(known.groups.iter().map(|group| whole(group, "a group")));
     let lines = || Offers::of(known.lines.iter().map(|line| whole(line, "a line")));
-    let families =
-        || Offers::of(Family::ALL.map(|family| whole(family.to_string(), family.capabilities().name)));
+    let families = || {
+        Offers::of(
+            Family::all().into_iter().map(|family| whole(family.to_string(), family.capabilities().name)),
+        )
+    };
     match (&*place.path, name) {
         (_, "LINE" | "PORT") if arg.get_long() == Some("line") => {
             Offers::of(line(typed, family_of_line(place)))
@@ -152,15 +155,15 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         }
         (_, "FILE" | "PATH" | "LINK" | "FOLDER" | "DIR" | "FILE|FOLDER") => Offers::files(),
         (_, "FAMILY") => families(),
-        (_, "FAMILY@ADDRESS" | "FAMILY@ADDRESSES") => {
-            Offers::of(Family::ALL.map(|family| part(format!("{family}@"), family.capabilities().name)))
-        }
+        (_, "FAMILY@ADDRESS" | "FAMILY@ADDRESSES") => Offers::of(
+            Family::all().into_iter().map(|family| part(format!("{family}@"), family.capabilities().name)),
+        ),
         (_, "MODE") => Offers::of(StopMode::ALL.map(|mode| whole(mode.to_string().replace(' ', "-"), ""))),
         (_, "DIRECTION") => Offers::of([whole("forward", ""), whole("reverse", "")]),
         (_, "NAME=VALUE") => {
             let family = family_of_line(place);
-            let own =
-                OPTIONS.iter().filter(move |option| family.is_none_or(|family| option.family == family));
+            let families = family.map_or_else(Family::all, |family| vec![family]);
+            let own = families.into_iter().flat_map(Family::options);
             Offers::of(own.map(|option| part(format!("{}=", option.name), option.meaning)))
         }
         (_, "BAUD[,FORMAT]") => Offers::of(settings("", typed, family_of_line(place))),
@@ -254,7 +257,7 @@ fn protocols(before: &str, typed: &str, family: Option<Family>) -> Vec<Offer> {
 
 /// What a family has, or any of them where none is named; each once.
 fn of<T: PartialEq>(family: Option<Family>, has: impl Fn(Family) -> Vec<T>) -> Vec<T> {
-    let families = Family::ALL.into_iter().filter(|one| family.is_none_or(|family| family == *one));
+    let families = Family::all().into_iter().filter(|one| family.is_none_or(|family| family == *one));
     families.flat_map(has).fold(Vec::new(), |mut all, one| {
         if !all.contains(&one) {
             all.push(one);

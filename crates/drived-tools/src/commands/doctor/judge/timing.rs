@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_families::Family;
+use drive_core::AnswerDelay;
 
 use super::{Case, is_times, share};
 use crate::commands::doctor::{
@@ -253,15 +253,14 @@ pub(super) fn slow(case: &Case<'_>, is_held: bool) -> Option<Verdict> {
 }
 
 /// The longest time that a drive takes before it answers, by its manual, and where that stands.
-fn printed(case: &Case<'_>, slave: u8) -> Option<(Duration, &'static str)> {
+fn printed(case: &Case<'_>, slave: u8) -> Option<(Duration, String)> {
     let family = case.seen.expected.iter().find(|name| name.slave.number() == slave)?.family;
-    if family != Family::Omron3g3ev {
-        return None;
-    }
+    let delay = family.capabilities().answer_delay?;
     let set = case.seen.own_waits.iter().find(|(of, _)| *of == slave).map(|(_, wait)| *wait);
-    let bits = case.seen.config.serial.bits(24);
-    Some(match set {
-        Some(wait) => (bits + wait, "24 bits and its n65, §2.1, p. 6"),
-        None => (bits + Duration::from_millis(40), "24 bits and n65 of at most 40 ms, §2.1, p. 6"),
-    })
+    let AnswerDelay { code, longest, bits, source } = delay;
+    let why = match set {
+        Some(_) => format!("{bits} bits and its {code}, {source}"),
+        None => format!("{bits} bits and {code} of at most {longest:?}, {source}"),
+    };
+    Some((delay.of(case.seen.config.serial, set), why))
 }

@@ -7,7 +7,7 @@ use std::{
 
 use drive_bus::{Line, SlaveSettings};
 use drive_core::{
-    Class, Drive, Error, PortError, SlaveAddress, Terms,
+    Class, Drive, Error, PortError, Row, SlaveAddress, Terms,
     tokio_modbus::{Request, client::Client as _},
 };
 use drive_families::{Family, Options};
@@ -49,7 +49,7 @@ pub(super) struct Asking {
     pub(super) line: Line,
     pub(super) began: Instant,
     pub(super) asked: Vec<Asked>,
-    pub(super) own_waits: Vec<(u8, Duration)>,
+    pub(super) own_waits: Vec<(u8, u16)>,
     pub(super) never_quiet: bool,
     /// When the last exchange began that was read back.
     pub(super) last: Option<Instant>,
@@ -266,12 +266,11 @@ impl Asking {
             Err(Error::Port { problem, .. }) => self.check(&problem)?,
             Err(_) => {}
         }
-        if is_first && asker.drive.capabilities().key == Family::Omron3g3ev.capabilities().key {
-            let row = asker.drive.capabilities().rows.iter().find(|row| row.code == "n65");
-            if let Some(row) = row
+        if is_first && let Some(delay) = asker.drive.capabilities().answer_delay {
+            if let Some(row) = Row::find(asker.drive.capabilities().rows, delay.code)
                 && let Ok(wait) = asker.drive.read_parameter(row).await
             {
-                self.own_waits.push((asker.slave, Duration::from_millis(u64::from(wait))));
+                self.own_waits.push((asker.slave, wait));
             }
             self.note(asker, 0, false);
         }

@@ -34,15 +34,14 @@ pub(super) fn of_doctor(task: &Task) -> LineConfig {
 /// How a slave is asked: after the pause that its family's manual wants, or the longest of any where it is not known.
 pub(super) fn settings_of(task: &Task, slave: SlaveAddress) -> SlaveSettings {
     let named = task.expected.iter().find(|name| name.slave == slave);
-    let pauses = Family::ALL.map(|family| family.capabilities().turnaround);
+    let pauses = Family::all().into_iter().map(|family| family.capabilities().turnaround);
     match named {
         Some(name) => SlaveSettings {
             turnaround: name.family.capabilities().turnaround,
             response_timeout: Some(PATIENCE),
         },
-        None => SlaveSettings {
-            turnaround: pauses.into_iter().max().unwrap_or_default(),
-            response_timeout: Some(task.wait),
-        },
+        None => {
+            SlaveSettings { turnaround: pauses.max().unwrap_or_default(), response_timeout: Some(task.wait) }
+        }
     }
 }

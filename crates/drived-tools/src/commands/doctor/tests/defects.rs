@@ -88,7 +88,8 @@ async fn broken(broken: Broken, bench: &Bench) {
             line.set_defects(Defects { noise, ..Defects::default() });
         }
         Broken::TwoAtTheThird(micros) => {
-            let other = line.add_beside(3, simulated::model(Family::Atv312, SetUp::Factory)).unwrap();
+            let other =
+                line.add_beside(3, simulated::model(Family::Atv312, SetUp::Factory).unwrap()).unwrap();
             other.set_turnaround(Some(Duration::from_micros(5_000 + micros)));
         }
         Broken::OtherSettings(_, talks) => {

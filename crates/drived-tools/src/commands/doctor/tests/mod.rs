@@ -60,7 +60,8 @@ impl Bench {
         let line = SimLine::new(Wiring::rtu(serial));
         let mut bench = Self { line, names: Vec::new(), machines: Vec::new(), serial };
         for (family, number) in families.iter().zip(1..) {
-            let machine = bench.line.add_boxed(number, simulated::model(*family, SetUp::Factory)).unwrap();
+            let machine =
+                bench.line.add_boxed(number, simulated::model(*family, SetUp::Factory).unwrap()).unwrap();
             bench.machines.push(machine);
             bench.names.push(DriveName { family: *family, slave: SlaveAddress::try_from(number).unwrap() });
         }

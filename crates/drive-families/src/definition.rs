@@ -1,0 +1,84 @@
+//! What a family consists of: [`Definition`].
+
+use drive_core::{Capabilities, Drive, Port, SlaveAddress};
+
+#[cfg(feature = "sim")]
+use crate::twin::Twin;
+use crate::{
+    bits::Bit,
+    options::{OptionEntry, Options},
+};
+
+/// Makes the drive of this address behind a port, as its owner says that it is. Nothing is sent by it.
+pub type Open = fn(Box<dyn Port>, SlaveAddress, &Options) -> Box<dyn Drive>;
+
+/// What a family of drives consists of, for whoever chooses drives by name.
+///
+/// A family from outside is one by the same definition as ours, and gets everything that ours get:
+///
+/// ```
+/// use drive_core::{Capabilities, Drive, Port, SlaveAddress};
+/// use drive_families::{Definition, Family, OptionEntry, Options};
+///
+/// const CAPABILITIES: Capabilities = Capabilities::least("fan1", "Somebody's fan drive");
+///
+/// fn open(port: Box<dyn Port>, slave: SlaveAddress, options: &Options) -> Box<dyn Drive> {
+///     # let _ = (port, slave, options);
+///     todo!("Fan1::new(port, slave)")
+/// }
+///
+/// static FAN1: Definition = Definition::new(&CAPABILITIES, open).with_options(&[OptionEntry::new(
+///     "blades",
+///     "a whole number",
+///     "how many blades its fan has (default 6)",
+///     |text| text.parse::<u8>().is_ok(),
+/// )]);
+///
+/// // Once, where the program begins.
+/// Family::new(&FAN1).add()?;
+/// assert_eq!("fan1".parse::<Family>().unwrap().capabilities().name, "Somebody's fan drive");
+/// # Ok::<(), drive_families::NameTaken>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Definition {
+    pub(crate) capabilities: &'static Capabilities,
+    pub(crate) open: Open,
+    pub(crate) options: &'static [OptionEntry],
+    pub(crate) bits: fn(u16) -> Vec<Bit>,
+    #[cfg(feature = "sim")]
+    pub(crate) twin: Option<Twin>,
+}
+
+impl Definition {
+    /// A family that can do this, and how a drive of it is made.
+    #[must_use]
+    pub const fn new(capabilities: &'static Capabilities, open: Open) -> Self {
+        Self {
+            capabilities,
+            open,
+            options: &[],
+            bits: |_| Vec::new(),
+            #[cfg(feature = "sim")]
+            twin: None,
+        }
+    }
+
+    /// The same with what only the owner of such a drive knows of it.
+    #[must_use]
+    pub const fn with_options(self, options: &'static [OptionEntry]) -> Self {
+        Self { options, ..self }
+    }
+
+    /// The same with the bits that the manual names of the register at an address, the lowest first.
+    #[must_use]
+    pub const fn with_bits(self, bits: fn(u16) -> Vec<Bit>) -> Self {
+        Self { bits, ..self }
+    }
+
+    /// The same with its simulated twin, by which `sim`, `demo` and tests have such drives. With the feature `sim`.
+    #[cfg(feature = "sim")]
+    #[must_use]
+    pub const fn with_twin(self, twin: Twin) -> Self {
+        Self { twin: Some(twin), ..self }
+    }
+}
