@@ -10,7 +10,7 @@ use std::{
 const SHOWS: &[&str] = &[
     "drive-fleet/src/shows.rs",
     "drive-fleet/src/view.rs",
-    "drived-tools/src/commands/poll/json.rs",
+    "drived-line-tools/src/poll/json.rs",
     "drived-broker/src/mqtt/discovery.rs",
     "drived-gateway/src/virtual_unit.rs",
     "drived-http/src/metrics/drives.rs",

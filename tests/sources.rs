@@ -42,6 +42,7 @@ fn no_tool_looks_anything_up_by_its_key_but_reads_it_as_what_it_is() {
         "drived-client/src",
         "drived-daemon/src/run",
         "drived/src/commands",
+        "drived-line-tools/src",
         "drived-tools/src",
         "drived-screen/src/row",
     ] {

@@ -1,5 +1,5 @@
-//! The subcommands of `drived` that ask or tell something: of a drive, of a line, of the running daemon ([`commands`]), over a
-//! line of their own ([`one_drive`], [`commanded`]) or through the daemon; and what the words of a line mean ([`explain`]).
+//! The subcommands of `drived` that speak with a drive or with the running daemon ([`commands`]): over a line of their own
+//! ([`one_drive`], [`commanded`]) or through the daemon.
 
 #![forbid(unsafe_code)]
 #![allow(
@@ -10,5 +10,4 @@
 
 pub mod commanded;
 pub mod commands;
-pub mod explain;
 pub mod one_drive;

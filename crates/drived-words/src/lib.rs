@@ -2,7 +2,7 @@
 //!
 //! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]).
 //! - What is told: results and tables ([`output`]), objects ([`json`]), measurements ([`values`]), parameters
-//!   ([`registers`]), and the [log](`logging`).
+//!   ([`registers`]), frames of a line in words ([`explain`]), and the [log](`logging`).
 //! - How it ends: what went wrong ([`failure`]) being asked to end ([`signals`]) and letting a port go
 //!   ([`closing`]).
 
@@ -17,6 +17,7 @@ pub mod closing;
 pub mod drive_options;
 pub mod drive_spec;
 pub mod duration;
+pub mod explain;
 pub mod failure;
 pub mod json;
 pub mod line_spec;

@@ -8,9 +8,9 @@ use tracing::Level;
 use crate::commands::{audit, check, completions, export, token};
 use drived_daemon::demo;
 use drived_daemon::run;
+use drived_line_tools::{capture, doctor, explain, families, init, plan, poll, replay, scan, sim};
 use drived_tools::commands::{
-    capture, doctor, explain, families, faults, init, monitor, param, plan, poll, release, reload, replay,
-    report, reset, scan, setpoint, sim, start, status, stop, watch,
+    faults, monitor, param, release, reload, report, reset, setpoint, start, status, stop, watch,
 };
 use drived_words::{failure::Failure, output};
 

@@ -15,9 +15,9 @@ use super::{
     document::Document,
     plot,
 };
-use crate::explain::word_in_words;
 use drived_plant::plant::views::DriveView;
 use drived_screen::row::{self, alarm, fitted, height_of};
+use drived_words::explain::word_in_words;
 use drived_words::{logging::escaped, output, values};
 
 /// From this width on the curves stand beside the words.

@@ -10,9 +10,9 @@ use drive_bus::{
 use http_body_util::BodyExt as _;
 use hyper::body::Incoming;
 
-use crate::explain::Known;
 use drived_client::{DaemonArgs, path_of};
 use drived_plant::plant::views::{LineView, StateView};
+use drived_words::explain::Known;
 use drived_words::{failure::Failure, line_spec::LineSpec};
 
 /// The longest capture that is read.

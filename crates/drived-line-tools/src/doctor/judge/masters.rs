@@ -8,24 +8,24 @@ use drive_bus::{
 };
 
 use super::Case;
-use crate::{
-    commands::doctor::{
-        observations::Observations,
-        verdict::{Certainty, Defect, Verdict},
-    },
-    explain::{Explainer, Known},
+use crate::doctor::{
+    observations::Observations,
+    verdict::{Certainty, Defect, Verdict},
 };
-use drived_words::output;
+use drived_words::{
+    explain::{Explainer, Known},
+    output,
+};
 
 /// What somebody else asks again and again.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::commands::doctor) struct Habit {
-    pub(in crate::commands::doctor) slave: Option<u8>,
+pub(in crate::doctor) struct Habit {
+    pub(in crate::doctor) slave: Option<u8>,
     /// What is asked, in words.
-    pub(in crate::commands::doctor) what: String,
-    pub(in crate::commands::doctor) times: usize,
+    pub(in crate::doctor) what: String,
+    pub(in crate::doctor) times: usize,
     /// From one time to the next, on average.
-    pub(in crate::commands::doctor) every: Option<Duration>,
+    pub(in crate::doctor) every: Option<Duration>,
 }
 
 /// A second master, if one was heard.
@@ -59,7 +59,7 @@ pub(super) fn second(case: &Case<'_>) -> Option<Verdict> {
 }
 
 /// What is asked by requests that were heard.
-pub(in crate::commands::doctor) fn habits(seen: &Observations) -> Vec<Habit> {
+pub(in crate::doctor) fn habits(seen: &Observations) -> Vec<Habit> {
     let mut kinds: BTreeMap<_, Vec<&Heard>> = BTreeMap::new();
     for frame in seen.listened.frames().filter(|frame| matches!(frame.role, Role::Request | Role::Either)) {
         kinds.entry((frame.slave, frame.bytes.clone())).or_default().push(frame);

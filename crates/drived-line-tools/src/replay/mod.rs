@@ -16,7 +16,7 @@ use tokio::sync::mpsc;
 
 use self::recorded::{Exchanges, exchanges};
 use super::sim;
-use crate::explain::{Explainer, Known};
+use drived_words::explain::{Explainer, Known};
 use drived_words::{
     drive_spec::{DriveSpec, on_one_line},
     failure::Failure,

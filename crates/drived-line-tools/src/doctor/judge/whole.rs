@@ -6,7 +6,7 @@ use drive_bus::Endpoint;
 use drive_core::serial::Parity;
 
 use super::Case;
-use crate::commands::doctor::{
+use crate::doctor::{
     observations::Listened,
     verdict::{Certainty, Defect, Verdict},
 };

@@ -19,7 +19,7 @@ use super::{
     chance::Chance,
     terms::{IMPATIENCE, of_doctor, settings_of},
 };
-use crate::commands::doctor::observations::{Asked, Observations};
+use crate::doctor::observations::{Asked, Observations};
 use drived_client::own_line;
 use drived_words::failure::Failure;
 

@@ -14,7 +14,7 @@ use super::{
     asking::{Asker, Asking},
     terms::IMPATIENCE,
 };
-use crate::commands::doctor::observations::{Asked, Ending};
+use crate::doctor::observations::{Asked, Ending};
 
 /// One that has answered so often, and always so soon, is waited for only so long from then on: what it misses would cost a second
 /// each.

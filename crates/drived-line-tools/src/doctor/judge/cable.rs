@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, time::Duration};
 use drive_bus::listen::Role;
 
 use super::{Case, FEW, is_times, share};
-use crate::commands::doctor::{
+use crate::doctor::{
     observations::Asked,
     verdict::{Certainty, Defect, Verdict},
 };

@@ -16,7 +16,7 @@ use drive_families::Family;
 use serde::Serialize;
 
 use self::{pdu::Asked, unite::Telway, words::Words};
-use drived_words::output::milliseconds;
+use crate::output::milliseconds;
 
 /// A word of a register in words: its bits, where it is a word of bits.
 pub fn word_in_words(family: Option<Family>, address: u16, word: u16) -> String {

@@ -3,7 +3,7 @@
 use drive_bus::evidence::{self, Finding};
 
 use super::Case;
-use crate::commands::doctor::verdict::{Certainty, Defect, Verdict};
+use crate::doctor::verdict::{Certainty, Defect, Verdict};
 
 /// What it has found, the same defect of several told once; but for [`two`], which is told of those for whom nothing
 /// else explains it.

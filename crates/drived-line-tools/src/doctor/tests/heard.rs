@@ -7,7 +7,7 @@ use tokio::{
 };
 
 use super::*;
-use crate::commands::doctor::verdict::Certainty;
+use crate::doctor::verdict::Certainty;
 
 const SECOND: Duration = Duration::from_secs(1);
 

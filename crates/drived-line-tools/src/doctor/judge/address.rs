@@ -1,7 +1,7 @@
 //! Drives that should be there and are not.
 
 use super::Case;
-use crate::commands::doctor::verdict::{Certainty, Defect, Verdict};
+use crate::doctor::verdict::{Certainty, Defect, Verdict};
 
 /// Drives that should be there and have never answered, where others have.
 pub(super) fn absent(case: &Case<'_>) -> Option<Verdict> {

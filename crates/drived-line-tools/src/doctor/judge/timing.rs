@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_core::AnswerDelay;
 
 use super::{Case, is_times, share};
-use crate::commands::doctor::{
+use crate::doctor::{
     observations::{Asked, Figures},
     verdict::{Certainty, Defect, Verdict},
 };

@@ -8,9 +8,9 @@ use serde_json::json;
 use tokio::time::{Instant, sleep};
 
 use super::frames::Frames;
-use crate::explain::{Counts, Explained, Explainer, Known};
 use drived_client::DaemonArgs;
 use drived_file::Config;
+use drived_words::explain::{Counts, Explained, Explainer, Known};
 use drived_words::{
     drive_spec::{DriveName, DriveSpec, on_one_line},
     failure::Failure,
