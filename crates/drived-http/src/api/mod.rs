@@ -13,8 +13,8 @@ mod read;
 mod reload;
 mod routes;
 mod stream;
-#[cfg(any(test, feature = "testing"))]
-pub mod testing;
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;
 

@@ -1,9 +1,10 @@
-//! Answers held against the description of the API, for tests.
+//! Answers held against the description of the API, for the tests of this crate and, by its path, of the daemon: no program is to be
+//! built with a validator of schemas.
 
 use serde_json::Value;
 
 /// Validates against a schema of the document.
-pub fn validate(document: &Value, schema: &Value, answer: &Value, what: &str) {
+pub(crate) fn validate(document: &Value, schema: &Value, answer: &Value, what: &str) {
     let mut schema = schema.clone();
     schema["components"] = document["components"].clone();
     let validator = jsonschema::draft202012::options().build(&schema).unwrap();

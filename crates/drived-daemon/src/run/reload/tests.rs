@@ -9,8 +9,11 @@ use tower::ServiceExt as _;
 
 use super::*;
 use drived_doors::{Caller, Rights};
-use drived_http::api::testing::validate;
 use drived_simulated as simulated;
+
+#[path = "../../../../drived-http/src/api/testing.rs"]
+mod described;
+use described::validate;
 
 /// Lines whose port is nowhere, with watched drives by line, address and name.
 fn text(drives: &[(&str, u8, &str)]) -> String {
