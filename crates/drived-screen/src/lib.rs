@@ -5,7 +5,8 @@
 #![allow(
     missing_docs,
     missing_copy_implementations,
-    reason = "a crate of the program: what is public is so for its other crates, and most names say it all"
+    rustdoc::private_intra_doc_links,
+    reason = "a crate of the program: what is public is so for its other crates, who read its sources, and most names say it all"
 )]
 
 pub mod row;

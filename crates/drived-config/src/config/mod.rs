@@ -1,5 +1,5 @@
 //! What the configuration file is made of: how a key is declared ([`table`]) and read ([`values`]), where it stands ([`place`]), and
-//! its tables of lines, drives and groups. Each face has its own table; the file as a whole is [`crate::config_file`].
+//! its tables of lines, drives and groups. Each face has its own table; the file as a whole is `drived-file`.
 
 mod described;
 mod drive;
