@@ -7,6 +7,7 @@ use drive_core::{Direction, Error, Frequency, SerialSettings, SlaveAddress, Stop
 use drive_families::Family;
 use drive_fleet::{DriveSettings, Fleet, FleetError};
 use drive_sim::{SimLine, Wiring};
+use drive_testing::witness::Witnesses;
 use support::{drives, plant::common_settings};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -32,6 +33,7 @@ async fn a_drive_is_commanded_on_the_line_and_at_the_address_under_which_it_is_r
         .drive("south", 2, DriveSettings::controlled("pump"), |port, slave| family.open(port, slave))
         .start()
         .expect("it can be");
+    let _witnesses = Witnesses::of_fleet(&fleet, [("north", &north), ("south", &south)]);
     let pump = fleet.drive("pump").expect("it is there");
     pump.ready(60 * SECOND).await.expect("it gets ready");
     assert!(pump.run(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
@@ -93,6 +95,7 @@ async fn a_line_that_was_told_nothing_keeps_the_pause_of_its_families_and_a_long
             })
             .start()
             .expect("it can be");
+        let _witnesses = Witnesses::of_fleet(&fleet, [("north", &simulated)]);
         let fan = fleet.drive("fan").expect("it is there");
         fan.ready(60 * SECOND).await.expect("it gets ready");
         assert!(fan.run(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());

@@ -9,6 +9,7 @@ use drive_core::{Direction, Frequency, SerialSettings, State};
 use drive_families::Family;
 use drive_fleet::{Fleet, GroupStart, Link, Until, WatchdogCheck};
 use drive_sim::{SimLine, Wiring};
+use drive_testing::witness::Witnesses;
 use support::{drives, plant};
 use tokio::process::Command;
 
@@ -78,6 +79,7 @@ async fn drives_of_a_killed_process_trip_by_their_watchdogs_and_the_next_one_ado
 
     let writes: Vec<u64> = machines.iter().map(plant::Plant::writes).collect();
     let (fleet, line) = open(&link).await;
+    let witnesses = Witnesses::of_fleet(&fleet, [("pty", &simulated)]);
     for (drive, (family, _)) in fleet.drives().iter().zip(MEMBERS) {
         let verified = drive.wait_until(|snapshot| matches!(snapshot.watchdog, WatchdogCheck::Verified(_)));
         let snapshot =
@@ -94,6 +96,6 @@ async fn drives_of_a_killed_process_trip_by_their_watchdogs_and_the_next_one_ado
     }
     let after: Vec<u64> = machines.iter().map(plant::Plant::writes).collect();
     assert_eq!(after, writes, "nothing is written until somebody commands");
-    drop(fleet);
+    drop((witnesses, fleet));
     line.close().await;
 }

@@ -168,7 +168,7 @@ impl Surrounded for Around {
     }
 
     fn judge(&self, machine: &SimSlave) -> Option<Box<dyn Judge>> {
-        Some(Box::new(ByManual::new(five(self.0), self.0.capabilities().rows, machine.clone())))
+        ByManual::of(machine).map(|judge| Box::new(judge) as Box<dyn Judge>)
     }
 
     fn parameter(&self) -> Option<(&'static str, u16)> {

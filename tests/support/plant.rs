@@ -10,6 +10,7 @@ use drive_fleet::{
     WatchdogContract,
 };
 use drive_sim::{SimLine, SimSlave, Wiring};
+use drive_testing::witness::Witnesses;
 use tokio::time::timeout;
 
 use crate::drives;
@@ -77,6 +78,10 @@ impl Site {
     }
 }
 
+fn line_name(number: usize) -> String {
+    format!("line {number}")
+}
+
 /// Sites and the fleet that watches them.
 pub struct Plant {
     /// The sites.
@@ -88,6 +93,8 @@ pub struct Plant {
     /// The lines between.
     pub lines: Vec<Line>,
     machines: BTreeMap<String, SimSlave>,
+    /// Everything that the fleet tells is held against the machines; a contradiction is a panic at the end.
+    witnesses: Witnesses,
 }
 
 impl Plant {
@@ -114,7 +121,7 @@ impl Plant {
             let config = site.config();
             // With a repeater in the middle: an Altivar 28 allows 18 stations on a segment.
             let line = Line::over(site.simulated.in_memory(), config);
-            let name = format!("line {number}");
+            let name = line_name(number);
             let in_halves = |budget| LineBudget { segments: 2, ..budget };
             builder = builder.line_with(name.clone(), line.clone(), in_halves);
             for (family, address, settings) in &site.members {
@@ -130,7 +137,10 @@ impl Plant {
         }
         let fleet = builder.start()?;
         let events = fleet.events();
-        Ok(Self { sites, fleet, events, lines, machines })
+        let names: Vec<String> = (0..sites.len()).map(line_name).collect();
+        let lines_by_name = names.iter().map(String::as_str).zip(sites.iter().map(|site| &site.simulated));
+        let witnesses = Witnesses::of_fleet(&fleet, lines_by_name);
+        Ok(Self { sites, fleet, events, lines, machines, witnesses })
     }
 
     /// One drive on one line, with its watchdog where it has one, and other settings as a test wants them.
@@ -150,8 +160,8 @@ impl Plant {
     /// # Panics
     /// When the fleet refuses its settings.
     pub async fn restarted(self) -> Self {
-        let Self { sites, fleet, lines, events, .. } = self;
-        drop((fleet, events));
+        let Self { sites, fleet, lines, events, witnesses, .. } = self;
+        drop((fleet, events, witnesses));
         for line in lines {
             line.close().await;
         }

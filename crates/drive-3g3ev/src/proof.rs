@@ -102,7 +102,10 @@ impl<P: Port> Drive3g3ev<P> {
         let at_zero = status.raw(address::REFERENCE_SEEN) == Some(0) && output == Frequency::ZERO;
         let off = state.contains(DriveState::OUTPUT_OFF) && !(runs && at_zero);
         let ordered = self.command.is_none_or(|held| held.contains(Command::RUN));
-        if status.is_fault() || state.contains(DriveState::UNDERVOLTAGE) {
+        if status.is_fault() {
+            return Output::Tripped;
+        }
+        if state.contains(DriveState::UNDERVOLTAGE) {
             return Output::Cut;
         }
         if runs && !off {

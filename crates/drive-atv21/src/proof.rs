@@ -142,7 +142,7 @@ fn output(word: StatusWord, frequency: Option<Frequency>, was_braked: bool) -> O
     let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
     // A trip may stop along a ramp (F603 = 1).
     if word.contains(StatusWord::TRIPPED) {
-        return if was_braked { Output::None } else { Output::Cut };
+        return if was_braked { Output::None } else { Output::Tripped };
     }
     if word.intersects(cut) || !word.contains(StatusWord::STANDBY) {
         return Output::Cut;

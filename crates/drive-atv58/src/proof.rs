@@ -161,6 +161,7 @@ impl<P: Port> Atv58<P> {
             Some(ChartState::QuickStopActive | ChartState::SwitchedOn) if braked => Output::None,
             // A trip cuts off a motor that was coming down for another reason.
             Some(ChartState::Fault) if reacted => Output::None,
+            Some(ChartState::Fault) => Output::Tripped,
             _ => Output::Cut,
         };
         self.proof.see(status.at, shown, output);

@@ -21,7 +21,9 @@ pub enum Motion {
     Held,
     /// The output was cut while it turned, and nothing tells when it has come to rest.
     Coasting,
-    /// The drive brought it down to no output, or has shown no output since it was first seen, or its coast time is over.
+    /// The drive brought it down to no output, or has shown no output since it was first seen, or its coast time is over. What it did
+    /// between two looks, or while its line was lost, nobody saw: a motor that was at rest, and that others have run and let coast
+    /// meanwhile, is told to be at rest still.
     AtRest,
     /// The words do not tell.
     #[default]
@@ -66,8 +68,10 @@ pub enum Output {
     /// There is no output any more, of a motor that a stop brought down in whose place another may stand by now: only how fast it
     /// came down tells a ramp that has ended from a cut.
     Gone,
-    /// The output is cut: freewheel, a blocked output, a trip, no mains.
+    /// The output is cut: freewheel, a blocked output, no mains.
     Cut,
+    /// The output is cut by a trip.
+    Tripped,
     /// The words do not tell.
     NotKnown,
 }
@@ -86,6 +90,8 @@ enum Past {
     /// It was never seen.
     #[default]
     Unseen,
+    /// It was not seen before a stop went out, or before a trip cut its output.
+    Stopped,
     /// It stood.
     AtRest,
     /// It was driven. Of one that was at zero in two statuses behind each other nothing is to be expected when the output goes.
@@ -182,6 +188,13 @@ impl Shaft {
         self.was_lost = true;
     }
 
+    /// A stop goes out. What a motor did that was never seen before nobody knows: without an output behind it, it may coast.
+    pub fn stops(&mut self) {
+        if self.past == Past::Unseen {
+            self.past = Past::Stopped;
+        }
+    }
+
     /// Whether the last status showed it being brought down.
     #[must_use]
     pub const fn was_braked(&self) -> bool {
@@ -194,7 +207,11 @@ impl Shaft {
         let was_lost = std::mem::take(&mut self.was_lost);
         let descent = std::mem::take(&mut self.descent);
         let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
+        if shown == Output::Tripped {
+            self.stops();
+        }
         let shown = match shown {
+            Output::Tripped => Output::Cut,
             Output::None if is_cut => Output::Cut,
             Output::Gone if is_cut || descent.rate.is_none() => Output::Cut,
             Output::Gone => Output::None,
@@ -226,12 +243,14 @@ impl Shaft {
                 (self.past, self.injected_since) = (Past::AtRest, None);
                 Motion::Held
             }
-            Output::None | Output::Gone | Output::Cut if turns => {
+            Output::None | Output::Gone | Output::Cut | Output::Tripped if turns => {
                 // It tells an output all the same: it comes down.
                 self.past = Past::Braked { still: false };
                 Motion::Braking
             }
-            Output::None | Output::Gone | Output::Cut => self.without_output(at, shown == Output::Cut),
+            Output::None | Output::Gone | Output::Cut | Output::Tripped => {
+                self.without_output(at, shown == Output::Cut)
+            }
         }
     }
 
@@ -252,7 +271,7 @@ impl Shaft {
         self.past = match self.past {
             // Whoever was driven and is without an output was not seen to be brought down: a ramp, or a cut between two looks.
             Past::Driven { still: false, .. } => Past::Coasts(at),
-            Past::Braked { still: false } if cut => Past::Coasts(at),
+            Past::Stopped | Past::Braked { still: false } if cut => Past::Coasts(at),
             coasts @ Past::Coasts(since)
                 if self.coast_time.is_none_or(|time| at.saturating_duration_since(since) < time) =>
             {
@@ -287,6 +306,22 @@ mod tests {
         let (mut shaft, now) = (Shaft::new(), Instant::now());
         shaft.see(now, Output::Driven, FIFTY);
         assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_was_stopped_or_has_tripped_before_it_was_ever_seen_may_coast_where_its_output_is_cut()
+     {
+        let now = Instant::now();
+        for (shown, motion) in [(Output::Cut, Motion::Coasting), (Output::None, Motion::AtRest)] {
+            let mut shaft = Shaft::new();
+            shaft.stops();
+            assert_eq!(shaft.see(now, shown, Some(Frequency::ZERO)), motion);
+        }
+        assert_eq!(Shaft::new().see(now, Output::Tripped, Some(Frequency::ZERO)), Motion::Coasting);
+        let mut shaft = Shaft::new();
+        shaft.see(now, Output::None, Some(Frequency::ZERO));
+        shaft.stops();
+        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest, "it stood");
     }
 
     #[tokio::test(start_paused = true)]

@@ -159,6 +159,10 @@ impl fmt::Display for Status {
         if let Some(frequency) = self.output_frequency {
             write!(f, ", {frequency}")?;
         }
+        // No output is not standstill.
+        if self.motion == Motion::Coasting {
+            write!(f, ", {}", self.motion)?;
+        }
         if let Some(current) = self.current {
             write!(f, ", {current}")?;
         }
@@ -356,5 +360,16 @@ mod tests {
             ..Status::default()
         };
         assert_eq!(status.to_string(), "running, reverse, 50.00 Hz, 4.2 A, at reference, control: bus");
+    }
+
+    #[test]
+    fn a_status_says_that_a_shaft_whose_output_was_cut_may_coast() {
+        let status = Status {
+            state: State::Disabled,
+            output_frequency: Some(Frequency::ZERO),
+            motion: Motion::Coasting,
+            ..Status::default()
+        };
+        assert_eq!(status.to_string(), "disabled, 0.00 Hz, output off, the shaft may coast");
     }
 }

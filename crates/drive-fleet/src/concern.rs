@@ -123,6 +123,9 @@ table! {
     /// A stop is on its way and not confirmed yet.
     StopPending: "stop_pending", "a stop is on its way, not confirmed yet", Note, false,
         "wait until it is confirmed";
+    /// Its output was cut while the motor turned, and nothing tells when the shaft has come to rest.
+    Coasting: "coasting", "output off, the shaft may coast", Note, false,
+        "keep away from the shaft until it is seen to stand";
     /// It has not been seen yet.
     NeverSeen: "never_seen", "not seen yet", Note, false,
         "wait, or look at its supply, its address and its cable";

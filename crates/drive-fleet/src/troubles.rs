@@ -1,5 +1,6 @@
 //! What troubles a drive now, read off its snapshot: by the table of [`ConcernKind`] and nowhere else.
 
+use drive_core::Motion;
 use tokio::time::Instant;
 
 use crate::{
@@ -97,6 +98,10 @@ impl Snapshot {
                 let lasts = Tenths(now.saturating_duration_since(stop.since));
                 let how = if stop.taken { "the drive is stopping" } else { "it is repeated" };
                 (Some(stop.since), Some(format!("{} stop for {lasts}, {how}", stop.mode)))
+            }
+            ConcernKind::Coasting => {
+                let coasts = status.is_some_and(|status| status.value.motion == Motion::Coasting);
+                (None, (coasts && self.link == Link::Connected).then_some(None)?)
             }
             ConcernKind::NeverSeen => (None, (self.link == Link::Connecting).then(error)?),
         };

@@ -40,4 +40,4 @@ pub use serve::{Gateway, GatewayInMemory, SecondConnection, Serving};
 pub use slave::Received;
 pub use watchdog::Watchdog;
 pub use wire::Delivery;
-pub use world::{Act, Surroundings, Switch, UnknownName};
+pub use world::{Act, Intervened, Intervention, Surroundings, Switch, UnknownName};

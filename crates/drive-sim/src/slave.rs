@@ -15,9 +15,10 @@ use crate::{
     record::Breach,
     speech::{Content, Speech},
     unite::{self, LinkCounters},
+    world::{Intervened, Intervention},
 };
 
-/// Requests that a slave remembers.
+/// Requests that a slave remembers, and as many interventions of others.
 const REMEMBERED: usize = 256;
 /// Line feed, the last character of an ASCII frame until function 08/03 changes it.
 pub(crate) const LINE_FEED: u8 = b'\n';
@@ -84,6 +85,7 @@ pub(crate) struct Slave {
     refuses: Option<Exception>,
     requests: BTreeMap<u8, u64>,
     received: VecDeque<Received>,
+    interventions: VecDeque<Intervened>,
 }
 
 impl Slave {
@@ -114,6 +116,7 @@ impl Slave {
             refuses: None,
             requests: BTreeMap::new(),
             received: VecDeque::new(),
+            interventions: VecDeque::new(),
         }
     }
 
@@ -444,6 +447,26 @@ impl Slave {
 
     pub(crate) fn received(&self) -> Vec<Received> {
         self.received.iter().cloned().collect()
+    }
+
+    pub(crate) fn received_since(&self, since: Instant) -> Vec<Received> {
+        let newer = self.received.iter().rev().take_while(|request| request.at > since);
+        let mut newer: Vec<Received> = newer.cloned().collect();
+        newer.reverse();
+        newer
+    }
+
+    /// Somebody else than the line's master has done something to it.
+    pub(crate) fn note(&mut self, at: Instant, what: Intervention) {
+        let number = self.interventions.back().map_or(0, |last| last.number + 1);
+        if self.interventions.len() == REMEMBERED {
+            self.interventions.pop_front();
+        }
+        self.interventions.push_back(Intervened { number, at, what });
+    }
+
+    pub(crate) fn interventions(&self) -> Vec<Intervened> {
+        self.interventions.iter().copied().collect()
     }
 }
 

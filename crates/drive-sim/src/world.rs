@@ -2,6 +2,9 @@
 //! manual can be read in two ways.
 
 use drive_core::{FaultEntry, Percent, registers::Row};
+use tokio::time::Instant;
+
+use crate::model::Panel;
 
 /// What there is around the drives of a family, by name.
 ///
@@ -66,6 +69,34 @@ pub enum Act {
     MotorSupply(bool),
     /// From now on the drive follows this reading (the second name) of what its manual leaves open (the first).
     Reading(&'static str, &'static str),
+}
+
+/// What somebody else than the line's master has done to a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Intervention {
+    /// At its terminals, at the supply of its power stage, or in how its manual is read.
+    World(Act),
+    /// At its panel.
+    Panel(Panel),
+    /// The supply of its control came (`true`) or went.
+    Power(bool),
+    /// It was tripped.
+    Trip(u16),
+    /// A register was given a word without the line.
+    Set(u16, u16),
+    /// Another master of the line wrote a word to a register.
+    Master(u16, u16),
+}
+
+/// An [`Intervention`], and when it was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Intervened {
+    /// How many came before it.
+    pub number: u64,
+    /// When.
+    pub at: Instant,
+    /// What was done.
+    pub what: Intervention,
 }
 
 /// A name that the drive's [`Surroundings`] do not have.

@@ -5,7 +5,7 @@
 //! - [`words`]: a drive that is nothing but words, behind a plain port: what is asked of it, and what becomes of writes.
 //! - [`babble`]: a drive that answers any word to anything.
 //! - [`bench`](mod@bench), [`rig`]: one simulated drive on a line in virtual time.
-//! - [`truth`]: what a status says, against the machine.
+//! - [`truth`]: what a status says, against the machine; [`witness`]: what others tell of it, against the machine.
 //! - [`referee`]: who may move a motor and what stops it, by the manuals alone.
 //! - [`worlds`]: everything around a drive that may decide over its motor, and who judges what is said of it then.
 //! - [`Contract`]: what every family promises of itself, for a family from anywhere to run on itself.
@@ -23,6 +23,7 @@ pub mod recorder;
 pub mod referee;
 pub mod rig;
 pub mod truth;
+pub mod witness;
 pub mod words;
 
 pub use contract::Contract;

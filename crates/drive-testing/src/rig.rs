@@ -7,6 +7,8 @@ use drive_core::{Drive, Frequency, SerialSettings, SlaveAddress, Status};
 use drive_sim::{Model, Observation, SimLine, SimSlave, Wiring};
 use tokio::time::{Instant, sleep, timeout_at};
 
+use crate::truth::contradiction;
+
 /// Where the drive is.
 pub const ADDRESS: u8 = 5;
 
@@ -54,10 +56,11 @@ impl Rig {
         Self { drive, machine, simulated, line }
     }
 
-    /// Polls the drive until its own status is so. A drive that is not polled would trip by its watchdog.
+    /// Polls the drive until its own status is so. A drive that is not polled would trip by its watchdog. Each status is held against
+    /// the machine.
     ///
     /// # Panics
-    /// When that does not come in two minutes of virtual time.
+    /// When that does not come in two minutes of virtual time, and when a status says what the machine contradicts.
     pub async fn until(&mut self, what: &str, is_so: impl Fn(&Status) -> bool) -> Status {
         self.until_both(what, |status, _| is_so(status)).await
     }
@@ -84,8 +87,15 @@ impl Rig {
         let mut last = None;
         loop {
             match timeout_at(end, self.drive.status()).await {
-                Ok(Ok(status)) if is_so(&status, &self.machine.observe()) => return status,
-                Ok(seen) => last = Some(seen),
+                Ok(Ok(status)) => {
+                    let machine = self.machine.observe();
+                    assert_eq!(contradiction(&status, &machine), None, "the words against the shaft");
+                    if is_so(&status, &machine) {
+                        return status;
+                    }
+                    last = Some(Ok(status));
+                }
+                Ok(failed) => last = Some(failed),
                 Err(_) => panic!("{what}: not seen; the last was {last:?}"),
             }
             sleep(Duration::from_millis(50)).await;

@@ -13,13 +13,17 @@ pub const TOLERANCE: i32 = 20;
 /// Below this a ramp may pass zero within one exchange.
 const CROSSING: Frequency = Frequency::from_hertz(2);
 
-/// What the status says that the machine contradicts: told at rest or held, and the shaft turns; told in force, and nothing drives
+/// What the status says that the machine contradicts: told at rest or held, and the shaft turns; told to coast, and the output is
+/// on; told in force, and nothing drives
 /// the motor, or it turns the other way, or at another speed than the reference that it is said to have reached.
 #[must_use]
 pub fn contradiction(status: &Status, seen: &Observation) -> Option<String> {
     let turns = seen.shaft_frequency.abs() > TOLERANCE;
     let told = |what: &str| Some(format!("told {what} ({status}); {seen:?}"));
     if matches!(status.motion, Motion::AtRest | Motion::Held) && turns {
+        return told(&status.motion.to_string());
+    }
+    if status.motion == Motion::Coasting && seen.running {
         return told(&status.motion.to_string());
     }
     if status.verdict != Some(Verdict::InForce) {

@@ -13,7 +13,8 @@ use drived_plant::{
         views::CommandView,
     },
 };
-use drived_words::{failure::Failure, output};
+
+use drived_words::{failure::Failure, output, values};
 
 /// How often it is asked for what became of it.
 const ASKED_EVERY: Duration = Duration::from_millis(500);
@@ -130,14 +131,15 @@ fn name(command: &CommandView) -> &str {
 }
 
 fn sentence(told: &Told, command: &CommandView) -> String {
-    let shows = command.status.as_ref().and_then(|shown| shown.status());
-    let shows = shows.map(|shows| format!(": the drive shows {shows}")).unwrap_or_default();
+    let status = command.status.as_ref().and_then(|shown| shown.status());
+    let shows = status.map(|shows| format!(": the drive shows {shows}")).unwrap_or_default();
     if let Some(started) = command.started {
         return format!("{} {started}{shows}", name(command));
     }
     let by = command.stop.is_some().then_some(command.text.as_deref()).flatten();
     let by = by.map(|by| format!(", {by}")).unwrap_or_default();
-    format!("{} {}{by}{shows}", name(command), told.done)
+    let done = if told.action == ActionWord::Stop { values::stopped(status) } else { &told.done };
+    format!("{} {done}{by}{shows}", name(command))
 }
 
 fn why(command: &CommandView) -> String {

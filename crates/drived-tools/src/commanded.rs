@@ -263,6 +263,7 @@ mod tests {
     use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
     use drive_families::Family;
     use drive_sim::{SimLine, Wiring};
+    use drive_testing::witness::Witnesses;
     use tokio::time::sleep;
 
     use super::*;
@@ -282,6 +283,8 @@ mod tests {
                 let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
                 let options = simulated::options();
                 let mut one = Commanded::over(name, line, config, &options, Vec::new()).unwrap();
+                let mut witnesses = Witnesses::default();
+                witnesses.attend_drive(&machine, &one.handle);
                 let setpoint = Frequency::from_hertz(20);
                 let held = one.command(async |drive| drive.set_setpoint(setpoint).await).await.unwrap();
                 assert!(held.is_confirmed(), "{family}: {held}");

@@ -17,7 +17,7 @@ use drived_words::{
     drive_spec::{DriveName, DriveSpec},
     failure::Failure,
     line_spec::{self, LineSpec},
-    output,
+    output, values,
 };
 
 /// Which drive a subcommand acts on: one on a line, by `--line` and `--drive`, or what the running daemon knows by name.
@@ -138,8 +138,8 @@ impl OneDriveArgs {
         if stop.is_told() {
             body["text"] = json!(stop.to_string());
         }
-        self.daemon
-            .say(&body, || output::say(format_args!("{name} stands still{by}: the drive shows {status}")))
+        let stopped = values::stopped(Some(status));
+        self.daemon.say(&body, || output::say(format_args!("{name} {stopped}{by}: the drive shows {status}")))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Fault, Identity, Measurements, RawWord, Status, Watchdog};
+use drive_core::{Fault, Identity, Measurements, Motion, RawWord, Status, Watchdog};
 use drive_fleet::{Counters, FrequencyLimits, IdentityCheck, WatchdogCheck};
 
 use crate::output;
@@ -28,12 +28,23 @@ pub fn status(status: &Status) -> Values {
     let presence = |present: bool| if present { "present" } else { "none" }.to_owned();
     told([
         ("output frequency", status.output_frequency.map(|value| value.to_string())),
+        ("shaft", (!status.motion.is_not_known()).then(|| status.motion.to_string())),
         ("motor current", output::current(status)),
         ("control", status.control.map(|value| value.to_string())),
         ("fault code", status.fault_code.filter(|&code| code != 0).map(|code| code.to_string())),
         ("warning", status.warning.map(presence)),
         ("words", words(&status.raw)),
     ])
+}
+
+/// What a motor does whose stop is confirmed.
+pub const fn stopped(status: Option<&Status>) -> &'static str {
+    match status {
+        Some(Status { motion: Motion::AtRest, .. }) => "stands still",
+        Some(Status { motion: Motion::Held, .. }) => "is held at rest by direct current",
+        Some(Status { motion: Motion::Coasting, .. }) => "has cut its output, the shaft may coast",
+        _ => "has taken the stop",
+    }
 }
 
 /// Words as a drive sent them; nothing where there are none.

@@ -10,6 +10,7 @@ use drive_fleet::{
     Until,
 };
 use drive_sim::{SimLine, SimSlave, Wiring, models::atv312::Atv312};
+use drive_testing::witness::Witnesses;
 use tokio::{
     task::{JoinHandle, JoinSet},
     time::{Instant, sleep},
@@ -27,6 +28,7 @@ const fn periods(period: u64, max_age: u64) -> Periods {
 struct FullLine {
     fleet: Fleet,
     machines: Vec<SimSlave>,
+    _witnesses: Witnesses,
 }
 
 impl FullLine {
@@ -44,11 +46,12 @@ impl FullLine {
                 builder.drive("north", number, settings, |port, slave| Family::Atv312.open(port, slave));
         }
         let fleet = builder.start().expect("it is planned to work");
+        let _witnesses = Witnesses::of_fleet(&fleet, [("north", &simulated)]);
         for drive in fleet.drives() {
             drive.ready(Duration::MAX).await.expect("it gets ready");
             drive.wait_until(|snapshot| matches!(snapshot.identity, IdentityCheck::Same(_))).await;
         }
-        Self { fleet, machines }
+        Self { fleet, machines, _witnesses }
     }
 
     fn running(&self) -> usize {

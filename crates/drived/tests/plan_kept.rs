@@ -10,6 +10,7 @@ use drive_fleet::{
     WatchdogContract, forecast,
 };
 use drive_sim::{SimLine, Wiring, models::atv312::Atv312};
+use drive_testing::witness::Witnesses;
 use tokio::time::{Instant, sleep, timeout_at};
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -66,6 +67,7 @@ async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_
         builder = builder.drive("north", number, settings, |port, slave| family.open(port, slave));
     }
     let fleet = builder.start().expect("it is planned to work");
+    let _witnesses = Witnesses::of_fleet(&fleet, [("north", &simulated)]);
     for drive in fleet.drives() {
         drive.ready(120 * SECOND).await.expect("it gets ready");
     }

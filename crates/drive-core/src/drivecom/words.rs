@@ -366,6 +366,7 @@ impl StatusWords {
             ChartState::SwitchedOn if braked => Output::None,
             // A trip cuts off a motor that was coming down for another reason.
             ChartState::Fault if braked && reacted => Output::None,
+            ChartState::Fault => Output::Tripped,
             _ => Output::Cut,
         }
     }

@@ -11,7 +11,7 @@ use crate::{
     model::{Dialect, Exception, Observation, Panel},
     slave::{LineCounters, Received, Slave},
     state::Place,
-    world::{Act, Surroundings, UnknownName},
+    world::{Act, Intervened, Intervention, Surroundings, UnknownName},
 };
 
 /// How often a waiting observer looks. The time of a model passes only while somebody looks at it.
@@ -116,13 +116,13 @@ impl SimSlave {
 
     /// Trips the drive with a code of its family.
     pub fn trip(&self, code: u16) {
-        self.order(|slave, _| slave.at(Instant::now()).trip(code));
+        self.intervene(Intervention::Trip(code), |slave, _| slave.at(Instant::now()).trip(code));
     }
 
     /// Switches the supply of the control, and with it the whole drive, on or off. Nothing happens when it already is
     /// so.
     pub fn power(&self, on: bool) {
-        self.order(|slave, line| slave.power(Instant::now(), on, line));
+        self.intervene(Intervention::Power(on), |slave, line| slave.power(Instant::now(), on, line));
     }
 
     /// Switches the supply off and on.
@@ -138,7 +138,7 @@ impl SimSlave {
 
     /// Somebody at the panel acts.
     pub fn panel(&self, action: Panel) {
-        self.order(|slave, _| slave.at(Instant::now()).panel(action));
+        self.intervene(Intervention::Panel(action), |slave, _| slave.at(Instant::now()).panel(action));
     }
 
     /// What there is around the drive.
@@ -180,7 +180,9 @@ impl SimSlave {
     /// The exception that the drive answers.
     pub fn written_by_another(&self, register: u16, value: u16) -> Result<(), Exception> {
         let mut result = Ok(());
-        self.order(|slave, _| result = slave.written_by_another(Instant::now(), register, value));
+        self.intervene(Intervention::Master(register, value), |slave, _| {
+            result = slave.written_by_another(Instant::now(), register, value);
+        });
         result
     }
 
@@ -197,7 +199,9 @@ impl SimSlave {
 
     /// Changes a register, without the rules of the line; `false` when there is none.
     pub fn poke(&self, address: u16, value: u16) -> bool {
-        self.order(|slave, _| slave.at(Instant::now()).poke(address, value))
+        self.intervene(Intervention::Set(address, value), |slave, _| {
+            slave.at(Instant::now()).poke(address, value)
+        })
     }
 
     /// How many requests of a function it took, broadcasts included.
@@ -226,8 +230,21 @@ impl SimSlave {
         self.with(|slave, _| slave.received())
     }
 
+    /// Those of them that it took behind this moment.
+    #[must_use]
+    pub fn received_since(&self, since: Instant) -> Vec<Received> {
+        self.with(|slave, _| slave.received_since(since))
+    }
+
+    /// The last 256 things that somebody else than the line's master did to it, the oldest first: at its panel, its terminals, its
+    /// supplies, its settings, and what another master wrote.
+    #[must_use]
+    pub fn interventions(&self) -> Vec<Intervened> {
+        self.with(|slave, _| slave.interventions())
+    }
+
     pub(crate) fn world(&self, act: Act) {
-        self.order(|slave, _| slave.at(Instant::now()).world(act));
+        self.intervene(Intervention::World(act), |slave, _| slave.at(Instant::now()).world(act));
     }
 
     async fn wait_for<T: Default>(&self, look: impl Fn(&mut Slave) -> T, is_so: impl Fn(&T) -> bool) -> T {
@@ -255,5 +272,17 @@ impl SimSlave {
         let result = self.with(act);
         self.line.shared.has_changed();
         result
+    }
+
+    /// The same, by somebody else than the line's master.
+    fn intervene<R: Default>(
+        &self,
+        what: Intervention,
+        act: impl FnOnce(&mut Slave, LineCounters) -> R,
+    ) -> R {
+        self.order(|slave, line| {
+            slave.note(Instant::now(), what);
+            act(slave, line)
+        })
     }
 }

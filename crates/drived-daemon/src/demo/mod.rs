@@ -28,6 +28,7 @@ use drived_words::{
     failure::Failure,
     output::{self, Table},
     signals::Ending,
+    values,
 };
 
 /// How long the motors may take to come to a stop at the end: the longest ramp of a simulated drive is 10 s, and one
@@ -149,9 +150,11 @@ fn farewell(plant: &Plant, why: Why) -> Result<(), Failure> {
         let action =
             actions.iter().find(|(name, _)| **name == *unit.name.to_string()).map(|(_, action)| action);
         let verdict = match action {
-            Some(ExitAction::Left) if unit.stands() => "stands still",
+            Some(ExitAction::Left) if unit.stands() => values::stopped(unit.status().as_deref()),
             Some(ExitAction::Left) => "left as it is",
-            Some(ExitAction::Stopped(outcome)) if outcome.is_confirmed() => "stands still",
+            Some(ExitAction::Stopped(outcome)) if outcome.is_confirmed() => {
+                values::stopped(unit.status().as_deref())
+            }
             _ => {
                 turning.push(unit.name.to_string());
                 "NOT CONFIRMED"

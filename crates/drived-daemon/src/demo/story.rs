@@ -137,7 +137,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_motor_that_a_person_has_stopped_is_not_started_by_the_story() {
         let named = |name: String| DriveSettings::controlled(name.replace("pump ", "atv312@"));
-        let TestPlant { plant, machines, .. } = TestPlant::with(2, named).await;
+        let TestPlant { plant, machines, witnesses: _witnesses, .. } = TestPlant::with(2, named).await;
         let fleet = plant.fleet();
         let unit = |((address, machine), handle): ((u8, &drive_sim::SimSlave), DriveHandle)| {
             let slave = SlaveAddress::try_from(address).unwrap();

@@ -148,7 +148,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn sixty_columns_cut_no_number_and_who_is_lost_stands_first_with_what_it_showed_in_brackets() {
-        let TestPlant { plant, machines, line: _line } = TestPlant::of(3).await;
+        let TestPlant { plant, machines, line: _line, witnesses: _witnesses } = TestPlant::of(3).await;
         let drive = plant.fleet().drive("pump 1").unwrap();
         assert!(drive.set_setpoint(Frequency::from_decihertz(405)).await.is_confirmed());
         assert!(drive.start(Direction::Reverse).await.is_confirmed());
@@ -180,7 +180,8 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn who_has_no_room_is_counted_and_the_log_has_its_own() {
-        let TestPlant { plant, .. } = TestPlant::with(20, DriveSettings::watched).await;
+        let TestPlant { plant, witnesses: _witnesses, .. } =
+            TestPlant::with(20, DriveSettings::watched).await;
         let log = ["2026-11-21 14:03:21.350+01:00 WARN  north: pump 3 lost", "another form"];
         let screen = drawn(&plant, &log, 80, 16);
         // A title, eight rows with their heads, one line, the log.
@@ -191,7 +192,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_screen_that_is_too_small_is_no_panic() {
-        let TestPlant { plant, .. } = TestPlant::of(2).await;
+        let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(2).await;
         for (width, height) in [(1, 1), (5, 2), (30, 5), (200, 3)] {
             drawn(&plant, &["a line"], width, height);
         }

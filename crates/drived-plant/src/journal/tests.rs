@@ -7,6 +7,7 @@ use drive_core::{Direction, Frequency, Reaction, SerialSettings, SlaveAddress, S
 use drive_families::{Family, Options};
 use drive_fleet::{Commanders, DriveSettings, Fleet, Outcome, WatchdogContract};
 use drive_sim::{Fault, SimLine, Wiring};
+use drive_testing::witness::Witnesses;
 use tokio::{
     io::{AsyncWriteExt, DuplexStream, copy_bidirectional, duplex},
     sync::watch,
@@ -104,6 +105,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         });
     }
     let fleet = builder.start().unwrap();
+    let _witnesses = Witnesses::of_fleet(&fleet, [("north", &simulated)]);
     let (start, told) = (Instant::now(), Told::default());
     let drives = fleet.drives();
     let heard = told.clone();

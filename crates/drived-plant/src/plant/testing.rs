@@ -16,6 +16,7 @@ use drive_fleet::{
     WatchdogCheck,
 };
 use drive_sim::{SimLine, SimSlave, Wiring};
+use drive_testing::witness::Witnesses;
 use tokio::time::Instant;
 
 use super::{Plant, views::DriveView};
@@ -27,6 +28,8 @@ pub struct TestPlant {
     pub plant: Plant,
     pub line: SimLine,
     pub machines: Vec<SimSlave>,
+    /// What the fleet tells is held against the machines.
+    pub witnesses: Witnesses,
 }
 
 impl TestPlant {
@@ -57,11 +60,12 @@ impl TestPlant {
             });
         }
         let fleet = builder.start().unwrap();
+        let witnesses = Witnesses::of_fleet(&fleet, [("north", &line)]);
         let plant = Plant::start(fleet, vec![Group { name: "pumps".to_owned(), drives: names }], false);
         for drive in plant.fleet().drives() {
             let _ = drive.ready(Duration::from_secs(10)).await;
         }
-        Self { plant, line, machines }
+        Self { plant, line, machines, witnesses }
     }
 }
 

@@ -82,7 +82,7 @@ async fn through_daemon(args: &Args, order: StopOrder) -> Result<(), Failure> {
             Some(time) => json!({ "mode": order.mode, "injection_ms": milliseconds(time) }),
             None => json!({ "mode": order.mode }),
         },
-        done: "stands still".to_owned(),
+        done: "has taken the stop".to_owned(),
     };
     let mut daemon = args.one.daemon.connect().await.map_err(unsent)?;
     let target = match (args.all, &args.name) {

@@ -5,7 +5,7 @@ use drive_core::{
     drivecom::ChartState,
     registers::{Row, Storage},
 };
-use drive_sim::{Observation, SimSlave};
+use drive_sim::{Act, Intervened, Intervention, Observation, Panel, SimSlave};
 use tokio::time::Instant;
 
 use super::Judge;
@@ -20,6 +20,8 @@ pub struct ByManual {
     rows: &'static [Row],
     machine: SimSlave,
     world: World,
+    /// How many interventions of others were looked at.
+    seen: u64,
     /// What happened and was not told to the manual yet.
     happened: Vec<(Instant, Vec<Change>)>,
     heard_until: Instant,
@@ -30,16 +32,27 @@ pub struct ByManual {
 }
 
 impl ByManual {
-    /// A machine with these registers as it is set up now, at rest, before anything is written to it.
+    /// A machine as it is set up now, at rest, before anything is written to it; `None` where nobody has transcribed the manual of its
+    /// family.
     #[must_use]
-    pub fn new(family: Family, rows: &'static [Row], machine: SimSlave) -> Self {
-        let is_setting = |row: &&Row| row.access.is_writable() && row.storage != Storage::Volatile;
-        let settings = rows.iter().filter(is_setting);
+    pub fn of(machine: &SimSlave) -> Option<Self> {
+        let (around, machine) = (machine.surroundings(), machine.clone());
+        let family = match around.family {
+            "atv21" => Family::Atv21,
+            "atv28" => Family::Atv28,
+            "atv58" => Family::Atv58,
+            "atv312" => Family::Atv312,
+            "3g3ev" => Family::Omron3g3ev,
+            _ => return None,
+        };
+        let rows = around.rows;
+        let settings = rows.iter().filter(|row| is_setting(row));
         let words = settings.filter_map(|row| Some((row.address, machine.peek(row.address)?))).collect();
         let world = World::switched_on(family, words);
         let mut judge = Self {
             family,
             rows,
+            seen: machine.interventions().last().map_or(0, |last| last.number + 1),
             machine,
             world,
             happened: Vec::new(),
@@ -55,52 +68,63 @@ impl ByManual {
         if let Some(state) = judge.chart() {
             judge.world.state = state;
         }
-        judge
+        Some(judge)
     }
 
-    fn changes(&self, deed: &str) -> Option<Vec<Change>> {
-        let words: Vec<&str> = deed.split_whitespace().collect();
+    /// What an intervention is to the manual; `None`: it has no word for it.
+    fn changes(&self, what: Intervention) -> Option<Vec<Change>> {
         let number = |name: &str| name.trim_start_matches(char::is_alphabetic).parse::<u8>().ok();
         let pressed = |key| vec![Change::Key { key, held: true }, Change::Key { key, held: false }];
-        Some(match *words.as_slice() {
-            ["terminal", name, level] if self.family == Family::Atv21 => {
-                // ST has no bit in FD06.
-                let (_, bit) =
-                    [("F", 0), ("R", 1), ("RES", 2), ("VIA", 7)].into_iter().find(|it| it.0 == name)?;
-                vec![Change::Input { bit, closed: level == "on" }]
-            }
-            // The manual knows none of them: what they do shows in 002Ch.
-            ["terminal", ..] if self.family == Family::Omron3g3ev => Vec::new(),
-            ["terminal", name, level] if name.starts_with("LI") => {
-                vec![Change::Input { bit: number(name)? - 1, closed: level == "on" }]
-            }
-            ["analog", name, level] => {
+        Some(match what {
+            Intervention::World(Act::Terminal(name, closed)) => match self.family {
+                Family::Atv21 => {
+                    // ST has no bit in FD06.
+                    let (_, bit) =
+                        [("F", 0), ("R", 1), ("RES", 2), ("VIA", 7)].into_iter().find(|it| it.0 == name)?;
+                    vec![Change::Input { bit, closed }]
+                }
+                // The manual knows none of them: what they do shows in 002Ch.
+                Family::Omron3g3ev => Vec::new(),
+                _ if name.starts_with("LI") => vec![Change::Input { bit: number(name)? - 1, closed }],
+                _ => return None,
+            },
+            Intervention::World(Act::Analog(name, level)) => {
                 let number = match name {
                     "AIV1" => 16,
                     "VIA" => 1,
                     "VIB" => 2,
                     _ => number(name)?,
                 };
-                let percent: i16 = level.trim_end_matches('%').parse().ok()?;
-                vec![Change::Analog { number, value: percent * 100 }]
+                vec![Change::Analog { number, value: i16::try_from(level.hundredths()).ok()? }]
             }
-            ["panel", "takes" | "releases"] if self.family == Family::Atv21 => {
-                vec![Change::Key { key: Key::Local, held: words[1] == "takes" }]
+            Intervention::Panel(Panel::TakeControl | Panel::ReleaseControl)
+                if self.family == Family::Atv21 =>
+            {
+                let held = what == Intervention::Panel(Panel::TakeControl);
+                vec![Change::Key { key: Key::Local, held }]
             }
             // Whether its STOP acts while the bus commands, their manuals do not say.
-            ["panel", "stop"] if matches!(self.family, Family::Atv21 | Family::Omron3g3ev) => return None,
-            ["panel", "run"] => pressed(Key::Run),
-            ["panel", "stop"] => pressed(Key::Stop),
-            ["power", level] => vec![Change::Mains(level == "on")],
-            ["trip", code] => vec![Change::Trip(code.parse().ok()?), Change::CauseGone],
-            ["master", code, value] => {
-                let row = Row::find(self.rows, code)?;
-                let value = row.read(value)?;
-                vec![Change::Write { address: row.address, value }]
+            Intervention::Panel(Panel::Stop) if matches!(self.family, Family::Atv21 | Family::Omron3g3ev) => {
+                return None;
             }
+            Intervention::Panel(Panel::Run) => pressed(Key::Run),
+            Intervention::Panel(Panel::Stop) => pressed(Key::Stop),
             // Forced local and the reference of the panel are read from the world that `ask` corrects.
-            ["panel", "takes" | "releases" | "reference", ..] => Vec::new(),
-            _ => return None,
+            Intervention::Panel(Panel::TakeControl | Panel::ReleaseControl | Panel::Reference(_)) => {
+                Vec::new()
+            }
+            Intervention::Power(on) => vec![Change::Mains(on)],
+            Intervention::Trip(code) => vec![Change::Trip(code), Change::CauseGone],
+            Intervention::Master(address, value) => vec![Change::Write { address, value }],
+            // A setting is one whoever makes it.
+            Intervention::Set(address, value)
+                if self.rows.iter().any(|row| row.address == address && is_setting(row)) =>
+            {
+                vec![Change::Write { address, value }]
+            }
+            Intervention::Panel(Panel::Reset) | Intervention::Set(..) | Intervention::World(_) => {
+                return None;
+            }
         })
     }
 
@@ -172,18 +196,21 @@ impl ByManual {
 }
 
 impl Judge for ByManual {
-    fn happened_at(&mut self, at: Instant, deed: &str) {
-        self.another |= deed.starts_with("master");
-        match self.changes(deed) {
-            Some(changes) => self.happened.push((at, changes)),
-            None => self.lost = true,
-        }
-    }
-
     fn follow(&mut self) {
+        let interventions = self.machine.interventions();
+        for Intervened { number, at, what } in interventions {
+            if number < self.seen {
+                continue;
+            }
+            self.seen = number + 1;
+            self.another |= matches!(what, Intervention::Master(..));
+            match self.changes(what) {
+                Some(changes) => self.happened.push((at, changes)),
+                None => self.lost = true,
+            }
+        }
         let since = self.heard_until;
-        let written = self.machine.received().into_iter().filter(|request| request.at > since);
-        for request in written {
+        for request in self.machine.received_since(since) {
             self.heard_until = request.at;
             self.happened.push((request.at, writes(&request.pdu)));
         }
@@ -231,6 +258,11 @@ impl Judge for ByManual {
     fn decides(&self) -> bool {
         !self.lost && !referee::order(&self.world).is_silent()
     }
+}
+
+/// Whether it is kept through a loss of the supply.
+fn is_setting(row: &Row) -> bool {
+    row.access.is_writable() && row.storage != Storage::Volatile
 }
 
 fn motion(seen: &Observation) -> Motion {

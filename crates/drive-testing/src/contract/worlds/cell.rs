@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::{Control, Direction, Error, ErrorKind, Frequency, Row, Status, StopMode};
 use drive_sim::Observation;
-use tokio::time::{Instant, sleep};
+use tokio::time::sleep;
 
 use super::{Configuration, Event, Judge, Scene, Surrounded};
 use crate::{
@@ -151,9 +151,6 @@ impl<'a> Cell<'a> {
     fn happens(&mut self, deeds: &[String]) {
         for deed in deeds {
             self.scene.happens(deed);
-            if let Some(judge) = &mut self.judge {
-                judge.happened_at(Instant::now(), deed);
-            }
         }
     }
 
@@ -317,14 +314,10 @@ impl<'a> Cell<'a> {
     /// The event comes behind the first exchanges of the operation, whatever they are.
     async fn operate_amid(&mut self) -> Result<Option<Status>, Error> {
         let (around, event) = (self.scene.around(), self.event);
-        let (done, at) = tokio::join!(self.operate(), async {
+        let (done, ()) = tokio::join!(self.operate(), async {
             sleep(Duration::from_millis(60)).await;
             event.comes.iter().for_each(|deed| around.happens(deed));
-            Instant::now()
         });
-        if let Some(judge) = &mut self.judge {
-            event.comes.iter().for_each(|deed| judge.happened_at(at, deed));
-        }
         done
     }
 

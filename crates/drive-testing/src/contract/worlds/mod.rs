@@ -21,7 +21,6 @@ mod scene;
 
 use drive_core::registers::{Range, Row};
 use drive_sim::{Model, SimSlave, Surroundings};
-use tokio::time::Instant;
 
 pub use self::{
     by_manual::ByManual,
@@ -137,10 +136,7 @@ pub trait Surrounded {
 
 /// Who follows what is written to a machine and what happens around it, and says then what a manual makes of its motor.
 pub trait Judge {
-    /// Something has happened around the machine, in the simulator's text.
-    fn happened_at(&mut self, at: Instant, deed: &str);
-
-    /// Time has passed: what was written to the machine since is taken in.
+    /// Time has passed: what was written to the machine since and what was [done](SimSlave::interventions) to it is taken in.
     fn follow(&mut self);
 
     /// What the manual has against the motor as it is seen, and against what is said of our run command: `held`, a run command of

@@ -9,7 +9,6 @@ use drive_core::{
 };
 use drive_sim::{Observation, Surroundings};
 use fastrand::Rng;
-use tokio::time::Instant;
 
 use super::{Event, Judge, Scene, Surrounded, Values};
 use crate::{contract::Contract, truth::TOLERANCE};
@@ -93,9 +92,6 @@ impl Run {
 
     fn happens(&mut self, deed: &str) {
         self.scene.happens(deed);
-        if let Some(judge) = &mut self.judge {
-            judge.happened_at(Instant::now(), deed);
-        }
     }
 
     /// Time passes; what is said then, against shaft and manual.

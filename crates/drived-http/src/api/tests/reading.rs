@@ -10,7 +10,7 @@ use super::*;
 
 #[tokio::test(start_paused = true)]
 async fn the_state_has_every_line_drive_and_group() {
-    let TestPlant { plant, .. } = TestPlant::of(3).await;
+    let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(3).await;
     let (status, state) = get(&plant, "/api/v1/state").await;
     assert_eq!(status, StatusCode::OK);
     assert_eq!(state["lines"][0]["name"], "north");
@@ -24,7 +24,7 @@ async fn the_state_has_every_line_drive_and_group() {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_is_found_by_its_name_and_no_other_is() {
-    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     let (status, drive) = get(&plant, "/api/v1/drives/pump%201").await;
     assert_eq!((status, &drive["name"]), (StatusCode::OK, &Value::from("pump 1")));
     assert_eq!(get(&plant, "/api/v1/drives/pump%202").await.0, StatusCode::NOT_FOUND);
@@ -32,7 +32,7 @@ async fn a_drive_is_found_by_its_name_and_no_other_is() {
 
 #[tokio::test(start_paused = true)]
 async fn a_value_behind_a_cut_cable_is_stale_and_never_shown_as_live() {
-    let TestPlant { plant, line, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, line, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     tokio::time::sleep(Duration::from_secs(15)).await;
     let (_, drive) = get(&plant, "/api/v1/drives/pump%201").await;
     assert_eq!(drive["measurements"]["quality"], "good", "{drive}");
@@ -47,7 +47,7 @@ async fn a_value_behind_a_cut_cable_is_stale_and_never_shown_as_live() {
 
 #[tokio::test(start_paused = true)]
 async fn a_tripped_drive_says_what_the_fault_means_and_what_to_do() {
-    let TestPlant { plant, machines, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, machines, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     machines[0].trip(9);
     tokio::time::sleep(Duration::from_secs(3)).await;
     let (_, drive) = get(&plant, "/api/v1/drives/pump%201").await;
@@ -59,7 +59,7 @@ async fn a_tripped_drive_says_what_the_fault_means_and_what_to_do() {
 
 #[tokio::test(start_paused = true)]
 async fn a_value_behind_a_cut_cable_is_in_no_output_shown_as_live() {
-    let TestPlant { plant, line, .. } = TestPlant::of(2).await;
+    let TestPlant { plant, line, witnesses: _witnesses, .. } = TestPlant::of(2).await;
     let start = json!({"id": "run", "setpoint": {"frequency_hz": 30.0}});
     assert_eq!(command(&plant, "/api/v1/drives/pump%201/start", &start).await.0, StatusCode::OK);
     tokio::time::sleep(Duration::from_secs(15)).await;
@@ -89,7 +89,7 @@ async fn a_value_behind_a_cut_cable_is_in_no_output_shown_as_live() {
 
 #[tokio::test(start_paused = true)]
 async fn a_line_shows_its_last_hundred_exchanges_its_load_now_and_when_who_is_off_line_is_asked_next() {
-    let TestPlant { plant, line, .. } = TestPlant::of(2).await;
+    let TestPlant { plant, line, witnesses: _witnesses, .. } = TestPlant::of(2).await;
     tokio::time::sleep(Duration::from_secs(60)).await;
     let (_, north) = get(&plant, "/api/v1/lines/north").await;
     let last = north["last"].as_array().unwrap();
@@ -121,7 +121,7 @@ async fn a_line_shows_its_last_hundred_exchanges_its_load_now_and_when_who_is_of
 
 #[tokio::test(start_paused = true)]
 async fn a_line_tells_its_plan_beside_what_was_measured_with_the_answer_times_of_each_slave() {
-    let TestPlant { plant, line, machines } = TestPlant::of(2).await;
+    let TestPlant { plant, line, machines, witnesses: _witnesses } = TestPlant::of(2).await;
     for machine in &machines {
         machine.set_turnaround(Some(Duration::from_millis(30)));
     }
@@ -158,7 +158,7 @@ async fn a_line_tells_its_plan_beside_what_was_measured_with_the_answer_times_of
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_tells_its_settings_and_how_its_watchdog_is_fed_as_it_was_found() {
-    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     tokio::time::sleep(Duration::from_secs(15)).await;
     let (_, told) = get(&plant, "/api/v1/drives/pump%201/settings").await;
     assert_eq!(told["settings"]["control"], true, "{told}");
@@ -192,7 +192,7 @@ fn nothing_is_live(told: &Value, path: &str) {
 
 #[tokio::test(start_paused = true)]
 async fn the_history_is_ten_minutes_long_and_no_longer() {
-    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     tokio::time::sleep(Duration::from_secs(700)).await;
     let (_, history) = get(&plant, "/api/v1/drives/pump%201/history").await;
     for column in ["time_unix_ms", "frequency_hz", "setpoint_hz", "current_a", "torque_percent"] {
@@ -203,7 +203,7 @@ async fn the_history_is_ten_minutes_long_and_no_longer() {
 
 #[tokio::test(start_paused = true)]
 async fn the_faults_and_their_history_are_read_from_the_drive() {
-    let TestPlant { plant, machines, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, machines, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     machines[0].trip(9);
     tokio::time::sleep(Duration::from_secs(3)).await;
     let (status, faults) = get(&plant, "/api/v1/drives/pump%201/faults").await;
@@ -265,7 +265,7 @@ async fn a_parameter_is_read_and_written_by_an_engineer_and_kept_from_everybody_
 // In real time: a thread writes the file, and a paused clock would not wait for it.
 #[tokio::test]
 async fn a_capture_is_a_file_that_begins_as_pcapng_and_ends_in_time() {
-    let TestPlant { plant, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     let request = Request::get("/api/v1/lines/north/capture?seconds=2").body(Body::empty()).unwrap();
     let response = api(&plant, "reader", ALL).oneshot(request).await.unwrap();
     assert_eq!(response.headers()["content-type"], "application/x-pcapng");
@@ -277,7 +277,7 @@ async fn a_capture_is_a_file_that_begins_as_pcapng_and_ends_in_time() {
 
 #[tokio::test(start_paused = true)]
 async fn the_program_is_ready_while_its_lines_are_asked_whether_or_not_anybody_answers() {
-    let TestPlant { plant, line, .. } = TestPlant::of(1).await;
+    let TestPlant { plant, line, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     assert_eq!(get(&plant, "/healthz").await.0, StatusCode::OK);
     line.cut();
     tokio::time::sleep(Duration::from_secs(60)).await;

@@ -63,6 +63,7 @@ export const SENTENCES_FR = {
   'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
   'give control back there': 'y rendre la commande',
   'wait until it is confirmed': 'attendre qu’il soit confirmé',
+  'keep away from the shaft until it is seen to stand': 'se tenir à l’écart de l’arbre tant qu’on ne l’a pas vu à l’arrêt',
   'wait, or look at its supply, its address and its cable': 'attendre, ou voir son alimentation, son adresse et son câble',
 
   // What became of it.

@@ -140,6 +140,7 @@ mod tests {
     use drive_core::{Direction, Frequency, SlaveAddress};
     use drive_families::Family;
     use drive_sim::{SimLine, SimSlave, Wiring};
+    use drive_testing::witness::Witnesses;
     use serde_json::json;
     use tokio::{sync::mpsc, time::sleep};
 
@@ -175,13 +176,14 @@ mod tests {
                 })
             });
             let other = builder.start().unwrap();
+            let witnesses = Witnesses::of_fleet(&other, [("line", &simulated)]);
             for drive in other.drives() {
                 let _ = drive.ready(Duration::from_secs(20)).await;
                 let held = drive.set_setpoint(Frequency::from_hertz(20)).await;
                 let started = drive.start(Direction::Forward).await;
                 assert!(held.is_confirmed() && started.is_confirmed(), "{family}: {held} {started}");
             }
-            drop(other);
+            drop((witnesses, other));
             let before = machines.each_ref().map(writes);
             let source = Source::over(line, &names, &simulated::options()).unwrap();
             sleep(Duration::from_secs(60)).await;
