@@ -2,7 +2,7 @@
 
 #[cfg(feature = "serial")]
 use std::path::{Path, PathBuf};
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, fmt, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
@@ -50,6 +50,19 @@ impl Endpoint {
             #[cfg(feature = "tcp")]
             Self::Tcp(_) => true,
             _ => false,
+        }
+    }
+}
+
+/// The path of the port, `tcp://host:port`, or that it is a stream of the caller's.
+impl fmt::Display for Endpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            #[cfg(feature = "serial")]
+            Self::Serial(path) => path.display().fmt(f),
+            #[cfg(feature = "tcp")]
+            Self::Tcp(address) => write!(f, "tcp://{address}"),
+            Self::Stream => f.write_str("a stream"),
         }
     }
 }

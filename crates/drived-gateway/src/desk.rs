@@ -32,6 +32,7 @@ use super::{
     virtual_unit::{self, Outcomes},
 };
 use crate::config::{GatewayConfig, Units};
+use drived_config::names::Names;
 use drived_doors::audit::Audit;
 use drived_plant::plant::Plant;
 
@@ -93,6 +94,8 @@ pub(super) struct Desk {
     pub(super) counters: Arc<Counters>,
     pub(super) plant: Plant,
     pub(super) audit: Audit,
+    /// Which place each drive has in the virtual unit.
+    pub(super) names: Names,
     pub(super) clients: Clients,
     pub(super) kept: Kept,
     /// What the virtual unit tells of the last commands.
@@ -110,10 +113,23 @@ impl Desk {
         config: GatewayConfig,
         plant: Plant,
         audit: Audit,
+        names: Names,
         options: HashMap<String, Options>,
     ) -> Arc<Self> {
         let (counters, clients, kept, outcomes, turns, under_way) = Default::default();
-        Arc::new(Self { config, counters, plant, audit, clients, kept, outcomes, options, turns, under_way })
+        Arc::new(Self {
+            config,
+            counters,
+            plant,
+            audit,
+            names,
+            clients,
+            kept,
+            outcomes,
+            options,
+            turns,
+            under_way,
+        })
     }
 
     /// The PDU that answers a request; `None`: silence.
@@ -153,8 +169,11 @@ impl Desk {
             let Ask::Read { function, address, count } = ask else {
                 return Err(ExceptionCode::IllegalFunction);
             };
-            let drives = self.plant.fleet().drives();
-            let words = virtual_unit::read(&drives, &self.outcomes, address, count);
+            // Without numbers nobody's values are told, and not somebody else's.
+            let slots = self.names.slots().ok_or(ExceptionCode::ServerDeviceFailure)?;
+            let fleet = self.plant.fleet();
+            let drive = |name: &str| fleet.drive(name);
+            let words = virtual_unit::read(&slots, drive, &self.outcomes, address, count);
             let words = words.ok_or(ExceptionCode::IllegalDataAddress)?;
             return Ok(pdu::words(function, &words));
         }

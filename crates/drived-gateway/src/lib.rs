@@ -37,7 +37,7 @@ use self::{
     counters::{Counted, Ended},
     desk::Desk,
 };
-use drived_config::config::LinePart;
+use drived_config::{config::LinePart, names::Names};
 use drived_doors::{
     TRIED_AGAIN,
     audit::Audit,
@@ -54,13 +54,20 @@ pub struct Gateways {
 
 impl Gateways {
     /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
-    pub fn open(gateways: &[GatewayConfig], lines: &[LinePart], plant: &Plant, audit: &Audit) -> Self {
+    pub fn open(
+        gateways: &[GatewayConfig],
+        lines: &[LinePart],
+        plant: &Plant,
+        audit: &Audit,
+        names: &Names,
+    ) -> Self {
         let (end, ended) = watch::channel(());
         let drives = lines.iter().flat_map(|line| &line.drives);
         let options: HashMap<_, _> =
             drives.map(|drive| (drive.settings.name.clone(), drive.options.clone())).collect();
-        let desk =
-            |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), options.clone());
+        let desk = |config: &GatewayConfig| {
+            Desk::new(config.clone(), plant.clone(), audit.clone(), names.clone(), options.clone())
+        };
         let desks: Vec<_> = gateways.iter().map(desk).collect();
         for desk in desks.iter().cloned() {
             let mut ended = ended.clone();

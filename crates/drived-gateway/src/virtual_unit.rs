@@ -6,6 +6,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
+use crc::{CRC_16_MODBUS, Crc};
 use drive_core::{Control, Direction, Setpoint, State, Status};
 use drive_fleet::{DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot};
 use tokio::time::Instant;
@@ -14,18 +15,21 @@ use tokio::time::Instant;
 const UNKNOWN: u16 = 0xFFFF;
 
 /// The head: what is where, so that a reader need not know it.
-const HEAD: [(&str, u16, &str); 8] = [
+const HEAD: [(&str, u16, &str); 9] = [
     ("magic", 0x4452, "4452h, \"DR\""),
     ("magic", 0x4956, "4956h, \"IV\""),
     ("version", 1, "of this map"),
-    ("drives", 0, "how many there are"),
+    ("drives", 0, "how many places there are: a drive keeps its own, and one that is gone leaves it empty"),
     ("overview", OVERVIEW_AT, "where the overview begins"),
     ("overview_stride", OVERVIEW.len() as u16, "its registers of each drive"),
     ("details", DETAILS_AT, "where the details begin"),
     ("details_stride", DETAILS.len() as u16, "their registers of each drive"),
+    ("revision", 0, "of who stands where: another one when a drive has come, left, or has another name"),
 ];
 /// Which register of the head is the number of drives.
 const DRIVES: usize = 3;
+/// Which is the revision.
+const REVISION: usize = 8;
 /// Four registers of each drive: 31 drives in one read of 124.
 const OVERVIEW_AT: u16 = 16;
 const DETAILS_AT: u16 = 2_000;
@@ -143,7 +147,8 @@ fn number_of(outcome: &Outcome) -> u16 {
 
 /// A drive as it is shown: everything of one moment.
 struct Shown {
-    snapshot: Arc<Snapshot>,
+    /// `None`: nobody is in this place.
+    snapshot: Option<Arc<Snapshot>>,
     slave: u8,
     last: Option<Last>,
     now: Instant,
@@ -151,12 +156,12 @@ struct Shown {
 
 impl Shown {
     fn status(&self) -> Option<&Status> {
-        self.snapshot.status.as_ref().map(|status| &*status.value)
+        self.snapshot.as_ref()?.status.as_ref().map(|status| &*status.value)
     }
 
     /// The status, where it is one of now.
     fn live(&self) -> Option<&Status> {
-        self.snapshot.fresh_status(self.now)
+        self.snapshot.as_ref()?.fresh_status(self.now)
     }
 
     fn flags(&self) -> u16 {
@@ -165,12 +170,12 @@ impl Shown {
         self.state()
             | bit(way == Some(Direction::Forward), 4)
             | bit(way == Some(Direction::Reverse), 5)
-            | bit(self.snapshot.link == Link::Connected, 6)
+            | bit(self.link() == 1, 6)
             | self.quality() << 8
             | bit(self.live().is_some_and(Status::is_fault), 10)
             | bit(self.live().is_some_and(|status| status.warning == Some(true)), 11)
-            | bit(self.snapshot.stop.is_some(), 12)
-            | bit(self.snapshot.started_here(), 13)
+            | bit(self.snapshot.as_ref().is_some_and(|snapshot| snapshot.stop.is_some()), 12)
+            | bit(self.snapshot.as_ref().is_some_and(|snapshot| snapshot.started_here()), 13)
     }
 
     fn state(&self) -> u16 {
@@ -188,18 +193,18 @@ impl Shown {
     }
 
     fn quality(&self) -> u16 {
-        match self.snapshot.freshness(self.now) {
-            Freshness::Never => 0,
-            Freshness::Stale => 1,
-            Freshness::Fresh => 2,
+        match self.snapshot.as_ref().map(|snapshot| snapshot.freshness(self.now)) {
+            None | Some(Freshness::Never) => 0,
+            Some(Freshness::Stale) => 1,
+            Some(Freshness::Fresh) => 2,
         }
     }
 
     fn link(&self) -> u16 {
-        match self.snapshot.link {
-            Link::Connecting => 0,
-            Link::Connected => 1,
-            Link::Lost => 2,
+        match self.snapshot.as_ref().map(|snapshot| snapshot.link) {
+            None | Some(Link::Connecting) => 0,
+            Some(Link::Connected) => 1,
+            Some(Link::Lost) => 2,
         }
     }
 
@@ -223,14 +228,15 @@ impl Shown {
     }
 
     fn age(&self) -> u16 {
-        word(self.snapshot.status.as_ref().map(|status| status.age(self.now).as_millis() / 100))
+        let status = self.snapshot.as_ref().and_then(|snapshot| snapshot.status.as_ref());
+        word(status.map(|status| status.age(self.now).as_millis() / 100))
     }
 
     fn fault(&self) -> u16 {
         match self.live() {
             None => UNKNOWN,
             Some(status) if status.is_fault() => {
-                let trip = self.snapshot.present_trip().and_then(drive_fleet::Trip::fault);
+                let trip = self.snapshot.as_ref().and_then(|snapshot| snapshot.present_trip()?.fault());
                 trip.map(|fault| fault.code).or(status.fault_code).unwrap_or(UNKNOWN)
             }
             Some(_) => 0,
@@ -238,7 +244,7 @@ impl Shown {
     }
 
     fn setpoint(&self) -> u16 {
-        match self.snapshot.setpoint {
+        match self.snapshot.as_ref().and_then(|snapshot| snapshot.setpoint) {
             Some(Setpoint::Frequency(frequency)) => word(Some(frequency.centihertz())),
             _ => UNKNOWN,
         }
@@ -257,11 +263,11 @@ impl Shown {
     }
 
     fn trips(&self) -> u16 {
-        word(Some(self.snapshot.counters.trips))
+        word(Some(self.snapshot.as_ref().map_or(0, |snapshot| snapshot.counters.trips)))
     }
 
     fn lost(&self) -> u16 {
-        word(Some(self.snapshot.counters.lost))
+        word(Some(self.snapshot.as_ref().map_or(0, |snapshot| snapshot.counters.lost)))
     }
 }
 
@@ -270,53 +276,75 @@ fn word<T: TryInto<u16>>(number: Option<T>) -> u16 {
     number.and_then(|number| number.try_into().ok()).unwrap_or(UNKNOWN)
 }
 
-/// The registers of a read; `None` where one of them is nowhere.
+/// The registers of a read; `None` where one of them is nowhere. Each drive stands in its own place, whoever else is there.
 pub(super) fn read(
-    drives: &[DriveHandle],
+    slots: &[Option<Arc<str>>],
+    drive: impl Fn(&str) -> Option<DriveHandle>,
     outcomes: &Outcomes,
     address: u16,
     count: u16,
 ) -> Option<Vec<u16>> {
     let now = Instant::now();
-    let shown: Vec<Shown> = drives
-        .iter()
-        .map(|drive| Shown {
-            snapshot: drive.snapshot(),
-            slave: drive.slave().number(),
-            last: outcomes.of(drive.name()),
+    let shown = |slot: usize| {
+        let name = slots.get(slot)?;
+        let handle = name.as_deref().and_then(&drive);
+        Some(Shown {
+            snapshot: handle.as_ref().map(DriveHandle::snapshot),
+            slave: handle.as_ref().map_or(0, |handle| handle.slave().number()),
+            last: name.as_deref().and_then(|name| outcomes.of(name)),
             now,
         })
-        .collect();
-    (0..count).map(|number| register(&shown, address.checked_add(number)?)).collect()
-}
-
-fn register(shown: &[Shown], address: u16) -> Option<u16> {
-    let of_block = |at: u16, columns: &[Column]| {
+    };
+    // All registers of a drive are of one moment.
+    let mut last: Option<(usize, Shown)> = None;
+    let mut of_block = |address: u16, at: u16, columns: &[Column]| {
         let offset = usize::from(address.checked_sub(at)?);
-        let drive = shown.get(offset / columns.len())?;
+        let slot = offset / columns.len();
+        if last.as_ref().is_none_or(|(of, _)| *of != slot) {
+            last = Some((slot, shown(slot)?));
+        }
+        let (_, drive) = last.as_ref()?;
         columns.get(offset % columns.len()).map(|column| (column.of)(drive))
     };
-    match usize::from(address) {
-        DRIVES => Some(shown.len() as u16),
+    let mut register = |address: u16| match usize::from(address) {
+        DRIVES => u16::try_from(slots.len()).ok(),
+        REVISION => Some(revision(slots)),
         head if address < OVERVIEW_AT => Some(HEAD.get(head).map_or(0, |(_, value, _)| *value)),
-        _ => of_block(DETAILS_AT, &DETAILS).or_else(|| of_block(OVERVIEW_AT, &OVERVIEW)),
+        _ if address >= DETAILS_AT => of_block(address, DETAILS_AT, &DETAILS),
+        _ => of_block(address, OVERVIEW_AT, &OVERVIEW),
+    };
+    (0..count).map(|number| register(address.checked_add(number)?)).collect()
+}
+
+/// A number that tells one order of the drives from another: the CRC-16 of Modbus over their names, each with its place.
+fn revision(slots: &[Option<Arc<str>>]) -> u16 {
+    const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+    let mut digest = CHECK.digest();
+    for (slot, name) in slots.iter().enumerate() {
+        if let Some(name) = name {
+            digest.update(format!("{slot}\t{name}\n").as_bytes());
+        }
     }
+    digest.finalize()
 }
 
 /// How many drives have room.
 pub const MOST_DRIVES: usize = (DETAILS_AT - OVERVIEW_AT) as usize / OVERVIEW.len();
 
-/// The map for these drives, as CSV.
-pub fn map(drives: &[&str]) -> String {
+/// The map for these drives, each in its place, as CSV.
+pub fn map(slots: &[Option<Arc<str>>]) -> String {
     let mut lines = vec!["register,drive,name,meaning".to_owned()];
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     for (address, (name, _, meaning)) in HEAD.iter().enumerate() {
-        lines.push(format!("{address},,{name},{}", quoted(meaning)));
+        let of_map = if address == REVISION { format!("; {} here", revision(slots)) } else { String::new() };
+        lines.push(format!("{address},,{name},{}", quoted(&format!("{meaning}{of_map}"))));
     }
     for (at, columns) in [(OVERVIEW_AT, &OVERVIEW[..]), (DETAILS_AT, &DETAILS[..])] {
-        let rows = drives.iter().flat_map(|drive| columns.iter().map(move |column| (drive, column)));
+        let rows = slots.iter().flat_map(|drive| columns.iter().map(move |column| (drive, column)));
         for (address, (drive, Column { name, meaning, .. })) in (usize::from(at)..).zip(rows) {
-            lines.push(format!("{address},{},{name},{}", quoted(drive), quoted(meaning)));
+            if let Some(drive) = drive {
+                lines.push(format!("{address},{},{name},{}", quoted(drive), quoted(meaning)));
+            }
         }
     }
     lines.join("\n")

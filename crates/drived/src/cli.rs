@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
-use crate::commands::{audit, check, completions, export, token};
+use crate::commands::{audit, check, completions, export, names, token};
 use drived_daemon::demo;
 use drived_daemon::run;
 use drived_line_tools::{capture, doctor, explain, families, init, plan, poll, replay, scan, sim};
@@ -24,7 +24,7 @@ The running daemon: all these without --line and with the names of its drives; w
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain; replay plays it back
 The service file:   report, of the running daemon or of one line
-The plant's drives: check, plan, run, token, audit, each with --config FILE; export for its alerts and board
+The plant's drives: check, plan, run, names, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
 
 A line is PATH[,BAUD[,FORMAT[,PROTOCOL]]], such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]], or \
@@ -74,6 +74,8 @@ pub(crate) enum Command {
     Monitor(monitor::Args),
     Reload(reload::Args),
     #[command(subcommand)]
+    Names(names::Command),
+    #[command(subcommand)]
     Token(token::Command),
     #[command(subcommand)]
     Audit(audit::Command),
@@ -120,6 +122,7 @@ impl Command {
             Self::Watch(args) => watch::run(args).await,
             Self::Monitor(args) => monitor::run(args).await,
             Self::Reload(args) => reload::run(args).await,
+            Self::Names(command) => names::run(command),
             Self::Token(command) => token::run(command).await,
             Self::Audit(command) => audit::run(command),
         }

@@ -28,6 +28,7 @@ use self::{
 use drived_broker::{mqtt::Mqtt, sparkplug::Sparkplug};
 use drived_config::{
     config::{LinePart, add},
+    names::Names,
     records::{self, Records, in_folder},
 };
 use drived_doors::{
@@ -38,7 +39,7 @@ use drived_doors::{
     },
 };
 use drived_file::{Config, ledger};
-use drived_gateway::Gateways;
+use drived_gateway::{Gateways, virtual_unit::MOST_DRIVES};
 use drived_http::{
     api::{self, Reload as _},
     metrics, page,
@@ -117,9 +118,11 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
-    let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit());
+    let names = Names::in_folder(config.doors.state.folder.as_deref());
+    tell_names(&names, &config.lines);
+    let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit(), &names);
     let shutdown = config.shutdown;
-    let reloader = Reloader::new(plant.clone(), notify.clone(), args.config, config);
+    let reloader = Reloader::new(plant.clone(), notify.clone(), names, args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
     let mut sources: Vec<Arc<dyn drived_plant::counts::Source>> = vec![Arc::new(reloader.clone())];
     let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
@@ -189,6 +192,21 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         closing::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Gives each drive its number, and says in the log what has changed.
+fn tell_names(names: &Names, lines: &[LinePart]) {
+    match names.take_up(lines) {
+        Ok(told) if told.is_empty() => {}
+        Ok(told) => tracing::info!("numbers of drives: {}", told.join("; ")),
+        Err(why) => tracing::error!("{why}"),
+    }
+    let places = names.slots().map_or(0, |slots| slots.len());
+    if places > MOST_DRIVES {
+        tracing::warn!(
+            "{places} numbers are given, and a virtual unit has {MOST_DRIVES} places: drived names forget frees those of drives that are gone"
+        );
+    }
 }
 
 /// Shows the drives and the lines as a table, and the log below it.

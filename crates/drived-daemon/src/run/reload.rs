@@ -14,7 +14,10 @@ use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
 use super::notify::Notify;
-use drived_config::config::{DrivePart, add};
+use drived_config::{
+    config::{DrivePart, add},
+    names::Names,
+};
 use drived_file::Config;
 use drived_http::api::Reload;
 use drived_plant::{
@@ -30,6 +33,7 @@ pub(super) struct Reloader(Arc<Inner>);
 struct Inner {
     plant: Plant,
     notify: Notify,
+    names: Names,
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
@@ -40,11 +44,12 @@ struct Inner {
 }
 
 impl Reloader {
-    pub(super) fn new(plant: Plant, notify: Notify, file: PathBuf, config: Config) -> Self {
+    pub(super) fn new(plant: Plant, notify: Notify, names: Names, file: PathBuf, config: Config) -> Self {
         let last = std::sync::Mutex::new((true, unix(Instant::now())));
         Self(Arc::new(Inner {
             plant,
             notify,
+            names,
             file,
             config: Mutex::new(config),
             last,
@@ -89,6 +94,8 @@ impl Reloader {
         let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
             .map(|()| settle(&fleet, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
+        // Also where nothing has changed: what is kept may have been mended.
+        super::tell_names(&self.0.names, &config.lines);
         if !changes.is_empty() {
             plant.revisions().begin_anew();
         }

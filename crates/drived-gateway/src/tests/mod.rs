@@ -19,6 +19,7 @@ use tokio::{
 
 use super::{client, desk::Desk};
 use crate::config::{GatewayConfig, Units};
+use drived_config::names::{Named, Names};
 use drived_doors::{
     Role,
     audit::Audit,
@@ -51,6 +52,25 @@ fn config() -> GatewayConfig {
         client_timeout: None,
         stops_when_silent: false,
     }
+}
+
+/// The numbers of a plant's drives, in the order of its configuration.
+fn names(plant: &TestPlant) -> Names {
+    let names = Names::default();
+    names.take(&named(plant)).unwrap();
+    names
+}
+
+/// Gives numbers to those who are there now.
+fn take_up(desk: &Desk, plant: &TestPlant) {
+    desk.names.take(&named(plant)).unwrap();
+}
+
+fn named(plant: &TestPlant) -> Vec<Named> {
+    let drives = plant.plant.fleet().drives();
+    let named =
+        drives.iter().map(|drive| Named { name: drive.name().to_string(), place: drive.slave().to_string() });
+    named.collect()
 }
 
 /// A client that checks what every answer has to have.
@@ -118,6 +138,6 @@ async fn plant(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlan
     let plant = TestPlant::of(drives).await;
     let mut config = config();
     change(&mut config);
-    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), HashMap::new());
+    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), names(&plant), HashMap::new());
     (plant, desk)
 }

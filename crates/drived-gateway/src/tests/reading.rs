@@ -8,7 +8,7 @@ use tokio::{
     time::{Instant, timeout},
 };
 
-use super::{ETA, Peer, plant, read};
+use super::{ETA, Peer, plant, read, take_up};
 
 #[tokio::test(start_paused = true)]
 async fn a_read_is_answered_with_what_the_drive_holds() {
@@ -263,6 +263,33 @@ async fn the_virtual_unit_has_all_drives_in_one_read_and_marks_what_is_old() {
     assert_eq!(second[15], 2, "its slave");
     assert_eq!(peer.ask(247, &read(overview + 31 * stride, 1)).await, [0x83, 0x02]);
     assert_eq!(peer.ask(247, &[0x06, 0, 0, 0, 0]).await, [0x86, 0x01], "nothing is written there");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_leaves_moves_nobody_in_the_virtual_unit_and_its_place_is_never_anothers() {
+    let (plant, desk) = plant(4, |config| config.virtual_unit = Some(247)).await;
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let mut peer = Peer::of(&desk);
+    let mut all = async || -> Vec<u16> {
+        let head = peer.ask(247, &read(0, 9)).await;
+        let details = peer.ask(247, &read(2_000, 4 * 16)).await;
+        let words = head[2..].chunks(2).chain(details[2..].chunks(2));
+        words.map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
+    };
+    let slave = |words: &[u16], place: usize| words[9 + place * 16 + 15];
+    let quality = |words: &[u16], place: usize| words[9 + place * 16 + 2];
+    let before = all().await;
+    assert_eq!((0..4).map(|place| slave(&before, place)).collect::<Vec<_>>(), [1, 2, 3, 4]);
+    let fleet = plant.plant.fleet();
+    let first = fleet.drives()[0].name().to_string();
+    let _ = fleet.remove(&[&first], Duration::from_secs(1)).await;
+    take_up(&desk, &plant);
+    let after = all().await;
+    assert_eq!((0..4).map(|place| slave(&after, place)).collect::<Vec<_>>(), [0, 2, 3, 4]);
+    assert_eq!((quality(&after, 0), quality(&after, 1)), (0, 2), "nothing is told of who is gone");
+    assert_eq!(after[9 + 4..9 + 8], [0, 0xFFFF, 0xFFFF, 0xFFFF]);
+    assert_eq!(after[3], 4, "as many places as before");
+    assert_ne!(after[8], before[8], "the revision tells that somebody has left");
 }
 
 /// A client whose side takes nothing any more, as after a reset that only its writes have noticed.

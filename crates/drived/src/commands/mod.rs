@@ -4,4 +4,5 @@ pub(crate) mod audit;
 pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod export;
+pub(crate) mod names;
 pub(crate) mod token;

@@ -8,6 +8,7 @@ use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
 
 use super::*;
+use drived_config::names::Names;
 use drived_doors::{Caller, Rights};
 use drived_simulated as simulated;
 
@@ -60,7 +61,7 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
     let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
-    let reloader = Reloader::new(plant, Notify::start(), file.clone(), config);
+    let reloader = Reloader::new(plant, Notify::start(), Names::default(), file.clone(), config);
     // Somebody else in the program has taken a name that the file does not know yet.
     let family = Family::Atv312;
     let stranger = DriveSettings::watched("four".to_owned());

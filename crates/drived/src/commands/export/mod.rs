@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 #[cfg(test)]
 pub(crate) use self::man::ENVIRONMENT;
+use super::names::numbered;
 use drived_file::Config;
 use drived_gateway::virtual_unit;
 use drived_http::metrics;
@@ -46,9 +47,7 @@ pub(crate) fn run(args: &Args, program: clap::Command) -> Result<(), Failure> {
         (What::Alerts, None) => output::say_as_it_is(metrics::ALERTS.trim_end()),
         (What::GatewayMap, None) => {
             let config = Config::load_workable(&args.config)?;
-            let drives = config.lines.iter().flat_map(|line| &line.drives);
-            let names: Vec<&str> = drives.map(|drive| drive.settings.name.as_str()).collect();
-            output::say_as_it_is(virtual_unit::map(&names))
+            output::say_as_it_is(virtual_unit::map(&numbered(&config)?.slots()))
         }
         (What::Dashboard, None) => output::say_as_it_is(format_args!("{:#}", metrics::dashboard())),
     }

@@ -1,0 +1,146 @@
+//! `drived names`: which number each drive has for those who know drives by numbers.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use drived_config::{
+    kept::Kept,
+    names::{self, Table},
+};
+use drived_file::Config;
+use drived_words::{
+    failure::Failure,
+    output::{self, JsonArgs},
+};
+
+/// Show and change the numbers of the drives, by which a SCADA finds them in the virtual unit of a gateway
+///
+/// A drive gets a number when it is first configured and keeps it, whatever comes, goes or is called otherwise; that of a drive that is
+/// gone is given to no other before it is forgotten. They stand in names.json of the state folder. A running daemon has what is changed
+/// here after `drived reload`.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// List the drives with their numbers
+    List {
+        #[command(flatten)]
+        place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
+    },
+    /// Give a drive another number, which no other has
+    Give {
+        /// The drive
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// The number, from 0
+        #[arg(value_name = "NUMBER")]
+        number: u16,
+        #[command(flatten)]
+        place: PlaceArgs,
+    },
+    /// Forget a drive that is gone, so that its number is free
+    Forget {
+        /// The drive
+        #[arg(value_name = "NAME")]
+        name: String,
+        #[command(flatten)]
+        place: PlaceArgs,
+    },
+    /// Number all drives anew, as the configuration has them; what was kept is put aside
+    Renew {
+        #[command(flatten)]
+        place: PlaceArgs,
+    },
+}
+
+/// Where they are kept.
+#[derive(Debug, clap::Args)]
+pub(crate) struct PlaceArgs {
+    /// The configuration, whose state folder keeps them
+    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
+    config: PathBuf,
+}
+
+impl PlaceArgs {
+    fn config(&self) -> Result<Config, Failure> {
+        Config::load_workable(&self.config)
+    }
+}
+
+pub(crate) fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::List { place, json } => list(&place.config()?, json),
+        Command::Give { name, number, place } => {
+            change(&place.config()?, |table| table.give(&name, number))?;
+            output::say(format_args!(
+                "{name} has the number {number}, in a running daemon after drived reload"
+            ))
+        }
+        Command::Forget { name, place } => {
+            let number = change(&place.config()?, |table| table.forget(&name))?;
+            output::say(format_args!("{name} is forgotten; {number} is free"))
+        }
+        Command::Renew { place } => {
+            let config = place.config()?;
+            let renewed = names::renewed(&file(&config)?, &config.lines);
+            let (table, aside) = renewed.map_err(Failure::Input)?;
+            if let Some(aside) = aside {
+                output::say(format_args!("what was kept is in {}", aside.display()))?;
+            }
+            say(&table)
+        }
+    }
+}
+
+fn list(config: &Config, json: JsonArgs) -> Result<(), Failure> {
+    let table = numbered(config)?;
+    let object = || {
+        let drives = table.drives.iter().map(|known| {
+            json!({ "name": known.name, "number": known.slot, "place": known.place, "gone": known.gone })
+        });
+        json!({ "drives": drives.collect::<Vec<_>>() })
+    };
+    json.say(object, || say(&table))
+}
+
+fn say(table: &Table) -> Result<(), Failure> {
+    let mut rows = output::Table::new(["number", "drive", "where", ""]);
+    for known in &table.drives {
+        let gone = if known.gone { "gone" } else { "" };
+        rows.row([known.slot.to_string(), known.name.clone(), known.place.clone(), gone.to_owned()]);
+    }
+    output::say_table(rows)
+}
+
+/// The numbers that the drives of a configuration have, or will have when its daemon starts. Nothing is written.
+///
+/// # Errors
+/// What is kept cannot be read.
+pub(crate) fn numbered(config: &Config) -> Result<Table, Failure> {
+    let mut table = match &config.doors.state.folder {
+        Some(folder) => names::read(&Kept::at(&names::place(folder))).map_err(Failure::Input)?,
+        None => Table::default(),
+    };
+    table.take_up(&names::of_lines(&config.lines));
+    table.drives.sort_by_key(|known| known.slot);
+    Ok(table)
+}
+
+/// Changes what is kept, with the drives of the configuration in it.
+fn change<T>(config: &Config, change: impl FnOnce(&mut Table) -> Result<T, String>) -> Result<T, Failure> {
+    let changed = names::changed(&file(config)?, |table| {
+        table.take_up(&names::of_lines(&config.lines));
+        change(table)
+    });
+    changed.map(|(_, done)| done).map_err(Failure::Input)
+}
+
+fn file(config: &Config) -> Result<Kept, Failure> {
+    let folder = config.doors.state.folder.as_ref().ok_or_else(|| {
+        Failure::Input(
+            "no state folder keeps numbers: name one in the configuration, state = \"FOLDER\"".to_owned(),
+        )
+    })?;
+    Ok(Kept::at(&names::place(folder)))
+}
