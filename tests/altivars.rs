@@ -14,7 +14,7 @@ use drive_testing::{bench, rig::Rig, truth::contradiction};
 use support::drives::{self, Five, five};
 use tokio::time::sleep;
 
-const ALTIVARS: [Family; 3] = [Family::Atv28, Family::Atv58, Family::Atv312];
+const ALTIVARS: [Family; 3] = [Family::ATV28, Family::ATV58, Family::ATV312];
 const TWENTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(20));
 
 /// In how many statuses what shows in a drive's words is told, as the READMEs print it: each looks for one thing more.
@@ -101,7 +101,7 @@ impl Bench {
 async fn what_takes_the_run_command_its_output_or_its_reference_is_told_within_a_few_statuses() {
     for family in ALTIVARS {
         let Registers { cmd, lfr, lfrd, .. } = registers(family);
-        let stop = if family == Family::Atv58 { 0x0007 } else { 0x100F };
+        let stop = if family == Family::ATV58 { 0x0007 } else { 0x100F };
         let mut cases = vec![
             ("panel takes".to_owned(), None, Lack::Command),
             ("motor-supply off".to_owned(), None, Lack::Output),
@@ -110,10 +110,10 @@ async fn what_takes_the_run_command_its_output_or_its_reference_is_told_within_a
             ("another sign".to_owned(), Some((lfr, 0xFF38)), Lack::Reference),
             ("another stop".to_owned(), Some((cmd, stop)), Lack::Command),
         ];
-        if family != Family::Atv58 {
+        if family != Family::ATV58 {
             cases.push(("panel stop".to_owned(), None, Lack::Output));
         }
-        if family == Family::Atv312 {
+        if family == Family::ATV312 {
             // FSt by LI6 and nSt by LI5, which are open (p. 8, 40, 41).
             cases.push(("set FSt 134".to_owned(), None, Lack::Output));
             cases.push(("set nSt 133".to_owned(), None, Lack::Output));
@@ -140,7 +140,7 @@ async fn what_takes_the_run_command_its_output_or_its_reference_is_told_within_a
 
 #[tokio::test(start_paused = true)]
 async fn a_reference_in_hertz_of_another_master_is_told_beside_a_setpoint_in_rpm_of_ours() {
-    for family in [Family::Atv28, Family::Atv312] {
+    for family in [Family::ATV28, Family::ATV312] {
         let mut bench = Bench::new(family);
         bench.drive().set_setpoint(Speed::from_rpm(600).into()).await.unwrap();
         bench.drive().start(Direction::Forward).await.unwrap();
@@ -157,7 +157,7 @@ async fn a_reference_in_hertz_of_another_master_is_told_beside_a_setpoint_in_rpm
 #[tokio::test(start_paused = true)]
 async fn a_summing_input_that_moves_in_the_middle_of_a_run_is_told_by_its_name() {
     // SA2 is AI2 as an Altivar 312 leaves the factory, and is added to whatever Fr1 is (p. 15, 42).
-    let mut bench = Bench::new(Family::Atv312);
+    let mut bench = Bench::new(Family::ATV312);
     bench.happens("set SA2 2");
     bench.drive().set_setpoint(TWENTY).await.unwrap();
     bench.drive().start(Direction::Forward).await.unwrap();
@@ -173,7 +173,7 @@ async fn a_summing_input_that_moves_in_the_middle_of_a_run_is_told_by_its_name()
 async fn direct_current_into_a_motor_at_rest_is_standstill_whatever_gives_it() {
     // AdC = Ct (p. 41); dCI by LI5, closed while the motor stands (p. 8, 40).
     for (before, behind) in [("set AdC 2", ""), ("set dCI 133", "terminal LI5 on")] {
-        let mut bench = Bench::new(Family::Atv312);
+        let mut bench = Bench::new(Family::ATV312);
         bench.happens(before);
         bench.drive().set_setpoint(TWENTY).await.unwrap();
         bench.drive().start(Direction::Forward).await.unwrap();
@@ -201,7 +201,7 @@ async fn direct_current_into_a_motor_at_rest_is_standstill_whatever_gives_it() {
 #[tokio::test(start_paused = true)]
 async fn wires_that_are_changed_take_the_functions_of_the_inputs_along_and_the_next_stop_knows_it() {
     // p. 33: tCC puts every function of a logic input back, dCI among them.
-    let mut bench = Bench::new(Family::Atv312);
+    let mut bench = Bench::new(Family::ATV312);
     bench.drive().self_restarts().await.unwrap();
     let row = Row::find(drive_atv312::ROWS, "tCC").unwrap();
     bench.drive().write_parameter(row, 1).await.unwrap();
@@ -229,7 +229,7 @@ async fn a_trip_that_is_first_seen_behind_a_reconnect_is_withdrawn_on_the_wire()
         assert_eq!(bench.told_within(3).await, Some(Lack::Output), "{family}");
         let withdrawn = bench.drive().withdraw().await.unwrap();
         assert!(matches!(withdrawn, Withdrawn::Ended(_)), "{family}");
-        let word = if family == Family::Atv58 { 0x0000 } else { 0x100F };
+        let word = if family == Family::ATV58 { 0x0000 } else { 0x100F };
         assert_eq!(bench.wrote().last(), Some(&word), "{family}");
         assert_eq!(bench.drive().lease(), None, "{family}");
         let again = bench.drive().withdraw().await.unwrap();
@@ -317,7 +317,7 @@ async fn a_fast_stop_that_another_masters_stop_turns_into_a_freewheel_is_not_tol
  {
     // Bit 12 stops in the way of Stt (p. 12, 40), which lets the motor coast here.
     for looks in [0, 1, 3] {
-        let mut bench = Bench::new(Family::Atv312);
+        let mut bench = Bench::new(Family::ATV312);
         bench.happens("set Stt 2");
         bench.drive().set_setpoint(TWENTY).await.unwrap();
         bench.drive().start(Direction::Forward).await.unwrap();
@@ -327,7 +327,7 @@ async fn a_fast_stop_that_another_masters_stop_turns_into_a_freewheel_is_not_tol
             bench.status().await;
             sleep(Duration::from_millis(20)).await;
         }
-        bench.written(registers(Family::Atv312).cmd, 0x100F).await;
+        bench.written(registers(Family::ATV312).cmd, 0x100F).await;
         for _ in 0..10 {
             let status = bench.status().await;
             let shaft = bench.rig.machine.observe().shaft_frequency;
@@ -345,7 +345,7 @@ async fn limits_that_are_lowered_at_the_keypad_are_found_in_their_turn_and_hold_
         assert!(bench.rig.machine.poke(registers(family).hsp, 400));
         let mut found = None;
         // Two things take their turn on the Altivar 28 and 58; on the 312 the settings do as well.
-        let things = if family == Family::Atv312 { 2 * 21 } else { 2 };
+        let things = if family == Family::ATV312 { 2 * 21 } else { 2 };
         for _ in 0..things * STATUSES_PER_TURN {
             bench.status().await;
             found = found.or(bench.drive().take_changed());
@@ -380,10 +380,10 @@ async fn a_motor_that_stands_at_a_setpoint_of_zero_leaves_the_limits_their_turn(
 async fn no_reset_starts_a_motor_whose_terminals_ask_for_a_run() {
     // Forced local with LI1 closed (58); the run input on another input than LI1 and LI2 (28); at L1 (312).
     for (family, deeds, commands) in [
-        (Family::Atv58, &["panel takes", "terminal LI1 on"][..], false),
-        (Family::Atv28, &["terminal LI3 on"][..], true),
-        (Family::Atv28, &["terminal LI1 on"][..], false),
-        (Family::Atv312, &["set Cd1 1", "set tCt 0", "terminal LI1 on"][..], false),
+        (Family::ATV58, &["panel takes", "terminal LI1 on"][..], false),
+        (Family::ATV28, &["terminal LI3 on"][..], true),
+        (Family::ATV28, &["terminal LI1 on"][..], false),
+        (Family::ATV312, &["set Cd1 1", "set tCt 0", "terminal LI1 on"][..], false),
     ] {
         for wires in ["level", "edge"] {
             let mut bench = Bench::new(family);
@@ -409,7 +409,7 @@ async fn nothing_that_moves_control_is_written_to_an_altivar_28_while_an_input_i
     // tCC changes what each input does (twin p. 33), LCC who commands (twin p. 38).
     for code in ["tCC", "LCC"] {
         let row = Row::find(drive_atv28::ROWS, code).unwrap();
-        let mut bench = Bench::new(Family::Atv28);
+        let mut bench = Bench::new(Family::ATV28);
         bench.happens("terminal LI3 on");
         let error = bench.drive().write_parameter(row, 1).await.unwrap_err();
         assert!(error.to_string().contains("LI3"), "{code}: {error}");
@@ -441,16 +441,16 @@ async fn a_start_says_which_setpoint_it_uses_also_after_a_power_cut() {
 async fn what_a_family_cannot_tell_of_its_drives_is_said_and_what_it_can_is_judged() {
     let says = |model: &str| Identity { model: Some(model.to_owned()), ..Identity::default() };
     for (family, model, expected) in [
-        (Family::Atv28, None, Recognised::CannotTell),
-        (Family::Atv58, None, Recognised::CannotTell),
-        (Family::Atv58, Some("ATV58HU18N4"), Recognised::Mine),
-        (Family::Atv312, Some("ATV312HU15N4"), Recognised::Mine),
+        (Family::ATV28, None, Recognised::CannotTell),
+        (Family::ATV58, None, Recognised::CannotTell),
+        (Family::ATV58, Some("ATV58HU18N4"), Recognised::Mine),
+        (Family::ATV312, Some("ATV312HU15N4"), Recognised::Mine),
     ] {
         let mut bench = Bench::new(family);
         let identity = model.map_or_else(Identity::default, says);
         assert_eq!(bench.drive().recognise(&identity), expected, "{family} {model:?}");
     }
-    for family in [Family::Atv58, Family::Atv312] {
+    for family in [Family::ATV58, Family::ATV312] {
         let its = Bench::new(family).drive().recognise(&says("ATV71HU15N4"));
         assert!(matches!(its, Recognised::NotMine { .. }), "{family}");
     }
@@ -487,7 +487,7 @@ async fn whoever_stops_by_another_mode_says_so_and_why() {
         let mut bench = Bench::running(family).await;
         bench.drive().stop(StopMode::Fast).await.unwrap();
         let stopped = bench.drive().stop(StopMode::DcInjection).await.unwrap();
-        if family == Family::Atv58 {
+        if family == Family::ATV58 {
             assert_eq!(
                 stopped.mode == StopMode::DcInjection,
                 stopped.instead.is_none(),
@@ -499,7 +499,7 @@ async fn whoever_stops_by_another_mode_says_so_and_why() {
         }
     }
     // At L3 as it is delivered no bit of the control word brakes: dCI is not assigned (p. 40).
-    let mut bench = Bench::new(Family::Atv312);
+    let mut bench = Bench::new(Family::ATV312);
     bench.happens("set dCI 0");
     bench.happens("set FSt 0");
     bench.drive().set_setpoint(TWENTY).await.unwrap();

@@ -76,11 +76,11 @@ async fn command_words_are_understood_as_the_manuals_have_them_and_none_needs_an
         (0x0101, None),
     ];
     for (family, registers, words) in [
-        (Family::Atv312, &[8_501, 8_601][..], &chart[..]),
-        (Family::Atv28, &[400, 601], &chart),
-        (Family::Atv58, &[400], &chart),
-        (Family::Atv21, &[0xFA00], &atv21),
-        (Family::Omron3g3ev, &[0x0001], &omron),
+        (Family::ATV312, &[8_501, 8_601][..], &chart[..]),
+        (Family::ATV28, &[400, 601], &chart),
+        (Family::ATV58, &[400], &chart),
+        (Family::ATV21, &[0xFA00], &atv21),
+        (Family::OMRON_3G3EV, &[0x0001], &omron),
     ] {
         let (machine, mut drive) = drive(family);
         for register in registers {
@@ -96,26 +96,26 @@ async fn command_words_are_understood_as_the_manuals_have_them_and_none_needs_an
 #[tokio::test(start_paused = true)]
 async fn references_are_understood_in_the_unit_that_they_have_in_the_drive() {
     for (family, register, word, setpoint) in [
-        (Family::Atv312, 8_502, 305, Some(hertz(3_050))),
-        (Family::Atv312, 8_502, 0xFED4, None),
-        (Family::Atv312, 8_602, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
-        (Family::Atv28, 401, 305, Some(hertz(3_050))),
-        (Family::Atv28, 603, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
-        (Family::Atv58, 401, 305, Some(hertz(3_050))),
-        (Family::Atv21, 0xFA01, 3_005, Some(hertz(3_005))),
-        (Family::Atv21, 0xFA13, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
-        (Family::Omron3g3ev, 0x0002, 305, Some(hertz(3_050))),
+        (Family::ATV312, 8_502, 305, Some(hertz(3_050))),
+        (Family::ATV312, 8_502, 0xFED4, None),
+        (Family::ATV312, 8_602, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
+        (Family::ATV28, 401, 305, Some(hertz(3_050))),
+        (Family::ATV28, 603, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
+        (Family::ATV58, 401, 305, Some(hertz(3_050))),
+        (Family::ATV21, 0xFA01, 3_005, Some(hertz(3_005))),
+        (Family::ATV21, 0xFA13, 900, Some(Setpoint(Speed::from_rpm(900).into()))),
+        (Family::OMRON_3G3EV, 0x0002, 305, Some(hertz(3_050))),
     ] {
         let (_machine, mut drive) = drive(family);
         let told = drive.intent(register, word).await;
         assert_eq!(told.ok().flatten(), setpoint, "{family}: {register} = {word}");
     }
     // CMI bit 9: 32767 counts for 600 Hz (BBV51701 p. 20).
-    let (machine, mut drive) = drive(Family::Atv312);
+    let (machine, mut drive) = drive(Family::ATV312);
     assert!(machine.poke(8_504, 1 << 9));
     assert_eq!(drive.intent(8_502, 1_638).await.unwrap(), Some(hertz(2_999)));
     // n39 = 2: 30000 counts are 100 % (3G3EV §2.1).
-    let (machine, mut drive) = self::drive(Family::Omron3g3ev);
+    let (machine, mut drive) = self::drive(Family::OMRON_3G3EV);
     assert!(machine.poke(0x0127, 2));
     assert_eq!(drive.intent(0x0002, 3_000).await.unwrap(), Some(Setpoint(Percent::from_percent(10).into())));
 }
@@ -124,11 +124,11 @@ async fn references_are_understood_in_the_unit_that_they_have_in_the_drive() {
 #[tokio::test(start_paused = true)]
 async fn registers_that_act_behind_the_rules_are_nobodys_and_parameters_are_no_commands() {
     for (family, kept, parameter) in [
-        (Family::Atv312, &[8_503, 8_504, 8_001, 8_002][..], 9_001),
-        (Family::Atv28, &[402, 440], 252),
-        (Family::Atv58, &[402], 250),
-        (Family::Atv21, &[0xFA20], 0x0009),
-        (Family::Omron3g3ev, &[0x0009, 0x0900], 0x0114),
+        (Family::ATV312, &[8_503, 8_504, 8_001, 8_002][..], 9_001),
+        (Family::ATV28, &[402, 440], 252),
+        (Family::ATV58, &[402], 250),
+        (Family::ATV21, &[0xFA20], 0x0009),
+        (Family::OMRON_3G3EV, &[0x0009, 0x0900], 0x0114),
     ] {
         let (_machine, mut drive) = drive(family);
         for register in kept {

@@ -14,56 +14,56 @@ use support::{contracts::contract, drives};
 
 #[tokio::test(start_paused = true)]
 async fn whatever_a_drive_says_nothing_panics_and_only_control_words_of_its_manual_are_written() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).survives_any_words().await;
     }
 }
 
 #[tokio::test]
 async fn every_status_word_is_decoded_and_kept_and_says_a_state_that_fits_its_own_words() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).decodes_every_status_word().await;
     }
 }
 
 #[tokio::test]
 async fn a_request_beyond_the_words_of_a_family_is_never_sent() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).sends_no_request_that_is_too_long().await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn each_exception_has_the_meaning_that_its_manual_gives() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).explains_its_exceptions().await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_a_family_claims_it_does_and_what_it_does_not_claim_is_unsupported() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).does_what_it_claims().await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn the_watchdog_that_a_family_claims_is_the_one_that_it_has() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).has_the_watchdog_that_it_claims().await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_family_has_a_history_of_faults_if_it_claims_one() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).has_the_history_that_it_claims().await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_stands_or_runs_takes_as_many_exchanges_as_are_claimed() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         contract(family).takes_the_exchanges_that_it_claims().await;
     }
 }
@@ -71,7 +71,7 @@ async fn a_drive_that_stands_or_runs_takes_as_many_exchanges_as_are_claimed() {
 #[tokio::test(start_paused = true)]
 async fn no_disobedient_drive_and_no_lost_answer_makes_a_family_say_what_is_not_so() {
     let mut complaints = Vec::new();
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let its = contract(family).complaints().await;
         complaints.extend(its.iter().map(|complaint| format!("{family}: {complaint}")));
     }
@@ -80,15 +80,15 @@ async fn no_disobedient_drive_and_no_lost_answer_makes_a_family_say_what_is_not_
 
 /// Faults that one family cannot show: without a reading that is done once nothing is forgotten.
 const CANNOT_SHOW: &[(Family, Mutant)] = &[
-    (Family::Omron3g3ev, Mutant::ForgetForgetsNothing),
-    (Family::Atv28, Mutant::ForgetForgetsNothing),
-    (Family::Atv58, Mutant::ForgetForgetsNothing),
+    (Family::OMRON_3G3EV, Mutant::ForgetForgetsNothing),
+    (Family::ATV28, Mutant::ForgetForgetsNothing),
+    (Family::ATV58, Mutant::ForgetForgetsNothing),
 ];
 
 #[tokio::test(start_paused = true)]
 async fn the_contract_complains_of_every_family_that_breaks_it() {
     let mut unseen = Vec::new();
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         for mutant in Mutant::ALL {
             let shows = !CANNOT_SHOW.contains(&(family, mutant));
             if shows && mutant.of(contract(family)).complaints().await.is_empty() {
@@ -106,7 +106,7 @@ impl Surrounded for FromOutside {
     fn configurations(&self) -> Vec<Configuration> {
         let of = |name: &str, settings: &[&str]| Configuration {
             name: name.to_owned(),
-            open: Box::new(|port, slave| drives::drive(Family::Atv28, port, slave)),
+            open: Box::new(|port, slave| drives::drive(Family::ATV28, port, slave)),
             machine: Box::new(|| Box::new(models::atv28::Atv28::new())),
             settings: settings.iter().map(|&setting| setting.to_owned()).collect(),
         };
@@ -115,7 +115,7 @@ impl Surrounded for FromOutside {
 }
 
 fn from_outside() -> Contract {
-    Contract { around: Some(Box::new(FromOutside)), ..contract(Family::Atv28) }
+    Contract { around: Some(Box::new(FromOutside)), ..contract(Family::ATV28) }
 }
 
 #[tokio::test(start_paused = true)]
@@ -132,10 +132,10 @@ async fn a_family_that_tells_only_its_configurations_is_judged_by_shaft_and_twin
 
 #[tokio::test(start_paused = true)]
 async fn the_check_that_is_published_fails_for_every_family_that_breaks_the_contract() {
-    contract(Family::Atv312).check().await;
+    contract(Family::ATV312).check().await;
     let mut passed = Vec::new();
     for mutant in Mutant::ALL {
-        let broken = mutant.of(contract(Family::Atv312));
+        let broken = mutant.of(contract(Family::ATV312));
         match AssertUnwindSafe(broken.check()).catch_unwind().await {
             Ok(()) => passed.push(mutant),
             Err(why) => println!("{mutant:?}: {}", why.downcast_ref::<String>().map_or("", String::as_str)),

@@ -10,24 +10,24 @@ use support::contracts::contract;
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_21_starts_reverses_stops_trips_and_recovers() {
-    contract(Family::Atv21).lives_the_story().await;
+    contract(Family::ATV21).lives_the_story().await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_28_starts_reverses_stops_trips_and_recovers() {
-    contract(Family::Atv28).lives_the_story().await;
+    contract(Family::ATV28).lives_the_story().await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_58_starts_reverses_stops_trips_and_recovers() {
-    contract(Family::Atv58).lives_the_story().await;
+    contract(Family::ATV58).lives_the_story().await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_58_lives_the_same_story_in_modbus_ascii() {
     for format in [CharacterFormat::F7E1, CharacterFormat::F8O1] {
         let settings = SerialSettings::new(9_600, format).expect("it is a speed of the card");
-        let contract = contract(Family::Atv58);
+        let contract = contract(Family::ATV58);
         let rig = contract.rig_speaking(Protocol::Ascii(AsciiSettings::default()), settings);
         contract.lives_the_story_on(rig).await;
     }
@@ -35,20 +35,20 @@ async fn an_altivar_58_lives_the_same_story_in_modbus_ascii() {
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_58_lives_the_same_story_on_uni_telway() {
-    let settings = Family::Atv58.capabilities().factory;
+    let settings = Family::ATV58.capabilities().factory;
     for header in [NetworkHeader::default(), NetworkHeader::Simplified] {
         let protocol = Protocol::UniTelway(UniTelwaySettings { header, ..UniTelwaySettings::default() });
-        let contract = contract(Family::Atv58);
+        let contract = contract(Family::ATV58);
         contract.lives_the_story_on(contract.rig_speaking(protocol, settings)).await;
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn an_altivar_312_starts_reverses_stops_trips_and_recovers() {
-    contract(Family::Atv312).lives_the_story().await;
+    contract(Family::ATV312).lives_the_story().await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_3g3ev_starts_reverses_stops_trips_and_recovers() {
-    contract(Family::Omron3g3ev).lives_the_story().await;
+    contract(Family::OMRON_3G3EV).lives_the_story().await;
 }

@@ -15,7 +15,7 @@ use tokio::time::{sleep, timeout};
 const SECOND: Duration = Duration::from_secs(1);
 
 /// Families whose watchdog the bus can set, and a line of the simulator that switches it off.
-const SETTABLE: [(Family, &str); 2] = [(Family::Atv21, "set F803 0"), (Family::Atv312, "set SLL 0")];
+const SETTABLE: [(Family, &str); 2] = [(Family::ATV21, "set F803 0"), (Family::ATV312, "set SLL 0")];
 
 fn is_named(kind: &EventKind, name: &str) -> bool {
     kind.name() == name
@@ -29,7 +29,7 @@ async fn ended(plant: &mut Plant) -> Vec<EventKind> {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_stands_does_not_trip_because_the_program_has_ended() {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     plant.happens("set SLL 0");
     plant.event("the contract", |kind| is_named(kind, "watchdog verified")).await;
     let told = ended(&mut plant).await;
@@ -40,7 +40,7 @@ async fn a_drive_that_stands_does_not_trip_because_the_program_has_ended() {
 
 #[tokio::test(start_paused = true)]
 async fn a_motor_that_was_stopped_at_the_exit_does_not_trip_afterwards() {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     plant.happens("set SLL 0");
     plant.run_at(30).await;
     ended(&mut plant).await;
@@ -51,7 +51,7 @@ async fn a_motor_that_was_stopped_at_the_exit_does_not_trip_afterwards() {
 
 #[tokio::test(start_paused = true)]
 async fn a_watchdog_that_nto_had_switched_off_is_off_again_and_sll_stays_what_it_was() {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     // CMI bit 14, BBV51701 p. 20.
     plant.happens("set CMI 16384");
     plant.event("the contract", |kind| is_named(kind, "watchdog verified")).await;
@@ -65,7 +65,7 @@ async fn a_watchdog_that_nto_had_switched_off_is_off_again_and_sll_stays_what_it
 #[tokio::test(start_paused = true)]
 async fn a_watchdog_in_an_eeprom_is_put_back_only_where_the_policy_says_so_and_else_it_is_told() {
     for restores in [false, true] {
-        let mut plant = Plant::single(Family::Atv21, |settings| {
+        let mut plant = Plant::single(Family::ATV21, |settings| {
             if restores {
                 settings.on_exit_watchdog = drive_fleet::OnExitWatchdog::Restore;
             }
@@ -86,7 +86,7 @@ async fn a_watchdog_in_an_eeprom_is_put_back_only_where_the_policy_says_so_and_e
 /// A drive whose watchdog was off before a program armed it and was killed, and the program after it, which knows what was
 /// kept, changed by `change`.
 async fn after_a_kill(change: impl FnOnce(&mut WatchdogBefore)) -> Plant {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     // CMI bit 14, BBV51701 p. 20.
     plant.happens("set CMI 16384");
     let verified = plant.event("the contract", |kind| is_named(kind, "watchdog verified")).await;
@@ -125,7 +125,7 @@ async fn what_was_kept_of_another_drive_or_another_setting_is_not_put_back() {
 
 #[tokio::test(start_paused = true)]
 async fn a_motor_that_turns_at_the_exit_and_was_not_started_here_is_an_alarm() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let plant = Plant::single(family, |_| {});
         plant.run_at(30).await;
         let mut plant = plant.restarted().await;
@@ -142,7 +142,7 @@ async fn an_adopted_motor_is_stopped_at_the_exit_or_left_without_an_alarm_where_
     use drive_core::StopMode;
     use drive_fleet::OnExitAdopted;
     for (policy, stands) in [(OnExitAdopted::Stop(StopMode::Ramp), true), (OnExitAdopted::Leave, false)] {
-        let plant = Plant::single(Family::Atv312, |settings| settings.on_exit_adopted = policy);
+        let plant = Plant::single(Family::ATV312, |settings| settings.on_exit_adopted = policy);
         plant.run_at(30).await;
         let mut plant = plant.restarted().await;
         plant.event("the adoption", |kind| matches!(kind, EventKind::Connected(_))).await;
@@ -156,7 +156,7 @@ async fn an_adopted_motor_is_stopped_at_the_exit_or_left_without_an_alarm_where_
 
 #[tokio::test(start_paused = true)]
 async fn a_stop_given_up_at_the_exit_is_an_alarm() {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     plant.run_at(30).await;
     plant.happens("line cut");
     let told = ended(&mut plant).await;
@@ -166,7 +166,7 @@ async fn a_stop_given_up_at_the_exit_is_an_alarm() {
 
 #[tokio::test(start_paused = true)]
 async fn a_watchdog_trip_found_at_the_next_start_is_known_by_the_drives_own_code_and_reset_by_policy() {
-    for family in [Family::Atv21, Family::Atv312, Family::Omron3g3ev] {
+    for family in [Family::ATV21, Family::ATV312, Family::OMRON_3G3EV] {
         let plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);
         plant.run_at(30).await;
         let Plant { sites, fleet, lines, events, .. } = plant;
@@ -188,7 +188,7 @@ async fn a_watchdog_trip_found_at_the_next_start_is_known_by_the_drives_own_code
 
 #[tokio::test(start_paused = true)]
 async fn another_trip_that_came_while_the_line_was_away_is_not_reset_as_the_watchdogs() {
-    for family in [Family::Atv21, Family::Atv312, Family::Omron3g3ev] {
+    for family in [Family::ATV21, Family::ATV312, Family::OMRON_3G3EV] {
         let mut plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);
         plant.run_at(30).await;
         plant.happens(&format!("trip {}", drives::a_trip(family)));
@@ -229,7 +229,7 @@ async fn a_motor_that_runs_with_another_watchdog_than_its_contract_is_an_alarm_a
 
 #[tokio::test(start_paused = true)]
 async fn a_motor_is_started_without_an_alarm_where_its_watchdog_is_armed_for_it() {
-    let mut plant = Plant::single(Family::Atv312, |settings| {
+    let mut plant = Plant::single(Family::ATV312, |settings| {
         settings.watchdog = Some(WatchdogContract { timeout: 5 * SECOND, reaction: Reaction::Ramp });
     });
     plant.run_at(30).await;

@@ -67,9 +67,9 @@ async fn pressed(
 async fn five_presses_of_stop_all_in_a_second_for_ten_seconds_keep_no_drive_of_a_full_line_from_confirming_one()
  {
     for (family, mode) in [
-        (Family::Atv312, StopMode::Ramp),
-        (Family::Atv21, StopMode::Ramp),
-        (Family::Atv28, StopMode::Freewheel),
+        (Family::ATV312, StopMode::Ramp),
+        (Family::ATV21, StopMode::Ramp),
+        (Family::ATV28, StopMode::Freewheel),
     ] {
         let plant = full_line(family).await;
         let (alone, report) = pressed(&plant, 1, SECOND, mode).await.remove(0);
@@ -119,7 +119,7 @@ async fn broadcast_by<T>(family: Family, deed: impl AsyncFnOnce(&Plant) -> T) ->
 
 #[tokio::test(start_paused = true)]
 async fn nothing_but_the_stop_of_all_drives_of_a_line_is_broadcast() {
-    let (family, mode) = (Family::Atv28, StopMode::Freewheel);
+    let (family, mode) = (Family::ATV28, StopMode::Freewheel);
     let (_, broadcasts, _) = broadcast_by(family, async |plant| {
         for order in [Order::ResetFaults, Order::Release, Order::Persist] {
             for drive in plant.fleet.drives() {

@@ -24,7 +24,7 @@ fn site(family: Family, settings: SerialSettings) -> (SimLine, Line) {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_is_commanded_on_the_line_and_at_the_address_under_which_it_is_registered() {
-    let family = Family::Atv312;
+    let family = Family::ATV312;
     let (north, north_line) = site(family, SerialSettings::MODBUS_DEFAULT);
     let (south, south_line) = site(family, SerialSettings::MODBUS_DEFAULT);
     let fleet = Fleet::builder()
@@ -45,7 +45,7 @@ async fn a_drive_is_commanded_on_the_line_and_at_the_address_under_which_it_is_r
 
 #[tokio::test(start_paused = true)]
 async fn what_was_made_for_another_address_is_refused() {
-    let family = Family::Atv312;
+    let family = Family::ATV312;
     let (_site, line) = site(family, SerialSettings::MODBUS_DEFAULT);
     let other = SlaveAddress::try_from(2).expect("it is an address");
     let refused = Fleet::builder()
@@ -58,7 +58,7 @@ async fn what_was_made_for_another_address_is_refused() {
 
 #[tokio::test(start_paused = true)]
 async fn what_cannot_be_is_refused_with_its_name() {
-    let family = Family::Atv312;
+    let family = Family::ATV312;
     for (line_name, address, expected) in [
         ("south", 1, "pump: there is no line \"south\""),
         ("north", 0, "pump: 0 is not a slave address"),
@@ -80,7 +80,7 @@ async fn what_cannot_be_is_refused_with_its_name() {
 
 #[tokio::test(start_paused = true)]
 async fn a_line_that_was_told_nothing_keeps_the_pause_of_its_families_and_a_longer_one_that_it_was_told() {
-    let family = Family::Omron3g3ev;
+    let family = Family::OMRON_3G3EV;
     let needed = family.capabilities().turnaround;
     for said in [Duration::ZERO, 2 * needed] {
         let simulated = SimLine::new(Wiring::rtu(common_settings()));
@@ -107,7 +107,7 @@ async fn a_line_that_was_told_nothing_keeps_the_pause_of_its_families_and_a_long
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_of_another_address_than_its_port_says_so_and_neither_slave_hears_of_it() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let (simulated, line) = site(family, common_settings());
         let [one, two] = [1, 2].map(|at| SlaveAddress::try_from(at).expect("an address"));
         let mut drive = family.open(line.slave(1), two);

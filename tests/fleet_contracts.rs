@@ -14,22 +14,22 @@ const SECOND: Duration = Duration::from_secs(1);
 /// Setting and word, by the manuals: what is changed, and on what it bears.
 const CHANGES: &[(Family, &str, u16, u16, Ground)] = &[
     // Altivar 21 Modbus §6.4: time-out and reaction; UL; §8.4: what the inputs do.
-    (Family::Atv21, "F803", 0x0803, 30, Ground::Watchdog),
-    (Family::Atv21, "F603", 0x0603, 1, Ground::Watchdog),
-    (Family::Atv21, "UL", 0x0012, 4_000, Ground::Limits),
-    (Family::Atv21, "F113", 0x0113, 48, Ground::Inputs),
+    (Family::ATV21, "F803", 0x0803, 30, Ground::Watchdog),
+    (Family::ATV21, "F603", 0x0603, 1, Ground::Watchdog),
+    (Family::ATV21, "UL", 0x0012, 4_000, Ground::Limits),
+    (Family::ATV21, "F113", 0x0113, 48, Ground::Inputs),
     // Altivar 28 RS485 kit and VW3A58303: HSP.
-    (Family::Atv28, "HSP", 250, 400, Ground::Limits),
-    (Family::Atv58, "HSP", 250, 400, Ground::Limits),
+    (Family::ATV28, "HSP", 250, 400, Ground::Limits),
+    (Family::ATV58, "HSP", 250, 400, Ground::Limits),
     // BBV51701: ttO; HSP; bit 9 of CMI; dCI.
-    (Family::Atv312, "ttO", 6005, 300, Ground::Watchdog),
-    (Family::Atv312, "HSP", 3104, 400, Ground::Limits),
-    (Family::Atv312, "CMI", 8504, 1 << 9, Ground::Units),
-    (Family::Atv312, "dCI", 11_203, 0, Ground::Inputs),
+    (Family::ATV312, "ttO", 6005, 300, Ground::Watchdog),
+    (Family::ATV312, "HSP", 3104, 400, Ground::Limits),
+    (Family::ATV312, "CMI", 8504, 1 << 9, Ground::Units),
+    (Family::ATV312, "dCI", 11_203, 0, Ground::Inputs),
     // 3G3EV §2.1: n39, n40 and n02.
-    (Family::Omron3g3ev, "n39", 0x0127, 1, Ground::Units),
-    (Family::Omron3g3ev, "n40", 0x0128, 1, Ground::Watchdog),
-    (Family::Omron3g3ev, "n02", 0x0102, 3, Ground::Inputs),
+    (Family::OMRON_3G3EV, "n39", 0x0127, 1, Ground::Units),
+    (Family::OMRON_3G3EV, "n40", 0x0128, 1, Ground::Watchdog),
+    (Family::OMRON_3G3EV, "n02", 0x0102, 3, Ground::Inputs),
 ];
 
 #[tokio::test(start_paused = true)]

@@ -19,7 +19,7 @@ const SECOND: Duration = Duration::from_secs(1);
 
 /// Four drives of four families, ready.
 async fn four() -> Plant {
-    let families = [Family::Atv312, Family::Atv28, Family::Atv21, Family::Omron3g3ev];
+    let families = [Family::ATV312, Family::ATV28, Family::ATV21, Family::OMRON_3G3EV];
     let member = |(family, address): (Family, u8)| (family, address, controlled(family, &family.to_string()));
     let site = Site::new(common_settings(), families.into_iter().zip(1..).map(member).collect());
     let plant = Plant::open(vec![site]).expect("it can be fed");
@@ -56,7 +56,7 @@ async fn a_group_starts_together_and_reaches_its_reference() {
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_is_lost_on_its_way_to_its_reference_reaches_it_all_the_same() {
     let settings = DriveSettings::controlled(MOTOR);
-    let site = Site::new(common_settings(), vec![(Family::Atv21, ADDRESS, settings)]);
+    let site = Site::new(common_settings(), vec![(Family::ATV21, ADDRESS, settings)]);
     let mut plant = Plant::open(vec![site]).expect("it can be");
     plant.motor().ready(60 * SECOND).await.expect("it gets ready");
     let group = plant.fleet.all();
@@ -85,7 +85,7 @@ async fn a_staggered_group_starts_one_after_the_other() {
 #[tokio::test(start_paused = true)]
 async fn when_one_is_not_ready_it_is_named_and_nobody_starts() {
     let mut plant = four().await;
-    plant.machine_of("atv28").trip(drives::a_trip(Family::Atv28));
+    plant.machine_of("atv28").trip(drives::a_trip(Family::ATV28));
     plant.event("the trip", |kind| matches!(kind, EventKind::Tripped(_))).await;
     let failure = plant.fleet.all().start(start(Duration::ZERO)).await.expect_err("one has tripped");
     let GroupFailure::NotReady(unready) = failure else { panic!("{failure}") };
@@ -103,7 +103,7 @@ async fn when_one_does_not_start_the_others_are_stopped_again() {
     let others = plant.machine_of("atv312").clone();
     tokio::spawn(async move {
         others.wait_until(|machine| machine.running).await;
-        machine.trip(drives::a_trip(Family::Omron3g3ev));
+        machine.trip(drives::a_trip(Family::OMRON_3G3EV));
     });
     let failure = plant.fleet.all().start(start(2 * SECOND)).await.expect_err("one trips");
     let GroupFailure::Failed { outcomes, stopped } = failure else { panic!("{failure}") };
@@ -124,7 +124,7 @@ async fn a_group_that_failed_to_start_does_not_slow_a_freewheel_that_is_under_wa
         sleep(SECOND).await;
         machine.mute();
         let freewheel = motor.stop(StopMode::Freewheel);
-        tripped.trip(drives::a_trip(Family::Omron3g3ev));
+        tripped.trip(drives::a_trip(Family::OMRON_3G3EV));
         let _outcome = freewheel.await;
     });
     plant.fleet.all().start(start(2 * SECOND)).await.expect_err("one trips");
@@ -147,7 +147,7 @@ async fn a_group_takes_a_setpoint_and_each_drives_outcome_is_told() {
 #[tokio::test(start_paused = true)]
 async fn limits_bands_and_rates_keep_a_setpoint_from_the_machine() {
     let hertz = Frequency::from_hertz;
-    let plant = Plant::single(Family::Atv312, |settings| {
+    let plant = Plant::single(Family::ATV312, |settings| {
         settings.limits = FrequencyLimits {
             low: Some(hertz(10)),
             high: Some(hertz(45)),
@@ -171,7 +171,7 @@ async fn limits_bands_and_rates_keep_a_setpoint_from_the_machine() {
 
 #[tokio::test(start_paused = true)]
 async fn only_those_who_may_command_do_and_anybody_may_stop() {
-    let plant = Plant::single(Family::Atv312, |settings| {
+    let plant = Plant::single(Family::ATV312, |settings| {
         settings.commanders = Commanders::Only(vec!["operator".to_owned()]);
     });
     let operator = plant.motor().commanded_by("operator");
@@ -185,7 +185,7 @@ async fn only_those_who_may_command_do_and_anybody_may_stop() {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_was_lost_is_stopped_on_its_return_where_its_policy_says_so() {
-    let mut plant = Plant::single(Family::Atv28, |settings| settings.on_loss = OnLoss::Stop(StopMode::Ramp));
+    let mut plant = Plant::single(Family::ATV28, |settings| settings.on_loss = OnLoss::Stop(StopMode::Ramp));
     plant.run_at(30).await;
     plant.machine().mute();
     plant.event("the loss", |kind| matches!(kind, EventKind::Lost { .. })).await;
@@ -198,7 +198,7 @@ async fn a_drive_that_was_lost_is_stopped_on_its_return_where_its_policy_says_so
 
 #[tokio::test(start_paused = true)]
 async fn a_current_above_its_alarm_is_told_and_told_when_it_is_back() {
-    let mut plant = Plant::single(Family::Atv312, |settings| {
+    let mut plant = Plant::single(Family::ATV312, |settings| {
         settings.alarms.current = Some(drive_core::Current::from_deciamperes(20));
     });
     plant.run_at(30).await;
@@ -211,7 +211,7 @@ async fn a_current_above_its_alarm_is_told_and_told_when_it_is_back() {
 
 #[tokio::test(start_paused = true)]
 async fn a_panel_that_takes_a_running_drive_is_told() {
-    let mut plant = Plant::single(Family::Atv312, |_| {});
+    let mut plant = Plant::single(Family::ATV312, |_| {});
     plant.run_at(30).await;
     plant.machine().panel(drive_sim::Panel::TakeControl);
     plant.event("the panel", |kind| matches!(kind, EventKind::ControlTaken(_))).await;
@@ -222,14 +222,14 @@ async fn a_panel_that_takes_a_running_drive_is_told() {
 #[tokio::test(start_paused = true)]
 async fn two_drives_at_one_address_or_of_one_name_are_refused() {
     let settings = |name: &str| DriveSettings::watched(name);
-    let site = Site::new(SerialSettings::MODBUS_DEFAULT, vec![(Family::Atv312, ADDRESS, settings(MOTOR))]);
+    let site = Site::new(SerialSettings::MODBUS_DEFAULT, vec![(Family::ATV312, ADDRESS, settings(MOTOR))]);
     let mut twice = site.members.clone();
-    twice.push((Family::Atv312, ADDRESS, settings("another")));
+    twice.push((Family::ATV312, ADDRESS, settings("another")));
     let Err(error) = Plant::open(vec![Site { members: twice, ..site }]) else {
         panic!("one address, two drives")
     };
     assert_eq!(error.to_string(), "another: address 5 of line \"line 0\" is taken");
-    let members = vec![(Family::Atv312, 1, settings(MOTOR)), (Family::Atv312, 2, settings(MOTOR))];
+    let members = vec![(Family::ATV312, 1, settings(MOTOR)), (Family::ATV312, 2, settings(MOTOR))];
     let Err(error) = Plant::open(vec![Site::new(SerialSettings::MODBUS_DEFAULT, members)]) else {
         panic!("one name, two drives")
     };
@@ -238,7 +238,7 @@ async fn two_drives_at_one_address_or_of_one_name_are_refused() {
 
 #[tokio::test(start_paused = true)]
 async fn a_start_at_a_setpoint_is_confirmed_in_force_and_not_only_at_its_reference() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let plant = Plant::single(family, |_| {});
         assert_eq!(plant.motor().ready(PATIENCE).await, Ok(()), "{family}");
         let setpoint = Frequency::from_hertz(30);
@@ -254,7 +254,7 @@ async fn a_start_at_a_setpoint_is_confirmed_in_force_and_not_only_at_its_referen
 
 #[tokio::test(start_paused = true)]
 async fn the_stream_of_events_tells_what_recv_tells_and_ends_with_the_fleet() {
-    let plant = Plant::single(Family::Atv312, |_| {});
+    let plant = Plant::single(Family::ATV312, |_| {});
     let read = tokio::spawn(plant.fleet.events().collect::<Vec<Received>>());
     plant.motor().wait_until(|snapshot| snapshot.link == Link::Connected).await;
     let _ = plant.fleet.shutdown(PATIENCE).await;
@@ -298,7 +298,7 @@ async fn line_of(families: &[Family], read_only: &[u8]) -> Plant {
 async fn a_stop_by_broadcast_reaches_only_a_line_whose_drives_are_all_meant_may_all_be_commanded_and_all_take_it()
  {
     let mut broadcast = 0;
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let Some(mode) = family.capabilities().broadcast_stops.first().copied() else { continue };
         let plant = line_of(&[family, family], &[]).await;
         let report = plant.fleet.all().stop(mode).await;
@@ -317,7 +317,7 @@ async fn a_stop_by_broadcast_reaches_only_a_line_whose_drives_are_all_meant_may_
         assert_eq!(report.broadcasts.len(), 0, "{family}: one of two is only read");
         assert_eq!(Plant::writes(plant.machine_of("2")), writes, "{family}");
 
-        let other = if family == Family::Omron3g3ev { Family::Atv312 } else { Family::Omron3g3ev };
+        let other = if family == Family::OMRON_3G3EV { Family::ATV312 } else { Family::OMRON_3G3EV };
         let plant = line_of(&[family, other], &[]).await;
         let report = plant.fleet.all().stop(mode).await;
         assert_eq!(report.broadcasts.len(), 0, "{family}: to {other} the word means something else");

@@ -14,7 +14,7 @@ use support::{drives, plant};
 use tokio::process::Command;
 
 /// Every family that has a watchdog which stops it, at its address.
-const MEMBERS: [(Family, u8); 3] = [(Family::Atv312, 1), (Family::Atv21, 2), (Family::Omron3g3ev, 3)];
+const MEMBERS: [(Family, u8); 3] = [(Family::ATV312, 1), (Family::ATV21, 2), (Family::OMRON_3G3EV, 3)];
 
 /// Tells the process that is to be killed where its drives are.
 const LINK: &str = "FLEET_KILL_LINK";

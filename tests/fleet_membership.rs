@@ -15,7 +15,7 @@ use support::{
 use tokio::time::{sleep, timeout};
 
 const SECOND: Duration = Duration::from_secs(1);
-const FAMILY: Family = Family::Atv312;
+const FAMILY: Family = Family::ATV312;
 
 /// A line with drives "1" and "2", and a machine at address 3 that nobody watches yet.
 fn plant() -> Plant {

@@ -43,7 +43,7 @@ async fn eight_lines_of_31_drives_miss_no_deadline_in_an_hour_and_their_memory_i
     let sites = (0..LINES)
         .map(|line| {
             let member =
-                |address| (Family::Atv312, address, planned(Family::Atv312, format!("{line}/{address}")));
+                |address| (Family::ATV312, address, planned(Family::ATV312, format!("{line}/{address}")));
             Site::new(SerialSettings::MODBUS_DEFAULT, (1..=DRIVES).map(member).collect())
         })
         .collect();
@@ -76,7 +76,7 @@ async fn eight_lines_of_31_drives_miss_no_deadline_in_an_hour_and_their_memory_i
 
 #[tokio::test(start_paused = true)]
 async fn a_reader_that_is_slow_is_told_how_many_events_it_missed() {
-    let member = |address| (Family::Atv312, address, DriveSettings::controlled(format!("drive {address}")));
+    let member = |address| (Family::ATV312, address, DriveSettings::controlled(format!("drive {address}")));
     let site = Site::new(SerialSettings::MODBUS_DEFAULT, (1..=3).map(member).collect());
     let plant = Plant::open(vec![site]).expect("it can be");
     let mut slow = plant.fleet.events();
@@ -106,7 +106,7 @@ async fn a_reader_that_is_slow_is_told_how_many_events_it_missed() {
 
 #[tokio::test(start_paused = true)]
 async fn a_stop_of_31_running_drives_of_mixed_families_stops_the_living_in_the_bound_and_names_the_mute() {
-    let families = [Family::Atv312, Family::Atv28, Family::Atv58, Family::Atv21, Family::Omron3g3ev];
+    let families = [Family::ATV312, Family::ATV28, Family::ATV58, Family::ATV21, Family::OMRON_3G3EV];
     let member = |address: u8| {
         let family = families[usize::from(address) % families.len()];
         let periods =
@@ -179,7 +179,7 @@ async fn a_stop_of_31_running_drives_of_mixed_families_stops_the_living_in_the_b
 
 #[tokio::test(start_paused = true)]
 async fn a_line_of_one_family_is_stopped_by_one_broadcast_and_each_drive_then_confirms() {
-    let member = |address| (Family::Atv28, address, DriveSettings::controlled(format!("drive {address}")));
+    let member = |address| (Family::ATV28, address, DriveSettings::controlled(format!("drive {address}")));
     let plant =
         Plant::open(vec![Site::new(common_settings(), (1..=8).map(member).collect())]).expect("it can be");
     for drive in plant.fleet.drives() {

@@ -19,7 +19,7 @@ async fn measurements_that_are_cut_at_every_turn_are_whole_within_as_many_turns_
         Periods { running: 150 * MS, rest: 200 * MS, slow: Duration::from_secs(1), max_age: 450 * MS };
     let beside = Periods { running: 300 * MS, rest: 400 * MS, max_age: 900 * MS, ..alone };
     for (periods, families) in
-        [(alone, &[Family::Atv21][..]), (beside, &[Family::Atv21, Family::Atv312, Family::Omron3g3ev])]
+        [(alone, &[Family::ATV21][..]), (beside, &[Family::ATV21, Family::ATV312, Family::OMRON_3G3EV])]
     {
         let member = |(family, address): (&Family, u8)| {
             let mut settings = controlled(*family, &format!("{family} {address}"));

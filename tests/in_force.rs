@@ -23,25 +23,25 @@ async fn holds(family: Family) {
 
 #[tokio::test(start_paused = true)]
 async fn what_an_altivar_21_confirms_is_in_force_whoever_else_may_decide() {
-    holds(Family::Atv21).await;
+    holds(Family::ATV21).await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_an_altivar_28_confirms_is_in_force_whoever_else_may_decide() {
-    holds(Family::Atv28).await;
+    holds(Family::ATV28).await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_an_altivar_58_confirms_is_in_force_whoever_else_may_decide() {
-    holds(Family::Atv58).await;
+    holds(Family::ATV58).await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_an_altivar_312_confirms_is_in_force_whoever_else_may_decide() {
-    holds(Family::Atv312).await;
+    holds(Family::ATV312).await;
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_a_3g3ev_confirms_is_in_force_whoever_else_may_decide() {
-    holds(Family::Omron3g3ev).await;
+    holds(Family::OMRON_3G3EV).await;
 }

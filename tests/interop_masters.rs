@@ -53,7 +53,7 @@ async fn minimalmodbus_reads_and_writes_a_simulated_altivar_312() {
 #[tokio::test(flavor = "multi_thread")]
 async fn minimalmodbus_reads_and_writes_a_simulated_altivar_58_in_modbus_ascii() {
     let Some(python) = peers::python_with("minimalmodbus") else { return };
-    let ascii = Wiring { protocol: Protocol::Ascii, ..Wiring::rtu(Family::Atv58.capabilities().factory) };
+    let ascii = Wiring { protocol: Protocol::Ascii, ..Wiring::rtu(Family::ATV58.capabilities().factory) };
     let rig = Rig::serving("minimalmodbus-ascii", ascii, models::atv58::Atv58::new());
     let answer = run(Command::new(python)
         .arg(peers::script("minimalmodbus_master.py"))

@@ -68,7 +68,7 @@ async fn runs(rig: &mut Rig) -> bool {
 
 #[tokio::test(start_paused = true)]
 async fn a_start_that_fails_behind_its_run_command_is_unknown_and_one_that_fails_before_starts_nothing() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         for failure in FAILURES {
             let mut unknown = 0;
             for exchanges in 0..MANY {
@@ -94,7 +94,7 @@ async fn a_start_that_fails_behind_its_run_command_is_unknown_and_one_that_fails
 
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_fails_behind_its_word_is_unknown_and_has_stopped_the_motor() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let (register, ..) = run_command(family);
         for failure in FAILURES {
             let mut unknown = 0;
@@ -122,7 +122,7 @@ async fn a_stop_that_fails_behind_its_word_is_unknown_and_has_stopped_the_motor(
 
 #[tokio::test(start_paused = true)]
 async fn a_start_whose_caller_gives_up_moves_nothing_before_its_run_command_and_is_stopped_after_it() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         for exchanges in 0..MANY {
             let (mut rig, mut drive, port) = ready(family).await;
             port.after(exchanges, Event::Silence);
@@ -142,16 +142,16 @@ async fn a_start_whose_caller_gives_up_moves_nothing_before_its_run_command_and_
 
 #[tokio::test(start_paused = true)]
 async fn a_start_neither_undoes_nor_hides_a_stop_that_somebody_else_gives_on_its_way() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         // The ramp stop of the Altivar 58 is a word of the ladder itself, and so nothing tells the two apart.
-        let told_apart = |mode| (family, mode) != (Family::Atv58, StopMode::Ramp);
+        let told_apart = |mode| (family, mode) != (Family::ATV58, StopMode::Ramp);
         let modes = [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel];
         let has = |mode: &StopMode| family.capabilities().stop_modes.contains(mode);
         for mode in modes.into_iter().filter(has).filter(|&mode| told_apart(mode)) {
             for exchanges in 0..MANY {
                 let (mut rig, mut drive, port) = ready(family).await;
                 // The start of an Altivar 21 that the bus does not command yet writes the word of a ramp stop first.
-                if family == Family::Atv21 {
+                if family == Family::ATV21 {
                     rig.drive.stop(StopMode::Ramp).await.expect("it stands");
                 }
                 let somebody = another(family, Interrupted::new(rig.line.slave(ADDRESS)));
@@ -175,7 +175,7 @@ async fn a_start_neither_undoes_nor_hides_a_stop_that_somebody_else_gives_on_its
 
 #[tokio::test(start_paused = true)]
 async fn a_stop_is_not_confirmed_while_a_start_that_came_late_runs_the_motor() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let (register, run, _) = run_command(family);
         for exchanges in 1..MANY {
             let (mut rig, mut drive, port) = ready(family).await;

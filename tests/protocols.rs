@@ -30,7 +30,7 @@ fn ascii() -> Protocol {
 
 /// Altivars 58 at these addresses, and the line to them.
 fn line(protocol: Protocol, addresses: &[u8], delivery: Delivery) -> (SimLine, Line) {
-    let settings: SerialSettings = Family::Atv58.capabilities().factory;
+    let settings: SerialSettings = Family::ATV58.capabilities().factory;
     let spoken = match protocol {
         Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
         Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
@@ -76,7 +76,7 @@ async fn two_drives_on_one_uni_telway_line_turn_at_their_own_speeds() {
         let mut drives = Vec::new();
         for (address, hertz) in [(3, 20), (16, 35)] {
             let slave = SlaveAddress::try_from(address).expect("it is one");
-            let mut drive = Family::Atv58.open(line.slave(address), slave);
+            let mut drive = Family::ATV58.open(line.slave(address), slave);
             drive.set_setpoint(Frequency::from_hertz(hertz).into()).await.expect("it takes the setpoint");
             drive.start(Direction::Forward).await.expect("it starts");
             drives.push((drive, Frequency::from_hertz(hertz)));
@@ -113,7 +113,7 @@ async fn a_mute_uni_telway_slave_does_not_keep_the_others_waiting() {
 
 #[tokio::test(start_paused = true)]
 async fn the_specific_request_climbs_the_chart_and_reports_in_the_same_exchange() {
-    let mut rig = contract(Family::Atv58).rig_speaking(unitelway(), Family::Atv58.capabilities().factory);
+    let mut rig = contract(Family::ATV58).rig_speaking(unitelway(), Family::ATV58.capabilities().factory);
     let mut unite = rig.line.slave(ADDRESS).unite();
     let identity = unite.identify().await.expect("it says who it is");
     assert_eq!((identity.product, identity.subtype, &*identity.rating), (0x18, 0x58, "ATV58U18N4"));
@@ -197,7 +197,7 @@ async fn under_every_fault_nothing_wrong_is_taken_for_right_in_either_protocol()
 
 #[tokio::test(start_paused = true)]
 async fn the_last_character_that_the_card_is_told_is_followed_until_it_forgets_it() {
-    let mut rig = contract(Family::Atv58).rig_speaking(ascii(), Family::Atv58.capabilities().factory);
+    let mut rig = contract(Family::ATV58).rig_speaking(ascii(), Family::ATV58.capabilities().factory);
     let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
     let mut card = drive_atv58::Atv58::new(rig.line.slave(ADDRESS), slave);
     card.change_ascii_delimiter(b'!').await.expect("the card has 08/03");

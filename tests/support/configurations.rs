@@ -13,19 +13,19 @@ use crate::drives::{self, Five, five};
 type Way = (&'static str, fn() -> Box<dyn Model>, &'static [&'static str]);
 
 fn atv21() -> Box<dyn Model> {
-    drives::machine(Family::Atv21)
+    drives::machine(Family::ATV21)
 }
 
 fn atv28() -> Box<dyn Model> {
-    drives::machine(Family::Atv28)
+    drives::machine(Family::ATV28)
 }
 
 fn atv58() -> Box<dyn Model> {
-    drives::machine(Family::Atv58)
+    drives::machine(Family::ATV58)
 }
 
 fn atv312() -> Box<dyn Model> {
-    drives::machine(Family::Atv312)
+    drives::machine(Family::ATV312)
 }
 
 fn atv312_as_delivered() -> Box<dyn Model> {
@@ -33,7 +33,7 @@ fn atv312_as_delivered() -> Box<dyn Model> {
 }
 
 fn omron() -> Box<dyn Model> {
-    drives::machine(Family::Omron3g3ev)
+    drives::machine(Family::OMRON_3G3EV)
 }
 
 /// Altivar 21, §6.2 p. 12–17: five configurations, the keypad, and the inputs that override the bus (§8.4 p. 31).
@@ -172,7 +172,7 @@ impl Surrounded for Around {
     }
 
     fn parameter(&self) -> Option<(&'static str, u16)> {
-        Some((if self.0 == Family::Omron3g3ev { "n20" } else { "ACC" }, 25))
+        Some((if self.0 == Family::OMRON_3G3EV { "n20" } else { "ACC" }, 25))
     }
 
     fn values_of(&self, row: &Row) -> Option<Values> {

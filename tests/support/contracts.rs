@@ -26,7 +26,7 @@ pub fn contract(family: Family) -> Contract {
         status: Some(status(family)),
         exceptions: exceptions(family),
         // The card of the Altivar 58 says it over UNI-TELWAY only.
-        identifies_elsewhere: family == Family::Atv58,
+        identifies_elsewhere: family == Family::ATV58,
         around: Some(Box::new(Around(family))),
         ..Contract::new(
             family.capabilities(),

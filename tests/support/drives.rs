@@ -83,7 +83,7 @@ pub async fn reset(family: Family, drive: &mut Box<dyn Drive>) {
         Err(error) => {
             let unheard =
                 matches!(error.kind(), ErrorKind::NoAnswer | ErrorKind::OutcomeUnknown | ErrorKind::NotSent);
-            assert!(family == Family::Atv21 && unheard, "{error}");
+            assert!(family == Family::ATV21 && unheard, "{error}");
         }
     }
 }

@@ -63,25 +63,6 @@ impl Family {
     /// Omron 3G3EV.
     pub const OMRON_3G3EV: Self = Self(omron_3g3ev::DEFINITION);
 
-    // The names of before, until all callers have the new ones.
-    #[allow(missing_docs, non_upper_case_globals)]
-    #[doc(hidden)]
-    pub const Atv21: Self = Self::ATV21;
-    #[allow(missing_docs, non_upper_case_globals)]
-    #[doc(hidden)]
-    pub const Atv28: Self = Self::ATV28;
-    #[allow(missing_docs, non_upper_case_globals)]
-    #[doc(hidden)]
-    pub const Atv58: Self = Self::ATV58;
-    #[allow(missing_docs, non_upper_case_globals)]
-    #[doc(hidden)]
-    pub const Atv312: Self = Self::ATV312;
-    #[allow(missing_docs, non_upper_case_globals)]
-    #[doc(hidden)]
-    pub const Omron3g3ev: Self = Self::OMRON_3G3EV;
-    #[doc(hidden)]
-    pub const ALL: [Self; 5] = Self::BUILT_IN;
-
     /// Those that every program knows.
     pub const BUILT_IN: [Self; 5] = [Self::ATV21, Self::ATV28, Self::ATV58, Self::ATV312, Self::OMRON_3G3EV];
 

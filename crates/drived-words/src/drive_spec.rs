@@ -194,7 +194,7 @@ mod tests {
         }
         let fan = |number: u8| {
             (
-                DriveName { family: Family::Atv312, slave: SlaveAddress::try_from(number).unwrap() },
+                DriveName { family: Family::ATV312, slave: SlaveAddress::try_from(number).unwrap() },
                 format!("fan {number}"),
             )
         };

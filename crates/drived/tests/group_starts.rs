@@ -43,7 +43,7 @@ impl FullLine {
             machines.push(simulated.add(number, Atv312::under_bus_control()).expect("the address is free"));
             let settings = DriveSettings { periods, ..DriveSettings::controlled(format!("fan {number}")) };
             builder =
-                builder.drive("north", number, settings, |port, slave| Family::Atv312.open(port, slave));
+                builder.drive("north", number, settings, |port, slave| Family::ATV312.open(port, slave));
         }
         let fleet = builder.start().expect("it is planned to work");
         let _witnesses = Witnesses::of_fleet(&fleet, [("north", &simulated)]);

@@ -76,7 +76,7 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
     let ended = run(&["plan", "--config", file.path()]);
     let out = ended.assert_done();
     assert!(out.starts_with("line north: 31 drives on /dev/nowhere, 19200 8E1 rtu"), "{out}");
-    let family = Family::Atv312.capabilities();
+    let family = Family::ATV312.capabilities();
     assert_eq!(family.status_exchanges, 1, "the figures below count one");
     let slow_reads = Nanos::from(family.measurement_exchanges);
 
@@ -154,7 +154,7 @@ fn a_line_that_is_too_slow_for_its_periods_is_refused_with_the_arithmetic() {
     let ended = run(&["plan", "--config", file.path()]);
     let sweep = 31 * read(9_600);
     // Each drive has a status in each half second, and its measurements each minute.
-    let slow = Nanos::from(Family::Atv312.capabilities().measurement_exchanges);
+    let slow = Nanos::from(Family::ATV312.capabilities().measurement_exchanges);
     let percent = (sweep * 120 + slow * sweep) * 1_000 / (60 * S);
     ended.assert_refused(2, &format!(
         "too-slow.toml:1: lines.north: one status of 31 drives takes {}.{:03}s and the polls want {}.{} % of the line",

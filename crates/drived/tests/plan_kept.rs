@@ -40,7 +40,7 @@ async fn longest_gaps(drive: DriveHandle, end: Instant) -> (Duration, Duration) 
 
 #[tokio::test(start_paused = true)]
 async fn no_value_of_31_drives_grows_older_than_planned_also_with_three_of_them_dead() {
-    let family = Family::Atv312;
+    let family = Family::ATV312;
     let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
     let config = LineConfig {
         response_timeout: Duration::from_millis(200),

@@ -288,7 +288,7 @@ mod tests {
         let gone = || async { Err::<tokio::io::DuplexStream, _>(std::io::Error::other("no such port")) };
         let line = Line::over_reopened(gone, config);
         let drive = |port: drive_bus::Slave, slave: SlaveAddress| {
-            Family::Atv312.open_with(port, slave, &Options::default())
+            Family::ATV312.open_with(port, slave, &Options::default())
         };
         let builder = Fleet::builder().line("north", line.clone());
         let builder = builder.drive("north", 1, DriveSettings::watched("pump 1"), drive);

@@ -248,10 +248,10 @@ mod tests {
     async fn a_poll_that_is_rarer_than_a_watchdog_wants_feeds_it_in_between() {
         let ascii = Protocol::Ascii(AsciiSettings::default());
         for (family, protocol, wired) in [
-            (Family::Atv58, ascii, drive_sim::Protocol::Ascii),
-            (Family::Atv58, Protocol::Rtu, drive_sim::Protocol::Rtu),
-            (Family::Atv312, Protocol::Rtu, drive_sim::Protocol::Rtu),
-            (Family::Omron3g3ev, Protocol::Rtu, drive_sim::Protocol::Rtu),
+            (Family::ATV58, ascii, drive_sim::Protocol::Ascii),
+            (Family::ATV58, Protocol::Rtu, drive_sim::Protocol::Rtu),
+            (Family::ATV312, Protocol::Rtu, drive_sim::Protocol::Rtu),
+            (Family::OMRON_3G3EV, Protocol::Rtu, drive_sim::Protocol::Rtu),
         ] {
             let settings = family.capabilities().factory;
             let simulated = SimLine::new(Wiring { protocol: wired, ..Wiring::rtu(settings) });

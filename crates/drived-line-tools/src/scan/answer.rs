@@ -128,9 +128,9 @@ mod tests {
 
     #[test]
     fn what_a_drive_says_of_itself_is_told_from_what_its_registers_look_like() {
-        let sure = like(Family::Atv312, true, Some("ATV312HU15N4"));
+        let sure = like(Family::ATV312, true, Some("ATV312HU15N4"));
         assert_eq!(described(&[sure]), "atv312 (ATV312HU15N4), by its own words");
-        let (one, other) = (like(Family::Atv28, false, None), like(Family::Atv58, false, None));
+        let (one, other) = (like(Family::ATV28, false, None), like(Family::ATV58, false, None));
         assert_eq!(described(std::slice::from_ref(&one)), "likely atv28, by its registers");
         assert_eq!(described(&[one, other]), "likely atv28 or atv58, by its registers");
         assert!(described(&[]).contains("no drive of a family"));

@@ -84,15 +84,15 @@ mod tests {
 
     #[test]
     fn a_watchdog_that_is_off_needs_no_feeding_and_one_that_does_not_tell_the_shortest_of_its_family() {
-        let told = |timeout, reaction| interval(Family::Atv21, false, Some(Watchdog { timeout, reaction }));
+        let told = |timeout, reaction| interval(Family::ATV21, false, Some(Watchdog { timeout, reaction }));
         assert_eq!(told(None, None), None);
         assert_eq!(told(Some(SECOND), Some(Reaction::Ignore)), None);
         assert_eq!(told(Some(4 * SECOND), Some(Reaction::Freewheel)), Some(2 * SECOND));
         // F803 counts whole seconds; the 3G3EV has 2 s; the Altivar 58 in ASCII 1 s (VVDED397054 p. 24/48).
-        assert_eq!(interval(Family::Atv21, false, None), Some(SECOND / 2));
-        assert_eq!(interval(Family::Omron3g3ev, false, None), Some(SECOND));
-        assert_eq!(interval(Family::Atv58, true, None), Some(SECOND / 2));
-        assert_eq!(interval(Family::Atv28, false, None), Some(UNKNOWN));
+        assert_eq!(interval(Family::ATV21, false, None), Some(SECOND / 2));
+        assert_eq!(interval(Family::OMRON_3G3EV, false, None), Some(SECOND));
+        assert_eq!(interval(Family::ATV58, true, None), Some(SECOND / 2));
+        assert_eq!(interval(Family::ATV28, false, None), Some(UNKNOWN));
     }
 
     #[test]

@@ -69,7 +69,7 @@ pub(super) async fn ask(line: &Line, slave: SlaveAddress, wait: Duration) -> Res
 /// Asks it once, and again where the answer is damaged. `None`: it answers.
 async fn ask_once(line: &Line, slave: SlaveAddress) -> Result<Option<Heard>, Failure> {
     // The shortest read that a family has; an exception is an answer too.
-    let mut drive = open(line, Family::Atv312, slave);
+    let mut drive = open(line, Family::ATV312, slave);
     Ok(match often(line, async || drive.keep_alive().await).await {
         Asked::Refused(Error::Exception { code, .. }) if GATEWAY.contains(&code) => Some(Heard::Nothing),
         Asked::Refused(Error::Port { problem: PortError::Timeout { .. }, .. }) => Some(Heard::Nothing),
@@ -192,7 +192,7 @@ fn likeness(family: Family, identity: Option<Identity>) -> Likeness {
 
 /// Asks whom we know, so that a watchdog begins anew. What comes of it is not asked: one that has gone cannot be fed.
 pub(super) async fn feed(line: &Line, family: Option<Family>, slave: SlaveAddress) {
-    let _ = open(line, family.unwrap_or(Family::Atv312), slave).keep_alive().await;
+    let _ = open(line, family.unwrap_or(Family::ATV312), slave).keep_alive().await;
 }
 
 fn open(line: &Line, family: Family, slave: SlaveAddress) -> Box<dyn Drive> {

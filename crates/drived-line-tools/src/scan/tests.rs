@@ -67,16 +67,16 @@ async fn every_family_is_known_again_and_nothing_is_written_to_it() {
     for set_up in [SetUp::Factory, SetUp::ForTheBus] {
         let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
         let mut machines = Vec::new();
-        for (family, number) in Family::ALL.into_iter().zip(1..) {
+        for (family, number) in Family::BUILT_IN.into_iter().zip(1..) {
             machines.push(simulated.add_boxed(number, simulated::model(family, set_up).unwrap()).unwrap());
         }
         let finds = scanned(&simulated, &at_one("19200 8N1", 1..=7)).await;
         assert_eq!(finds.len(), 5);
-        for (find, family) in finds.iter().zip(Family::ALL) {
+        for (find, family) in finds.iter().zip(Family::BUILT_IN) {
             let Answer::Slave(alike) = &find.answer else { panic!("{find:?}") };
             let [Likeness { family: seen, certain, .. }] = alike[..] else { panic!("{alike:?}") };
             assert_eq!(seen, family);
-            assert_eq!(certain, [Family::Atv312, Family::Atv21].contains(&family), "{alike:?}");
+            assert_eq!(certain, [Family::ATV312, Family::ATV21].contains(&family), "{alike:?}");
             most = most.max(find.found.exchanges);
         }
         assert_only_read(&machines);
@@ -88,7 +88,7 @@ async fn every_family_is_known_again_and_nothing_is_written_to_it() {
 #[tokio::test(start_paused = true)]
 async fn an_answer_that_cannot_be_understood_is_told_from_silence() {
     let simulated = SimLine::default();
-    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+    simulated.add_boxed(7, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
     simulated.set_fault(Fault::Flipped, ALWAYS);
     let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
     assert!(
@@ -100,12 +100,12 @@ async fn an_answer_that_cannot_be_understood_is_told_from_silence() {
 #[tokio::test(start_paused = true)]
 async fn a_stray_byte_before_each_answer_is_no_second_drive() {
     let simulated = SimLine::default();
-    simulated.add_boxed(7, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+    simulated.add_boxed(7, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
     simulated.set_fault(Fault::Noise, ALWAYS);
     let finds = scanned(&simulated, &at_one("19200 8E1", 6..=7)).await;
     let [Find { answer: Answer::Slave(alike), .. }] = &finds[..] else { panic!("{finds:?}") };
     assert!(
-        matches!(&alike[..], [Likeness { family, certain: true, .. }] if *family == Family::Atv312),
+        matches!(&alike[..], [Likeness { family, certain: true, .. }] if *family == Family::ATV312),
         "{alike:?}"
     );
 }
@@ -113,7 +113,7 @@ async fn a_stray_byte_before_each_answer_is_no_second_drive() {
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_is_slower_than_the_scan_waits_is_found_and_nobody_else() {
     let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
-    let slow = simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+    let slow = simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
     slow.set_turnaround(Some(Duration::from_millis(180)));
     let finds = scanned(&simulated, &at_one("19200 8N1", 4..=8)).await;
     let [Find { step, answer: Answer::Slave(_), .. }] = &finds[..] else { panic!("{finds:?}") };
@@ -125,7 +125,7 @@ async fn one_read_of_a_watchdog_that_fails_is_no_watchdog_of_a_tenth_of_a_second
     for seed in 0..20 {
         let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
         simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Lost, ALWAYS / 20));
-        simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+        simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
         let finds = scanned(&simulated, &at_one("19200 8N1", [5])).await;
         for find in finds {
             assert!(
@@ -141,19 +141,19 @@ fn mixed(simulated: &SimLine) -> Vec<(SimSlave, Family, Dialect)> {
     let rtu = |text| Dialect { settings: serial(text), protocol: drive_sim::Protocol::Rtu };
     let of = |text, protocol| Dialect { settings: serial(text), protocol };
     let drives = [
-        (1, Family::Atv312, rtu("19200 8E1")),
-        (2, Family::Atv312, rtu("4800 8O1")),
-        (200, Family::Atv312, rtu("9600 8N2")),
-        (1, Family::Atv28, rtu("9600 8N1")),
-        (28, Family::Atv28, rtu("19200 8N1")),
-        (3, Family::Omron3g3ev, rtu("9600 8E1")),
-        (4, Family::Omron3g3ev, rtu("2400 8O1")),
-        (247, Family::Atv21, rtu("19200 8O1")),
-        (5, Family::Atv58, rtu("4800 8N1")),
-        (6, Family::Atv58, of("9600 7E1", drive_sim::Protocol::Ascii)),
-        (7, Family::Atv58, of("19200 7O2", drive_sim::Protocol::Ascii)),
-        (8, Family::Atv58, of("19200 8O1", drive_sim::Protocol::UniTelway)),
-        (9, Family::Atv58, of("4800 8O1", drive_sim::Protocol::UniTelway)),
+        (1, Family::ATV312, rtu("19200 8E1")),
+        (2, Family::ATV312, rtu("4800 8O1")),
+        (200, Family::ATV312, rtu("9600 8N2")),
+        (1, Family::ATV28, rtu("9600 8N1")),
+        (28, Family::ATV28, rtu("19200 8N1")),
+        (3, Family::OMRON_3G3EV, rtu("9600 8E1")),
+        (4, Family::OMRON_3G3EV, rtu("2400 8O1")),
+        (247, Family::ATV21, rtu("19200 8O1")),
+        (5, Family::ATV58, rtu("4800 8N1")),
+        (6, Family::ATV58, of("9600 7E1", drive_sim::Protocol::Ascii)),
+        (7, Family::ATV58, of("19200 7O2", drive_sim::Protocol::Ascii)),
+        (8, Family::ATV58, of("19200 8O1", drive_sim::Protocol::UniTelway)),
+        (9, Family::ATV58, of("4800 8O1", drive_sim::Protocol::UniTelway)),
     ];
     let add = |(address, family, dialect)| {
         let machine =
@@ -228,11 +228,11 @@ async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() 
     let simulated = SimLine::default();
     // n40 is 0 from the factory: after 2 s without a message it trips (§2.1).
     let drive =
-        simulated.add_boxed(1, simulated::model(Family::Omron3g3ev, SetUp::Factory).unwrap()).unwrap();
+        simulated.add_boxed(1, simulated::model(Family::OMRON_3G3EV, SetUp::Factory).unwrap()).unwrap();
     drive.set_dialect(Dialect { settings: serial("9600 8E1"), ..Dialect::default() });
     // ttO of a second and SLL, which trips.
-    let other = simulated.add_boxed(2, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
-    let rows = Family::Atv312.capabilities().rows;
+    let other = simulated.add_boxed(2, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
+    let rows = Family::ATV312.capabilities().rows;
     let tto = rows.iter().find(|row| row.code == "ttO").unwrap();
     assert!(other.poke(tto.address, 10));
     let plan = Plan::new(Others::default().trials(None), &addresses(1..=31), WAIT);
@@ -268,7 +268,7 @@ mod two_at_one_address {
 
     #[tokio::test(start_paused = true)]
     async fn two_of_one_family_are_known_by_what_they_differ_in() {
-        let (simulated, one, _) = two(Family::Atv312, Family::Atv312);
+        let (simulated, one, _) = two(Family::ATV312, Family::ATV312);
         // The version of their firmware (UdP, W3302).
         assert!(one.poke(3_302, 0x1305));
         let answer = verdict(&simulated).await;
@@ -280,16 +280,16 @@ mod two_at_one_address {
 
     #[tokio::test(start_paused = true)]
     async fn two_that_say_the_same_at_the_same_moment_cannot_be_told_from_one() {
-        let (simulated, ..) = two(Family::Atv312, Family::Atv312);
+        let (simulated, ..) = two(Family::ATV312, Family::ATV312);
         assert!(matches!(verdict(&simulated).await, Answer::Slave(alike) if alike.len() == 1));
     }
 
     #[tokio::test(start_paused = true)]
     async fn two_of_different_families_are_known() {
         for (one, other) in [
-            (Family::Atv312, Family::Atv21),
-            (Family::Atv28, Family::Omron3g3ev),
-            (Family::Atv58, Family::Atv28),
+            (Family::ATV312, Family::ATV21),
+            (Family::ATV28, Family::OMRON_3G3EV),
+            (Family::ATV58, Family::ATV28),
         ] {
             let (simulated, ..) = two(one, other);
             let answer = verdict(&simulated).await;
@@ -300,7 +300,7 @@ mod two_at_one_address {
     #[tokio::test(start_paused = true)]
     async fn a_second_answer_after_the_first_or_into_it_is_known() {
         for millis in [6, 8, 15, 40, 90] {
-            let (simulated, _, other) = two(Family::Atv312, Family::Atv312);
+            let (simulated, _, other) = two(Family::ATV312, Family::ATV312);
             other.set_turnaround(Some(Duration::from_millis(millis)));
             let answer = verdict(&simulated).await;
             assert!(matches!(answer, Answer::Two { .. }), "{millis} ms: {answer:?}");
@@ -312,7 +312,7 @@ mod two_at_one_address {
         for seed in 0..20 {
             let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
             simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, ALWAYS / 10));
-            simulated.add_boxed(5, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+            simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
             let answer = verdict(&simulated).await;
             assert!(matches!(&answer, Answer::Slave(alike) if alike.len() == 1), "{seed}: {answer:?}");
         }

@@ -85,7 +85,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
     let plug = Plug(plug);
     let mut machines = Vec::new();
     for address in 1..=DRIVES {
-        let model = simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap();
+        let model = simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap();
         machines.push(simulated.add_boxed(address, model).unwrap());
     }
     let port = simulated.clone();
@@ -101,7 +101,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         settings.watchdog = (address == 3)
             .then_some(WatchdogContract { timeout: Duration::from_secs(10), reaction: Reaction::Ramp });
         builder = builder.drive("north", address, settings, |port, slave: SlaveAddress| {
-            Family::Atv312.open_with(port, slave, &Options::default())
+            Family::ATV312.open_with(port, slave, &Options::default())
         });
     }
     let fleet = builder.start().unwrap();
@@ -241,11 +241,11 @@ async fn a_drive_that_a_reload_adds_is_told_of_by_its_line_and_name() {
     let settings = SerialSettings::MODBUS_DEFAULT;
     let simulated = SimLine::new(Wiring::rtu(settings));
     for address in [1, 2] {
-        simulated.add_boxed(address, simulated::model(Family::Atv312, SetUp::ForTheBus).unwrap()).unwrap();
+        simulated.add_boxed(address, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
     }
     let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
     let open = |port: drive_bus::Slave, slave: SlaveAddress| {
-        Family::Atv312.open_with(port, slave, &Options::default())
+        Family::ATV312.open_with(port, slave, &Options::default())
     };
     let builder = Fleet::builder().line("north", line);
     let fleet = builder.drive("north", 1, DriveSettings::watched("pump 1"), open).start().unwrap();

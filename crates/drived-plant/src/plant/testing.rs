@@ -40,7 +40,7 @@ impl TestPlant {
 
     /// Drives with these settings, each once it can be started or has been tried for long enough.
     pub async fn with(drives: u8, settings: impl Fn(String) -> DriveSettings) -> Self {
-        let family = Family::Atv312;
+        let family = Family::ATV312;
         let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
         let config = LineConfig {
             response_timeout: Duration::from_millis(100),

@@ -63,7 +63,7 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
     let reloader = Reloader::new(plant, Notify::start(), Names::default(), file.clone(), config);
     // Somebody else in the program has taken a name that the file does not know yet.
-    let family = Family::Atv312;
+    let family = Family::ATV312;
     let stranger = DriveSettings::watched("four".to_owned());
     let options = simulated::options();
     fleet

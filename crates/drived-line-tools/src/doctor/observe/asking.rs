@@ -200,7 +200,7 @@ impl Asking {
     fn asker(&self, task: &Task, slave: SlaveAddress) -> Asker {
         let named = task.expected.iter().find(|name| name.slave == slave);
         // An exception is an answer too, so that any family's shortest question does.
-        let family = named.map_or(Family::Atv312, |name| name.family);
+        let family = named.map_or(Family::ATV312, |name| name.family);
         let mut drive = family.open_with(self.line.slave(slave.number()), slave, &Options::default());
         own_line::wait_at_most(&mut *drive);
         let is_named = named.is_some();

@@ -35,7 +35,7 @@ enum Broken {
 }
 
 /// Who stands on the line.
-const FAMILIES: [Family; 3] = [Family::Atv21, Family::Omron3g3ev, Family::Atv312];
+const FAMILIES: [Family; 3] = [Family::ATV21, Family::OMRON_3G3EV, Family::ATV312];
 
 /// A panel that reads one word of two drives.
 fn somebody() -> SecondMaster {
@@ -89,7 +89,7 @@ async fn broken(broken: Broken, bench: &Bench) {
         }
         Broken::TwoAtTheThird(micros) => {
             let other =
-                line.add_beside(3, simulated::model(Family::Atv312, SetUp::Factory).unwrap()).unwrap();
+                line.add_beside(3, simulated::model(Family::ATV312, SetUp::Factory).unwrap()).unwrap();
             other.set_turnaround(Some(Duration::from_micros(5_000 + micros)));
         }
         Broken::OtherSettings(_, talks) => {

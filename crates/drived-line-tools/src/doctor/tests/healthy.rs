@@ -9,7 +9,7 @@ use super::*;
 fn line(seed: u64) -> Bench {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
     let families: Vec<Family> =
-        (0..=random.below(12)).map(|_| Family::ALL[random.below(Family::ALL.len())]).collect();
+        (0..=random.below(12)).map(|_| Family::BUILT_IN[random.below(Family::BUILT_IN.len())]).collect();
     let speeds = [9_600, 19_200, 38_400].into_iter();
     let formats = [CharacterFormat::F8N1, CharacterFormat::F8E1, CharacterFormat::F8O1];
     let possible: Vec<SerialSettings> = speeds
@@ -32,7 +32,7 @@ fn line(seed: u64) -> Bench {
     for (machine, family) in bench.machines.iter().zip(&families) {
         let turnaround = Duration::from_micros(3_000 + random.below(25_000) as u64);
         // A 3G3EV waits as long as its n65 says.
-        if *family != Family::Omron3g3ev {
+        if *family != Family::OMRON_3G3EV {
             machine.set_turnaround(Some(turnaround));
         }
     }

@@ -54,7 +54,7 @@ impl Ways for Through {
 
 /// What the doctor notices of two drives through something.
 async fn seen(change: Change, time: Duration) -> Observations {
-    let bench = Bench::of(&[Family::Atv312, Family::Atv21]);
+    let bench = Bench::of(&[Family::ATV312, Family::ATV21]);
     let task = bench.task(LineConfig::stream(bench.serial), time);
     observe::observe(&task, &Through(bench.line.clone(), change), |_| {}, std::future::pending())
         .await
@@ -108,7 +108,7 @@ async fn a_line_that_is_silent_from_the_eighth_second_is_no_noise() {
 
 /// One that refuses everything, for another reason each.
 async fn refused(code: u8) -> Observations {
-    let bench = Bench::of(&[Family::Atv312]);
+    let bench = Bench::of(&[Family::ATV312]);
     let task = bench.task(LineConfig::stream(bench.serial), 10 * SECOND);
     let line = move |mut far: DuplexStream| async move {
         let mut bytes = [0; 512];
@@ -154,7 +154,7 @@ async fn exceptions_to_everything_are_not_healthy_and_name_who_gives_them() {
 
 #[tokio::test(start_paused = true)]
 async fn a_diagnosis_that_is_asked_to_end_judges_from_what_there_is() {
-    let bench = Bench::of(&[Family::Atv312]);
+    let bench = Bench::of(&[Family::ATV312]);
     let task = bench.task(LineConfig::stream(bench.serial), 60 * SECOND);
     let ways = Through(bench.line.clone(), |_, said| {
         said.remove(0);
@@ -168,7 +168,7 @@ async fn a_diagnosis_that_is_asked_to_end_judges_from_what_there_is() {
 
 #[tokio::test(start_paused = true)]
 async fn a_gateway_that_answers_for_a_dead_drive_is_not_taken_for_the_drive() {
-    let bench = Bench::of(&[Family::Atv312]);
+    let bench = Bench::of(&[Family::ATV312]);
     bench.machine(1).mute();
     let gateway = bench.line.behind(drive_sim::Gateway {
         attempts: 1,

@@ -271,7 +271,7 @@ mod tests {
         let tenths = drive("a", "Inr = { raw = 1 }\nACC = { raw = 30 }\ndEC = { raw = 30 }");
         let hundredths = drive("b", "Inr = { raw = 0 }\nACC = { raw = 300 }\ndEC = { raw = 30 }");
         assert_eq!(codes(&tenths, &hundredths, false), ["Inr", "dEC"]);
-        let factory = Backup::of_factory(Family::Atv312);
+        let factory = Backup::of_factory(Family::ATV312);
         assert_eq!(Comparison::of(&tenths, &factory, false).differences, []);
     }
 

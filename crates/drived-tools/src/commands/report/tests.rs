@@ -35,7 +35,7 @@ impl Bench {
     fn new() -> Self {
         let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).unwrap();
         let line = SimLine::new(Wiring::rtu(settings));
-        let machines = Family::ALL.into_iter().zip(1..).map(|(family, slave)| {
+        let machines = Family::BUILT_IN.into_iter().zip(1..).map(|(family, slave)| {
             let machine = line.add_boxed(slave, simulated::model(family, SetUp::Factory).unwrap()).unwrap();
             (DriveName { family, slave: SlaveAddress::try_from(slave).unwrap() }, machine)
         });
@@ -85,8 +85,8 @@ fn texts(html: &str) -> String {
 async fn a_report_of_five_families_with_one_tripped_and_one_dead_says_so_and_writes_to_none() {
     let bench = Bench::new();
     // BBV51701, LFT: 9 is OCF.
-    bench.machine(Family::Atv312).trip(9);
-    bench.machine(Family::Atv28).mute();
+    bench.machine(Family::ATV312).trip(9);
+    bench.machine(Family::ATV28).mute();
     let gathered = bench.read(true).await;
     let html = html(&gathered);
     for (name, machine) in &bench.machines {
@@ -114,7 +114,7 @@ async fn a_report_of_five_families_with_one_tripped_and_one_dead_says_so_and_wri
 async fn what_differs_from_factory_stands_there_in_its_unit_and_what_cannot_be_judged_apart() {
     let bench = Bench::new();
     // BBV51701 p. 39: ACC, 3.0 s from the factory, in tenths.
-    assert!(bench.machine(Family::Atv312).poke(9_001, 125));
+    assert!(bench.machine(Family::ATV312).poke(9_001, 125));
     let html = html(&bench.read(true).await);
     let chapter = chapter(&html, "atv312@4");
     let ramp = chapter.split_once("\nACC\n").map(|(_, row)| row.lines().take(6).collect::<Vec<_>>()).unwrap();
@@ -143,7 +143,7 @@ async fn answer_times_are_those_of_the_simulator_and_each_slave_has_its_picture(
     for (_, machine) in &bench.machines {
         machine.set_turnaround(Some(Duration::from_millis(25)));
     }
-    bench.machine(Family::Atv21).mute();
+    bench.machine(Family::ATV21).mute();
     let gathered = bench.read(false).await;
     let line = gathered.lines[0].as_ref().unwrap();
     for slave in line.line.slaves.iter().filter(|slave| slave.slave != 1) {

@@ -156,7 +156,7 @@ fn seen(machine: &SimSlave) -> Vec<u16> {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_in_factory_setting_is_restored_to_no_difference_in_the_order_of_its_manual() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let file = Bench::kept(family).await;
         let mut new = Bench::of(family, SetUp::Factory);
         assert!(!new.differences(&file).await.is_empty(), "{family}");
@@ -190,7 +190,7 @@ async fn a_drive_in_factory_setting_is_restored_to_no_difference_in_the_order_of
 
 #[tokio::test(start_paused = true)]
 async fn whenever_the_line_is_cut_it_is_told_what_was_written_and_the_next_run_goes_on() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let file = Bench::kept(family).await;
         let mut whole = Bench::of(family, SetUp::Factory);
         let plan = whole.plan(&file).await;
@@ -239,7 +239,7 @@ async fn whenever_the_line_is_cut_it_is_told_what_was_written_and_the_next_run_g
 
 #[tokio::test(start_paused = true)]
 async fn functions_that_exclude_each_other_are_taken_away_before_others_are_given() {
-    let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+    let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
     let presets = bench.source.keep().await.unwrap();
     let mut pi = presets.clone();
     for (code, word) in [("PIF", 1), ("SA2", 0), ("PS2", 0), ("PS4", 0)] {
@@ -255,12 +255,12 @@ async fn functions_that_exclude_each_other_are_taken_away_before_others_are_give
 
 #[tokio::test(start_paused = true)]
 async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_written() {
-    let file = Bench::kept(Family::Atv312).await;
+    let file = Bench::kept(Family::ATV312).await;
     // BBV51701 p. 35: from L3 back to L1 only by a factory setting.
     for (code, word, set_up) in [("LAC", 0, SetUp::ForTheBus)] {
         let mut file = file.clone();
         file.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
-        let mut new = Bench::of(Family::Atv312, set_up);
+        let mut new = Bench::of(Family::ATV312, set_up);
         let plan = new.plan(&file).await;
         let carried = new.carry(&plan).await;
         let stopped = carried.stopped.as_ref().unwrap_or_else(|| panic!("{code} was written"));
@@ -276,9 +276,9 @@ async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_wr
 
 #[tokio::test(start_paused = true)]
 async fn the_line_itself_is_changed_only_if_that_is_asked_for_and_last() {
-    let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+    let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
     let now = bench.source.keep().await.unwrap();
-    let file = Bench::kept(Family::Atv312).await;
+    let file = Bench::kept(Family::ATV312).await;
     let without = Plan::of(&file, &now, false).unwrap();
     assert!(!codes(&without.changes).contains(&"Add"));
     let skipped = without.skipped.iter().find(|(row, _)| row.code == "Add").unwrap();
@@ -301,11 +301,11 @@ async fn say(bench: &mut Bench, file: &Backup, more: &[&str]) -> Result<Told, Fa
 
 #[tokio::test(start_paused = true)]
 async fn nothing_is_written_without_write_to_another_family_or_to_another_rating() {
-    let file = Bench::kept(Family::Atv312).await;
-    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    let file = Bench::kept(Family::ATV312).await;
+    let mut new = Bench::of(Family::ATV312, SetUp::Factory);
     let told = say(&mut new, &file, &[]).await.unwrap();
     assert!(told.failure.is_none() && told.text.iter().any(|text| text.contains("nothing has been written")));
-    let mut other = Bench::of(Family::Atv28, SetUp::Factory);
+    let mut other = Bench::of(Family::ATV28, SetUp::Factory);
     let Err(Failure::Input(why)) = say(&mut other, &file, &["--write"]).await else { panic!("taken") };
     assert!(why.contains("the file is of the family atv312"), "{why}");
 
@@ -324,10 +324,10 @@ async fn nothing_is_written_without_write_to_another_family_or_to_another_rating
 
 #[tokio::test(start_paused = true)]
 async fn a_macro_configuration_of_another_drive_is_said_before_anything_is_written_and_set_by_hand() {
-    let mut file = Bench::kept(Family::Atv312).await;
+    let mut file = Bench::kept(Family::ATV312).await;
     // BBV51701 p. 32: CFG, 0 = StS, 1 = Std, which is its factory setting; a write loads that configuration at once.
     file.entries.iter_mut().find(|entry| entry.row.code == "CFG").unwrap().held = Ok(0);
-    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    let mut new = Bench::of(Family::ATV312, SetUp::Factory);
     assert!(new.differences(&file).await.contains(&"CFG"), "diff shows it");
     let told = say(&mut new, &file, &[]).await.unwrap();
     let first =
@@ -345,7 +345,7 @@ async fn a_macro_configuration_of_another_drive_is_said_before_anything_is_writt
     assert!(told.failure.is_none(), "{:?}", told.failure);
     assert_eq!(new.differences(&file).await, [""; 0]);
     // Without that the rest is written if it is asked for, and CFG never.
-    let mut other = Bench::of(Family::Atv312, SetUp::Factory);
+    let mut other = Bench::of(Family::ATV312, SetUp::Factory);
     let told = say(&mut other, &file, &["--write", "--other-macro"]).await.unwrap();
     assert!(told.failure.is_none(), "{:?}", told.failure);
     assert_eq!(other.differences(&file).await, ["CFG"]);
@@ -355,7 +355,7 @@ async fn a_macro_configuration_of_another_drive_is_said_before_anything_is_writt
 #[tokio::test(start_paused = true)]
 async fn what_acts_only_after_a_power_cycle_is_said_before_and_after_it_is_written() {
     // 3G3EV §2.1, note 3: n02, n39, n40 and n63 to n67 need a power cycle; §2.1: n39 is 0 from the factory.
-    let mut bench = Bench::of(Family::Omron3g3ev, SetUp::Factory);
+    let mut bench = Bench::of(Family::OMRON_3G3EV, SetUp::Factory);
     let mut file = bench.source.keep().await.unwrap();
     file.entries.iter_mut().find(|entry| entry.row.code == "n39").unwrap().held = Ok(1);
     let told = say(&mut bench, &file, &[]).await.unwrap();
@@ -370,7 +370,7 @@ async fn what_acts_only_after_a_power_cycle_is_said_before_and_after_it_is_writt
     );
     // What acts at once is not said to act later: n19, the acceleration.
     let of = |family: Family, address| family.capabilities().restoring.acts_later(address).is_some();
-    assert!(of(Family::Omron3g3ev, 0x0102) && !of(Family::Omron3g3ev, 0x0114));
+    assert!(of(Family::OMRON_3G3EV, 0x0102) && !of(Family::OMRON_3G3EV, 0x0114));
     // Altivar 21 §6.1: protocol, speed and parity after a reset, the address at once; §6.3: the blocks after a reset.
     for (address, later) in [
         (0x0829, true),
@@ -381,16 +381,16 @@ async fn what_acts_only_after_a_power_cycle_is_said_before_and_after_it_is_writt
         (0x0875, true),
         (0x0803, false),
     ] {
-        assert_eq!(of(Family::Atv21, address), later, "{address:04X}h");
+        assert_eq!(of(Family::ATV21, address), later, "{address:04X}h");
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_value_that_the_manual_does_not_allow_is_refused_before_anything_is_written() {
-    let mut file = Bench::kept(Family::Atv312).await;
+    let mut file = Bench::kept(Family::ATV312).await;
     // JGF, 0 to 10 Hz (BBV51701 p. 45).
     file.entries.iter_mut().find(|entry| entry.row.code == "JGF").unwrap().held = Ok(101);
-    let mut new = Bench::of(Family::Atv312, SetUp::Factory);
+    let mut new = Bench::of(Family::ATV312, SetUp::Factory);
     let Err(Failure::Input(why)) = say(&mut new, &file, &["--write"]).await else { panic!("taken") };
     assert!(why.contains("JGF") && why.contains("10.1 Hz is not allowed"), "{why}");
     assert_eq!(seen(&new.machine), [0_u16; 0]);
@@ -398,7 +398,7 @@ async fn a_value_that_the_manual_does_not_allow_is_refused_before_anything_is_wr
 
 #[tokio::test(start_paused = true)]
 async fn nothing_is_written_to_a_drive_whose_motor_runs() {
-    for family in [Family::Atv21, Family::Atv28, Family::Atv312, Family::Omron3g3ev] {
+    for family in [Family::ATV21, Family::ATV28, Family::ATV312, Family::OMRON_3G3EV] {
         let file = Bench::kept(family).await;
         let mut running = Bench::of(family, SetUp::ForTheBus);
         running.run().await;
@@ -415,7 +415,7 @@ async fn nothing_is_written_to_a_drive_whose_motor_runs() {
 
 #[tokio::test(start_paused = true)]
 async fn the_eeprom_is_written_only_where_it_is_asked_for_or_the_drive_does_it_by_itself() {
-    for family in Family::ALL {
+    for family in Family::BUILT_IN {
         let file = Bench::kept(family).await;
         for save in [false, true] {
             let mut new = Bench::of(family, SetUp::Factory);
@@ -434,10 +434,10 @@ async fn the_eeprom_is_written_only_where_it_is_asked_for_or_the_drive_does_it_b
                 _ => writes,
             };
             assert_eq!(writes, expected, "{family} {save}: {:?}", told.text);
-            if family == Family::Atv21 {
+            if family == Family::ATV21 {
                 assert_eq!(usize::try_from(writes).unwrap(), written, "{:?}", told.text);
             }
-            if [Family::Atv312, Family::Omron3g3ev].contains(&family) {
+            if [Family::ATV312, Family::OMRON_3G3EV].contains(&family) {
                 new.machine.power_cycle();
                 sleep(Duration::from_secs(5)).await;
                 assert_eq!(new.differences(&file).await.is_empty(), save, "{family}");

@@ -109,7 +109,7 @@ mod tests {
 
     /// What is kept of a drive to which something happens after so many requests.
     async fn kept(after: u64, happens: impl Fn(&drive_sim::SimSlave) + Send + 'static) -> Backup {
-        let mut bench = Bench::of(Family::Atv312, SetUp::Factory);
+        let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
         let machine = bench.machine.clone();
         let happening = tokio::spawn(async move {
             machine.wait_for_requests(after).await;
@@ -117,7 +117,7 @@ mod tests {
         });
         let backup = bench.source.keep().await.unwrap();
         happening.await.unwrap();
-        let kept = Family::Atv312.capabilities().rows.iter().filter(|row| is_kept(Family::Atv312, row));
+        let kept = Family::ATV312.capabilities().rows.iter().filter(|row| is_kept(Family::ATV312, row));
         assert!(kept.eq(backup.entries.iter().map(|entry| entry.row)), "nothing is left out");
         backup
     }
