@@ -416,8 +416,7 @@ impl Gate {
 
     fn log_in(&self, door: &Door, peer: Peer, caller: Caller, body: &[u8]) -> Result<Response, Refusal> {
         self.wait(peer)?;
-        let LoginBody { token: secret } = serde_json::from_slice(body)
-            .map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "expected {\"token\": \"drv_…\"}"))?;
+        let LoginBody { token: secret } = token_desk::read(body, "{\"token\": \"drv_…\"}")?;
         let secret = secret.trim();
         let Some(token) = self.token(secret).map_err(unreadable)? else {
             return Err(self.failed(peer, &caller));

@@ -498,3 +498,21 @@ async fn tokens_are_made_and_removed_over_the_socket_and_by_no_door_that_others_
     let audited = rig.audited().await;
     assert_eq!(audited.iter().filter(|line| *line == "token local -").count(), 2, "{audited:?}");
 }
+
+#[tokio::test]
+async fn a_null_in_what_is_asked_of_tokens_is_refused_with_the_name_of_its_key() {
+    let rig = Rig::new("token-null");
+    for (method, path, body, key) in [
+        ("POST", TOKENS, r#"{"name":"panel","role":"view","days":null}"#, "days: null is no value"),
+        ("POST", TOKENS, r#"{"name":"panel","role":"view","scope":null}"#, "scope: null is no value"),
+        ("POST", TOKENS, r#"{"name":"panel","role":"view","role":"engineer"}"#, "role stands there twice"),
+        ("PUT", "/api/v1/tokens/panel", r#"{"hours":null}"#, "hours: null is no value"),
+        ("POST", LOGIN, r#"{"token":null}"#, "token: null is no value"),
+    ] {
+        let answer = rig.ask_on_socket(&Asked { method, path, body, headers: &[] }).await;
+        answer.assert_refused(400);
+        assert!(answer.body.contains(key), "{}", answer.body);
+    }
+    let listed = rig.ask_on_socket(&Asked { path: TOKENS, ..STATE }).await.body;
+    assert!(!listed.contains("panel"), "{listed}");
+}

@@ -9,7 +9,7 @@ use axum::{
     response::Response,
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use tokio::task::spawn_blocking;
 
 use super::{
@@ -18,7 +18,7 @@ use super::{
     tokens::{Token, TokenError, TokenView, Tokens},
 };
 use drived_config::rights::{Caller, Role, Scope};
-use drived_words::json::line;
+use drived_words::{json::line, strict};
 
 /// Where tokens are made, listed and, with the name of one behind it, removed.
 pub const TOKENS: &str = "/api/v1/tokens";
@@ -122,12 +122,7 @@ pub(super) async fn answer(
             Ok(told(&TokensView { file, tokens: tokens.views().map_err(refused)? }))
         }
         (&Method::POST, None) => {
-            let NewToken { name, role, scope, days } = serde_json::from_slice(body).map_err(|error| {
-                Refusal::new(
-                    StatusCode::BAD_REQUEST,
-                    format!("expected {{\"name\": …, \"role\": …}}: {error}"),
-                )
-            })?;
+            let NewToken { name, role, scope, days } = read(body, "{\"name\": …, \"role\": …}")?;
             let rights = (role, scope.clone());
             let add = move |tokens: &Tokens, name: &str| tokens.add(name, rights, days.map(of_days));
             let token = changed(&tokens, name.clone(), add).await?;
@@ -139,9 +134,7 @@ pub(super) async fn answer(
             Ok(told(&MadeToken { name, role, scope, token }))
         }
         (&Method::PUT, Some(name)) => {
-            let Rotation { hours } = serde_json::from_slice(body).map_err(|error| {
-                Refusal::new(StatusCode::BAD_REQUEST, format!("expected {{\"hours\": …}}: {error}"))
-            })?;
+            let Rotation { hours } = read(body, "{\"hours\": …}")?;
             let rotate = move |tokens: &Tokens, name: &str| tokens.rotate(name, of_hours(hours));
             let (token, secret) = changed(&tokens, name.to_owned(), rotate).await?;
             record(replaced(name, hours)).whenever();
@@ -157,6 +150,12 @@ pub(super) async fn answer(
             Err(Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "tokens are listed, made, replaced and removed"))
         }
     }
+}
+
+/// What is asked for, read as strictly as a command.
+pub(super) fn read<T: DeserializeOwned>(body: &[u8], expected: &str) -> Result<T, Refusal> {
+    strict::body(body)
+        .map_err(|unclear| Refusal::new(StatusCode::BAD_REQUEST, format!("expected {expected}: {unclear}")))
 }
 
 /// What changes a file waits for the disk, and no task for that.

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use drived_plant::plant::commands::{ActionWord, OutcomeWord, Rejected, Unclear};
+use drived_plant::plant::commands::{ActionWord, OutcomeWord, Rejected};
+use drived_words::strict::Unclear;
 
 /// Why a message does nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

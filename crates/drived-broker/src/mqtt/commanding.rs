@@ -20,8 +20,9 @@ use crate::{
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::{
     follow::SETTLES_FOR,
-    plant::commands::{Action, LIFETIME, OutcomeWord, Said, Target, Unclear, is_id},
+    plant::commands::{Action, LIFETIME, OutcomeWord, Said, Target, is_id},
 };
+use drived_words::strict::Unclear;
 
 /// Who asks where the topic names nobody.
 const NAMELESS: &str = "mqtt";

@@ -23,9 +23,9 @@ use crate::{
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::plant::{
     Plant,
-    commands::{Action, Said, Target, Unclear},
+    commands::{Action, Said, Target},
 };
-use drived_words::json::unix;
+use drived_words::{json::unix, strict::Unclear};
 
 /// Who asks: hosts do not say who they are.
 const CALLER: &str = "sparkplug";

@@ -13,8 +13,9 @@ use tokio::time::Instant;
 
 use super::problem::Problem;
 use drived_doors::Caller;
-use drived_plant::plant::commands::{Said, body};
+use drived_plant::plant::commands::Said;
 use drived_words::duration::Time;
+use drived_words::strict::body;
 
 /// How long an answer is waited for, unless it is said, and at the longest.
 const WAIT: Duration = Duration::from_secs(2);

@@ -16,9 +16,10 @@ use serde_json::Value;
 use drived_config::rights::Caller;
 use drived_doors::lacking;
 use drived_plant::plant::{
-    commands::{OutcomeWord, Rejected, Unclear},
+    commands::{OutcomeWord, Rejected},
     views::CommandView,
 };
+use drived_words::strict::Unclear;
 
 /// The kind of a command that was refused.
 const REFUSED: &str = "urn:drived:refused";

@@ -5,7 +5,6 @@
 mod body;
 mod carry;
 mod log;
-mod object;
 mod outcome;
 mod said;
 mod settle;
@@ -27,7 +26,7 @@ pub use self::{
     body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
     log::Told,
     outcome::OutcomeWord,
-    said::{Said, Unclear, body},
+    said::Said,
 };
 use self::{carry::Work, log::Found};
 use super::{Plant, views::CommandView};

@@ -1,35 +1,21 @@
 //! What a message says, read strictly: whoever asks for motion says one thing, and a stop is one whatever else it says.
 //!
-//! Two values of one key, a key that nobody knows and a `null` are refused by the name of the key, at every door. What names
-//! a stop without being one is said to be neither stop nor start, so that nobody believes that the motor stops.
+//! What is refused of everything that is no stop: [`drived_words::strict`].
 
 use std::time::Duration;
 
 use drive_core::StopMode;
 use drive_fleet::StopOrder;
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use drived_words::{
+    object::Object,
+    strict::{STOP, Unclear, object, strict, unambiguous},
+};
+use serde_json::Value;
 
 use super::{
     Action, ActionWord,
     body::{Asked, is_id},
-    object::Object,
 };
-
-/// The word of a stop.
-const STOP: &str = "stop";
-
-/// Why it cannot be understood.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Unclear {
-    #[error("it is no JSON: {0}")]
-    NoJson(String),
-    #[error("{0}")]
-    Malformed(String),
-    /// It names a stop beside something else.
-    #[error("{0}: this is no stop and no start")]
-    Ambiguous(String),
-}
 
 /// A message, as far as it can be understood.
 #[derive(Debug, Clone)]
@@ -108,18 +94,6 @@ impl Said {
     }
 }
 
-/// A body whose address says what it asks for; nothing stands for an object without members.
-///
-/// # Errors
-/// Why it is none of these.
-pub fn body<T: DeserializeOwned>(text: &[u8]) -> Result<T, Unclear> {
-    let text = if text.trim_ascii().is_empty() { b"{}" } else { text };
-    let object = object(text)?;
-    unambiguous(&object)?;
-    let members = strict(object)?;
-    serde_json::from_value(Value::Object(members)).map_err(malformed)
-}
-
 /// What an object that is no stop asks for, and when it was issued.
 fn asked(object: &Object) -> Result<(Asked, Option<u64>), Unclear> {
     unambiguous(object)?;
@@ -135,48 +109,8 @@ fn asked(object: &Object) -> Result<(Asked, Option<u64>), Unclear> {
     Ok((asked, issued.transpose()?))
 }
 
-fn object(text: &[u8]) -> Result<Object, Unclear> {
-    match Object::read(text) {
-        Ok(Some(object)) => Ok(object),
-        Ok(None) => {
-            let what = if text.trim_ascii() == b"null" { ", and not null" } else { "" };
-            Err(Unclear::Malformed(format!("expected an object in JSON{what}")))
-        }
-        Err(error) => Err(Unclear::NoJson(error.to_string())),
-    }
-}
-
-/// Refuses what names a stop and is none.
-fn unambiguous(object: &Object) -> Result<(), Unclear> {
-    let is_stop = |text: &str| text.trim().eq_ignore_ascii_case(STOP);
-    for (key, value) in object.members() {
-        if is_stop(key) {
-            return Err(Unclear::Ambiguous(format!("{key} is no key of a command")));
-        }
-        if key == "action" && value.as_str().is_some_and(is_stop) {
-            return Err(Unclear::Ambiguous(format!("its action is {value}, and not only that")));
-        }
-    }
-    Ok(())
-}
-
-/// Its members, of which each stands there once and has a value.
-fn strict(object: Object) -> Result<Map<String, Value>, Unclear> {
-    if let Some(key) = object.twice() {
-        return Err(Unclear::Malformed(format!("{key} stands there twice")));
-    }
-    if let Some(key) = object.null() {
-        return Err(Unclear::Malformed(format!("{key}: null is no value: leave the key out")));
-    }
-    Ok(object.into_members())
-}
-
 fn mode(value: &Value) -> Option<StopMode> {
     serde_json::from_value(value.clone()).ok()
-}
-
-fn malformed(error: serde_json::Error) -> Unclear {
-    Unclear::Malformed(error.to_string())
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use serde_json::{Map, Number, Value};
 
 /// The members of an object, in their order.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Object {
+pub struct Object {
     members: Vec<(String, Value)>,
     twice: Option<String>,
     null: Option<String>,
@@ -21,45 +21,45 @@ impl Object {
     ///
     /// # Errors
     /// It is no JSON.
-    pub(super) fn read(text: &[u8]) -> serde_json::Result<Option<Self>> {
+    pub fn read(text: &[u8]) -> serde_json::Result<Option<Self>> {
         Ok(match serde_json::from_slice(text)? {
             Node::Object(object) => Some(object),
             Node::Other(..) => None,
         })
     }
 
-    pub(super) fn members(&self) -> impl Iterator<Item = (&str, &Value)> {
+    pub fn members(&self) -> impl Iterator<Item = (&str, &Value)> {
         self.members.iter().map(|(key, value)| (key.as_str(), value))
     }
 
     /// Every value of a key.
-    pub(super) fn all<'a>(&'a self, key: &'a str) -> impl Iterator<Item = &'a Value> {
+    pub fn all<'a>(&'a self, key: &'a str) -> impl Iterator<Item = &'a Value> {
         self.members().filter(move |(known, _)| *known == key).map(|(_, value)| value)
     }
 
     /// The value of a key that stands there once.
-    pub(super) fn one<'a>(&'a self, key: &'a str) -> Option<&'a Value> {
+    pub fn one<'a>(&'a self, key: &'a str) -> Option<&'a Value> {
         let mut values = self.all(key);
         values.next().filter(|_| values.next().is_none())
     }
 
     /// The path of the first key that stands twice in its object, such as `setpoint.frequency_hz`.
-    pub(super) fn twice(&self) -> Option<&str> {
+    pub fn twice(&self) -> Option<&str> {
         self.twice.as_deref()
     }
 
     /// The path of the first key whose value is `null`.
-    pub(super) fn null(&self) -> Option<&str> {
+    pub fn null(&self) -> Option<&str> {
         self.null.as_deref()
     }
 
     /// The last value of each key.
-    pub(super) fn into_members(self) -> Map<String, Value> {
+    pub fn into_members(self) -> Map<String, Value> {
         self.members.into_iter().collect()
     }
 
     /// For somebody who reads it later: a key that stands there twice has all its values.
-    pub(super) fn shown(&self) -> Value {
+    pub fn shown(&self) -> Value {
         let mut values: BTreeMap<&str, Vec<Value>> = BTreeMap::new();
         for (key, value) in self.members() {
             values.entry(key).or_default().push(value.clone());
