@@ -1,11 +1,15 @@
 // A question of the page. Nothing behind it can be reached while it stands, but for the stop of all, which is above it.
 
 import { el } from './dom.js';
-import { t } from './texts.js';
+import { daemonNow } from './plant.js';
+import { named, t } from './texts.js';
 
 /** What a question stands before. */
 const BEHIND = '.bar, main, .demo, .skip';
+const SHOWN_MS = 12_000;
 let standing = 0;
+/** The questions whose yes is a command: for which drives, since when, and how each is taken away. */
+const questions = new Set();
 
 /** Puts a dialog with this form up: `close(value)` takes it away, Escape too; `closed` ends then, with the value. */
 export function ask(name, form) {
@@ -29,14 +33,31 @@ export function ask(name, form) {
   return { close: value => dialog.close(value), closed };
 }
 
-/** Asks; `true` when the answer is `yes`. Escape and Cancel are a no. */
-export async function confirmed(question, yes) {
+/** Asks whether these drives are commanded; `true` when the answer is `yes`. Escape, Cancel and a stop meanwhile are a no. */
+export async function confirmed(drives, question, yes) {
   const form = el('form', { method: 'dialog' },
     el('p', {}, question),
     el('div.buttons', {},
       el('button', { value: 'no' }, t('cancel')),
       el('button.primary', { value: 'yes' }, yes)));
-  return await ask(yes, form).closed === 'yes';
+  const { close, closed } = ask(yes, form);
+  const one = { drives, yes, close, since: daemonNow() };
+  questions.add(one);
+  const answer = await closed;
+  questions.delete(one);
+  return answer === 'yes';
+}
+
+/** A stop of all was pressed here, or the daemon tells of this one: what was asked of its drives before is asked no more. */
+export function withdraw(stop) {
+  for (const one of [...questions]) {
+    const stopped = [stop?.drive, ...(stop?.drives ?? []).map(each => each.drive)];
+    if (stop && (stop.time_unix_ms < one.since || !one.drives.some(drive => stopped.includes(drive)))) continue;
+    one.close('no');
+    const note = el('p.bad', {}, named(one.yes, t(stop ? 'withdrawn_by_stop' : 'withdrawn_by_stop_all')));
+    document.getElementById('outcomes').prepend(note);
+    setTimeout(() => note.remove(), SHOWN_MS);
+  }
 }
 
 function shut(isShut) {

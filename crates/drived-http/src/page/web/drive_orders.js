@@ -26,7 +26,7 @@ export function ordersPanel(name) {
   const mode = el('select', { 'aria-label': t('stop_mode') }, ...STOPS.map(kind => el('option', { value: kind }, word(kind))));
   const stop = button('stop', () => order('stop', { mode: mode.value }), { 'data-order': 'stop' });
   const reset = button('reset', askReset, { 'data-order': 'reset' });
-  const release = button('release', async () => await confirmed(t('confirm_release', { drive: name }), t('release')) && order('release'));
+  const release = button('release', async () => await confirmed([name], t('confirm_release', { drive: name }), t('release')) && order('release'));
   const moving = [setpoint.element, el('div.pair', {}, forward, reverse)];
   const stopping = el('div.pair', {}, stop, mode);
   const settling = el('div.pair', {}, reset, release);
@@ -61,12 +61,12 @@ export function ordersPanel(name) {
     const said = { drive: name, direction: t(`in_direction_${direction}`) };
     const at = plant.drives.get(name)?.setpoint?.frequency_hz;
     const question = at === undefined ? t('confirm_start', said) : t('confirm_start_at', { ...said, setpoint: quantity(at, 1, 'Hz') });
-    if (await confirmed(question, t(`start_${direction}`))) order('start', { direction });
+    if (await confirmed([name], question, t(`start_${direction}`))) order('start', { direction });
   }
 
   async function askReset() {
     const fault = faultText(plant.drives.get(name));
-    if (await confirmed(t('confirm_reset', { drive: name, fault }), t('reset'))) order('reset');
+    if (await confirmed([name], t('confirm_reset', { drive: name, fault }), t('reset'))) order('reset');
   }
 
   function order(action, body = {}) {

@@ -124,7 +124,7 @@ function parameterRow(name, row) {
   const field = el('input.small', { value: row.value ?? '', 'aria-label': row.mnemonic });
   const write = async event => {
     event.preventDefault();
-    if (!await confirmed(t('confirm_parameter', { drive: name, name: row.mnemonic, value: field.value }), t('set'))) return;
+    if (!await confirmed([name], t('confirm_parameter', { drive: name, name: row.mnemonic, value: field.value }), t('set'))) return;
     const number = Number(field.value.replace(',', '.'));
     const given = field.value.trim() === '' || Number.isNaN(number) ? field.value : number;
     carryOut(name, 'parameter', () => post(path('drives', name, 'parameters', row.mnemonic), { value: given }, 'PUT'));

@@ -1,5 +1,6 @@
 // The frame of the page: which view is shown, what the header says, who is told.
 
+import { withdraw } from './ask.js';
 import { writeDemo } from './demo.js';
 import { setAttribute, setClass, setText } from './dom.js';
 import { drive } from './drive.js';
@@ -30,7 +31,7 @@ let alarm;
 writeTexts();
 place('view').before(place('stop-account'));
 Object.assign(stopAll.later, {
-  closeStream: rest, openStream: start, lacksRight: askToken, told,
+  closeStream: rest, openStream: start, lacksRight: askToken, told, withdraw,
   isAlarmed: name => plant.drives.get(name)?.concerns?.some(concern => concern.kind === 'stop_unconfirmed'),
 });
 addEventListener('hashchange', open);

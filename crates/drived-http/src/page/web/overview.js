@@ -121,7 +121,7 @@ export function overview(root) {
   async function orderGroup(action) {
     const chosen = plant.groups.find(one => one.name === asked.group);
     if (action === 'start'
-      && !await confirmed(t('confirm_start_group', { count: chosen.drives.length, group: chosen.name }), t('start_group'))) return;
+      && !await confirmed(chosen.drives, t('confirm_start_group', { count: chosen.drives.length, group: chosen.name }), t('start_group'))) return;
     command(chosen.name, action, path('groups', chosen.name, action));
   }
 }

@@ -1,7 +1,7 @@
 
 // STOP ALL: sent at once, without a question, and followed until every drive is accounted for. It stands in the first bytes
 // of the document and needs nothing else of the page; what comes later may hand it `window.stopAll.later`: how to close the
-// page's stream, who lacks a right, the daemon's sentences and words in the page's language, whose stop the fleet alarms.
+// page's stream and its questions, who lacks a right, the daemon's sentences and words in the page's language, whose stop the fleet alarms.
 (() => {
   'use strict';
   const ATTEMPT_MS = 2_000;
@@ -66,6 +66,7 @@
 
   /** Where a stop is under way that nobody has answered, a press sends it once more; else it is another one. */
   function press() {
+    later.withdraw?.();
     if (account.phase === 'sending' || account.phase === 'unheard') return void wake();
     send(++presses);
   }
@@ -147,6 +148,7 @@
   /** What the page's stream tells of a command. */
   function news(command) {
     if (command.id === account.id && command.drives) take(command);
+    if (command.action === 'stop') later.withdraw?.(command);
   }
 
   function take(answer) {

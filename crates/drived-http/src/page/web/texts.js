@@ -108,6 +108,8 @@ const TABLE = {
   start_refused: ['A start would be refused now: {why}', 'Un démarrage serait refusé à présent : {why}'],
   confirm_start: ['{drive}: start {direction}? The motor will turn.', '{drive} : démarrer {direction} ? Le moteur va tourner.'],
   confirm_start_at: ['{drive}: start {direction} at {setpoint}? The motor will turn.', '{drive} : démarrer {direction} à {setpoint} ? Le moteur va tourner.'],
+  withdrawn_by_stop: ['question closed, a stop came meanwhile. Ask again if it is wanted still.', 'question fermée, un arrêt est arrivé entre-temps. Redemandez si cela reste voulu.'],
+  withdrawn_by_stop_all: ['question closed, all drives are to stop. Ask again if it is wanted still.', 'question fermée, tous les variateurs doivent s’arrêter. Redemandez si cela reste voulu.'],
   confirm_reset: ['{drive}: reset the fault {fault}? No motor starts by it. See first that its cause is gone.', '{drive} : acquitter le défaut {fault} ? Aucun moteur ne démarre de ce fait. Vérifiez d’abord que sa cause a disparu.'],
   confirm_release: ['{drive}: give control back to panel or terminals?', '{drive} : rendre la main au terminal ou au bornier ?'],
   confirm_start_group: ['Start the {count} drives of the group {group}? The motors will turn.', 'Démarrer les {count} variateurs du groupe {group} ? Les moteurs vont tourner.'],
