@@ -173,7 +173,7 @@ async fn changed<T: Send + 'static>(
 
 fn refused(error: TokenError) -> Refusal {
     let status = match error {
-        TokenError::Name(_) | TokenError::Reserved(_) | TokenError::Taken(_) => {
+        TokenError::Name(_) | TokenError::Reserved(_) | TokenError::Taken(_) | TokenError::Alike(..) => {
             StatusCode::UNPROCESSABLE_ENTITY
         }
         TokenError::Unknown { .. } => StatusCode::NOT_FOUND,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use subtle::ConstantTimeEq as _;
 
 use drived_config::{
+    config::look_alikes::are_alike,
     kept::{Kept, Readers, Stamp, digits, sha256},
     rights::{Role, Scope},
 };
@@ -111,6 +112,8 @@ pub enum TokenError {
     Reserved(String),
     #[error("there is a token {0} already: drived token remove {0}")]
     Taken(String),
+    #[error("{0} looks like {1}, which is a token already: choose another name")]
+    Alike(String, String),
     #[error("there is no token {name:?}: there are {there}", there = .there.join(", "))]
     Unknown { name: String, there: Vec<String> },
 }
@@ -206,8 +209,11 @@ impl Tokens {
         }
         let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
         let mut tokens = self.all()?;
-        if tokens.iter().any(|token| token.name == name) {
-            return Err(TokenError::Taken(name.to_owned()));
+        if let Some(taken) = tokens.iter().find(|token| are_alike(&token.name, name)) {
+            return Err(match taken.name == name {
+                true => TokenError::Taken(name.to_owned()),
+                false => TokenError::Alike(name.to_owned(), taken.name.clone()),
+            });
         }
         let secret = new_secret()?;
         let (sha256, made) = (sha256(secret.as_bytes()), now());
@@ -307,6 +313,11 @@ mod tests {
         let tokens = Tokens::open(&folder.file("tokens")).unwrap();
         for name in ["", "local", "anonymous", "a b", "päuse", "line\nbreak", &"x".repeat(65)] {
             assert!(tokens.add(name, (Role::View, None), None).is_err(), "{name:?}");
+        }
+        tokens.add("panel-1", (Role::View, None), None).unwrap();
+        for name in ["panel-l", "Panel-1"] {
+            let alike = Err(TokenError::Alike(name.to_owned(), "panel-1".to_owned()));
+            assert_eq!(tokens.add(name, (Role::View, None), None), alike);
         }
         assert!(matches!(tokens.remove("gone"), Err(TokenError::Unknown { .. })));
     }

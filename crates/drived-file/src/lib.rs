@@ -21,7 +21,7 @@ use self::file::File;
 use drived_broker::broker::config::{MqttConfig, SparkplugConfig};
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
-    Source, State, groups, line_part, of,
+    Source, State, groups, line_part, look_alikes, of,
 };
 use drived_doors::config::DoorsConfig;
 use drived_gateway::config::{GatewayConfig, GatewayEntry, gateways};
@@ -124,6 +124,34 @@ impl Config {
             mqtt: mqtt.transpose()?,
             sparkplug: sparkplug.transpose()?,
         })
+    }
+
+    /// Names that somebody may take for others.
+    pub fn doubts(&self) -> Vec<String> {
+        self.names()
+            .into_iter()
+            .flat_map(|(kind, names)| look_alikes::doubts(kind, names.into_iter()))
+            .collect()
+    }
+
+    /// What is doubtful in another configuration that comes after this one, and would not be without its new names.
+    pub fn new_doubt(&self, new: &Self) -> Option<String> {
+        let lived_with = self.names().into_iter().zip(new.names()).flat_map(|((_, mine), (kind, names))| {
+            look_alikes::doubts(kind, names.into_iter().filter(|name| mine.contains(name)))
+        });
+        let lived_with: Vec<String> = lived_with.collect();
+        new.doubts().into_iter().find(|doubt| !lived_with.contains(doubt))
+    }
+
+    /// The names of each kind: those of drives and groups stand beside each other.
+    fn names(&self) -> [(&'static str, Vec<&str>); 3] {
+        let drives =
+            self.lines.iter().flat_map(|line| &line.drives).map(|drive| drive.settings.name.as_str());
+        [
+            ("line", self.lines.iter().map(|line| line.name.as_str()).collect()),
+            ("drive or group", drives.chain(self.groups.iter().map(|group| group.name.as_str())).collect()),
+            ("gateway", self.gateways.iter().map(|gateway| gateway.name.as_str()).collect()),
+        ]
     }
 
     /// The same, if every line can work.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::scan::{self, Save, What};
+use drived_config::config::look_alikes;
 use drived_words::{failure::Failure, output::JsonArgs};
 
 /// Write a commented configuration from a scan of a line; nothing is written to any drive
@@ -26,5 +27,8 @@ pub struct Args {
 
 pub async fn run(args: Args) -> Result<(), Failure> {
     let Args { what, to, name, json } = args;
+    if let Some(oddity) = look_alikes::oddity(&name) {
+        return Err(Failure::Input(format!("--name {oddity}")));
+    }
     scan::scan(&what, Some(Save { file: to, name, option: "--to" }), json.is_json()).await
 }

@@ -48,6 +48,31 @@ fn a_hangup_reads_the_configuration_again_and_touches_only_what_has_changed() {
 }
 
 #[test]
+fn a_new_name_that_looks_like_another_is_not_taken_and_one_that_is_there_is_lived_with() {
+    let sim = Sim::serve("alike-reload", &["atv312@1-3"]);
+    let named = |drives: &[(u8, &str)]| {
+        drives.iter().fold(configuration(sim.link(), &[]), |text, (address, name)| {
+            let head = format!("[[drives]]\nline = \"bench\"\ndrive = \"atv312@{address}\"\n");
+            format!("{text}{head}name = \"{name}\"\n")
+        })
+    };
+    // The first letter of the second and the last of the third are Cyrillic.
+    let (one, other, third) = ((1, "pump a"), (2, "\u{440}ump a"), (3, "pump \u{430}"));
+    let file = File::new("alike-reload", &named(&[one, other]));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for_log("look alike");
+    daemon.wait_for(r#""event":"connected""#);
+    std::fs::write(file.path(), named(&[one, other, third])).expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log("a new name: drive or group");
+    // Another order of names that are there already is nothing new.
+    std::fs::write(file.path(), named(&[other, one, (3, "fan")])).expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log("fan added");
+    assert_eq!(daemon.interrupt().0, Some(0));
+}
+
+#[test]
 fn a_configuration_with_an_error_is_not_taken_and_the_old_one_holds_on() {
     let sim = Sim::serve("wrong-reload", &["atv312@1"]);
     let file = File::new("wrong-reload", &configuration(sim.link(), &[(1, "")]));

@@ -91,6 +91,24 @@ fn the_options_of_each_drive_are_part_of_what_a_configuration_means() {
 }
 
 #[test]
+fn names_that_look_alike_are_doubted_and_stop_no_plant() {
+    // The first letter of the second is Cyrillic.
+    let named = configuration("/dev/nowhere", "atv312@1", "").replace("pump {}", "pump 1");
+    let drive = |address: u8, name: &str| {
+        format!("[[drives]]\nline = \"bench\"\ndrive = \"atv312@{address}\"\nname = \"{name}\"\n")
+    };
+    let file =
+        File::new("alike", &format!("{named}{}{}", drive(8, "\u{440}ump 1"), drive(9, "fan\\u200B 1")));
+    let out = run(&["check", "--config", file.path()]).assert_done().to_owned();
+    for doubt in [
+        "DOUBTFUL: drive or group \"pump 1\" and \"\u{440}ump 1\" (U+0440) look alike: expected names that nobody confuses",
+        "DOUBTFUL: drive or group \"fan 1\" (U+200B): U+200B in it is not seen: expected a name without",
+    ] {
+        assert!(out.lines().any(|line| line == doubt), "{out}");
+    }
+}
+
+#[test]
 fn what_is_wrong_is_one_line_with_file_line_and_field() {
     let text = configuration("/dev/nowhere", "atv312@1-20", "running = \"soon\"");
     let file = File::new("wrong", &text);

@@ -5,6 +5,7 @@ mod described;
 mod drive;
 mod groups;
 mod line;
+pub mod look_alikes;
 mod place;
 mod state;
 mod table;

@@ -79,6 +79,9 @@ pub struct Args {
 
 pub async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_workable(&args.config)?;
+    for doubt in config.doubts() {
+        tracing::warn!("{doubt}");
+    }
     descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;

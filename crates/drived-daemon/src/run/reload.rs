@@ -127,6 +127,10 @@ impl Reload for Reloader {
         // A name of a server may have to be looked up.
         let read = tokio::task::spawn_blocking(move || Config::load_workable(&file)).await;
         let read = read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())));
+        let read = read.and_then(|new| match config.new_doubt(&new) {
+            Some(doubt) => Err(Failure::Input(format!("a new name: {doubt}"))),
+            None => Ok(new),
+        });
         if dry_run {
             let changes = changes(&config, &read?);
             return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());

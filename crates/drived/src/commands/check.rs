@@ -77,6 +77,7 @@ fn object(file: &Path, config: &Config) -> Value {
         "gateways": config.gateways.iter().map(gateway).collect::<Vec<_>>(),
         "mqtt": config.mqtt.as_ref().map(of_mqtt),
         "sparkplug": config.sparkplug.as_ref().map(of_sparkplug),
+        "doubts": config.doubts(),
         "state": config.doors.state.folder,
         "timeout_stop_s": (config.shutdown + CLOSING).as_secs(),
     })
@@ -116,6 +117,9 @@ fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
     if let Some(folder) = &config.doors.state.folder {
         let audit = if config.doors.state.audit.is_some() { "" } else { "; no audit log is kept" };
         output::say(format_args!("kept in {}{audit}", folder.display()))?;
+    }
+    for doubt in config.doubts() {
+        output::say(format_args!("DOUBTFUL: {doubt}"))?;
     }
     let needed = config.shutdown + CLOSING;
     output::say(format_args!(
