@@ -27,7 +27,7 @@ mod usage;
 mod utilisation;
 mod virtual_line;
 
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::{ffi::OsString, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{Parser, ValueEnum};
 
@@ -100,6 +100,9 @@ struct Arguments {
     /// Use a processor whenever nobody else wants it, until the standard input ends.
     #[arg(long, hide = true)]
     keep_awake: bool,
+    /// Be another program, for as long as the process lives that has started this one.
+    #[arg(long, hide = true, value_name = "PROGRAM", num_args = 1.., allow_hyphen_values = true)]
+    with_me: Vec<OsString>,
     /// Be the simulator of another process, which says on the standard input what it wants.
     #[arg(long, hide = true, value_name = "PLANT")]
     simulate: Option<String>,
@@ -110,6 +113,10 @@ fn main() -> ExitCode {
     if arguments.keep_awake {
         awake::spin();
         return ExitCode::SUCCESS;
+    }
+    if !arguments.with_me.is_empty() {
+        eprintln!("drive-bench: {}", doors::plant::become_one_that_ends_with_me(&arguments.with_me));
+        return ExitCode::FAILURE;
     }
     if let Some(plant) = &arguments.simulate {
         return match simulator::serve(plant) {

@@ -12,43 +12,50 @@ use std::{
 
 use socket2::{Domain, Socket, Type};
 
-use super::{PATIENCE, plant::Plant};
+use super::PATIENCE;
 
 /// Attackers come from another address than whoever stops: limits are by address.
 const ATTACKER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
 
+/// Whom it meets.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    pub(super) http: SocketAddr,
+    pub(super) gateway: SocketAddr,
+}
+
 /// What it is, and whoever does it until it is over.
-pub(super) type Attack = (&'static str, fn(&Plant, &AtomicBool));
+pub(super) type Attack = (&'static str, fn(Target, &AtomicBool));
 
 pub(super) const ATTACKS: [Attack; 8] = [
     ("nobody does anything", |_, over| wait(over)),
-    ("512 connections that say nothing", |plant, over| hold(plant.http, 512, b"", over)),
-    ("512 half-sent heads", |plant, over| {
-        hold(plant.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over);
+    ("512 connections that say nothing", |to, over| hold(to.http, 512, b"", over)),
+    ("512 half-sent heads", |to, over| {
+        hold(to.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over);
     }),
-    ("64 slow bodies of logins", |plant, over| {
-        hold(plant.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over);
+    ("64 slow bodies of logins", |to, over| {
+        hold(to.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over);
     }),
-    ("8 who try tokens on stops", |plant, over| {
+    ("8 who try tokens on stops", |to, over| {
         flood(
-            plant.http,
+            to.http,
             8,
             "POST /api/v1/stop?wait=0 HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer drv_wrong\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}",
             over,
         );
     }),
-    ("8 who send 64 KiB that they may not", |plant, over| {
+    ("8 who send 64 KiB that they may not", |to, over| {
         let body = " ".repeat(65_000);
         let start = format!(
             "POST /api/v1/drives/pump%201/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
             body.len()
         );
-        flood(plant.http, 8, &start, over);
+        flood(to.http, 8, &start, over);
     }),
-    ("256 event streams that nobody reads", |plant, over| {
-        hold(plant.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over);
+    ("256 event streams that nobody reads", |to, over| {
+        hold(to.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over);
     }),
-    ("256 silent clients of the gateway", |plant, over| hold(plant.gateway, 256, b"", over)),
+    ("256 silent clients of the gateway", |to, over| hold(to.gateway, 256, b"", over)),
 ];
 
 /// Opens connections, says the same on each and keeps them; those that are closed are opened again.

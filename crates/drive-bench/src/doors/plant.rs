@@ -3,14 +3,19 @@
 #![expect(clippy::disallowed_methods, reason = "there is no runtime here")]
 
 use std::{
-    env, fs,
+    env,
+    ffi::OsString,
+    fs,
     net::{SocketAddr, TcpListener, TcpStream},
+    os::unix::process::CommandExt as _,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::atomic::{AtomicU32, Ordering},
     thread,
     time::{Duration, Instant},
 };
+
+use rustix::process::{Signal, set_parent_process_death_signal};
 
 use crate::Error;
 
@@ -77,13 +82,28 @@ fn mosquitto(config: &Path, at: SocketAddr) -> Result<Option<Running>, Error> {
     Ok(Some(running))
 }
 
-/// A program that ends with the measurement.
+/// A program that ends with the measurement, and with this program, however that ends.
 pub(crate) struct Running(Child);
+
+/// Becomes a program that the system kills when whoever has started this one is gone.
+pub(crate) fn become_one_that_ends_with_me(program: &[OsString]) -> Error {
+    let Some((program, arguments)) = program.split_first() else { return "no program is named".into() };
+    if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
+        return error.into();
+    }
+    Command::new(program).args(arguments).exec().into()
+}
 
 impl Running {
     pub(crate) fn start(program: &Path, arguments: &[&str]) -> Result<Self, Error> {
-        let mut command = Command::new(program);
-        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut command = Command::new(env::current_exe()?);
+        command
+            .arg("--with-me")
+            .arg(program)
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         Ok(Self(command.spawn()?))
     }
 }

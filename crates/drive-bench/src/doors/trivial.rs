@@ -1,0 +1,47 @@
+//! A server that does nothing: what this machine and its attackers leave to whoever is attacked. It lets everybody in, reads one
+//! request and answers that it was taken.
+
+use std::{
+    io::Result,
+    net::{Ipv4Addr, SocketAddr},
+};
+
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    net::{TcpListener, TcpStream},
+    runtime::Runtime,
+};
+
+const ANSWER: &[u8] = b"HTTP/1.1 202 Accepted\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}";
+
+/// It serves until it is dropped.
+pub(super) struct Trivial {
+    _serves: Runtime,
+    pub(super) address: SocketAddr,
+}
+
+impl Trivial {
+    pub(super) fn start() -> Result<Self> {
+        let runtime = Runtime::new()?;
+        let listener = runtime.block_on(TcpListener::bind((Ipv4Addr::LOCALHOST, 0)))?;
+        let address = listener.local_addr()?;
+        runtime.spawn(async move {
+            while let Ok((stream, _)) = listener.accept().await {
+                tokio::spawn(serve(stream));
+            }
+        });
+        Ok(Self { _serves: runtime, address })
+    }
+}
+
+/// Answers once the head has come; the rest is nobody's.
+async fn serve(mut stream: TcpStream) -> Result<()> {
+    let (mut head, mut buffer) = (Vec::new(), [0; 4_096]);
+    while !head.windows(4).any(|end| end == b"\r\n\r\n") {
+        match stream.read(&mut buffer).await? {
+            0 => return Ok(()),
+            read => head.extend_from_slice(buffer.get(..read).unwrap_or_default()),
+        }
+    }
+    stream.write_all(ANSWER).await
+}
