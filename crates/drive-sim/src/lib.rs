@@ -30,7 +30,7 @@ pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use habits::{HeaderForm, LinkHabits, Unacknowledged};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};
 pub use model::{
-    Block, Cast, Damage, Dialect, Exception, Model, Observation, Panel, Played, Protocol, Rules, Says, UniTe,
+    Block, Cast, Damage, Dialect, Exception, Model, Observation, Played, Protocol, Rules, Says, UniTe,
 };
 pub use motor::{Motor, Nameplate, Ramp, Ramps};
 pub use pdu::identification;
@@ -40,4 +40,4 @@ pub use serve::{Gateway, GatewayInMemory, SecondConnection, Serving};
 pub use slave::Received;
 pub use watchdog::Watchdog;
 pub use wire::Delivery;
-pub use world::{Act, Intervened, Intervention, Surroundings, Switch, UnknownName};
+pub use world::{Act, Intervened, Intervention, Panel, Surroundings, Switch, UnknownName};

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use drive_core::{Frequency, SerialSettings};
+use drive_core::SerialSettings;
 
-use crate::world::{Act, Surroundings};
+use crate::world::{Act, Panel, Surroundings};
 
 /// What a slave has said to a request, once.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -128,23 +128,6 @@ pub struct UniTe {
     pub command: [u16; 4],
     /// The registers that its answer reports, in its order: reference, status, fault, motor current.
     pub report: [u16; 4],
-}
-
-/// What somebody does at the drive's panel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Panel {
-    /// Takes control away from the bus (forced local, LOC/REM key).
-    TakeControl,
-    /// Gives control back to the bus.
-    ReleaseControl,
-    /// Presses the STOP key.
-    Stop,
-    /// Presses the RUN key.
-    Run,
-    /// Resets a fault.
-    Reset,
-    /// Sets the panel's own reference.
-    Reference(Frequency),
 }
 
 /// What an observer of the machine sees, without using the line.

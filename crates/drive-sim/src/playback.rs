@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use crate::model::{Cast, Exception, Model, Observation, Panel, Played, Rules, Says, UniTe};
+use crate::{
+    model::{Cast, Exception, Model, Observation, Played, Rules, Says, UniTe},
+    world::Panel,
+};
 
 /// A slave nobody has recorded a rule of: it has its recording alone.
 const RULES: Rules = Rules {

@@ -1,10 +1,8 @@
 //! What is around a drive: its terminals, its analog inputs, its panel and its supplies, and the places where its
 //! manual can be read in two ways.
 
-use drive_core::{FaultEntry, Percent, registers::Row};
+use drive_core::{FaultEntry, Frequency, Percent, registers::Row};
 use tokio::time::Instant;
-
-use crate::model::Panel;
 
 /// What there is around the drives of a family, by name.
 ///
@@ -69,6 +67,23 @@ pub enum Act {
     MotorSupply(bool),
     /// From now on the drive follows this reading (the second name) of what its manual leaves open (the first).
     Reading(&'static str, &'static str),
+}
+
+/// What somebody does at the drive's panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Panel {
+    /// Takes control away from the bus (forced local, LOC/REM key).
+    TakeControl,
+    /// Gives control back to the bus.
+    ReleaseControl,
+    /// Presses the STOP key.
+    Stop,
+    /// Presses the RUN key.
+    Run,
+    /// Resets a fault.
+    Reset,
+    /// Sets the panel's own reference.
+    Reference(Frequency),
 }
 
 /// What somebody else than the line's master has done to a drive.

@@ -6,10 +6,7 @@ use drive_core::{
 };
 
 use super::ControlError;
-use crate::{
-    model::Panel,
-    world::{Act, Surroundings},
-};
+use crate::world::{Act, Panel, Surroundings};
 
 /// What a line asks of one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

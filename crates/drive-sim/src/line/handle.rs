@@ -8,10 +8,10 @@ use tokio::time::Instant;
 use super::SimLine;
 use crate::{
     habits::LinkHabits,
-    model::{Dialect, Exception, Observation, Panel},
+    model::{Dialect, Exception, Observation},
     slave::{LineCounters, Received, Slave},
     state::Place,
-    world::{Act, Intervened, Intervention, Surroundings, UnknownName},
+    world::{Act, Intervened, Intervention, Panel, Surroundings, UnknownName},
 };
 
 /// How often a waiting observer looks. The time of a model passes only while somebody looks at it.

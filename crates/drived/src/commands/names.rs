@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use drived_config::{
     kept::Kept,
@@ -38,6 +38,8 @@ pub(crate) enum Command {
         number: u16,
         #[command(flatten)]
         place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
     /// Forget a drive that is gone, so that its number is free
     Forget {
@@ -46,11 +48,15 @@ pub(crate) enum Command {
         name: String,
         #[command(flatten)]
         place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
     /// Number all drives anew, as the configuration has them; what was kept is put aside
     Renew {
         #[command(flatten)]
         place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
     },
 }
 
@@ -70,38 +76,44 @@ impl PlaceArgs {
 
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::List { place, json } => list(&place.config()?, json),
-        Command::Give { name, number, place } => {
-            change(&place.config()?, |table| table.give(&name, number))?;
-            output::say(format_args!(
-                "{name} has the number {number}, in a running daemon after drived reload"
-            ))
+        Command::List { place, json } => {
+            let table = numbered(&place.config()?)?;
+            json.say(|| object(&table), || say(&table))
         }
-        Command::Forget { name, place } => {
-            let number = change(&place.config()?, |table| table.forget(&name))?;
-            output::say(format_args!("{name} is forgotten; {number} is free"))
+        Command::Give { name, number, place, json } => {
+            let (table, ()) = change(&place.config()?, |table| table.give(&name, number))?;
+            let told = || {
+                output::say(format_args!(
+                    "{name} has the number {number}; drived reload tells a running daemon"
+                ))
+            };
+            json.say(|| object(&table), told)
         }
-        Command::Renew { place } => {
+        Command::Forget { name, place, json } => {
+            let (table, number) = change(&place.config()?, |table| table.forget(&name))?;
+            json.say(|| object(&table), || output::say(format_args!("{name} is forgotten; {number} is free")))
+        }
+        Command::Renew { place, json } => {
             let config = place.config()?;
             let renewed = names::renewed(&file(&config)?, &config.lines);
             let (table, aside) = renewed.map_err(Failure::Input)?;
-            if let Some(aside) = aside {
-                output::say(format_args!("what was kept is in {}", aside.display()))?;
-            }
-            say(&table)
+            let told = || {
+                if let Some(aside) = &aside {
+                    output::say(format_args!("what was kept is in {}", aside.display()))?;
+                }
+                say(&table)
+            };
+            json.say(|| object(&table), told)
         }
     }
 }
 
-fn list(config: &Config, json: JsonArgs) -> Result<(), Failure> {
-    let table = numbered(config)?;
-    let object = || {
-        let drives = table.drives.iter().map(|known| {
-            json!({ "name": known.name, "number": known.slot, "place": known.place, "gone": known.gone })
-        });
-        json!({ "drives": drives.collect::<Vec<_>>() })
-    };
-    json.say(object, || say(&table))
+/// The numbers for a program.
+fn object(table: &Table) -> Value {
+    let drives = table.drives.iter().map(
+        |known| json!({ "name": known.name, "number": known.slot, "place": known.place, "gone": known.gone }),
+    );
+    json!({ "drives": drives.collect::<Vec<_>>() })
 }
 
 fn say(table: &Table) -> Result<(), Failure> {
@@ -128,12 +140,15 @@ pub(crate) fn numbered(config: &Config) -> Result<Table, Failure> {
 }
 
 /// Changes what is kept, with the drives of the configuration in it.
-fn change<T>(config: &Config, change: impl FnOnce(&mut Table) -> Result<T, String>) -> Result<T, Failure> {
+fn change<T>(
+    config: &Config,
+    change: impl FnOnce(&mut Table) -> Result<T, String>,
+) -> Result<(Table, T), Failure> {
     let changed = names::changed(&file(config)?, |table| {
         table.take_up(&names::of_lines(&config.lines));
         change(table)
     });
-    changed.map(|(_, done)| done).map_err(Failure::Input)
+    changed.map_err(Failure::Input)
 }
 
 fn file(config: &Config) -> Result<Kept, Failure> {
