@@ -44,7 +44,8 @@ use crate::{
     nowhere::Nowhere,
 };
 
-/// A family of drives: a handle of its [`Definition`]. Two are the same where their [names](Capabilities::key) are.
+/// A family of drives: a handle of its [`Definition`]. Two are the same where their [names](Capabilities::key) are; those that are
+/// [built in](Self::BUILT_IN) come first, in that order, then the others by their names.
 #[derive(Clone, Copy)]
 pub struct Family(pub(crate) &'static Definition);
 
@@ -151,7 +152,10 @@ impl Eq for Family {}
 
 impl Ord for Family {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.capabilities().key.cmp(other.capabilities().key)
+        let place = |family: &Self| Self::BUILT_IN.iter().position(|built_in| built_in == family);
+        // Whoever has no place comes behind all that have one.
+        let rank = |family: &Self| place(family).unwrap_or(Self::BUILT_IN.len());
+        rank(self).cmp(&rank(other)).then_with(|| self.capabilities().key.cmp(other.capabilities().key))
     }
 }
 

@@ -68,6 +68,7 @@ impl Table {
     pub fn take_up(&mut self, drives: &[Named]) -> Vec<String> {
         let mut told = Vec::new();
         let is_there = |name: &str| drives.iter().any(|drive| drive.name == name);
+        let is_first = self.drives.is_empty();
         for Named { name, place } in drives {
             if let Some(known) = self.drives.iter_mut().find(|known| known.name == *name) {
                 known.place.clone_from(place);
@@ -91,11 +92,16 @@ impl Table {
             }
             match self.next() {
                 Some(slot) => {
-                    told.push(format!("{name} has the number {slot}"));
+                    if !is_first {
+                        told.push(format!("{name} has the number {slot}"));
+                    }
                     self.drives.push(Known { name: name.clone(), place: place.clone(), slot, gone: false });
                 }
                 None => told.push(format!("{name} has no number: none is left")),
             }
+        }
+        if is_first && !drives.is_empty() {
+            told.push("given for the first time, in the order of the configuration".to_owned());
         }
         told
     }

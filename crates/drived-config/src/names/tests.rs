@@ -84,7 +84,7 @@ fn what_is_kept_is_read_again_and_what_is_damaged_gives_nobody_a_number() {
 fn without_a_folder_the_numbers_hold_as_long_as_the_program() {
     let names = Names::in_folder(None);
     let all = named(&[("fan", "a 1"), ("pump", "a 2")]);
-    assert_eq!(names.take(&all).unwrap().len(), 2);
+    assert_eq!(names.take(&all).unwrap(), ["given for the first time, in the order of the configuration"]);
     names.take(&all[1..]).unwrap();
     assert_eq!(names.slots(), Some(vec![None, Some(Arc::from("pump"))]));
 }
