@@ -508,3 +508,19 @@ async fn whoever_stops_by_another_mode_says_so_and_why() {
     assert_eq!(stopped.mode, StopMode::Ramp, "{stopped}");
     assert!(stopped.instead.is_some_and(|why| why.contains("dCI")), "{stopped}");
 }
+
+/// BBV51701 p. 27, and the same of the others: HSP is changed at the keypad at any time.
+#[tokio::test(start_paused = true)]
+async fn a_high_speed_that_is_lowered_at_the_keypad_holds_ten_seconds_after_it_was_read_at_the_latest() {
+    for family in ALTIVARS {
+        let mut bench = Bench::new(family);
+        bench.drive().set_setpoint(TWENTY).await.unwrap();
+        assert!(bench.rig.machine.poke(registers(family).hsp, 300), "{family}");
+        for _ in 0..20 {
+            bench.status().await;
+            sleep(Duration::from_millis(500)).await;
+        }
+        let error = bench.drive().set_setpoint(Frequency::from_hertz(40).into()).await.unwrap_err();
+        assert!(matches!(error, Error::Setpoint { .. }), "{family}: {error}");
+    }
+}

@@ -1,16 +1,19 @@
 //! What every family promises of itself, through `dyn Drive` and the same door as families from outside.
 
-use std::panic::AssertUnwindSafe;
+use std::{panic::AssertUnwindSafe, sync::Arc, time::Duration};
 
+use drive_core::{Direction, Frequency, Motion, Status, StopMode, Verdict};
 use drive_families::Family;
 use drive_sim::models;
 use drive_testing::{
     Contract,
     mutants::Mutant,
+    witness::{Told, Witnesses},
     worlds::{Configuration, Share, Surrounded},
 };
 use futures_util::FutureExt;
 use support::{contracts::contract, drives};
+use tokio::{sync::watch, time::sleep};
 
 #[tokio::test(start_paused = true)]
 async fn whatever_a_drive_says_nothing_panics_and_only_control_words_of_its_manual_are_written() {
@@ -142,4 +145,83 @@ async fn the_check_that_is_published_fails_for_every_family_that_breaks_the_cont
         }
     }
     assert!(passed.is_empty(), "{passed:?}");
+}
+
+/// What is told of a motor that is not so.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Lie {
+    None,
+    AtRest,
+    Coasting,
+    OtherDirection,
+    OtherSpeed,
+    NoLease,
+    StillInForce,
+}
+
+impl Lie {
+    const ALL: [Self; 6] = [
+        Self::AtRest,
+        Self::Coasting,
+        Self::OtherDirection,
+        Self::OtherSpeed,
+        Self::NoLease,
+        Self::StillInForce,
+    ];
+
+    fn about(self, mut status: Status, held: bool) -> Told {
+        let at = status.at.expect("it was read");
+        match self {
+            Self::None | Self::NoLease => {}
+            Self::AtRest => status.motion = Motion::AtRest,
+            Self::Coasting => status.motion = Motion::Coasting,
+            Self::OtherDirection => status.direction = Some(Direction::Reverse),
+            Self::OtherSpeed => {
+                (status.reference, status.at_reference) = (Some(Frequency::from_hertz(30)), Some(true));
+            }
+            Self::StillInForce => {
+                (status.verdict, status.reference) =
+                    (Some(Verdict::InForce), Some(Frequency::from_hertz(20)));
+            }
+        }
+        Told { status: Arc::new(status), at, held: held && self != Self::NoLease }
+    }
+}
+
+/// What the witnesses say of this lie about a motor that runs, or that was stopped.
+async fn witnessed(family: Family, lie: Lie) -> Result<(), String> {
+    let mut rig = contract(family).rig();
+    let mut witnesses = Witnesses::default();
+    let (tell, told) = watch::channel(Arc::new(None));
+    witnesses.attend(&rig.machine, told, |told: &Option<Told>| told.clone());
+    let frequency = Frequency::from_hertz(20);
+    rig.drive.set_setpoint(frequency.into()).await.expect("it takes 20 Hz");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_at(frequency).await;
+    if lie == Lie::StillInForce {
+        rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+        rig.until_standstill().await;
+    }
+    for _ in 0..3 {
+        let status = rig.drive.status().await.expect("it answers");
+        tell.send_replace(Arc::new(Some(lie.about(status, rig.drive.lease().is_some()))));
+        sleep(Duration::from_millis(100)).await;
+    }
+    let dropped = std::panic::catch_unwind(AssertUnwindSafe(|| drop(witnesses)));
+    dropped.map_err(|why| why.downcast_ref::<String>().cloned().unwrap_or_default())
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_witness_complains_of_what_is_told_of_a_motor_and_is_not_so_and_of_nothing_else() {
+    let mut unseen = Vec::new();
+    for family in Family::BUILT_IN {
+        assert_eq!(witnessed(family, Lie::None).await, Ok(()), "{family}");
+        for lie in Lie::ALL {
+            match witnessed(family, lie).await {
+                Ok(()) => unseen.push((family, lie)),
+                Err(said) => assert!(said.contains("words against the machine"), "{family}: {lie:?}: {said}"),
+            }
+        }
+    }
+    assert_eq!(unseen, []);
 }

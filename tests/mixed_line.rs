@@ -6,7 +6,8 @@ use drive_bus::{Line, LineConfig, SlaveSettings};
 use drive_core::{Drive, SerialSettings, SlaveAddress, StopMode, serial::CharacterFormat};
 use drive_families::Family;
 use drive_sim::{SimLine, SimSlave, Wiring};
-use support::drives;
+use drive_testing::witness::Witnesses;
+use support::{attended::Attended, drives};
 use tokio::{
     task::JoinSet,
     time::{Instant, sleep},
@@ -20,8 +21,8 @@ const ANSWERS_AFTER: Duration = Duration::from_millis(7);
 #[tokio::test(start_paused = true)]
 async fn every_mix_of_families_keeps_the_silences_of_the_line_and_the_pauses_of_each_slave() {
     for mix in mixes() {
-        let plant = Plant::of(&mix);
-        let polls = plant.poll_everything();
+        let (plant, mut witnesses) = (Plant::of(&mix), Witnesses::default());
+        let polls = plant.poll_everything(&mut witnesses);
         sleep(Duration::from_secs(4)).await;
         drop(polls);
 
@@ -41,8 +42,8 @@ async fn every_mix_of_families_keeps_the_silences_of_the_line_and_the_pauses_of_
 #[tokio::test(start_paused = true)]
 async fn in_every_mix_a_stop_is_the_next_but_one_frame_on_a_line_full_of_polls() {
     for mix in mixes() {
-        let mut plant = Plant::of(&mix);
-        let polls = plant.poll_everything();
+        let (mut plant, mut witnesses) = (Plant::of(&mix), Witnesses::default());
+        let polls = plant.poll_everything(&mut witnesses);
         for index in 0..plant.members.len() {
             let family = plant.members[index].family;
             let mut drive = plant.another_hold_of(index);
@@ -107,10 +108,11 @@ impl Plant {
     }
 
     /// Polls every drive as fast as the line allows, until the tasks are dropped.
-    fn poll_everything(&self) -> JoinSet<()> {
+    fn poll_everything(&self, witnesses: &mut Witnesses) -> JoinSet<()> {
         let mut polls = JoinSet::new();
         for index in 0..self.members.len() {
-            let mut drive = self.another_hold_of(index);
+            let drive = self.another_hold_of(index);
+            let mut drive = Attended::new(drive, &self.members[index].machine, witnesses);
             polls.spawn(async move {
                 loop {
                     drive.status().await.expect("it answers");

@@ -16,7 +16,6 @@ const SHOWS: &[&str] = &[
     "drived-http/src/metrics/drives.rs",
     "drived-plant/src/journal/words.rs",
     "drived-screen/src/row/mod.rs",
-    "drived-simulated/src/lib.rs",
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

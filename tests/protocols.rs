@@ -11,8 +11,8 @@ use drive_bus::{
 use drive_core::{Class, Direction, Frequency, PortError, SerialSettings, SlaveAddress, StopMode, Terms};
 use drive_families::Family;
 use drive_sim::{ALWAYS, Delivery, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58};
-use drive_testing::rig::ADDRESS;
-use support::contracts::contract;
+use drive_testing::{rig::ADDRESS, witness::Witnesses};
+use support::{attended::Attended, contracts::contract};
 use tokio_modbus::{Request, Response, client::Client};
 
 /// W252, ACC: a word that keeps what is written to it.
@@ -73,12 +73,17 @@ fn bytes_of(requests: &[drive_sim::Received], code: u8) -> usize {
 async fn two_drives_on_one_uni_telway_line_turn_at_their_own_speeds() {
     for delivery in [Delivery::Whole, Delivery::Pieces(1)] {
         let (simulated, line) = line(unitelway(), &[3, 16], delivery);
-        let mut drives = Vec::new();
+        let (mut drives, mut witnesses) = (Vec::new(), Witnesses::default());
         for (address, hertz) in [(3, 20), (16, 35)] {
             let slave = SlaveAddress::try_from(address).expect("it is one");
-            let mut drive = Family::ATV58.open(line.slave(address), slave);
-            drive.set_setpoint(Frequency::from_hertz(hertz).into()).await.expect("it takes the setpoint");
-            drive.start(Direction::Forward).await.expect("it starts");
+            let drive = Family::ATV58.open(line.slave(address), slave);
+            let mut drive = Attended::new(drive, &machine(&simulated, address), &mut witnesses);
+            drive
+                .drive
+                .set_setpoint(Frequency::from_hertz(hertz).into())
+                .await
+                .expect("it takes the setpoint");
+            drive.drive.start(Direction::Forward).await.expect("it starts");
             drives.push((drive, Frequency::from_hertz(hertz)));
         }
         for (drive, reference) in &mut drives {
@@ -88,7 +93,7 @@ async fn two_drives_on_one_uni_telway_line_turn_at_their_own_speeds() {
         }
         let (first, second) = (machine(&simulated, 3).observe(), machine(&simulated, 16).observe());
         assert_eq!((first.output_frequency, second.output_frequency), (2_000, 3_500));
-        drives[1].0.stop(StopMode::Freewheel).await.expect("it stops");
+        drives[1].0.drive.stop(StopMode::Freewheel).await.expect("it stops");
         assert!(machine(&simulated, 3).observe().running && !machine(&simulated, 16).observe().running);
         assert_eq!(simulated.violations(), []);
         let stats = line.stats();

@@ -1,5 +1,6 @@
 //! The rig that the behaviour tests share.
 
+pub mod attended;
 pub mod cable;
 pub mod configurations;
 pub mod contracts;

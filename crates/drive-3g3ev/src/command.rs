@@ -106,7 +106,10 @@ impl<P: Port> Drive3g3ev<P> {
     /// The status, and after all that it shows 0001h.
     async fn status_and_command(&mut self) -> Result<Status> {
         let mut status = self.read_status(Class::Command).await?;
-        status.raw.push(self.read_command(Class::Command).await?);
+        // A status of a drive that is coming down has read it already, last of all.
+        if status.raw(address::COMMAND).is_none() {
+            status.raw.push(self.read_command(Class::Command).await?);
+        }
         Ok(status)
     }
 
@@ -130,7 +133,7 @@ impl<P: Port> Drive3g3ev<P> {
         self.write_stop().await?.ok();
         self.registers.owe_judgement();
         let (mut confirming, mut settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
-        let mut first = None;
+        let (mut first, mut seen) = (None, false);
         let (status, because, sent) = loop {
             let mut status = match self.status_and_command().await {
                 Ok(status) => status,
@@ -162,7 +165,10 @@ impl<P: Port> Drive3g3ev<P> {
                 status.verdict = None;
                 return Ok(Stopped { instead, ..Stopped::by(mode, status) });
             }
-            first = first.or(output);
+            if !seen {
+                // It takes two readings to see an output go down, and on a full line the first may take all of the time.
+                (first, confirming, seen) = (output, Confirming::begin(), true);
+            }
             let over = because.is_some() && !revoked && Instant::now() >= settled;
             if over || !confirming.again().await {
                 break (status, because, sent);

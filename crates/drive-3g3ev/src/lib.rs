@@ -76,6 +76,10 @@ pub const CAPABILITIES: Capabilities = Capabilities {
         source: "§2.1, p. 6",
     }),
     status_exchanges: 2,
+    status_words: 9,
+    statuses_per_turn: proof::STATUSES_PER_TURN,
+    // RUN may stand until the motor does: a second look, of three exchanges, shows that its output goes down.
+    stop_exchanges: 7,
     measurement_exchanges: 2,
     ..Capabilities::least("3g3ev", "Omron 3G3EV")
 };

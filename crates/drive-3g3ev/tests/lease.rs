@@ -7,7 +7,7 @@ use drive_core::{
     Direction, Drive, Error, ErrorKind, Frequency, Ground, Lack, Lease, Motion, Refusal, Result, Row,
     Setpoint, State, StopMode, Verdict, Withdrawn,
 };
-use drive_sim::{Panel, SimSlave};
+use drive_sim::{ALWAYS, Fault, Faults, Panel, SimSlave};
 use drive_testing::{
     bench,
     words::{Asked, Words},
@@ -390,4 +390,42 @@ async fn a_setpoint_in_hertz_under_a_unit_in_percent_says_what_to_write() {
         let error = rig::drive(words).set_setpoint(FIFTY).await.unwrap_err();
         assert!(error.to_string().contains("give it in percent, or write 0 to n39"), "{error}");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_a_run_rests_on_outlives_a_lost_line_and_a_reference_that_came_meanwhile_is_anothers() {
+    let (mut drive, machine, _rig) = started().await;
+    drive.forget();
+    for _ in 0..30 {
+        assert_eq!(lacks(drive.status().await.unwrap().verdict), None, "nobody has written another");
+    }
+    drive.forget();
+    machine.poke(2, machine.peek(2).unwrap() / 2);
+    let (lack, because) = lost(&mut drive, 3).await;
+    assert_eq!(lack, Lack::Reference);
+    assert!(because.contains("0002h"), "{because}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_whose_answer_was_lost_is_no_reference_of_another_master() {
+    let mut arrived = 0;
+    for after in (0..150).step_by(5).map(Duration::from_millis) {
+        let (mut drive, machine, rig) = started().await;
+        let (before, loses) = (machine.peek(2), Faults::seeded(1).with(Fault::Lost, ALWAYS));
+        let (given, ()) = tokio::join!(drive.set_setpoint(Frequency::from_hertz(20).into()), async {
+            sleep(after).await;
+            rig.sim.set_faults(loses);
+        });
+        rig.sim.set_faults(Faults::seeded(1));
+        arrived += usize::from(given.is_err() && machine.peek(2) != before);
+        let mut answered = 0;
+        while answered < 30 {
+            sleep(TENTH).await;
+            let Ok(status) = drive.status().await else { continue };
+            answered += 1;
+            let told = lacks(status.verdict);
+            assert!(!told.is_some_and(|(_, because)| because.contains("0002h")), "{after:?}: {given:?}");
+        }
+    }
+    assert!(arrived > 0);
 }

@@ -87,6 +87,9 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     fault_history: 4,
     // Two where the read block is used; it never is from the first status on.
     status_exchanges: 4,
+    status_words: 4,
+    statuses_per_turn: proof::STATUSES_PER_TURN,
+    stop_exchanges: 7,
     measurement_exchanges: reading::SLOW_SET.len() as u8 + 1,
     ..Capabilities::least("atv21", "Schneider Altivar 21")
 };

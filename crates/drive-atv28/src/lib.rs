@@ -46,6 +46,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,
     status_exchanges: 2,
+    status_words: 11,
+    stop_exchanges: 5,
     measurement_exchanges: 6,
     ..Capabilities::least("atv28", "Schneider Altivar 28")
 };

@@ -101,3 +101,26 @@ async fn no_fault_is_reset_where_nothing_tells_which_inputs_are_closed() {
     assert!(error.to_string().contains("IOLR"), "{error}");
     assert_eq!(drive.into_port().written(), []);
 }
+
+#[tokio::test(start_paused = true)]
+async fn the_words_around_a_missing_one_are_read_in_rows_and_a_drive_that_may_be_another_is_asked_anew() {
+    for missing in [451, 453, 456] {
+        let mut drive = without(missing);
+        for _ in 0..2 {
+            drive.status().await.unwrap();
+        }
+        drive.forget();
+        drive.status().await.unwrap();
+        let asked = drive.into_port().asked;
+        let names = |asked: &&Asked| matches!(asked, Asked::Read(_, at, count) if (*at..at + count).contains(&missing));
+        assert_eq!(
+            asked.iter().filter(names).count(),
+            4,
+            "{missing}: in its block and alone, and so once more"
+        );
+        // Each status ends with the second block.
+        let second = asked.split(|asked| matches!(asked, Asked::Read(_, 457, 4))).nth(1).unwrap();
+        let rows = second.iter().filter(|asked| matches!(asked, Asked::Read(_, 450..=456, _))).count();
+        assert_eq!(rows, if missing == 456 { 1 } else { 2 }, "{missing}: {second:?}");
+    }
+}

@@ -54,6 +54,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     persist: Some("CMI bit 1"),
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,
+    status_words: 6,
     measurement_exchanges: 6,
     ..Capabilities::least("atv312", "Schneider Altivar 312")
 };

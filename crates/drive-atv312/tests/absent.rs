@@ -2,7 +2,7 @@
 
 use drive_atv312::{Atv312, CAPABILITIES, ROWS};
 use drive_core::{Drive, Row};
-use drive_testing::words::Words;
+use drive_testing::words::{Asked, Words};
 
 /// Stands under the bus at L1: `ETA`, `ETI`, `HSP`, `tFr`.
 const STANDS: [(u16, u16); 4] = [(3201, 0x0627), (3206, 0x4002), (3104, 500), (3103, 600)];
@@ -29,5 +29,22 @@ async fn a_function_that_a_drive_lacks_is_assigned_to_nothing() {
     for code in ["JOG", "PIF", "SA3", "PS16", "Atr", "AdC", "dCI"] {
         let found = without(code).self_restarts().await.unwrap_or_else(|error| panic!("{code}: {error}"));
         assert_eq!(found, [], "{code}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_missing_is_not_asked_for_again_until_the_drive_may_be_another() {
+    for code in ["ULn", "tHd", "RFRD"] {
+        let (mut drive, missing) = (without(code), Row::find(ROWS, code).unwrap().address);
+        for _ in 0..3 {
+            drive.measurements().await.unwrap();
+        }
+        drive.forget();
+        drive.measurements().await.unwrap();
+        let asked = drive.into_port().asked;
+        let names = |asked: &&Asked| matches!(asked, Asked::Read(_, at, count) if (*at..at + count).contains(&missing));
+        let alone = |asked: &&Asked| matches!(asked, Asked::Read(_, at, 1) if *at == missing);
+        assert_eq!(asked.iter().filter(alone).count(), 2, "{code}: before forget and behind it");
+        assert!(asked.iter().filter(names).count() <= 4, "{code}: {asked:?}");
     }
 }

@@ -70,6 +70,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     watchdog: Some(watchdog(MESSAGE_WATCH)),
     identification: Some("UNI-TE request 0Fh, on a UNI-TELWAY line"),
     broadcast_stops: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
+    status_words: 9,
     measurement_exchanges: 2,
     ..Capabilities::least("atv58", "Schneider Altivar 58 with card VW3-A58303")
 };

@@ -88,3 +88,24 @@ async fn a_motor_is_started_and_given_its_setpoint_without_its_limits() {
         assert!(drive.into_port().written().contains(&(401, 400)), "{missing}");
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn the_words_around_a_missing_one_are_read_in_rows_and_a_drive_that_may_be_another_is_asked_anew() {
+    for missing in [451, 453, 456] {
+        let mut drive = without(missing, &[]);
+        for _ in 0..2 {
+            drive.status().await.unwrap();
+        }
+        drive.forget();
+        drive.status().await.unwrap();
+        let asked = drive.into_port().asked;
+        let names = |asked: &&Asked| matches!(asked, Asked::Read(_, at, count) if (*at..at + count).contains(&missing));
+        assert_eq!(
+            asked.iter().filter(names).count(),
+            4,
+            "{missing}: in its block and alone, and so once more"
+        );
+        // At the most the block and its nine words one by one, a row on each side, and both again.
+        assert!(asked.len() <= 10 + 2 + 10, "{missing}: {asked:?}");
+    }
+}

@@ -1,7 +1,9 @@
 """Shows the page in a headless Chromium and presses its stop: stop_in_browser.py URL. Says "ready" when it is shown.
 
 For each line on the standard input, "pointer" or "key", it presses so and says how many milliseconds have passed from the browser's
-own time of the event until the answer was whole that the daemon has taken the stop, or "never" after five seconds."""
+own time of the event until the answer was whole that the daemon has taken the stop, or "never" after five seconds. Both times are of one
+clock of the browser. An answer to what was sent before the press is not an answer to it: after a "never" the page goes on to send that
+stop, and it may be taken at any time."""
 
 import sys
 
@@ -18,7 +20,7 @@ MEASURE = """() => {
             resolve(wait);
         };
         const seen = new PerformanceObserver(list => {
-            const taken = list.getEntries().find(one => /api.v1.stop/.test(one.name) && [200, 202].includes(one.responseStatus));
+            const taken = list.getEntries().find(one => one.startTime >= pressed && /api.v1.stop/.test(one.name) && [200, 202].includes(one.responseStatus));
             if (taken) over(taken.responseEnd - pressed);
         });
         const late = setTimeout(() => over(null), 5_000);

@@ -94,6 +94,8 @@ struct Arguments {
     /// Where to draw the growth, as an SVG.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    doors: doors::Wanted,
     /// The seed of the faults.
     #[arg(long, default_value_t = 2_026)]
     seed: u64,
@@ -155,7 +157,7 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
         Section::Cpu => cpu::measure(report, time),
         Section::Lines => lines::measure(report, time, arguments.lines),
         Section::Growth => growth::measure(report, time, arguments.most_lines, arguments.plot.as_deref()),
-        Section::Doors => doors::measure(report),
+        Section::Doors => doors::measure(report, &arguments.doors),
         Section::FirstLook => first_look::measure(report),
         Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
         Section::Strangers => strangers::measure(report),

@@ -13,7 +13,7 @@ use crate::{
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Absent {
     missing: BTreeSet<u16>,
-    /// Blocks that are refused as such although the drive has each of their registers.
+    /// Registers of blocks that were refused: they are read one by one.
     singly: BTreeSet<u16>,
 }
 
@@ -36,7 +36,7 @@ impl Absent {
         count: u16,
     ) -> Result<Vec<Option<u16>>> {
         let mut words = vec![None; usize::from(count)];
-        let (mut at, known) = (first, self.missing.len());
+        let mut at = first;
         while let Some((from, row)) = self.next(at, first + count) {
             let read = calls.read_words(from, row).await;
             if let Some(read) = self.told(from, row, read)? {
@@ -44,10 +44,6 @@ impl Absent {
                 behind.zip(read).for_each(|(word, read)| *word = Some(read));
                 at = from + row;
             }
-        }
-        if self.missing.len() > known {
-            // Those between the missing ones are read in rows from now on, unless such a row is refused as well.
-            self.singly.retain(|register| !(first..first + count).contains(register));
         }
         Ok(words)
     }
@@ -57,7 +53,7 @@ impl Absent {
     #[must_use]
     pub fn next(&self, at: u16, end: u16) -> Option<(u16, u16)> {
         let from = (at..end).find(|&register| !self.has(register))?;
-        Some((from, self.row(from, 0, end - from)))
+        Some((from, self.row(from, end)))
     }
 
     /// What such a request was answered; `None`: one of them is missing, and [`next`](Self::next) tells how to go on.
@@ -66,10 +62,16 @@ impl Absent {
     /// The answer's, except that of a register that the drive does not have.
     pub fn told(&mut self, first: u16, count: u16, answer: Result<Vec<u16>>) -> Result<Option<Vec<u16>>> {
         match answer {
-            Ok(words) => Ok(Some(words)),
+            Ok(words) => {
+                if count == 1 {
+                    self.was_asked_alone(first);
+                }
+                Ok(Some(words))
+            }
             Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => {
                 if count == 1 {
                     self.missing.insert(first);
+                    self.was_asked_alone(first);
                 } else {
                     self.singly.extend(first..first + count);
                 }
@@ -87,15 +89,29 @@ impl Absent {
         Ok(self.read(calls, register, 1).await?.first().copied().flatten())
     }
 
-    /// How many words from `at` on are asked for together; 0: the drive does not have this one.
-    fn row(&self, first: u16, at: u16, count: u16) -> u16 {
-        if self.has(first + at) {
-            return 0;
+    /// The last one of a block that is read word by word ends that, where one was found for which the block was refused: those
+    /// between the missing ones are read in rows from then on, unless such a row is refused as well.
+    fn was_asked_alone(&mut self, last: u16) {
+        let is_singly =
+            |register: Option<u16>| register.is_some_and(|register| self.singly.contains(&register));
+        if !is_singly(Some(last)) || is_singly(last.checked_add(1)) {
+            return;
         }
-        if self.singly.contains(&(first + at)) {
+        let mut first = last;
+        while is_singly(first.checked_sub(1)) {
+            first -= 1;
+        }
+        if (first..=last).any(|register| self.has(register)) {
+            self.singly.retain(|register| !(first..=last).contains(register));
+        }
+    }
+
+    /// How many words from `first` on, which is not missing, are asked for together, up to `end`.
+    fn row(&self, first: u16, end: u16) -> u16 {
+        if self.singly.contains(&first) {
             return 1;
         }
-        let there = |&more: &u16| !self.has(first + more) && !self.singly.contains(&(first + more));
-        (at..count).take_while(there).count() as u16
+        let there = |register: &u16| !self.has(*register) && !self.singly.contains(register);
+        (first..end).take_while(there).count() as u16
     }
 }

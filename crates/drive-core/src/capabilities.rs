@@ -7,6 +7,7 @@ use crate::{
     registers::{Restoring, Row, Scaled},
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,
+    turns::STATUSES_PER_TURN,
 };
 
 /// What a family can do. What stands here the drive does; what does not is
@@ -80,6 +81,14 @@ pub struct Capabilities {
     /// read only once is known: what a plan counts, whatever is configured in the drive. One that is stopping or has
     /// tripped may take one more.
     pub status_exchanges: u8,
+    /// Words that these exchanges read, all together.
+    pub status_words: u16,
+    /// Behind how many statuses of a drive with a run command of this side there may be one more exchange that proves it, see
+    /// [`Drive::status`](crate::Drive::status); 0: never.
+    pub statuses_per_turn: u16,
+    /// Exchanges of one [`Drive::stop`](crate::Drive::stop) of a drive that runs and obeys, from its first word until it is
+    /// confirmed, at the most.
+    pub stop_exchanges: u8,
     /// Exchanges of one [`Drive::measurements`](crate::Drive::measurements).
     pub measurement_exchanges: u8,
 }
@@ -110,7 +119,7 @@ impl AnswerDelay {
 
 impl Capabilities {
     /// A family that does the least: functions 03 and 06, one word at a time, addresses up to 247, 9600 and 19200 bit/s, 8E1,
-    /// a stop along the ramp, one exchange for a status and one for the measurements; nothing else. A family of your own says
+    /// a stop along the ramp, one exchange of eight words for a status and one for the measurements; nothing else. A family of your own says
     /// what is different and ends with `..Capabilities::least(…)`, so that what is added here later breaks nothing:
     ///
     /// ```
@@ -157,6 +166,9 @@ impl Capabilities {
             turnaround: Duration::ZERO,
             answer_delay: None,
             status_exchanges: 1,
+            status_words: 8,
+            statuses_per_turn: STATUSES_PER_TURN,
+            stop_exchanges: 4,
             measurement_exchanges: 1,
         }
     }

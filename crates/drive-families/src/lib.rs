@@ -18,6 +18,8 @@ mod definition;
 mod five;
 mod nowhere;
 mod options;
+#[cfg(feature = "sim")]
+pub mod simulated;
 mod texts;
 #[cfg(feature = "sim")]
 mod twin;

@@ -126,6 +126,9 @@ table! {
     /// Its output was cut while the motor turned, and nothing tells when the shaft has come to rest.
     Coasting: "coasting", "output off, the shaft may coast", Note, false,
         "keep away from the shaft until it is seen to stand";
+    /// Direct current holds its shaft at rest, and heats its motor.
+    Held: "held", "direct current holds the shaft", Note, false,
+        "the current heats the motor: it ends with its time, or with a ramp stop";
     /// It has not been seen yet.
     NeverSeen: "never_seen", "not seen yet", Note, false,
         "wait, or look at its supply, its address and its cable";

@@ -100,6 +100,8 @@ pub enum Became {
     Expired,
     /// A later command, or a stop, took its place.
     Superseded,
+    /// There was nothing to be done: a withdrawal found no run command of this side.
+    Nothing,
 }
 
 /// What became of a command.
@@ -108,6 +110,8 @@ pub enum Became {
 pub enum Outcome {
     /// The drive's own words show it.
     Confirmed,
+    /// Of a withdrawal: no run command of this side stood any more, and nothing was written.
+    NothingStood,
     /// The drive's own words show it of a start: which way, and the setpoint that it uses.
     Started(Started),
     /// The drive's own words show it of a stop: how it was asked for, and how the drive has stopped.
@@ -159,6 +163,7 @@ impl Outcome {
             Self::NotConfirmed(Unconfirmed::Superseded | Unconfirmed::Stopped)
             | Self::Refused(Refused::Superseded | Refused::Stopped) => Became::Superseded,
             Self::Confirmed | Self::Started(_) | Self::Stopped(_) => Became::Confirmed,
+            Self::NothingStood => Became::Nothing,
             Self::NotConfirmed(_) => Became::NotConfirmed,
             Self::Expired => Became::Expired,
             Self::OutcomeUnknown(_) => Became::Unknown,
@@ -166,8 +171,8 @@ impl Outcome {
         }
     }
 
-    /// Its word for programs: `confirmed`, `not_confirmed`, `unknown`, `refused`, `expired`, or `superseded` where a later
-    /// command or a stop took its place.
+    /// Its word for programs: `confirmed`, `not_confirmed`, `unknown`, `refused`, `expired`, `superseded` where a later
+    /// command or a stop took its place, or `nothing` where there was nothing to be done.
     #[must_use]
     pub const fn word(&self) -> &'static str {
         match self.became() {
@@ -177,6 +182,7 @@ impl Outcome {
             Became::Refused => "refused",
             Became::Expired => "expired",
             Became::Superseded => "superseded",
+            Became::Nothing => "nothing",
         }
     }
 
@@ -185,6 +191,7 @@ impl Outcome {
     pub const fn reason(&self) -> Option<&'static str> {
         match self {
             Self::Confirmed
+            | Self::NothingStood
             | Self::Started(_)
             | Self::Stopped(_)
             | Self::Expired
@@ -194,11 +201,27 @@ impl Outcome {
         }
     }
 
+    /// What there is to be told of it in a sentence, for persons; `None` where its word says it all.
+    #[must_use]
+    pub fn text(&self) -> Option<String> {
+        match self {
+            Self::Started(started) => Some(started.to_string()),
+            Self::Stopped(stop) => stop.is_told().then(|| stop.to_string()),
+            Self::Confirmed => None,
+            Self::NothingStood => Some("no run command of this side stood any more".to_owned()),
+            Self::Expired => Some("its time was over before it was sent: it never will be".to_owned()),
+            Self::NotConfirmed(why) => Some(why.to_string()),
+            Self::OutcomeUnknown(unknown) => Some(unknown.to_string()),
+            Self::Refused(why) => Some(why.to_string()),
+        }
+    }
+
     /// Its kind in words, for logs.
     #[must_use]
     pub const fn kind(&self) -> &'static str {
         match self {
             Self::Confirmed | Self::Started(_) | Self::Stopped(_) => "confirmed",
+            Self::NothingStood => "nothing to be done",
             Self::NotConfirmed(_) => "not confirmed",
             Self::Expired => "expired",
             Self::OutcomeUnknown(_) => "outcome unknown",
@@ -210,14 +233,7 @@ impl Outcome {
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.kind())?;
-        match self {
-            Self::Started(started) => write!(f, ": {started}"),
-            Self::Stopped(stop) if stop.is_told() => write!(f, ": {stop}"),
-            Self::Confirmed | Self::Stopped(_) | Self::Expired => Ok(()),
-            Self::NotConfirmed(why) => write!(f, ": {why}"),
-            Self::OutcomeUnknown(unknown) => write!(f, ": {unknown}"),
-            Self::Refused(why) => write!(f, ": {why}"),
-        }
+        self.text().map_or(Ok(()), |text| write!(f, ": {text}"))
     }
 }
 

@@ -381,18 +381,22 @@ async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> R
 
 #[cfg(test)]
 mod tests {
-    use drive_core::{Direction, StopMode};
+    use drive_core::{Direction, Frequency, StopMode};
 
     use super::*;
 
     #[test]
     fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
-        let short = Some(Duration::from_millis(54));
-        assert_eq!(lifetimes(Job::Start(Direction::Forward), short).command, short);
-        for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
-            assert_eq!(lifetimes(stop, None).command, None, "{stop:?}");
+        let (short, usual) = (Some(Duration::from_millis(54)), Lifetimes::default());
+        let setpoint = Frequency::from_hertz(20).into();
+        let orders = [Job::SetSetpoint(setpoint), Job::ResetFaults, Job::Release, Job::Persist];
+        for order in [Job::Start(Direction::Forward)].into_iter().chain(orders) {
+            assert_eq!(lifetimes(order, short), Lifetimes { command: short, ..usual }, "{order:?}");
         }
-        assert_eq!(lifetimes(Job::Status { anew: false }, short).status, short);
-        assert_eq!(lifetimes(Job::KeepAlive, None), Lifetimes::default());
+        for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
+            assert_eq!(lifetimes(stop, short), Lifetimes { command: None, ..usual }, "{stop:?}");
+        }
+        assert_eq!(lifetimes(Job::Status { anew: false }, short), Lifetimes { status: short, ..usual });
+        assert_eq!(lifetimes(Job::KeepAlive, short), usual);
     }
 }

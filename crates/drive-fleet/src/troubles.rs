@@ -27,6 +27,8 @@ impl Snapshot {
         let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_standstill());
         let heard = status.map(|status| status.at);
         let error = || self.error.as_ref().map(ToString::to_string);
+        let connected = status.filter(|_| self.link == Link::Connected);
+        let shaft = |motion| connected.is_some_and(|status| status.value.motion == motion);
         let (since, detail) = match kind {
             ConcernKind::StopUnconfirmed => {
                 let stop = self.stop.filter(|stop| stop.alarm)?;
@@ -99,10 +101,8 @@ impl Snapshot {
                 let how = if stop.taken { "the drive is stopping" } else { "it is repeated" };
                 (Some(stop.since), Some(format!("{} stop for {lasts}, {how}", stop.mode)))
             }
-            ConcernKind::Coasting => {
-                let coasts = status.is_some_and(|status| status.value.motion == Motion::Coasting);
-                (None, (coasts && self.link == Link::Connected).then_some(None)?)
-            }
+            ConcernKind::Coasting => (None, shaft(Motion::Coasting).then_some(None)?),
+            ConcernKind::Held => (None, shaft(Motion::Held).then_some(None)?),
             ConcernKind::NeverSeen => (None, (self.link == Link::Connecting).then(error)?),
         };
         let noted = || self.since.iter().find(|(noted, _)| *noted == kind).map(|(_, since)| *since);

@@ -588,33 +588,17 @@ pub struct OutcomeView {
 
 impl From<&Outcome> for OutcomeView {
     fn from(outcome: &Outcome) -> Self {
-        let (text, error, last) = match outcome {
-            Outcome::Started(started) => (Some(started.to_string()), None, None),
-            Outcome::Stopped(stop) if stop.is_told() => (Some(stop.to_string()), None, None),
-            Outcome::Confirmed | Outcome::Stopped(_) | Outcome::Expired => (None, None, None),
-            Outcome::NotConfirmed(why) => {
-                let (error, last) = match why {
-                    Unconfirmed::Denied(error) | Unconfirmed::StopDenied { error, .. } => (Some(error), None),
-                    Unconfirmed::TimeOver { last, .. } => (None, last.as_ref()),
-                    _ => (None, None),
-                };
-                (Some(why.to_string()), error, last)
-            }
-            Outcome::OutcomeUnknown(unknown) => {
-                (Some(unknown.to_string()), unknown.error.as_ref(), unknown.last.as_ref())
-            }
-            Outcome::Refused(why) => {
-                let error = match why {
-                    Refused::Drive(error) => Some(error),
-                    _ => None,
-                };
-                (Some(why.to_string()), error, None)
-            }
+        let (error, last) = match outcome {
+            Outcome::NotConfirmed(Unconfirmed::Denied(error) | Unconfirmed::StopDenied { error, .. })
+            | Outcome::Refused(Refused::Drive(error)) => (Some(error), None),
+            Outcome::NotConfirmed(Unconfirmed::TimeOver { last, .. }) => (None, last.as_ref()),
+            Outcome::OutcomeUnknown(unknown) => (unknown.error.as_ref(), unknown.last.as_ref()),
+            _ => (None, None),
         };
         Self {
             outcome: outcome.became(),
             reason: outcome.reason().map(str::to_owned),
-            text,
+            text: outcome.text(),
             error: error.map(ErrorView::from),
             started: outcome.started(),
             stop: outcome.stop().map(StopModesView::from),

@@ -50,11 +50,13 @@ pub enum Mutant {
     StopSentEndsTheLease,
     /// No output is standstill.
     NoOutputIsStandstill,
+    /// Whatever reference the motor follows, the run command is in force.
+    AnyReferenceIsOurs,
 }
 
 impl Mutant {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::StartConfirmedByAnything,
         Self::StopConfirmedByAnything,
         Self::RunTwice,
@@ -72,6 +74,7 @@ impl Mutant {
         Self::ForgetEndsTheLease,
         Self::StopSentEndsTheLease,
         Self::NoOutputIsStandstill,
+        Self::AnyReferenceIsOurs,
     ];
 
     /// The family of a contract with this fault in it.

@@ -34,10 +34,11 @@ pub fn contradiction(status: &Status, seen: &Observation) -> Option<String> {
     if asks && !seen.running {
         return told("in force");
     }
-    // A motor that is turned round passes zero between its reading and the look.
+    // A motor that is turned round passes zero between its reading and the look; one that has come to its speed does not.
     let is_slow = |frequency: Frequency| frequency < CROSSING;
     let crosses = status.output_frequency.is_some_and(is_slow)
-        && is_slow(Frequency::from_centihertz(seen.shaft_frequency.unsigned_abs()));
+        && is_slow(Frequency::from_centihertz(seen.shaft_frequency.unsigned_abs()))
+        && seen.output_frequency.abs_diff(seen.setpoint) > TOLERANCE.unsigned_abs();
     let is_other = |way: Direction| (way == Direction::Reverse) != (seen.shaft_frequency < 0);
     if turns && !crosses && status.direction.is_some_and(is_other) {
         return told("in force in that direction");

@@ -138,3 +138,17 @@ impl Client for Words {
         Ok(())
     }
 }
+
+/// The words that a request writes, each with its register.
+pub(crate) fn words_written(pdu: &[u8]) -> Vec<(u16, u16)> {
+    let word = |at: usize| Some(u16::from_be_bytes([*pdu.get(at)?, *pdu.get(at + 1)?]));
+    let (Some(function), Some(first)) = (pdu.first(), word(1)) else { return Vec::new() };
+    let count = match function {
+        0x06 => 1,
+        0x10 => word(3).unwrap_or(0),
+        _ => 0,
+    };
+    let begin = if *function == 0x06 { 3 } else { 6 };
+    let value = |index: u16| word(begin + 2 * usize::from(index));
+    (0..count).filter_map(|index| Some((first.checked_add(index)?, value(index)?))).collect()
+}

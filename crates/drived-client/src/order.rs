@@ -7,7 +7,7 @@ use tokio::time::{Instant, timeout_at};
 
 use super::{Daemon, DaemonArgs, Remote, Target};
 use drived_plant::{
-    follow::{Follower, News},
+    follow::{Follower, News, Source},
     plant::{
         commands::{ActionWord, OutcomeWord},
         views::CommandView,
@@ -20,6 +20,8 @@ use drived_words::{failure::Failure, output, values};
 const ASKED_EVERY: Duration = Duration::from_millis(500);
 /// The longest ramp and then some: the daemon goes on when nobody asks any more.
 const WAITED: Duration = Duration::from_secs(90);
+/// For how long a daemon that does not answer is asked again: a busy one is late now and then, and the command goes on.
+const OUT_OF_SIGHT: Duration = Duration::from_secs(15);
 /// Between two words about a command that is not settled.
 const TOLD_EVERY: Duration = Duration::from_secs(5);
 
@@ -46,7 +48,9 @@ pub async fn order(
     let path = format!("{}?wait=2s", target.path(told.action.name()));
     let answer = daemon.post(&path, &told.body).await?;
     let Some(first) = answer.command() else { return Err(answer.failure()) };
-    let command = settled(args, Arc::new(first), daemon).await?;
+    let source = Remote::new(daemon, &first.id, ASKED_EVERY);
+    let say = |text: String| if args.is_json() { Ok(()) } else { output::say(text) };
+    let command = settled(Follower::from(source, Arc::new(first)), say).await?;
     if args.is_json() {
         let is_first = command.outcome != OutcomeWord::Pending && !answer.status.is_success();
         output::say_as_it_is(if is_first { answer.body } else { json!(command) })?;
@@ -89,26 +93,35 @@ fn one(args: &DaemonArgs, told: &Told, command: &CommandView) -> Result<(), Fail
     }
 }
 
-/// Follows a command until nothing is pending.
+/// Follows a command until nothing is pending, and says what there is to say meanwhile.
 async fn settled(
-    args: &DaemonArgs,
-    first: Arc<CommandView>,
-    daemon: Daemon,
+    mut follower: Follower<impl Source>,
+    mut say: impl FnMut(String) -> Result<(), Failure>,
 ) -> Result<Arc<CommandView>, Failure> {
     let until = Instant::now() + WAITED;
-    let mut follower = Follower::from(Remote::new(daemon, &first.id, ASKED_EVERY), first);
+    let mut out_of_sight: Option<(Instant, String)> = None;
     while follower.last().outcome == OutcomeWord::Pending && Instant::now() < until {
-        if !args.is_json() {
-            output::say(pending(&follower.last()))?;
-        }
+        say(match &out_of_sight {
+            None => pending(&follower.last()),
+            Some((_, why)) => format!("{why}: the command goes on, the daemon is asked again"),
+        })?;
         let tell_at = until.min(Instant::now() + TOLD_EVERY);
         while follower.last().outcome == OutcomeWord::Pending {
-            match timeout_at(tell_at, follower.next()).await {
-                Ok(Some(News::Told(_))) => {}
-                Ok(Some(News::OutOfSight(why) | News::Gone(why))) => return Err(Failure::Drive(why)),
+            let wake_at =
+                out_of_sight.as_ref().map_or(tell_at, |(since, _)| tell_at.min(*since + OUT_OF_SIGHT));
+            match timeout_at(wake_at, follower.next()).await {
+                Ok(Some(News::Told(_))) => out_of_sight = None,
+                Ok(Some(News::OutOfSight(why))) => {
+                    out_of_sight = Some((Instant::now(), why));
+                    break;
+                }
+                Ok(Some(News::Gone(why))) => return Err(Failure::Drive(why)),
                 Ok(None) => return Ok(follower.last()),
                 Err(_) => break,
             }
+        }
+        if let Some((_, why)) = out_of_sight.take_if(|(since, _)| since.elapsed() >= OUT_OF_SIGHT) {
+            return Err(Failure::Drive(why));
         }
     }
     Ok(follower.last())
@@ -153,7 +166,52 @@ fn why(command: &CommandView) -> String {
 
 #[cfg(test)]
 mod tests {
+    use drived_plant::follow::Lost;
+    use tokio::time::sleep;
+
     use super::*;
+
+    /// A daemon that is asked every half second and answers so, the last for ever.
+    struct Answers(Vec<Result<&'static str, Lost>>);
+
+    impl Source for Answers {
+        async fn news(&mut self) -> Result<Arc<CommandView>, Lost> {
+            sleep(ASKED_EVERY).await;
+            let next = if self.0.len() > 1 { self.0.remove(0) } else { self.0[0].clone() };
+            next.map(stop)
+        }
+    }
+
+    fn stop(outcome: &str) -> Arc<CommandView> {
+        let view = json!({"id": "a", "drive": "fan 1", "action": "stop", "command": "ramp stop", "caller": "local",
+            "origin": "socket", "outcome": outcome, "open": outcome == "pending", "time_unix_ms": 1});
+        Arc::new(serde_json::from_value(view).unwrap())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_daemon_that_is_late_once_is_asked_again_and_one_that_stays_silent_is_given_up() {
+        let late = || Err(Lost::ForNow("the daemon does not answer".to_owned()));
+        let told = std::cell::RefCell::new(Vec::new());
+        let follow = async |answers| {
+            told.borrow_mut().clear();
+            let say = |text| {
+                told.borrow_mut().push(text);
+                Ok(())
+            };
+            settled(Follower::from(Answers(answers), stop("pending")), say).await
+        };
+        let ended =
+            follow(vec![Ok("pending"), late(), late(), Ok("pending"), Ok("confirmed")]).await.unwrap();
+        assert_eq!(ended.outcome, OutcomeWord::Confirmed);
+        let silent = "the daemon does not answer: the command goes on, the daemon is asked again";
+        assert_eq!(*told.borrow(), ["fan 1 has not confirmed it yet: it goes on", silent]);
+
+        let began = Instant::now();
+        assert!(matches!(follow(vec![late()]).await, Err(Failure::Drive(_))));
+        assert_eq!(began.elapsed(), ASKED_EVERY + OUT_OF_SIGHT);
+        let gone = follow(vec![Err(Lost::ForGood("started anew".to_owned()))]).await;
+        assert!(matches!(gone, Err(Failure::Drive(_))));
+    }
 
     #[test]
     fn what_is_left_of_a_group_is_named() {

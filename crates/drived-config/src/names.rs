@@ -202,20 +202,16 @@ impl Names {
         let mut kind = self.lock();
         let Kind { file, table } = &mut *kind;
         let Some(file) = file else { return Ok(table.get_or_insert_default().take_up(drives)) };
-        let mut now = match read(file) {
-            Ok(now) => now,
-            Err(error) => {
-                *table = None;
-                return Err(error);
-            }
+        let kept = changed(file, |table| Ok(table.take_up(drives)));
+        *table = match &kept {
+            Ok((now, _)) => Some(now.clone()),
+            // What can be read and not be kept holds in this program alone.
+            Err(_) => read(file).ok().map(|mut now| {
+                now.take_up(drives);
+                now
+            }),
         };
-        let told = now.take_up(drives);
-        *table = Some(now);
-        changed(file, |table| {
-            table.take_up(drives);
-            Ok(())
-        })?;
-        Ok(told)
+        kept.map(|(_, told)| told)
     }
 
     /// Who has each number now, from 0 to the highest; `None`: what is kept cannot be read.

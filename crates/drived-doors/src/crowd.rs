@@ -3,7 +3,8 @@
 //! Where all ask, there are places that are for stops alone.
 
 use std::{
-    collections::BTreeMap,
+    cmp::Reverse,
+    collections::{BTreeMap, btree_map::Entry},
     net::IpAddr,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -62,6 +63,35 @@ pub struct Crowd {
 struct Members {
     next: u64,
     all: BTreeMap<u64, Member>,
+    /// How many each address has. Counted on, and not anew for each who comes: whoever comes again and again as fast as he can has to
+    /// cost next to nothing.
+    of: BTreeMap<Option<IpAddr>, usize>,
+}
+
+impl Members {
+    /// How many connections an address has.
+    fn of(&self, address: Option<IpAddr>) -> usize {
+        self.of.get(&address).copied().unwrap_or_default()
+    }
+
+    fn insert(&mut self, member: Member) -> u64 {
+        let id = self.next;
+        self.next += 1;
+        *self.of.entry(member.address).or_default() += 1;
+        self.all.insert(id, member);
+        id
+    }
+
+    fn remove(&mut self, id: u64) -> Option<Member> {
+        let member = self.all.remove(&id)?;
+        if let Entry::Occupied(mut count) = self.of.entry(member.address) {
+            *count.get_mut() -= 1;
+            if *count.get() == 0 {
+                count.remove();
+            }
+        }
+        Some(member)
+    }
 }
 
 #[derive(Debug)]
@@ -102,25 +132,22 @@ impl Crowd {
     /// A place for a connection, if there is room or somebody to make room.
     pub fn enter(&self, address: Option<IpAddr>, now: Instant) -> Option<Place> {
         let mut members = self.lock();
-        let of = |members: &Members, address: Option<IpAddr>| {
-            members.all.values().filter(|member| member.address == address).count()
-        };
-        let its_own = address.is_some() && of(&members, address) >= self.limits.per_address;
+        let has = members.of(address);
+        let its_own = address.is_some() && has >= self.limits.per_address;
         let mut is_for_stops = false;
         if its_own || members.all.len() >= self.limits.connections {
             let may_go = members.all.iter().filter(|(_, member)| !its_own || member.address == address);
             let is_silent = |since| now.saturating_duration_since(since) >= self.limits.silent_for;
-            let has = of(&members, address);
-            let crowds = |member: &Member| !member.heard && of(&members, member.address) > has + 1;
+            let crowds = |member: &Member| !member.heard && members.of(member.address) > has + 1;
             let waiting = may_go
                 .filter(|(_, member)| !member.asks() && (is_silent(member.waits_since) || crowds(member)));
             let first = waiting.max_by_key(|(id, member)| {
-                let longest = std::cmp::Reverse((member.waits_since, **id));
-                (!member.is_for_stops, of(&members, member.address), longest)
+                let longest = Reverse((member.waits_since, **id));
+                (!member.is_for_stops, members.of(member.address), longest)
             });
             match first.map(|(id, _)| *id) {
                 Some(first) => {
-                    let member = members.all.remove(&first);
+                    let member = members.remove(first);
                     // A place of those that are for stops goes to the next one as what it is.
                     is_for_stops = member.as_ref().is_some_and(|member| member.is_for_stops);
                     if let Some(member) = member {
@@ -136,8 +163,7 @@ impl Crowd {
                 }
             }
         }
-        let (id, shared) = (members.next, Arc::<Shared>::default());
-        members.next += 1;
+        let shared = Arc::<Shared>::default();
         let member = Member {
             address,
             waits_since: now,
@@ -146,7 +172,7 @@ impl Crowd {
             streams: false,
             shared: Arc::clone(&shared),
         };
-        members.all.insert(id, member);
+        let id = members.insert(member);
         drop(members);
         Some(Place { crowd: self.clone(), id, shared })
     }
@@ -204,7 +230,7 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.crowd.lock().all.remove(&self.id);
+        self.crowd.lock().remove(self.id);
     }
 }
 

@@ -8,7 +8,9 @@ use std::{
 
 use crc::{CRC_16_MODBUS, Crc};
 use drive_core::{Control, Direction, Setpoint, State, Status};
-use drive_fleet::{DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot};
+use drive_fleet::{
+    Became, DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot,
+};
 use tokio::time::Instant;
 
 /// What stands for a value that is not known, or too old to be told as one.
@@ -82,7 +84,7 @@ const DETAILS: [Column; 16] = [
     ),
     column(
         "outcome",
-        "of it: 0 none, 1 confirmed, 2 not confirmed, 3 unknown, 4 refused, 5 expired, 6 superseded",
+        "of it: 0 none, 1 confirmed, 2 not confirmed, 3 unknown, 4 refused, 5 expired, 6 superseded, 7 nothing to be done",
         Shown::outcome,
     ),
     column("outcome_age", "since then, 1 s; FFFFh: none, or longer", Shown::outcome_age),
@@ -135,13 +137,14 @@ impl Outcomes {
 }
 
 fn number_of(outcome: &Outcome) -> u16 {
-    match outcome.word() {
-        "confirmed" => 1,
-        "not_confirmed" => 2,
-        "unknown" => 3,
-        "refused" => 4,
-        "expired" => 5,
-        _ => 6,
+    match outcome.became() {
+        Became::Confirmed => 1,
+        Became::NotConfirmed => 2,
+        Became::Unknown => 3,
+        Became::Refused => 4,
+        Became::Expired => 5,
+        Became::Superseded => 6,
+        Became::Nothing => 7,
     }
 }
 

@@ -6,11 +6,11 @@ use std::{
     thread,
 };
 
-use drive_families::Options;
+use drive_bus::Protocol;
+use drive_families::{Options, SetUp, simulated};
 use drive_sim::{Serving, SimLine, Wiring};
 use tokio::sync::mpsc;
 
-use drived_simulated::{self as simulated, SetUp};
 use drived_words::{
     drive_spec::{self, DriveName, DriveSpec},
     failure::Failure,
@@ -51,7 +51,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let settings = SerialSpec { baud: args.baud, format, protocol }.settings(&drives);
     let settings = settings.map_err(|error| input(&error))?;
     let mut ending = Ending::listen()?;
-    let line = SimLine::new(Wiring { protocol: simulated::protocol(protocol), ..Wiring::rtu(settings) });
+    let line = SimLine::new(Wiring { protocol: by(protocol), ..Wiring::rtu(settings) });
     let set_up = if args.factory { SetUp::Factory } else { SetUp::ForTheBus };
     for name in &drives {
         let model = simulated::model(name.family, set_up).map_err(|error| input(&error))?;
@@ -83,6 +83,15 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         "served {} requests, {} answers; {} damaged frames, {} breaches of the line's rules",
         stats.requests, stats.answers, stats.bad_frames, stats.violations
     ))
+}
+
+/// The simulator's name of a protocol.
+pub(crate) const fn by(protocol: Protocol) -> drive_sim::Protocol {
+    match protocol {
+        Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
+        Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
+        _ => drive_sim::Protocol::Rtu,
+    }
 }
 
 /// The lines of standard input, until it ends. A thread reads them that is left behind when the program ends: nothing

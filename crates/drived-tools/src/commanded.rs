@@ -261,13 +261,12 @@ fn seen(last: Option<&LastSeen>) -> String {
 #[cfg(test)]
 mod tests {
     use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
-    use drive_families::Family;
+    use drive_families::{Family, SetUp, simulated};
     use drive_sim::{SimLine, Wiring};
     use drive_testing::witness::Witnesses;
     use tokio::time::sleep;
 
     use super::*;
-    use drived_simulated::{self as simulated, SetUp};
 
     #[tokio::test(start_paused = true)]
     async fn a_start_that_is_given_up_at_any_moment_leaves_no_motor_running() {

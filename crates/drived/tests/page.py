@@ -387,6 +387,14 @@ def long_group(page, url):
     assert widths[0] <= widths[1], widths
     stop = page.locator("#stop").bounding_box()
     assert stop["y"] + stop["height"] <= 844 and stop["x"] + stop["width"] <= 390, stop
+    # Of three pumps one is only read: nothing is sent to it, and it is told by its name.
+    page.locator("#stop").click()
+    account = page.locator("#stop-account")
+    expect(account.locator("[data-count=confirmed]")).to_have_text("2")
+    expect(account.locator("[data-count=pending]")).to_have_text("0")
+    expect(account.locator("[data-count=refused]")).to_have_text("1")
+    expect(account.locator(".head")).to_have_text(re.compile("^Taken by the daemon at [0-9:]+ for 2 drives$"))
+    expect(account.locator(".left")).to_have_text("only read, not stopped: pump 3")
 
 
 def dead(page, url):
@@ -432,6 +440,16 @@ def clocks(page, url):
     recorded = answer.value.json()
     assert recorded["time_unix_ms"][0] <= begins + 1_000, (begins, recorded)
     assert len(recorded["time_unix_ms"]) > 10, len(recorded["time_unix_ms"])
+    # The setpoint is the one that the drive follows, also where this daemon has given it none: another master of the line has
+    # written LFR, 40.0 Hz, and the three steps of CMD.
+    for word in ["0x2136 0190h", "0x2135 0006h", "0x2135 0007h", "0x2135 000Fh"]:
+        happen(f"atv312@1 master {word}")
+    big = lambda name: page.locator(".big > div", has=page.get_by_text(name, exact=True)).locator(".number")
+    expect(big("Frequency")).to_contain_text("40.0 Hz")
+    expect(big("Setpoint")).to_have_text("40.0 Hz")
+    expect(page.locator(".setpoint input[type=range]")).to_have_value("40")
+    page.locator("nav a").first.click()
+    expect(page.locator(".rows .row", has_text="pump 1")).to_contain_text("of 40.0 Hz")
 
 
 def axe(page, url, token):

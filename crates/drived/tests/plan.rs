@@ -28,6 +28,13 @@ fn read(baud: Nanos) -> Nanos {
     characters(baud, 8 + 21) + RESPONSE + t3_5(baud)
 }
 
+/// One status of an Altivar 312: one read of its six words (17 characters), and such a read behind every twentieth that proves its
+/// run command.
+fn status(baud: Nanos) -> Nanos {
+    let read = characters(baud, 8 + 17) + RESPONSE + t3_5(baud);
+    read + read / 20
+}
+
 /// A read without an answer.
 fn lost(baud: Nanos, timeout: Nanos) -> Nanos {
     characters(baud, 8) + t3_5(baud) + timeout
@@ -77,18 +84,20 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
     let out = ended.assert_done();
     assert!(out.starts_with("line north: 31 drives on /dev/nowhere, 19200 8E1 rtu"), "{out}");
     let family = Family::ATV312.capabilities();
-    assert_eq!(family.status_exchanges, 1, "the figures below count one");
+    let counted =
+        (family.status_exchanges, family.status_words, family.statuses_per_turn, family.stop_exchanges);
+    assert_eq!(counted, (1, 6, 20, 4), "the figures below count so");
     let slow_reads = Nanos::from(family.measurement_exchanges);
 
     // What the probes of the dead take, a twentieth, the living do without.
     let cases = [(19_200, 31, 0, 20), (38_400, 31, 0, 20), (19_200, 28, 3, 19)];
     for (column, (baud, living, dead, of_twenty)) in cases.into_iter().enumerate() {
         let cell = |label: &str| row(out, label).get(column).expect("each case has a column").clone();
-        let sweep = living * read(baud) * 20 / of_twenty;
+        let sweep = living * status(baud) * 20 / of_twenty;
         assert_eq!(cell("works"), "yes");
         assert_eq!(cell("cycle"), shown(sweep));
 
-        let each_minute = living * (40 * read(baud) + slow_reads * read(baud)) + (20 - of_twenty) * 3 * S;
+        let each_minute = living * (40 * status(baud) + slow_reads * read(baud)) + (20 - of_twenty) * 3 * S;
         assert_share(&cell("used by polls"), each_minute, 60 * S);
         assert_share(&cell("left for commands"), 60 * S - each_minute, 60 * S);
 
@@ -96,7 +105,7 @@ fn the_figures_of_a_file_follow_from_the_arithmetic_of_its_line() {
         let wait = sweep * 20 / 19;
         assert_eq!(cell("running: status"), shown(1_500 * MS + wait));
         assert_eq!(cell("at rest: status"), shown(2 * S + wait));
-        let statuses = living * 40 * read(baud) + (20 - of_twenty) * 3 * S;
+        let statuses = living * 40 * status(baud) + (20 - of_twenty) * 3 * S;
         let measured = 60 * S + living * slow_reads * read(baud) * 60 * S / (60 * S - statuses);
         let told: f64 = cell("measurements").trim_end_matches(" s").parse().expect("a number");
         assert!((told - measured as f64 / S as f64).abs() < 0.02, "{told} and {measured}");
@@ -152,10 +161,10 @@ fn lines_stop_beside_each_other_so_all_stop_with_the_slowest() {
 fn a_line_that_is_too_slow_for_its_periods_is_refused_with_the_arithmetic() {
     let file = File::new("too-slow", &fans("/dev/nowhere,9600,8E1", 31, "500ms", "max_age = \"6s\"\n"));
     let ended = run(&["plan", "--config", file.path()]);
-    let sweep = 31 * read(9_600);
+    let sweep = 31 * status(9_600);
     // Each drive has a status in each half second, and its measurements each minute.
-    let slow = Nanos::from(Family::ATV312.capabilities().measurement_exchanges);
-    let percent = (sweep * 120 + slow * sweep) * 1_000 / (60 * S);
+    let slow = Nanos::from(Family::ATV312.capabilities().measurement_exchanges) * 31 * read(9_600);
+    let percent = (sweep * 120 + slow) * 1_000 / (60 * S);
     ended.assert_refused(2, &format!(
         "too-slow.toml:1: lines.north: one status of 31 drives takes {}.{:03}s and the polls want {}.{} % of the line",
         sweep.div_ceil(MS) / 1_000, sweep.div_ceil(MS) % 1_000, percent / 10, percent % 10
@@ -200,7 +209,7 @@ fn a_watchdog_that_nobody_set_but_the_family_always_has_is_fed_too() {
 fn a_status_that_grows_older_than_it_may_is_refused_with_the_arithmetic() {
     let file = File::new("stale", &fans("/dev/nowhere,19200,8E1", 31, "1500ms", "max_age = \"2500ms\"\n"));
     let ended = run(&["plan", "--config", file.path()]);
-    let wait = (31 * read(19_200) * 20 / 19).div_ceil(MS);
+    let wait = (31 * status(19_200) * 20 / 19).div_ceil(MS);
     let told = format!("2s of the period and {wait}ms of waiting for the other drives, and from 2.5s on");
     ended.assert_refused(2, &told);
 }
@@ -276,7 +285,7 @@ fn modbus_tcp_has_no_speed_to_plan_with() {
     let out = run(&["plan", "--line", "tcp://gateway:502", "--drive", "atv312@1-4"]);
     let out = out.assert_done();
     assert!(!out.contains("38400"), "{out}");
-    assert_eq!(row(out, "cycle")[0], shown(4 * RESPONSE));
+    assert_eq!(row(out, "cycle")[0], shown(4 * (RESPONSE + RESPONSE / 20)));
 }
 
 #[test]

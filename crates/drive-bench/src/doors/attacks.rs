@@ -24,19 +24,29 @@ pub(super) struct Target {
     pub(super) gateway: SocketAddr,
 }
 
-/// What it is, and whoever does it until it is over.
-pub(super) type Attack = (&'static str, fn(Target, &AtomicBool));
+/// What somebody does until it is over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Attack {
+    /// As the command line names it.
+    pub(super) key: &'static str,
+    pub(super) name: &'static str,
+    pub(super) act: fn(Target, &AtomicBool),
+}
+
+const fn attack(key: &'static str, name: &'static str, act: fn(Target, &AtomicBool)) -> Attack {
+    Attack { key, name, act }
+}
 
 pub(super) const ATTACKS: [Attack; 8] = [
-    ("nobody does anything", |_, over| wait(over)),
-    ("512 connections that say nothing", |to, over| hold(to.http, 512, b"", over)),
-    ("512 half-sent heads", |to, over| {
+    attack("calm", "nobody does anything", |_, over| wait(over)),
+    attack("silent", "512 connections that say nothing", |to, over| hold(to.http, 512, b"", over)),
+    attack("half-heads", "512 half-sent heads", |to, over| {
         hold(to.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over);
     }),
-    ("64 slow bodies of logins", |to, over| {
+    attack("slow-logins", "64 slow bodies of logins", |to, over| {
         hold(to.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over);
     }),
-    ("8 who try tokens on stops", |to, over| {
+    attack("wrong-tokens", "8 who try tokens on stops", |to, over| {
         flood(
             to.http,
             8,
@@ -44,7 +54,7 @@ pub(super) const ATTACKS: [Attack; 8] = [
             over,
         );
     }),
-    ("8 who send 64 KiB that they may not", |to, over| {
+    attack("large-bodies", "8 who send 64 KiB that they may not", |to, over| {
         let body = " ".repeat(65_000);
         let start = format!(
             "POST /api/v1/drives/pump%201/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
@@ -52,10 +62,12 @@ pub(super) const ATTACKS: [Attack; 8] = [
         );
         flood(to.http, 8, &start, over);
     }),
-    ("256 event streams that nobody reads", |to, over| {
+    attack("unread-streams", "256 event streams that nobody reads", |to, over| {
         hold(to.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over);
     }),
-    ("256 silent clients of the gateway", |to, over| hold(to.gateway, 256, b"", over)),
+    attack("silent-gateway", "256 silent clients of the gateway", |to, over| {
+        hold(to.gateway, 256, b"", over);
+    }),
 ];
 
 /// Opens connections, says the same on each and keeps them; those that are closed are opened again.

@@ -39,7 +39,6 @@ impl Browser {
         let says = self.says.as_mut().ok_or(ErrorKind::BrokenPipe)?;
         writeln!(says, "{by}")?;
         let ms: f64 = self.line()?.trim().parse().map_err(|_| Error::from(ErrorKind::TimedOut))?;
-        // What is less than nothing, or no number, belongs to an answer to somebody else's press.
         Duration::try_from_secs_f64(ms / 1_000.0).map_err(|error| {
             Error::new(ErrorKind::InvalidData, format!("the browser tells of {ms} ms: {error}"))
         })

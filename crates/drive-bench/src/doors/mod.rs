@@ -22,6 +22,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use clap::Args;
+
 use self::{
     attacks::{ATTACKS, Attack, Target},
     browser::Browser,
@@ -43,12 +45,33 @@ const GOAL_MS: f64 = 50.0;
 const PATIENCE: Duration = Duration::from_secs(5);
 const BETWEEN: Duration = Duration::from_millis(20);
 
+/// Which doors and attacks somebody wants to see; where nothing is named, all.
+#[derive(Debug, Default, Args)]
+pub(crate) struct Wanted {
+    /// Of the doors, stop only at these: pointer, key, http, socket, gateway, mqtt.
+    #[arg(long, value_name = "DOOR", value_parser = DOORS.map(Door::key))]
+    door: Vec<String>,
+    /// Of the attacks on doors, only these.
+    #[arg(long, value_name = "ATTACK", value_parser = ATTACKS.map(|attack| attack.key))]
+    attack: Vec<String>,
+}
+
+impl Wanted {
+    fn has(of: &[String], key: &str) -> bool {
+        of.is_empty() || of.iter().any(|one| one == key)
+    }
+}
+
 /// Measures each door under each attack; and what the machine itself takes: the same attack on a server that does nothing, with stops at
 /// that one, and by the page's button at the daemon, which nobody attacks then.
-pub(crate) fn measure(report: &mut Report) -> Result<(), Error> {
+pub(crate) fn measure(report: &mut Report, wanted: &Wanted) -> Result<(), Error> {
     let (plant, trivial) = (Plant::start()?, Trivial::start()?);
-    let mut stopper = Stopper::of(&plant, &trivial)?;
-    let (doors, left_out): (Vec<Door>, Vec<Door>) = DOORS.into_iter().partition(|door| stopper.has(*door));
+    let wanted_doors: Vec<Door> =
+        DOORS.into_iter().filter(|door| Wanted::has(&wanted.door, door.key())).collect();
+    let is_pressed = wanted_doors.iter().any(|door| matches!(door, Door::Pointer | Door::Key));
+    let mut stopper = Stopper::of(&plant, &trivial, is_pressed)?;
+    let (doors, left_out): (Vec<Door>, Vec<Door>) =
+        wanted_doors.into_iter().partition(|door| stopper.has(*door));
     for door in left_out {
         eprintln!("drive-bench: {} is left out: {}", door.name(), door.wants());
     }
@@ -56,10 +79,10 @@ pub(crate) fn measure(report: &mut Report) -> Result<(), Error> {
         until(|| stopper.stop(*door).is_ok_and(|_| true))?;
     }
     let machine = Target { http: trivial.address, gateway: trivial.address };
-    let is_control = |door: &Door| *door == Door::Pointer && stopper.has(*door);
-    let controls: Vec<Door> = DOORS.into_iter().filter(is_control).chain([Door::Trivial]).collect();
-    for attack in ATTACKS {
-        let name = attack.0;
+    let is_control = |door: &Door| *door == Door::Pointer;
+    let controls: Vec<Door> = doors.iter().copied().filter(is_control).chain([Door::Trivial]).collect();
+    for attack in ATTACKS.into_iter().filter(|attack| Wanted::has(&wanted.attack, attack.key)) {
+        let name = attack.name;
         under(
             attack,
             Target { http: plant.http, gateway: plant.gateway },
@@ -79,7 +102,7 @@ pub(crate) fn measure(report: &mut Report) -> Result<(), Error> {
 
 /// Stops at each of these doors while somebody attacks.
 fn under(
-    (_, attack): Attack,
+    attack: Attack,
     target: Target,
     doors: &[Door],
     stopper: &mut Stopper<'_>,
@@ -87,7 +110,7 @@ fn under(
 ) {
     let over = AtomicBool::new(false);
     thread::scope(|scope| {
-        scope.spawn(|| attack(target, &over));
+        scope.spawn(|| (attack.act)(target, &over));
         thread::sleep(Duration::from_secs(1));
         for door in doors {
             // What was not taken is later than everything.
@@ -135,6 +158,19 @@ enum Door {
 const DOORS: [Door; 6] = [Door::Pointer, Door::Key, Door::Http, Door::Socket, Door::Gateway, Door::Mqtt];
 
 impl Door {
+    /// As the command line names it.
+    const fn key(self) -> &'static str {
+        match self {
+            Self::Pointer => "pointer",
+            Self::Key => "key",
+            Self::Http => "http",
+            Self::Socket => "socket",
+            Self::Gateway => "gateway",
+            Self::Mqtt => "mqtt",
+            Self::Trivial => "trivial",
+        }
+    }
+
     const fn name(self) -> &'static str {
         match self {
             Self::Pointer => "the page's button",
@@ -167,8 +203,11 @@ struct Stopper<'a> {
 }
 
 impl<'a> Stopper<'a> {
-    fn of(plant: &'a Plant, trivial: &'a Trivial) -> Result<Self, Error> {
-        let browser = Browser::start(&format!("http://{}/", plant.http))?;
+    fn of(plant: &'a Plant, trivial: &'a Trivial, is_pressed: bool) -> Result<Self, Error> {
+        let browser = match is_pressed {
+            true => Browser::start(&format!("http://{}/", plant.http))?,
+            false => None,
+        };
         Ok(Self { plant, trivial, browser, observer: Observer::start(&plant.socket)? })
     }
 

@@ -7,11 +7,13 @@ use drive_core::{Capabilities, SerialSettings, WatchdogCapability};
 
 use crate::{settings::Periods, watchdog::WatchdogContract};
 
-/// Words that an exchange of a status or of measurements is counted with.
+/// Words that an exchange is counted with of which a family does not say how long it is.
 const WORDS: usize = 8;
 /// Bytes of a request without what its protocol puts round it, and of an answer besides its words.
 const REQUEST: usize = 5;
 const ANSWER: usize = 2;
+/// Bytes of the answer to a frame for a watchdog: a word that is read, or what a loop-back has carried.
+const FED: usize = 5;
 
 /// What a line gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,11 +52,31 @@ impl LineBudget {
         }
     }
 
-    /// One exchange that reads eight words, with the silences that belong to it; what one poll is counted as.
+    /// One exchange that reads eight words, with the silences that belong to it; what an exchange of a stop or of measurements is
+    /// counted as.
     #[must_use]
     pub fn read_slot(&self) -> Duration {
+        self.slot(ANSWER + 2 * WORDS)
+    }
+
+    /// The exchanges of one status of such a drive.
+    #[must_use]
+    pub fn status_slot(&self, capabilities: &Capabilities) -> Duration {
+        let answer = |words: u16| ANSWER + 2 * usize::from(words);
+        let more = self.slot(answer(capabilities.status_words)).saturating_sub(self.slot(answer(0)));
+        self.slot(answer(0)) * u32::from(capabilities.status_exchanges.max(1)) + more
+    }
+
+    /// A frame for a watchdog, and its answer.
+    #[must_use]
+    pub fn fed_slot(&self) -> Duration {
+        self.slot(FED)
+    }
+
+    /// A request of the usual length and an answer with so many bytes, with the silences that belong to them.
+    fn slot(&self, answer: usize) -> Duration {
         self.serial.map_or(self.response, |serial| {
-            let wire = self.protocol.exchange_time(serial, REQUEST, ANSWER + 2 * WORDS);
+            let wire = self.protocol.exchange_time(serial, REQUEST, answer);
             wire + self.response * self.protocol.turns() + self.slave_change_gap
         })
     }

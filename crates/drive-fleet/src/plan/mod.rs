@@ -12,8 +12,6 @@ pub use self::{
 };
 use crate::supervisor::checks::FEED_PART;
 
-/// Exchanges of a stop besides its status: the ways down the state chart.
-const STOP_EXCHANGES: u32 = 3;
 /// A whole line, in millionths.
 const WHOLE_PPM: u64 = 1_000_000;
 /// What the line gives to the probes of so many dead drives at the most, in millionths.
@@ -33,7 +31,8 @@ const COMMANDS_PPM: u64 = 100_000;
 /// What a line will be like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LinePlan {
-    /// One status of every living drive, one after the other, and what the probes of dead ones take meanwhile.
+    /// One status of every living drive, one after the other, with what proves their run commands and with the frames that their
+    /// watchdogs get between two of them, and what the probes of dead ones take meanwhile.
     pub sweep: Duration,
     /// The share of the line that the polls and the watchdogs take while every drive runs, and the probes of dead ones,
     /// in millionths. It is more than a million where they want more than the line has.
@@ -45,7 +44,10 @@ pub struct LinePlan {
     drives: u32,
     dead: u32,
     watched: u32,
-    status_exchanges: u32,
+    /// Exchanges of the stops of all, each from its first word until it is confirmed.
+    stop_exchanges: u32,
+    /// The statuses of every drive alone, one after the other, and the probes of dead ones.
+    statuses: Duration,
     /// The measurements of every drive, one after the other.
     slow_sweep: Duration,
     /// What the measurements leave of the line, in millionths.
@@ -86,10 +88,16 @@ impl LinePlan {
         period + self.status_wait()
     }
 
-    /// What a status waits for the others: all of them come first, and what the line gives to the measurements.
+    /// What a status waits for the others: all of them come first, the frames that watchdogs want meanwhile, and what the line gives
+    /// to the measurements.
     fn status_wait(&self) -> Duration {
+        self.statuses_with(self.fed_ppm)
+    }
+
+    /// The statuses of all, on a line that gives so much, in millionths, to more urgent ones, and what it must to the measurements.
+    fn statuses_with(&self, urgent_ppm: u64) -> Duration {
         let background = if self.slow_sweep.is_zero() { 0 } else { BACKGROUND_PPM };
-        stretched(self.sweep, WHOLE_PPM - background)
+        stretched(self.statuses, (WHOLE_PPM - background).saturating_sub(urgent_ppm).max(1))
     }
 
     /// How old measurements that are asked for at this period are at the most when the next come: those of all the other
@@ -119,11 +127,10 @@ impl LinePlan {
     /// with so many mute drives among them; the motors then still need their ramps.
     #[must_use]
     pub fn stop_all(&self, mute: u32) -> Duration {
-        let exchanges = self.drives.saturating_mul(STOP_EXCHANGES).saturating_add(self.status_exchanges);
         let lost = mute.saturating_mul(self.budget.offline_after.max(1));
         self.budget.lost_slot()
             + self.budget.broadcast_turnaround
-            + self.budget.read_slot().saturating_mul(exchanges)
+            + self.budget.read_slot().saturating_mul(self.stop_exchanges)
             + self.budget.lost_slot().saturating_mul(lost)
     }
 }
@@ -182,8 +189,9 @@ pub struct Forecast {
 #[must_use]
 pub fn forecast(budget: LineBudget, drives: &[Demand], dead: usize) -> Forecast {
     let alone = drives.len() == 1;
+    let all = drives.iter().map(|demand| status_of(budget, demand, alone)).sum();
     let mut living: Vec<(&Demand, Load)> =
-        drives.iter().map(|demand| (demand, Load::of(budget, demand, alone))).collect();
+        drives.iter().map(|demand| (demand, Load::of(budget, demand, alone, all))).collect();
     living.sort_by_key(|(_, load)| load.status_ppm.saturating_add(load.slow_ppm));
     living.drain(..dead.min(living.len()));
 
@@ -191,23 +199,24 @@ pub fn forecast(budget: LineBudget, drives: &[Demand], dead: usize) -> Forecast 
     let sum =
         |of: fn(&Load) -> u64| living.iter().fold(probes, |sum, (_, load)| sum.saturating_add(of(load)));
     let slow_ppm = sum(|load| load.slow_ppm) - probes;
-    let exchanges = living.iter().map(|(demand, _)| u32::from(demand.capabilities.status_exchanges));
+    let exchanges = living.iter().map(|(demand, _)| u32::from(demand.capabilities.stop_exchanges));
     let plan = LinePlan {
-        sweep: stretched(living.iter().map(|(_, load)| load.status).sum(), WHOLE_PPM - probes),
+        sweep: stretched(living.iter().map(|(_, load)| load.status + load.fed).sum(), WHOLE_PPM - probes),
         utilisation_ppm: sum(|load| load.status_ppm).saturating_add(slow_ppm),
         feed_gap: None,
         budget,
         drives: count(living.len()),
         dead: count(dead),
         watched: count(living.iter().filter(|(demand, _)| demand.watchdog_timeout().is_some()).count()),
-        status_exchanges: exchanges.fold(0, u32::saturating_add),
+        stop_exchanges: exchanges.fold(0, u32::saturating_add),
+        statuses: stretched(living.iter().map(|(_, load)| load.status).sum(), WHOLE_PPM - probes),
         slow_sweep: living.iter().map(|(_, load)| load.slow).sum(),
         slow_ppm,
         fresh_ppm: 0,
         fed_ppm: sum(|load| load.fed_ppm) - probes,
     };
     let patience = living.iter().map(|(demand, _)| demand.patience()).min();
-    let fresh_ppm = patience.map_or(0, |patience| share(plan.status_wait(), patience));
+    let fresh_ppm = patience.map_or(0, |patience| share(plan.statuses_with(0), patience));
     let plan = LinePlan { fresh_ppm, ..plan };
     let shortest = living
         .iter()
@@ -261,8 +270,10 @@ fn stale(plan: &LinePlan, demand: &Demand) -> Option<PlanProblem> {
 /// What one drive takes of its line.
 #[derive(Debug, Clone, Copy)]
 struct Load {
-    /// One status.
+    /// One status, with its part of what proves a run command.
     status: Duration,
+    /// The frames for the watchdog between two of them, at the most.
+    fed: Duration,
     /// One slow set; nothing where it is never asked for.
     slow: Duration,
     /// The share of the statuses and of the frames for the watchdog, in millionths.
@@ -274,34 +285,68 @@ struct Load {
 }
 
 impl Load {
-    fn of(budget: LineBudget, demand: &Demand, alone: bool) -> Self {
-        let pause = if alone { budget.idle_pause(demand.capabilities) } else { Duration::ZERO };
-        let read = budget.read_slot() + pause;
-        let status = read * u32::from(demand.capabilities.status_exchanges.max(1));
-        // A watchdog that wants to hear more often than it is polled gets frames of its own between two polls.
-        let fed = |period: Duration| {
-            let fed = demand.watchdog_timeout().map(|timeout| timeout / FEED_PART);
-            let frames = fed.and_then(|fed| period.as_nanos().div_ceil(fed.as_nanos().max(1)).checked_sub(1));
-            let frames = frames.and_then(|frames| u32::try_from(frames).ok()).unwrap_or_default();
-            read.saturating_mul(frames)
+    fn of(budget: LineBudget, demand: &Demand, alone: bool, all: Duration) -> Self {
+        let pause = pause_of(budget, demand, alone);
+        let status = status_of(budget, demand, alone);
+        let late_by = |late: Duration, period: Duration| {
+            let after = demand.watchdog_timeout().map(|timeout| timeout / FEED_PART);
+            let ppm = after.map_or(0, |after| frames_ppm(period, after, status, late));
+            times_ppm(budget.fed_slot() + pause, ppm)
         };
+        let fed = |period: Duration| late_by(Duration::ZERO, period);
         let fast = |period: Duration| share(status.saturating_add(fed(period)), period);
+        // Where it has to wait for the statuses of all others a frame more may come.
+        let most = |period: Duration| late_by(all.saturating_sub(status), period);
         let slow = match demand.periods.slow.is_zero() {
             true => Duration::ZERO,
-            false => read * u32::from(demand.capabilities.measurement_exchanges.max(1)),
+            false => {
+                (budget.read_slot() + pause) * u32::from(demand.capabilities.measurement_exchanges.max(1))
+            }
         };
+        let of_either = [demand.periods.running, demand.periods.rest];
         Self {
             status,
+            fed: of_either.map(most).into_iter().max().unwrap_or_default(),
             slow,
-            status_ppm: fast(demand.periods.running).max(fast(demand.periods.rest)),
-            fed_ppm: [demand.periods.running, demand.periods.rest]
-                .map(|at| share(fed(at), at))
-                .into_iter()
-                .max()
-                .unwrap_or(0),
+            status_ppm: of_either.map(fast).into_iter().max().unwrap_or(0),
+            fed_ppm: of_either.map(|at| share(fed(at), at)).into_iter().max().unwrap_or(0),
             slow_ppm: if slow.is_zero() { 0 } else { share(slow, demand.periods.slow) },
         }
     }
+}
+
+/// What a drive's own pause adds to each of its exchanges.
+fn pause_of(budget: LineBudget, demand: &Demand, alone: bool) -> Duration {
+    if alone { budget.idle_pause(demand.capabilities) } else { Duration::ZERO }
+}
+
+/// One status of a drive, with its part of the exchange that proves a run command behind every so many, which is as long as those
+/// of a status.
+fn status_of(budget: LineBudget, demand: &Demand, alone: bool) -> Duration {
+    let (capabilities, pause) = (demand.capabilities, pause_of(budget, demand, alone));
+    let exchanges = u32::from(capabilities.status_exchanges.max(1));
+    let status = budget.status_slot(capabilities) + pause * exchanges;
+    let turn = (status / exchanges).checked_div(u32::from(capabilities.statuses_per_turn));
+    status + turn.unwrap_or_default()
+}
+
+/// The frames that a watchdog gets between two statuses, on average at the most and in millionths: one whenever the drive has
+/// heard nothing for the time `after`. So many fit into the period besides the status, and as many begin as a status that is `late`
+/// at some times and not at others leaves them the time. A drive that is polled more often gets none.
+fn frames_ppm(period: Duration, after: Duration, status: Duration, late: Duration) -> u64 {
+    if period < after {
+        return 0;
+    }
+    let left = period.saturating_sub(status);
+    let begun = (left + late).as_nanos().checked_div(after.as_nanos()).unwrap_or(u128::MAX);
+    let begun = u64::try_from(begun).unwrap_or(u64::MAX).saturating_mul(WHOLE_PPM);
+    share(left, after).min(begun)
+}
+
+/// Something so many millionths of a time.
+fn times_ppm(time: Duration, ppm: u64) -> Duration {
+    let nanos = time.as_nanos().saturating_mul(u128::from(ppm)) / u128::from(WHOLE_PPM);
+    Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
 }
 
 /// The part of a period that something takes, in millionths.

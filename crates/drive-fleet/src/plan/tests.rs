@@ -4,9 +4,14 @@ use drive_bus::LineConfig;
 use drive_core::{Capabilities, Reaction, SerialSettings};
 
 use super::*;
-use crate::{settings::Periods, testing::CAPABILITIES, watchdog::WatchdogContract};
+use crate::{settings::Periods, testing, watchdog::WatchdogContract};
+
+/// One exchange a status and nothing besides.
+const CAPABILITIES: Capabilities = Capabilities { statuses_per_turn: 0, ..testing::CAPABILITIES };
 
 const MS: Duration = Duration::from_millis(1);
+/// A frame for a watchdog: 8 + 8 characters.
+const FRAME: Duration = Duration::from_nanos(28 * 1_000_000 + 620_167 - 13 * 11 * 1_000_000_000 / 19_200);
 /// One exchange at 19200 8E1: 8 + 21 characters of 11 bits, t3.5, and the 10 ms of the slave.
 const READ: Duration = Duration::from_nanos(28 * 1_000_000 + 620_167);
 
@@ -146,14 +151,56 @@ fn more_drives_than_a_family_allows_on_a_segment_are_refused_unless_there_are_re
 
 #[test]
 fn behind_a_groups_command_the_line_is_left_to_the_polls_and_to_the_frames_for_the_watchdogs() {
-    // Each of 25 drives is polled every 4 s and wants to hear something every 2 s: one frame of its own between two polls.
-    let mut every = without_measurements(drives(25, 4_000 * MS, Some(4_000 * MS)));
+    // Each of 25 drives is polled every 4 s and wants to hear something every 2.5 s: one frame of its own between two polls.
+    let mut every = without_measurements(drives(25, 4_000 * MS, Some(5_000 * MS)));
     every.iter_mut().for_each(|demand| demand.periods = Periods { rest: 4_000 * MS, ..demand.periods });
     every.iter_mut().for_each(|demand| demand.periods.max_age = 5_000 * MS);
     let plan = forecast(budget(), &every, 0).plan;
     // A status of each within the second that it may be late, and a frame of each within its 4 s.
-    let (polls, frames) = (25.0 * READ.as_secs_f64() / 1.0, 25.0 * READ.as_secs_f64() / 4.0);
+    let (polls, frames) = (25.0 * READ.as_secs_f64() / 1.0, 25.0 * FRAME.as_secs_f64() / 4.0);
     let rest = plan.rest_after(1_000 * MS).as_secs_f64();
     let wanted = 1.0 / (1.0 - polls - frames) - 1.0;
     assert!((rest - wanted).abs() < 0.01, "{rest} s behind a command of 1 s, and {wanted} s are wanted");
+}
+
+#[test]
+fn a_sweep_counts_the_words_of_its_statuses_what_proves_a_run_command_and_the_frames_of_the_watchdogs() {
+    static FAMILY: Capabilities =
+        Capabilities { status_exchanges: 2, status_words: 11, statuses_per_turn: 10, ..CAPABILITIES };
+    let of = |watchdog| {
+        let mut every = without_measurements(drives(10, 4_000 * MS, watchdog));
+        every.iter_mut().for_each(|demand| {
+            demand.capabilities = &FAMILY;
+            demand.periods = Periods { rest: 4_000 * MS, ..demand.periods };
+        });
+        plan(budget(), &every).unwrap()
+    };
+    // Two exchanges are 16 + 10 + 22 characters, and half of that a tenth as often.
+    let characters = Duration::from_nanos(48 * 11 * 1_000_000_000 / 19_200);
+    let status = characters + 2 * (READ - Duration::from_nanos(29 * 11 * 1_000_000_000 / 19_200));
+    let statuses = 10 * (status + status / 20);
+    assert!(of(None).sweep.abs_diff(statuses) < MS / 10, "{:?}", of(None));
+    // A frame is due after 1.5 s without one, twice in 4 s.
+    let fed = of(Some(3_000 * MS));
+    assert!(fed.sweep.abs_diff(statuses + 20 * FRAME) < MS / 10, "{fed:?}");
+    let used = (statuses + 20 * FRAME).as_secs_f64() / 4.0;
+    assert!((fed.utilisation_ppm as f64 / 1e6 - used).abs() < 0.001, "{fed:?}");
+    assert!(fed.status_age(4_000 * MS) > 4_000 * MS + statuses, "the frames come first");
+    // One that is due as often as the drive is polled comes where a poll is late, and is counted.
+    let late = of(Some(8_000 * MS)).sweep;
+    assert!(late > statuses + 9 * FRAME && late < statuses + 10 * FRAME, "{late:?}");
+    assert_eq!(
+        of(Some(8_000 * MS)).utilisation_ppm,
+        of(None).utilisation_ppm,
+        "where it never is it gets none"
+    );
+}
+
+#[test]
+fn a_stop_of_all_counts_the_exchanges_that_the_family_says() {
+    static TWO_LOOKS: Capabilities = Capabilities { stop_exchanges: 7, ..CAPABILITIES };
+    let mut every = drives(10, 1_000 * MS, None);
+    let before = plan(budget(), &every).unwrap().stop_all(0);
+    every.iter_mut().for_each(|demand| demand.capabilities = &TWO_LOOKS);
+    assert_eq!(plan(budget(), &every).unwrap().stop_all(0) - before, budget().read_slot() * 30);
 }

@@ -134,9 +134,11 @@ impl Supervisor {
                 let asker = withdrawal.asker.clone();
                 self.withdrawal = None;
                 // Of what did not stand nobody says that it was withdrawn.
-                if let Withdrawn::Ended(_) = withdrawn {
-                    self.conclude(asker, Command::Withdraw, None, Outcome::Confirmed);
-                }
+                let outcome = match withdrawn {
+                    Withdrawn::Ended(_) => Outcome::Confirmed,
+                    Withdrawn::Nothing(_) => Outcome::NothingStood,
+                };
+                self.conclude(asker, Command::Withdraw, None, outcome);
                 self.accept_status(now, withdrawn.into_status());
             }
             Err(error) => {

@@ -180,7 +180,7 @@ fn what_could_be_checked_of_identity_and_watchdog_is_told_in_words() {
 }
 
 #[test]
-fn an_outcome_is_one_of_six_words_with_its_reason() {
+fn an_outcome_is_one_of_seven_words_with_its_reason() {
     let slave = SlaveAddress::try_from(7).unwrap();
     let because = Some(Refusal::NotInControl(Control::Panel));
     let over = Unconfirmed::TimeOver { after: Duration::from_secs(2), last: None, because, stop: None };
@@ -192,6 +192,7 @@ fn an_outcome_is_one_of_six_words_with_its_reason() {
         Error::NotConfirmed { slave, command: Command::Release, status: Box::default(), because: None };
     for (outcome, word, reason) in [
         (Outcome::Confirmed, "confirmed", None),
+        (Outcome::NothingStood, "nothing", None),
         (Outcome::Expired, "expired", None),
         (Outcome::OutcomeUnknown(Unknown { error: None, last: None, stop: None }), "unknown", None),
         (Outcome::NotConfirmed(over), "not_confirmed", Some("not_remote")),
@@ -215,7 +216,7 @@ fn an_outcome_is_one_of_six_words_with_its_reason() {
     ] {
         let told = to_value(&outcome).unwrap();
         assert_eq!((&told["outcome"], told.get("reason")), (&json!(word), reason.map(Value::from).as_ref()));
-        assert_eq!(told.get("text").is_some(), !matches!(word, "confirmed" | "expired"), "{told}");
+        assert_eq!(told.get("text").is_some(), word != "confirmed", "{told}");
     }
     is(
         Outcome::Started(Started { direction: Direction::Forward, reference: Some(Frequency::ZERO) }),
@@ -245,10 +246,11 @@ async fn an_event_tells_its_wall_time_and_what_belongs_to_it() {
         event,
         json!({
             "order": 0, "drive": "pump 1", "event": "command", "alarm": false, "cause": {"by": "drive"},
-            "text": "command: start forward at 30.00 Hz by operator: expired",
+            "text": "command: start forward at 30.00 Hz by operator: expired: its time was over before it was sent: it never will be",
             "command": {
                 "action": "start", "command": "start forward", "direction": "forward", "given": {"frequency_hz": 30.0},
-                "commander": "operator", "outcome": "expired"
+                "commander": "operator", "outcome": "expired",
+                "text": "its time was over before it was sent: it never will be"
             }
         })
     );

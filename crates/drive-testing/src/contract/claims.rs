@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use drive_core::{Direction, Error, ErrorKind, Frequency, Percent, Reaction, Speed, State, StopMode};
 
+use tokio::time::Instant;
+
 use super::Contract;
 use crate::rig::Rig;
 
@@ -112,7 +114,28 @@ impl Contract {
         // What only a turning motor shows is looked for once.
         rig.drive.measurements().await.expect("it measures");
         assert_eq!(exchanges(&mut rig).await, claimed, "{name} runs: of a status, of the measurements");
+        let words = words_of_a_status(&mut rig).await;
+        assert!(words <= usize::from(claims.status_words), "{name}: a status of {words} words");
+        let before = rig.machine.all_requests();
+        rig.drive.stop(StopMode::Ramp).await.expect("every family has a ramp");
+        let stop = rig.machine.all_requests() - before;
+        assert!(stop <= u64::from(claims.stop_exchanges), "{name}: {stop} exchanges of a stop");
     }
+}
+
+/// The words that a status reads, of several statuses the fewest.
+async fn words_of_a_status(rig: &mut Rig) -> usize {
+    let mut least = usize::MAX;
+    for _ in 0..3 {
+        let since = Instant::now();
+        rig.drive.status().await.expect("it answers");
+        let count = |pdu: &[u8]| match pdu {
+            [0x03 | 0x04, _, _, high, low] => usize::from(u16::from_be_bytes([*high, *low])),
+            _ => 0,
+        };
+        least = least.min(rig.machine.received_since(since).iter().map(|request| count(&request.pdu)).sum());
+    }
+    least
 }
 
 /// Exchanges of one status and of the measurements. What proves a run command takes turns: of some statuses the least counts.

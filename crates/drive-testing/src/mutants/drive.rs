@@ -5,9 +5,9 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Frequency, Ground, Identity, Intent,
-    KeptReadings, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Result, Row, SelfRestart,
-    Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability, Withdrawn,
-    Written,
+    KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Result, Row,
+    SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability,
+    Withdrawn, Written,
 };
 
 use super::{Mutant, port::Tap};
@@ -39,6 +39,11 @@ impl Faulty {
             }
         }
         if self.is(Mutant::AlwaysInForce) && self.drive.lease().is_some() {
+            status.verdict = Some(Verdict::InForce);
+        }
+        let other_reference =
+            matches!(status.verdict, Some(Verdict::NotInForce { lacks: Lack::Reference, .. }));
+        if self.is(Mutant::AnyReferenceIsOurs) && other_reference {
             status.verdict = Some(Verdict::InForce);
         }
         if self.is(Mutant::NoOutputIsStandstill) && status.output_frequency == Some(Frequency::ZERO) {

@@ -24,16 +24,17 @@ pub fn oddity(name: &str) -> Option<String> {
 
 /// Whether somebody who reads one name may take it for the other.
 pub fn are_alike(one: &str, other: &str) -> bool {
-    folded(one).iter().any(|form| folded(other).contains(form))
+    let (one, other) = (Looks::of(one), Looks::of(other));
+    one.known_by().iter().any(|look| other.taken_for().contains(look))
 }
 
 /// What is doubtful in the names of one kind, such as the drives: each by itself, and two of them together.
 pub fn doubts<'a>(kind: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let (mut doubts, mut known) = (Vec::new(), HashMap::<String, &str>::new());
+    let (mut doubts, mut known) = (Vec::new(), HashMap::<(Case, String), &str>::new());
     for name in names {
         doubts.extend(oddity(name).map(|oddity| format!("{kind} {oddity}")));
-        let forms = folded(name);
-        let like = forms.iter().find_map(|form| known.get(form)).filter(|like| **like != name);
+        let looks = Looks::of(name);
+        let like = looks.taken_for().iter().find_map(|look| known.get(look)).filter(|like| **like != name);
         doubts.extend(like.map(|like| {
             format!(
                 "{kind} {} and {} look alike: expected names that nobody confuses",
@@ -41,20 +42,63 @@ pub fn doubts<'a>(kind: &str, names: impl Iterator<Item = &'a str>) -> Vec<Strin
                 shown(name)
             )
         }));
-        for form in forms {
-            known.entry(form).or_insert(name);
+        for look in looks.known_by() {
+            known.entry(look).or_insert(name);
         }
     }
     doubts
 }
 
-/// How a name is seen, as it is and in small letters; spaces side by side are seen as one.
-fn folded(name: &str) -> [String; 2] {
-    let seen = |text: &str| {
-        let seen: String = skeleton(text).filter(|character| !is_unseen(*character)).collect();
-        seen.split_whitespace().collect::<Vec<_>>().join(" ")
-    };
-    [seen(name), seen(&name.to_lowercase())]
+/// In which letters a name is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Case {
+    Written,
+    Small,
+    Great,
+    /// As it is written, and what is seen then in small letters: `PANEL-I` is seen as `PANEL-l`, and said as `panel-l`.
+    SmallAfterwards,
+}
+
+/// How a name is seen. Looks of one case are compared with each other: in small letters `I` is no `1`, in great ones `l` is none.
+struct Looks {
+    written: String,
+    small: String,
+    great: String,
+    afterwards: String,
+}
+
+impl Looks {
+    /// What is not seen is left out, and spaces side by side are seen as one.
+    fn of(name: &str) -> Self {
+        let seen = |text: &str| {
+            let seen: String = skeleton(text).filter(|character| !is_unseen(*character)).collect();
+            seen.split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        let written = seen(name);
+        let afterwards = written.to_lowercase();
+        Self { small: seen(&name.to_lowercase()), great: seen(&name.to_uppercase()), written, afterwards }
+    }
+
+    fn known_by(&self) -> [(Case, String); 4] {
+        [
+            (Case::Written, self.written.clone()),
+            (Case::Small, self.small.clone()),
+            (Case::Great, self.great.clone()),
+            (Case::SmallAfterwards, self.afterwards.clone()),
+        ]
+    }
+
+    /// As others are [known by](Self::known_by) for whom it is taken. Not two that are alike only afterwards: else `TANK I` and `TANK L`
+    /// were.
+    fn taken_for(&self) -> [(Case, String); 5] {
+        [
+            (Case::Written, self.written.clone()),
+            (Case::Small, self.small.clone()),
+            (Case::Great, self.great.clone()),
+            (Case::Written, self.afterwards.clone()),
+            (Case::SmallAfterwards, self.written.clone()),
+        ]
+    }
 }
 
 /// A name with what is not seen, and all but ASCII behind it by their numbers.
@@ -101,6 +145,17 @@ mod tests {
             "İstanbul 1",
             "North/Fan-A_2",
             "Ø 40 mm",
+            // A tank for every letter.
+            "TANK H",
+            "TANK I",
+            "TANK L",
+            "TANK O",
+            "tank h 2",
+            "tank i 2",
+            "tank l 2",
+            "tank o 2",
+            "Tank I 3",
+            "Tank L 3",
         ];
         assert_eq!(doubts("drive", names.into_iter()), Vec::<String>::new());
     }
@@ -140,7 +195,15 @@ mod tests {
             ("Pump 1", "pump 1"),
             ("pump 1", "pump\u{200B} 1"),
             ("modem", "rnodem"),
+            // A digit and a letter that look alike in one case, the rest in another.
+            ("PANEL-I", "panel-1"),
+            ("PANEL-I", "panel-l"),
+            ("Panel-1", "PANEL-I"),
+            ("PANEL-I0", "panel-lo"),
+            ("fan 0", "FAN O"),
+            ("fan 0", "fan o"),
         ] {
+            assert!(are_alike(other, one), "{other} {one}");
             assert!(are_alike(one, other), "{one} {other}");
             let told = doubts("drive", [one, other].into_iter());
             assert!(told.iter().any(|doubt| doubt.contains("look alike")), "{told:?}");

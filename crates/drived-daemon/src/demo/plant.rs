@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc, time::Duration};
 
 use drive_bus::{Line, LineConfig};
 use drive_core::{SerialSettings, SlaveAddress, serial::CharacterFormat};
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_fleet::{DriveSettings, ExitAction, Fleet, Periods};
 use drive_sim::{SimLine, Wiring};
 use tokio::{sync::watch, task::AbortHandle};
@@ -12,7 +12,6 @@ use tokio::{sync::watch, task::AbortHandle};
 use super::{STOPPING, story, unit::Unit};
 use drived_config::config::Group;
 use drived_http::api::demo::Stage;
-use drived_simulated::{self as simulated, SetUp};
 use drived_words::{drive_spec::DriveName, failure::Failure};
 
 /// Drives of each family.

@@ -60,6 +60,9 @@ mod tests {
         assert_eq!((&object["kind"], &object["event"]), (&"event".into(), &"command".into()));
         assert_eq!(object["command"]["command"], "start forward");
         assert_eq!(object["command"]["outcome"], "expired");
-        assert_eq!(object["text"], "command: start forward by operator: expired");
+        assert_eq!(
+            object["text"],
+            "command: start forward by operator: expired: its time was over before it was sent: it never will be"
+        );
     }
 }

@@ -116,7 +116,7 @@ async fn carry_out(
     let command = command.map_err(|rejected| Problem::rejected(&rejected, caller))?;
     let no_store = [(CACHE_CONTROL, "no-store")];
     match command.outcome {
-        OutcomeWord::Confirmed => Ok((no_store, Json(command)).into_response()),
+        OutcomeWord::Confirmed | OutcomeWord::Nothing => Ok((no_store, Json(command)).into_response()),
         OutcomeWord::Pending => {
             let location = [(LOCATION, format!("/api/v1/commands/{}", command.id))];
             Ok((StatusCode::ACCEPTED, no_store, location, Json(command)).into_response())

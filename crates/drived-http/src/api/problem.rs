@@ -165,7 +165,7 @@ impl Problem {
             OutcomeWord::NotConfirmed => {
                 (StatusCode::GATEWAY_TIMEOUT, "The command is not confirmed", "urn:drived:not_confirmed")
             }
-            OutcomeWord::Unknown | OutcomeWord::Pending | OutcomeWord::Confirmed => {
+            OutcomeWord::Unknown | OutcomeWord::Pending | OutcomeWord::Confirmed | OutcomeWord::Nothing => {
                 (StatusCode::GATEWAY_TIMEOUT, "The outcome is unknown", "urn:drived:unknown")
             }
         };

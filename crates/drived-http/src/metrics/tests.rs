@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, fs, path::Path, time::Duration};
 
 use axum::{Extension, body::Body, http::Request};
 use drive_bus::{Line, LineConfig};
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_fleet::{ConcernKind, DriveSettings, Fleet};
 use drive_sim::{SimLine, Wiring};
 use http_body_util::BodyExt as _;
@@ -19,7 +19,6 @@ use super::{
 use crate::api;
 use drived_doors::{Caller, Rights};
 use drived_plant::plant::testing::TestPlant;
-use drived_simulated::{self as simulated, SetUp};
 
 /// Where the table of the metrics is written down.
 const DOCUMENT: &str = "../drived/METRICS.md";

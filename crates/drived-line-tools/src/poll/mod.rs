@@ -237,12 +237,11 @@ impl Book {
 mod tests {
     use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
     use drive_core::{Reaction, SlaveAddress};
-    use drive_families::{Family, Options};
+    use drive_families::{Family, Options, SetUp, simulated};
     use drive_sim::{SimLine, Wiring};
     use tokio::time::sleep;
 
     use super::*;
-    use drived_simulated::{self as simulated, SetUp};
 
     #[tokio::test(start_paused = true)]
     async fn a_poll_that_is_rarer_than_a_watchdog_wants_feeds_it_in_between() {

@@ -7,10 +7,10 @@ use std::{
 
 use drive_bus::{Line, LineConfig, capture::Writer};
 use drive_core::{Measurements, PortError, SlaveAddress, Status};
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 
 use super::*;
-use drived_simulated::{self as simulated, SetUp};
+use crate::sim;
 
 #[derive(Clone, Default)]
 struct Sink(Arc<Mutex<Vec<u8>>>);
@@ -49,7 +49,7 @@ async fn program(line: &Line, family: Family) -> Vec<String> {
 }
 
 async fn captured(family: Family, protocol: &str, settings: SerialSettings) -> (Vec<String>, Recording) {
-    let wiring = Wiring { protocol: simulated::protocol(protocol.parse().unwrap()), ..Wiring::rtu(settings) };
+    let wiring = Wiring { protocol: sim::by(protocol.parse().unwrap()), ..Wiring::rtu(settings) };
     let simulated = SimLine::new(wiring);
     let machine = simulated.add_boxed(3, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
     let line = Line::over(simulated.in_memory(), config(protocol, settings));

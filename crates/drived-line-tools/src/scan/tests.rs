@@ -4,16 +4,17 @@ use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, Protocol};
 use drive_core::{SerialSettings, SlaveAddress};
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_sim::{ALWAYS, Dialect, Fault, SimLine, SimSlave, Wiring};
 use tokio::time::Instant;
+
+use crate::sim;
 
 use super::{
     answer::{Answer, Likeness},
     plan::{Others, Plan, Trial},
     sweep::{Find, Sweep, Told},
 };
-use drived_simulated::{self as simulated, SetUp};
 
 const WAIT: Duration = Duration::from_millis(100);
 /// What changes something in a slave: functions of Modbus, and requests of UNI-TE (writing a word, words, the specific request,
@@ -178,7 +179,7 @@ async fn all_addresses_at_all_settings_find_every_drive_in_the_time_that_was_tol
             let [is, should] = [trial.serial, dialect.settings]
                 .map(|serial| (serial.baud(), serial.format().data_bits(), serial.format().parity()));
             is == should
-                && simulated::protocol(trial.protocol) == dialect.protocol
+                && sim::by(trial.protocol) == dialect.protocol
                 && find.step.slave.number() == machine.address()
         });
         let Some(Find { answer: Answer::Slave(alike), .. }) = found else {

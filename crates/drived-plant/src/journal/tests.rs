@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use drive_bus::LineConfig;
 use drive_core::{Direction, Frequency, Reaction, SerialSettings, SlaveAddress, StopMode};
-use drive_families::{Family, Options};
+use drive_families::{Family, Options, SetUp, simulated};
 use drive_fleet::{Commanders, DriveSettings, Fleet, Outcome, WatchdogContract};
 use drive_sim::{Fault, SimLine, Wiring};
 use drive_testing::witness::Witnesses;
@@ -15,7 +15,6 @@ use tokio::{
 };
 
 use super::*;
-use drived_simulated::{self as simulated, SetUp};
 
 /// How many drives the line has.
 const DRIVES: u8 = 10;

@@ -10,7 +10,7 @@ use drive_core::{
     Control, Current, Direction, Error, Fault, FaultEntry, Faults, Identity, Lease, Motion, SelfRestart,
     SerialSettings, State, Status, StopMode,
 };
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_fleet::{
     Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, Trip,
     WatchdogCheck,
@@ -21,7 +21,6 @@ use tokio::time::Instant;
 
 use super::{Plant, views::DriveView};
 use drived_config::config::Group;
-use drived_simulated::{self as simulated, SetUp};
 
 /// One line, named `north`, with Altivar 312: `pump 1`, `pump 2` … in the group `pumps`.
 pub struct TestPlant {

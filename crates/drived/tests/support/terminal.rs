@@ -130,6 +130,8 @@ struct Screen {
     cells: Vec<Vec<char>>,
     row: usize,
     column: usize,
+    /// Where the cursor stood before the alternate screen: DECSET 1049 saves it, DECRST 1049 puts it back (xterm, "Private Modes").
+    before: (usize, usize),
     is_alternate: bool,
     is_cursor_hidden: bool,
     /// What has come of a sequence or a character that is not whole.
@@ -143,6 +145,7 @@ impl Screen {
             cells: vec![vec![' '; columns]; rows],
             row: 0,
             column: 0,
+            before: (0, 0),
             is_alternate: false,
             is_cursor_hidden: false,
             rest: Vec::new(),
@@ -189,6 +192,10 @@ impl Screen {
             ("J", _) => self.cells.iter_mut().for_each(|row| row.fill(' ')),
             ("h" | "l", "?1049") => {
                 self.is_alternate = last == "h";
+                match self.is_alternate {
+                    true => self.before = (self.row, self.column),
+                    false => (self.row, self.column) = self.before,
+                }
                 self.cells.iter_mut().for_each(|row| row.fill(' '));
             }
             ("h" | "l", "?25") => self.is_cursor_hidden = last == "l",

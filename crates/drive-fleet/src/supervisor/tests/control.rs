@@ -1,6 +1,7 @@
 //! Control that somebody else takes and gives back, and drives that start again by themselves.
 
 use super::*;
+use crate::Became;
 
 /// A drive that runs by our command.
 fn running(settings: DriveSettings) -> Rig {
@@ -100,6 +101,22 @@ fn nothing_is_withdrawn_where_the_policy_says_so_or_the_drive_is_only_read_or_di
     standing.drive.status.control = Some(Control::Terminals);
     standing.pass(2_000 * MS);
     assert_eq!(standing.drive.writes(), []);
+}
+
+#[test]
+fn a_withdrawal_that_finds_no_run_command_is_told_as_such_and_not_as_confirmed() {
+    for (word_stands, became) in [(true, Became::Confirmed), (false, Became::Nothing)] {
+        let mut rig = running(settings());
+        rig.drive.word_stands = word_stands;
+        rig.drive.status.control = Some(Control::Terminals);
+        rig.pass(2_000 * MS);
+        let told = rig.happened().find_map(|happened| match &happened.kind {
+            EventKind::Command { command: Command::Withdraw, outcome, .. } => Some(outcome.became()),
+            _ => None,
+        });
+        assert_eq!(told, Some(became));
+        assert_eq!(rig.snapshot().lease, None);
+    }
 }
 
 /// What a status says of the run command from now on, whatever else it shows.

@@ -49,6 +49,8 @@ struct Paper {
     stops_by: Option<(StopMode, &'static str)>,
     /// Whether it has a word that withdraws a run command.
     withdraws: bool,
+    /// Its run word still stands when a withdrawal looks.
+    word_stands: bool,
     self_restarts: Vec<SelfRestart>,
     /// It confirms the write of its watchdog and keeps what it had.
     keeps_watchdog: bool,
@@ -105,6 +107,7 @@ impl Paper {
             obeys: true,
             stops_by: None,
             withdraws: true,
+            word_stands: true,
             self_restarts: Vec::new(),
             keeps_watchdog: false,
             denies_watchdog: false,
@@ -206,10 +209,12 @@ impl Paper {
                 Reply::Withdrawn(Err(Error::Unsupported { what, reason }))
             }
             Job::Withdraw => {
+                let stood = self.word_stands;
                 if reached {
-                    self.lease = None;
+                    (self.lease, self.word_stands) = (None, true);
                 }
-                Reply::Withdrawn(self.status().map(Withdrawn::Ended))
+                let told = if stood { Withdrawn::Ended } else { Withdrawn::Nothing };
+                Reply::Withdrawn(self.status().map(told))
             }
             Job::SelfRestarts => {
                 let restarts = self.self_restarts.clone();

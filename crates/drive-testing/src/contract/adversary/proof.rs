@@ -5,8 +5,11 @@ use std::time::Duration;
 use drive_core::{Status, StopMode, Verdict};
 use tokio::time::{Instant, sleep};
 
-use super::{Complaint, SETTLED, Stage};
-use crate::{contract::Contract, recorder::Habit, truth::contradiction};
+use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
+use crate::{contract::Contract, recorder::Habit, truth::contradiction, words::words_written};
+
+/// How long a reference of another may be taken for ours: longer than every turn of the families takes at this pace.
+const TOLD_WITHIN: Duration = Duration::from_secs(60);
 
 impl Contract {
     /// What it says of its run command and of the shaft holds, in every status.
@@ -17,6 +20,7 @@ impl Contract {
         }
         complaints.extend(self.a_trip_is_proved().await);
         complaints.extend(self.a_power_cut_is_proved().await);
+        complaints.extend(self.a_reference_of_another_is_told().await);
         complaints
     }
 
@@ -87,7 +91,57 @@ impl Contract {
     }
 }
 
+impl Contract {
+    /// Another master writes another setpoint over that of a run, in the word by which the family itself has given it. The machine
+    /// says who decides: no referee is needed.
+    async fn a_reference_of_another_is_told(&self) -> Vec<Complaint> {
+        let mut stage =
+            self.stage("a run command whose reference another master has replaced is not in force").await;
+        let Some((register, word)) = stage.word_of_another_setpoint().await else { return stage.complaints };
+        if stage.run().await.is_none() {
+            return stage.complaints;
+        }
+        let before = stage.seen().setpoint;
+        let write = format!("{} master {register:#06x} {word:04X}h", stage.rig.machine.name());
+        // Not every setpoint is one word that anybody may write.
+        if stage.rig.simulated.control(&write).is_err() {
+            return stage.complaints;
+        }
+        sleep(Duration::from_millis(500)).await;
+        let end = Instant::now() + TOLD_WITHIN;
+        while Instant::now() < end {
+            let status = stage.rig.drive.status().await;
+            let seen = stage.seen();
+            let is_told =
+                status.is_ok_and(|status| matches!(status.verdict, Some(Verdict::NotInForce { .. })));
+            if is_told || !seen.running || seen.setpoint == before {
+                return stage.complaints;
+            }
+            sleep(Duration::from_millis(400)).await;
+        }
+        let seen = stage.seen();
+        stage.blame(format!(
+            "another master wrote {word:04X}h to {register:04X}h {TOLD_WITHIN:?} ago, and it is told in force; {seen:?}"
+        ));
+        stage.complaints
+    }
+}
+
 impl Stage {
+    /// The register of a setpoint and the word that stands for [`OTHER`] in it, as the family writes them; the setpoint is
+    /// [`SETPOINT`] again afterwards.
+    async fn word_of_another_setpoint(&mut self) -> Option<(u16, u16)> {
+        let mut written = Vec::new();
+        for setpoint in [SETPOINT, OTHER, SETPOINT] {
+            let since = Instant::now();
+            self.rig.drive.set_setpoint(setpoint.into()).await.ok()?;
+            let received = self.rig.machine.received_since(since);
+            written.push(received.iter().flat_map(|request| words_written(&request.pdu)).collect::<Vec<_>>());
+        }
+        let is_other = |at: u16, word: u16| written[0].iter().any(|&(it, before)| it == at && before != word);
+        written[1].iter().copied().find(|&(at, word)| is_other(at, word))
+    }
+
     fn expect_lease(&mut self, stands: bool, when: &str) {
         let lease = self.rig.drive.lease();
         if lease.is_some() != stands {

@@ -12,6 +12,7 @@ use super::Judge;
 use crate::{
     referee::{self, Answer, Change, Family, Key, Motion, Order, State, Verdict, Who, World},
     truth::TOLERANCE,
+    words::words_written,
 };
 
 /// The manual's world of one machine of a family of the [`referee`].
@@ -144,6 +145,8 @@ impl ByManual {
                     (true, true) => 0,
                 };
                 self.world.words.insert(0x0102, mode);
+                // By which number an input resets a fault, S1 does not print: that one did shows in the drive alone.
+                self.world.tripped = self.machine.observe().trip;
             }
             _ => self.correct_altivar(),
         }
@@ -212,7 +215,9 @@ impl Judge for ByManual {
         let since = self.heard_until;
         for request in self.machine.received_since(since) {
             self.heard_until = request.at;
-            self.happened.push((request.at, writes(&request.pdu)));
+            let written = words_written(&request.pdu).into_iter();
+            let writes = written.map(|(address, value)| Change::Write { address, value }).collect();
+            self.happened.push((request.at, writes));
         }
         self.happened.sort_by_key(|(at, _)| *at);
         for (_, changes) in std::mem::take(&mut self.happened) {
@@ -226,7 +231,13 @@ impl Judge for ByManual {
 
     fn objects(&mut self, held: bool, in_force: bool) -> Option<String> {
         self.follow();
-        let cmd = if self.family == Family::Atv312 { 8501 } else { 400 };
+        // Where the command word of the bus stands: CMD, FA00 and 0001h of the manuals.
+        let cmd = match self.family {
+            Family::Atv312 => 8501,
+            Family::Atv28 | Family::Atv58 => 400,
+            Family::Atv21 => 0xFA00,
+            Family::Omron3g3ev => 0x0001,
+        };
         // Of two words at the same moment the wire does not tell which was the later.
         let is_told = self.world.command.is_none_or(|command| self.machine.peek(cmd) == Some(command));
         if self.lost || !is_told {
@@ -273,20 +284,4 @@ fn motion(seen: &Observation) -> Motion {
     } else {
         Motion::AtRest
     }
-}
-
-/// The words that a request writes.
-fn writes(pdu: &[u8]) -> Vec<Change> {
-    let word = |at: usize| Some(u16::from_be_bytes([*pdu.get(at)?, *pdu.get(at + 1)?]));
-    let (Some(function), Some(first)) = (pdu.first(), word(1)) else { return Vec::new() };
-    let count = match function {
-        0x06 => 1,
-        0x10 => word(3).unwrap_or(0),
-        _ => 0,
-    };
-    let begin = if *function == 0x06 { 3 } else { 6 };
-    let value = |index: u16| word(begin + 2 * usize::from(index));
-    (0..count)
-        .filter_map(|index| Some(Change::Write { address: first + index, value: value(index)? }))
-        .collect()
 }

@@ -98,6 +98,11 @@ pub(super) fn is_at(seen: &Observation, hundredths: i32) -> bool {
     (seen.output_frequency - hundredths).abs() <= TOLERANCE
 }
 
+/// Whether by this a panel takes over a motor that runs, whose twin does not.
+fn takes_over(deed: &str, seen: &Observation, twin: &Observation) -> bool {
+    deed == "panel takes" && seen.running && !twin.running
+}
+
 fn rests(seen: &Observation) -> bool {
     is_at(seen, 0) && seen.shaft_frequency.abs() <= TOLERANCE
 }
@@ -114,6 +119,8 @@ pub(super) struct Cell<'a> {
     /// Another reading of the manual than the usual: the judge, who follows the manual, is silent or of the first.
     doubtful: bool,
     twin_is_released: bool,
+    /// The panel has taken over a motor that ran, as it did not at the twin.
+    panel_took_a_run: bool,
     /// The manual decided at least once.
     pub(super) decided: bool,
 }
@@ -144,12 +151,14 @@ impl<'a> Cell<'a> {
             operation,
             doubtful,
             twin_is_released: false,
+            panel_took_a_run: false,
             decided: false,
         }
     }
 
     fn happens(&mut self, deeds: &[String]) {
         for deed in deeds {
+            self.panel_took_a_run |= takes_over(deed, &self.scene.seen(), &self.scene.twin());
             self.scene.happens(deed);
         }
     }
@@ -167,7 +176,8 @@ impl<'a> Cell<'a> {
         let (seen, twin) = (self.scene.seen(), self.scene.twin());
         let turns = seen.running && seen.setpoint != 0 && !is_at(&seen, 0);
         // A panel that has taken over a motor which ran commands it; its twin was taken over at rest.
-        if turns && !held && !twin.running && !seen.local && !self.has_masters() {
+        let is_panels = seen.local && self.panel_took_a_run;
+        if turns && !held && !twin.running && !is_panels && !self.has_masters() {
             return Err(at(format!("it turns, and no lease stands: {seen:?}, the twin {twin:?}")));
         }
         let Some(judge) = self.judge.as_mut().filter(|_| !self.doubtful) else { return Ok(()) };
@@ -313,11 +323,18 @@ impl<'a> Cell<'a> {
 
     /// The event comes behind the first exchanges of the operation, whatever they are.
     async fn operate_amid(&mut self) -> Result<Option<Status>, Error> {
-        let (around, event) = (self.scene.around(), self.event);
-        let (done, ()) = tokio::join!(self.operate(), async {
+        let (around, event, machine) = (self.scene.around(), self.event, self.scene.machine.clone());
+        let twin = self.scene.twin();
+        let (done, took) = tokio::join!(self.operate(), async {
             sleep(Duration::from_millis(60)).await;
-            event.comes.iter().for_each(|deed| around.happens(deed));
+            let took = |deed: &String| {
+                let took = takes_over(deed, &machine.observe(), &twin);
+                around.happens(deed);
+                took
+            };
+            event.comes.iter().map(took).fold(false, |took, one| took | one)
         });
+        self.panel_took_a_run |= took;
         done
     }
 

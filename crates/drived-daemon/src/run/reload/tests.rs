@@ -2,7 +2,7 @@
 
 use std::{fs, time::Duration};
 
-use drive_families::Family;
+use drive_families::{Family, simulated};
 use drive_fleet::DriveSettings;
 use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
@@ -10,7 +10,6 @@ use tower::ServiceExt as _;
 use super::*;
 use drived_config::names::Names;
 use drived_doors::{Caller, Rights};
-use drived_simulated as simulated;
 
 #[path = "../../../../drived-http/src/api/testing.rs"]
 mod described;

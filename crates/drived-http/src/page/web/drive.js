@@ -11,14 +11,14 @@ import { named, t } from './texts.js';
 import { trend } from './trend.js';
 import { trouble } from './trouble.js';
 import { word } from './vocabulary.js';
-import { currentText, frequencyText, setpointText, stateWord } from './words.js';
+import { currentText, frequencyText, setpointOf, setpointText, stateWord } from './words.js';
 
 /** Measurements are read seldom: what is older than this says so, though it is the latest that there is. */
 const DATED_FROM_MS = 3_000;
 
 const BIG = [
   ['frequency', drive => frequencyText(drive.status), 'status'],
-  ['setpoint', drive => setpointText(drive.setpoint), undefined],
+  ['setpoint', drive => setpointText(setpointOf(drive)), drive => drive.setpoint ? undefined : 'status'],
   ['current', drive => currentText(drive.status), 'status'],
   ['torque', drive => quantity(drive.measurements?.torque_percent, 0, '%'), 'measurements'],
   ['speed', drive => quantity(drive.measurements?.speed_rpm, 0, t('rpm')), 'measurements'],
@@ -70,6 +70,11 @@ export function drive(root, name) {
     return quality(shown[group], group === 'measurements' ? shown : undefined);
   }
 
+  /** With what a value was read; nothing where nobody had to read it. */
+  function groupOf(of) {
+    return typeof of === 'function' ? of(shown) : of;
+  }
+
   function update(names) {
     if (!names.has('state') && !names.has(`drive ${name}`)) return;
     shown = plant.drives.get(name) ?? shown;
@@ -84,7 +89,8 @@ export function drive(root, name) {
     const said = shown.fault || status.state === 'fault' ? '' : [text, first].filter(Boolean).join(' – ');
     setText(remark, said);
     remark.hidden = !said;
-    BIG.forEach(([, value, group], index) => {
+    BIG.forEach(([, value, of], index) => {
+      const group = groupOf(of);
       setText(big[index].children[1], value(shown));
       setAttribute(big[index], 'data-quality', group ? qualityOf(group) : 'good');
     });
@@ -98,7 +104,8 @@ export function drive(root, name) {
     const ms = age(shown.status, shown);
     setText(freshness, quality(shown.status) === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
     setAttribute(freshness, 'data-quality', quality(shown.status));
-    BIG.forEach(([, , group], index) => {
+    BIG.forEach(([, , of], index) => {
+      const group = groupOf(of);
       const ms = group && age(shown[group], shown);
       const isDated = ms !== undefined && (qualityOf(group) === 'stale' || ms > DATED_FROM_MS);
       setText(big[index].children[2], isDated ? old(ms) : '');

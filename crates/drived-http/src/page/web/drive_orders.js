@@ -12,6 +12,7 @@ import { t } from './texts.js';
 import { told } from './told.js';
 import { faultText } from './trouble.js';
 import { word } from './vocabulary.js';
+import { setpointOf } from './words.js';
 
 const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
 const EXPIRES_MS = 5_000;
@@ -59,7 +60,7 @@ export function ordersPanel(name) {
 
   async function start(direction) {
     const said = { drive: name, direction: t(`in_direction_${direction}`) };
-    const at = plant.drives.get(name)?.setpoint?.frequency_hz;
+    const at = setpointOf(plant.drives.get(name) ?? {})?.frequency_hz;
     const question = at === undefined ? t('confirm_start', said) : t('confirm_start_at', { ...said, setpoint: quantity(at, 1, 'Hz') });
     if (await confirmed([name], question, t(`start_${direction}`))) order('start', { direction });
   }

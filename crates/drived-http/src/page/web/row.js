@@ -6,7 +6,7 @@ import { age, quality } from './plant.js';
 import { t } from './texts.js';
 import { isTrouble, trouble } from './trouble.js';
 import { word } from './vocabulary.js';
-import { currentText, frequencyText, setpointText, stateWord } from './words.js';
+import { currentText, frequencyText, setpointOf, setpointText, stateWord } from './words.js';
 
 const USUAL_HIGH_HZ = 50;
 const ARROWS = { forward: '▶', reverse: '◀' };
@@ -53,10 +53,11 @@ export function makeRow(drive) {
     setText(state, stateWord(drive));
     setText(turns, status.direction && status.output_frequency_hz !== 0 ? `${ARROWS[status.direction] ?? ''} ${word(status.direction)}` : '');
     setText(frequency, frequencyText(status));
-    setText(setpoint, drive.setpoint ? t('to_setpoint', { setpoint: setpointText(drive.setpoint) }) : '');
+    const held = setpointOf(drive);
+    setText(setpoint, held ? t('to_setpoint', { setpoint: setpointText(held) }) : '');
     const high = drive.limits?.high_hz ?? USUAL_HIGH_HZ;
     fill(frequencyBar, status.output_frequency_hz, high);
-    placeMark(frequencyBar.lastChild, drive.setpoint?.frequency_hz, high);
+    placeMark(frequencyBar.lastChild, held?.frequency_hz, high);
     setText(current, currentText(status));
     setClass(currentBar, 'unknown', typeof status.current_percent !== 'number');
     fill(currentBar, status.current_percent, 100);

@@ -18,6 +18,7 @@ export const SENTENCES_FR = {
   'it was withdrawn before it was sent': 'il a été retiré avant son envoi',
   'too many commands for this drive wait': 'trop d’ordres attendent pour ce variateur',
   'the fleet has shut down': 'le service est arrêté',
+  'no run command of this side stood any more': 'aucun ordre de marche de ce côté n’était plus donné',
   'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
   'another start of a group was under way': 'un autre démarrage de groupe était en cours',
   'nobody of the group was started: another of its drives was not ready': 'aucun variateur du groupe n’a été démarré : un autre n’était pas prêt',
@@ -63,6 +64,7 @@ export const SENTENCES_FR = {
   'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
   'give control back there': 'y rendre la commande',
   'wait until it is confirmed': 'attendre qu’il soit confirmé',
+  'the current heats the motor: it ends with its time, or with a ramp stop': 'le courant échauffe le moteur : il cesse à son terme, ou par un arrêt sur rampe',
   'keep away from the shaft until it is seen to stand': 'se tenir à l’écart de l’arbre tant qu’on ne l’a pas vu à l’arrêt',
   'wait, or look at its supply, its address and its cable': 'attendre, ou voir son alimentation, son adresse et son câble',
 

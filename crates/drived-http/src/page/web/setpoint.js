@@ -3,6 +3,7 @@
 import { el, setAttribute, setText } from './dom.js';
 import { quantity } from './format.js';
 import { t } from './texts.js';
+import { setpointOf } from './words.js';
 
 const USUAL_HIGH_HZ = 50;
 const STEP_HZ = 0.1;
@@ -35,7 +36,7 @@ export function setpointControl(send) {
     }
     // Nobody's choice is pulled from under his finger by what the drive reports.
     if (!touched) {
-      field.value = String(drive.setpoint?.frequency_hz ?? '');
+      field.value = String(setpointOf(drive)?.frequency_hz ?? '');
       slider.value = field.value || limits.low;
     }
     draw(drive);
@@ -43,13 +44,13 @@ export function setpointControl(send) {
   }
 
   function draw(drive) {
-    const marks = [drive.status?.output_frequency_hz, drive.setpoint?.frequency_hz];
-    const now = JSON.stringify([limits, marks]);
+    const output = drive.status?.output_frequency_hz;
+    const now = JSON.stringify([limits, output]);
     if (now === drawn) return;
     drawn = now;
     bands.replaceChildren(
       ...limits.forbidden.map(([from, to]) => part('i.forbidden', from, to)),
-      ...(typeof marks[0] === 'number' ? [part('i.output', limits.low, marks[0])] : []));
+      ...(typeof output === 'number' ? [part('i.output', limits.low, output)] : []));
   }
 
   function part(name, from, to) {

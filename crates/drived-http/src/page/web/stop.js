@@ -192,7 +192,9 @@
     if (phase === 'sending') return t('stop_sending');
     if (phase === 'refused') return t('stop_refused', told);
     if (phase !== 'taken') return why ? t('stop_busy', told) : status ? t('stop_unheard_via', told) : t('stop_unheard', told);
-    const head = { count: answer.drives.length, time: clock(answer.time_unix_ms) };
+    // To those that are only read nothing was sent: they are named below.
+    const sent = answer.drives.filter(one => one.counted !== 'refused');
+    const head = { count: sent.length, time: clock(answer.time_unix_ms) };
     if (account.sight) return `${many('stop_taken', head)}. ${t(account.sight)}`;
     if (alarmed.length) return `${many('stop_alarm', { count: alarmed.length })}. ${many('stop_taken', head)}`;
     return many(left().length ? 'stop_taken' : 'stop_done', head);

@@ -70,6 +70,7 @@ const TABLE = {
   concern_control_taken: ['somebody else has taken control', 'quelqu’un d’autre a pris la commande'],
   concern_stop_pending: ['a stop is on its way, not confirmed yet', 'un arrêt est en cours, pas encore confirmé'],
   concern_coasting: ['output off, the shaft may coast', 'sortie coupée, l’arbre peut encore tourner'],
+  concern_held: ['direct current holds the shaft', 'un courant continu maintient l’arbre'],
   concern_never_seen: ['not seen yet', 'pas encore vu'],
   fault_unexplained: ['the drive has not said why yet', 'le variateur n’a pas encore dit pourquoi'],
   fault_number: ['fault {code}', 'défaut {code}'],

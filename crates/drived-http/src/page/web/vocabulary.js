@@ -36,6 +36,7 @@ const WORDS = {
   refused: ['refused', 'refusé'],
   expired: ['expired', 'expiré'],
   superseded: ['superseded by a later command', 'remplacé par un ordre ultérieur'],
+  nothing: ['nothing to be done', 'rien à faire'],
   // Actions.
   start: ['Start', 'Démarrage'],
   stop: ['Stop', 'Arrêt'],

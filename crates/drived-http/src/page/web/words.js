@@ -67,6 +67,12 @@ export function currentText(status) {
   return isShare ? quantity(status.current_percent, 0, '%') : quantity(status?.current_a, 1, 'A');
 }
 
+/** The setpoint of a drive: the one that the daemon gave it, else what the drive itself says that it follows, whoever gave that. */
+export function setpointOf(drive) {
+  const reference = drive.status?.reference_hz;
+  return drive.setpoint ?? (typeof reference === 'number' ? { frequency_hz: reference } : undefined);
+}
+
 /** A setpoint of the API. */
 export function setpointText(setpoint) {
   if (typeof setpoint?.frequency_hz === 'number') return quantity(setpoint.frequency_hz, 1, 'Hz');

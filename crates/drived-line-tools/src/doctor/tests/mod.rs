@@ -11,7 +11,7 @@ use drive_core::{
     SlaveAddress,
     serial::{CharacterFormat, SerialSettings},
 };
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_sim::{SimLine, SimSlave, Wiring};
 
 use super::{
@@ -20,7 +20,6 @@ use super::{
     observe::{self, Task, Ways},
     verdict::{Defect, Verdict},
 };
-use drived_simulated::{self as simulated, SetUp};
 use drived_words::{drive_spec::DriveName, failure::Failure, line_spec};
 
 /// A simulated line in memory.

@@ -22,6 +22,8 @@ pub enum OutcomeWord {
     Expired,
     /// A stop or a newer command took its place.
     Superseded,
+    /// There was nothing to be done.
+    Nothing,
 }
 
 drive_core::named! { OutcomeWord {
@@ -32,6 +34,7 @@ drive_core::named! { OutcomeWord {
     Refused => "refused",
     Expired => "expired",
     Superseded => "superseded",
+    Nothing => "nothing",
 } }
 
 /// Nobody of a group was started, because another of its drives was not ready.
@@ -52,24 +55,16 @@ pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Opt
         Became::Refused => OutcomeWord::Refused,
         Became::Expired => OutcomeWord::Expired,
         Became::Superseded => OutcomeWord::Superseded,
+        Became::Nothing => OutcomeWord::Nothing,
     };
-    let text = match outcome {
-        Outcome::Started(started) => Some(started.to_string()),
-        Outcome::Stopped(stop) if stop.is_told() => Some(stop.to_string()),
-        Outcome::Confirmed | Outcome::Stopped(_) => None,
-        Outcome::Expired => Some("its time was over before it was sent: it never will be".to_owned()),
-        Outcome::NotConfirmed(why) => Some(why.to_string()),
-        Outcome::OutcomeUnknown(unknown) => Some(unknown.to_string()),
-        Outcome::Refused(refused) => Some(refused.to_string()),
-    };
-    (word, outcome.reason(), text)
+    (word, outcome.reason(), outcome.text())
 }
 
 /// What becomes of a command for several drives: confirmed when all are that may be commanded, pending while one is, else
 /// the worst of them.
 pub(super) fn of_all<'a>(outcomes: impl Iterator<Item = (OutcomeWord, Option<&'a str>)>) -> OutcomeWord {
     let rank = |word| match word {
-        OutcomeWord::Confirmed => 0,
+        OutcomeWord::Nothing | OutcomeWord::Confirmed => 0,
         OutcomeWord::Superseded => 1,
         OutcomeWord::Refused => 2,
         OutcomeWord::Expired => 3,

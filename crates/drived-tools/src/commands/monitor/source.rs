@@ -138,7 +138,7 @@ fn watched(name: String) -> DriveSettings {
 mod tests {
     use drive_bus::LineConfig;
     use drive_core::{Direction, Frequency, SlaveAddress};
-    use drive_families::Family;
+    use drive_families::{Family, SetUp, simulated};
     use drive_sim::{SimLine, SimSlave, Wiring};
     use drive_testing::witness::Witnesses;
     use serde_json::json;
@@ -149,7 +149,6 @@ mod tests {
         *,
     };
     use drived_plant::plant::commands::OutcomeWord;
-    use drived_simulated::{self as simulated, SetUp};
 
     /// How often anything was written to it.
     fn writes(machine: &SimSlave) -> u64 {

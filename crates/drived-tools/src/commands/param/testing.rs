@@ -2,12 +2,11 @@
 
 use drive_bus::{Line, LineConfig, SlaveSettings};
 use drive_core::SlaveAddress;
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_sim::{SimLine, SimSlave, Wiring};
 
 use super::source::Source;
 use crate::one_drive::OneDrive;
-use drived_simulated::{self as simulated, SetUp};
 use drived_words::drive_spec::DriveName;
 
 /// A drive of a family on its own line.
@@ -18,6 +17,11 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn of(family: Family, set_up: SetUp) -> Self {
+        Self::taken_for(family, family, set_up)
+    }
+
+    /// The same, which a person takes for one of another family.
+    pub(super) fn taken_for(taken_for: Family, family: Family, set_up: SetUp) -> Self {
         let settings = family.capabilities().factory;
         let simulated = SimLine::new(Wiring::rtu(settings));
         let machine = simulated.add_boxed(1, simulated::model(family, set_up).unwrap()).unwrap();
@@ -25,7 +29,7 @@ impl Bench {
         let line = Line::over(simulated.in_memory(), config.clone());
         let turnaround = family.capabilities().turnaround;
         line.configure_slave(1, SlaveSettings { turnaround, ..SlaveSettings::default() });
-        let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
+        let name = DriveName { family: taken_for, slave: SlaveAddress::try_from(1).unwrap() };
         let one = OneDrive::over(name, line, config, &simulated::options());
         Self { source: Source::OnLine(Box::new(one)), machine }
     }

@@ -8,7 +8,7 @@ use drive_core::{
     Identity, SlaveAddress,
     serial::{CharacterFormat, SerialSettings},
 };
-use drive_families::Family;
+use drive_families::{Family, SetUp, simulated};
 use drive_fleet::{IdentityCheck, Periods, WatchdogCheck};
 use drive_sim::{SimLine, SimSlave, Wiring};
 
@@ -19,7 +19,6 @@ use super::{
 };
 use drived_config::config::LinePart;
 use drived_plant::plant::views::LineLink;
-use drived_simulated::{self as simulated, SetUp};
 use drived_words::drive_spec::DriveName;
 
 /// The functions that write (Modbus Application Protocol V1.1b3, section 6).

@@ -4,13 +4,12 @@ use std::time::Duration;
 
 use clap::Parser;
 use drive_core::{Direction, Frequency};
-use drive_families::Family;
+use drive_families::{Family, SetUp};
 use drive_sim::SimSlave;
 use tokio::time::sleep;
 
 use super::*;
 use crate::commands::param::testing::Bench;
-use drived_simulated::SetUp;
 
 impl Bench {
     /// The drive that is kept, as somebody has set it up.

@@ -100,12 +100,11 @@ impl Source {
 
 #[cfg(test)]
 mod tests {
-    use drive_families::Family;
+    use drive_families::{Family, SetUp};
     use drive_sim::Exception;
 
     use super::*;
     use crate::commands::param::testing::Bench;
-    use drived_simulated::SetUp;
 
     /// What is kept of a drive to which something happens after so many requests.
     async fn kept(after: u64, happens: impl Fn(&drive_sim::SimSlave) + Send + 'static) -> Backup {

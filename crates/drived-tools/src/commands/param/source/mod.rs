@@ -167,3 +167,32 @@ impl Source {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drive_families::SetUp;
+
+    use super::*;
+    use crate::commands::param::testing::Bench;
+
+    /// What each says of itself by function 43/14: "ATV21" (Altivar 21 Modbus manual, identification) and "ATV312" (Altivar 312
+    /// communication manual, "Identification"). The others have no word for it over Modbus RTU.
+    #[tokio::test(start_paused = true)]
+    async fn a_drive_that_says_it_is_of_another_family_is_not_written_to_directly_either() {
+        let known = [Family::ATV21, Family::ATV312];
+        for taken_for in known {
+            for family in known {
+                let bench = Bench::taken_for(taken_for, family, SetUp::ForTheBus);
+                let Source::OnLine(mut one) = bench.source else { panic!("it is on a line") };
+                match one.is_meant().await {
+                    Ok(()) => assert_eq!(taken_for, family),
+                    Err(failure) => {
+                        assert_ne!(taken_for, family, "{failure}");
+                        let told = failure.to_string();
+                        assert!(told.contains("nothing was written") && told.contains("Altivar"), "{told}");
+                    }
+                }
+            }
+        }
+    }
+}

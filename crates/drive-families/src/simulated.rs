@@ -1,11 +1,8 @@
-//! Simulated drives, for `sim` and `demo`, and for the tests of what stands on drives.
+//! Simulated drives of any family, for simulators, demos and tests.
 
-#![forbid(unsafe_code)]
-
-use drive_bus::Protocol;
-pub use drive_families::SetUp;
-use drive_families::{Family, Options};
 use drive_sim::Model;
+
+use crate::{Family, SetUp, options::Options};
 
 /// A family that nobody has simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -13,24 +10,19 @@ use drive_sim::Model;
 pub struct NoTwin(pub Family);
 
 /// A simulated drive of a family.
+///
+/// # Errors
+/// The family has no [`Twin`](crate::Twin).
 pub fn model(family: Family, set_up: SetUp) -> Result<Box<dyn Model>, NoTwin> {
     family.machine(set_up).ok_or(NoTwin(family))
 }
 
 /// What the owner of the simulated drives that are set up for the bus says of them.
+#[must_use]
 pub fn options() -> Options {
     let mut all = Options::default();
     for family in Family::all() {
         all.extend(family.simulated_options());
     }
     all
-}
-
-/// The simulator's name of a protocol.
-pub const fn protocol(protocol: Protocol) -> drive_sim::Protocol {
-    match protocol {
-        Protocol::Ascii(_) => drive_sim::Protocol::Ascii,
-        Protocol::UniTelway(_) => drive_sim::Protocol::UniTelway,
-        _ => drive_sim::Protocol::Rtu,
-    }
 }
