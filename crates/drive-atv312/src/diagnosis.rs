@@ -105,22 +105,27 @@ impl<P: Port> Atv312<P> {
         self.registers.at(Class::Background).read(ERRD).await
     }
 
-    /// Function 43/14, then the words that tell one model from another. A drive that refuses the function is described
-    /// by the words alone.
+    /// Function 43/14, then the words that tell one model from another: those are asked only of a drive that has not
+    /// called itself another. A drive that refuses the function is described by the words alone.
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
-        let asked = self.registers.at(Class::Background).identification(ReadCode::Basic).await;
-        let mut identity = match asked {
-            Err(Error::Exception { .. }) => Identity::default(),
-            asked => asked?,
-        };
-        let mut codes = Vec::new();
-        self.collect(&mut codes, &[ARE.row(), NCV.row(), VCAL.row()]).await?;
-        for row in [INV.row(), UDP.row(), TSP.row()] {
-            self.collect(&mut codes, &[row]).await?;
+        let mut identity = self.named(Class::Background).await?;
+        if !matches!(recognised(&identity), Recognised::NotMine { .. }) {
+            let codes = &mut identity.codes;
+            self.collect(codes, &[ARE.row(), NCV.row(), VCAL.row()]).await?;
+            for row in [INV.row(), UDP.row(), TSP.row()] {
+                self.collect(codes, &[row]).await?;
+            }
         }
-        identity.codes = codes;
         self.known.kind = Some(recognised(&identity));
         Ok(identity)
+    }
+
+    /// What the drive says of itself by function 43/14, and nothing where it refuses that.
+    async fn named(&mut self, class: Class) -> Result<Identity> {
+        match self.registers.at(class).identification(ReadCode::Basic).await {
+            Err(Error::Exception { .. }) => Ok(Identity::default()),
+            asked => asked,
+        }
     }
 
     /// Reads the words of these rows, which must follow each other, in one request.
@@ -137,11 +142,7 @@ impl<P: Port> Atv312<P> {
     /// Asks the drive what it is, once, where nobody has.
     pub(crate) async fn recognise_itself(&mut self) -> Result<()> {
         if self.known.kind.is_none() {
-            let asked = self.registers.at(Class::Command).identification(ReadCode::Basic).await;
-            let identity = match asked {
-                Err(Error::Exception { .. }) => Identity::default(),
-                asked => asked?,
-            };
+            let identity = self.named(Class::Command).await?;
             self.known.kind = Some(recognised(&identity));
         }
         Ok(())

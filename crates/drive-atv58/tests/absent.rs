@@ -37,8 +37,10 @@ async fn a_status_is_told_without_a_word_that_it_can_do_without() {
         assert!(status.raw(458).is_some(), "{missing}");
         drive.status().await.unwrap();
         let asked = drive.into_port().asked;
-        let names = |asked: &&Asked| matches!(asked, Asked::Read(_, at, count) if (*at..at + count).contains(&missing));
-        assert!(asked.iter().filter(names).count() <= 2, "{missing}: in its block and alone, then no more");
+        assert!(
+            asked.iter().filter(|asked| asked.reads(missing)).count() <= 2,
+            "{missing}: in its block and alone, then no more"
+        );
     }
 }
 
@@ -99,9 +101,8 @@ async fn the_words_around_a_missing_one_are_read_in_rows_and_a_drive_that_may_be
         drive.forget();
         drive.status().await.unwrap();
         let asked = drive.into_port().asked;
-        let names = |asked: &&Asked| matches!(asked, Asked::Read(_, at, count) if (*at..at + count).contains(&missing));
         assert_eq!(
-            asked.iter().filter(names).count(),
+            asked.iter().filter(|asked| asked.reads(missing)).count(),
             4,
             "{missing}: in its block and alone, and so once more"
         );

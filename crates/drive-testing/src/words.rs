@@ -20,6 +20,14 @@ pub enum Asked {
     LoopBack(Class),
 }
 
+impl Asked {
+    /// Whether it reads this register, alone or among others.
+    #[must_use]
+    pub fn reads(&self, register: u16) -> bool {
+        matches!(self, Self::Read(_, first, count) if (*first..first + count).contains(&register))
+    }
+}
+
 /// A drive that is nothing but words. It refuses, by a panic, what the family does not have: a function, or more words
 /// than one request may carry.
 #[derive(Debug, Clone)]

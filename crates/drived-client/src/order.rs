@@ -20,7 +20,7 @@ use drived_words::{failure::Failure, output, values};
 const ASKED_EVERY: Duration = Duration::from_millis(500);
 /// The longest ramp and then some: the daemon goes on when nobody asks any more.
 const WAITED: Duration = Duration::from_secs(90);
-/// For how long a daemon that does not answer is asked again: a busy one is late now and then, and the command goes on.
+/// For how long a daemon that does not answer is asked again: a busy one is late now and then.
 const OUT_OF_SIGHT: Duration = Duration::from_secs(15);
 /// Between two words about a command that is not settled.
 const TOLD_EVERY: Duration = Duration::from_secs(5);
@@ -103,7 +103,7 @@ async fn settled(
     while follower.last().outcome == OutcomeWord::Pending && Instant::now() < until {
         say(match &out_of_sight {
             None => pending(&follower.last()),
-            Some((_, why)) => format!("{why}: the command goes on, the daemon is asked again"),
+            Some((_, why)) => out_of_sight_of(&follower.last(), why),
         })?;
         let tell_at = until.min(Instant::now() + TOLD_EVERY);
         while follower.last().outcome == OutcomeWord::Pending {
@@ -125,6 +125,16 @@ async fn settled(
         }
     }
     Ok(follower.last())
+}
+
+/// What is told while the daemon does not answer: it may be late, and it may be no more.
+fn out_of_sight_of(command: &CommandView, why: &str) -> String {
+    match command.action {
+        ActionWord::Stop => {
+            format!("{why}: the motor may turn, use the emergency stop; the daemon is asked again")
+        }
+        _ => format!("{why}: nobody knows what becomes of it; the daemon is asked again"),
+    }
 }
 
 /// What is told of a command that is not settled.
@@ -203,7 +213,7 @@ mod tests {
         let ended =
             follow(vec![Ok("pending"), late(), late(), Ok("pending"), Ok("confirmed")]).await.unwrap();
         assert_eq!(ended.outcome, OutcomeWord::Confirmed);
-        let silent = "the daemon does not answer: the command goes on, the daemon is asked again";
+        let silent = "the daemon does not answer: the motor may turn, use the emergency stop; the daemon is asked again";
         assert_eq!(*told.borrow(), ["fan 1 has not confirmed it yet: it goes on", silent]);
 
         let began = Instant::now();
