@@ -12,7 +12,7 @@ use drive_fleet::{
     ConcernKind, DriveSettings, EventKind, ExitAction, Fleet, Link, OnExit, OnFault, Outcome, Periods,
     Refused, Times, WatchdogCheck, WatchdogContract,
 };
-use drive_sim::{Fault, Panel, SimLine, Wiring};
+use drive_sim::{Fault, Panel, SimLine, Wiring, models::atv21::Atv21};
 use drive_testing::witness::Witnesses;
 use support::{
     drives,
@@ -691,4 +691,30 @@ async fn units_that_another_master_changes_in_run_are_told_and_no_setpoint_is_ta
     sleep(10 * SECOND).await;
     let output = plant.machine().observe().output_frequency;
     assert!(!outcome.is_confirmed() || output.abs_diff(2_000) <= 20, "{outcome}, {output}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_altivar_21_whose_limit_or_regulator_overrides_the_setpoint_is_told_and_brought_to_rest() {
+    let drives =
+        [("LL", Atv21::new().with_lower_limit(Frequency::from_hertz(30))), ("PI", Atv21::new().regulated())];
+    for (name, machine) in drives {
+        let settings = controlled(Family::ATV21, MOTOR);
+        let simulated = SimLine::new(Wiring::rtu(common_settings()));
+        simulated.add(ADDRESS, machine).expect("the address is free");
+        let site = Site { simulated, members: vec![(Family::ATV21, ADDRESS, settings)] };
+        let mut plant = Plant::open(vec![site]).unwrap().without_witnesses();
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        assert!(plant.motor().set_setpoint(Frequency::from_hertz(10)).await.is_confirmed());
+        let outcome = plant.motor().start(Direction::Forward).await;
+        assert_eq!(
+            outcome.to_string(),
+            "confirmed: started forward at 10.00 Hz",
+            "{name}: it is on its way there"
+        );
+        let told = plant.event("told", |kind| matches!(kind, EventKind::ReferenceTaken(_))).await;
+        assert!(format!("{told:?}").contains("FD00 comes no nearer to FE02"), "{name}: {told:?}");
+        sleep(30 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{name}: its run command is taken back");
+        assert!(!plant.motor().snapshot().started_here(), "{name}");
+    }
 }

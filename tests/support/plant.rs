@@ -155,6 +155,13 @@ impl Plant {
         Self::open(vec![site]).expect("it can be fed")
     }
 
+    /// The same where nothing is held against the machines: for one that is set to what its manual gives no address of.
+    #[must_use]
+    pub fn without_witnesses(mut self) -> Self {
+        self.witnesses = Witnesses::default();
+        self
+    }
+
     /// The fleet ends as a killed process does, and another one begins over the same machines.
     ///
     /// # Panics

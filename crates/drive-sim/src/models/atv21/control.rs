@@ -12,6 +12,7 @@ use crate::{Panel, Ramp, Ramps};
 
 /// Bits of FA00.
 const PRESET: u16 = 0x0007;
+const REGULATOR_OFF: u16 = 1 << 5;
 pub(super) const RAMP_2: u16 = 1 << 6;
 const DC_BRAKING: u16 = 1 << 7;
 const REVERSE: u16 = 1 << 9;
@@ -171,9 +172,20 @@ impl Atv21 {
     pub(super) fn target(&self) -> i32 {
         match self.order() {
             _ if self.trip.is_some() => 0,
-            Order::Run { reverse: true } => -i32::from(self.reference()),
-            Order::Run { reverse: false } => i32::from(self.reference()),
+            Order::Run { reverse: true } => -i32::from(self.behind_regulator()),
+            Order::Run { reverse: false } => i32::from(self.behind_regulator()),
             Order::Stop | Order::Freewheel | Order::Brake => 0,
+        }
+    }
+
+    /// What regulator and lower limit make of the reference.
+    fn behind_regulator(&self) -> u16 {
+        let limit = self.bank.value(at::UPPER_LIMIT);
+        let switched_off = self.source() == Source::Serial && self.word() & REGULATOR_OFF != 0;
+        if self.regulated && !switched_off {
+            limit
+        } else {
+            self.reference().max(self.lower_limit).min(limit)
         }
     }
 

@@ -18,6 +18,7 @@ mod trips;
 use std::{collections::BTreeMap, time::Duration};
 
 use drive_atv21::{FAULTS, ROWS, blocks, registers::address as at};
+use drive_core::Frequency;
 
 use self::{
     inputs::{ANALOG_INPUTS, TERMINALS, function},
@@ -68,6 +69,9 @@ pub struct Atv21 {
     bank: Bank,
     /// What function 43/14 says it is.
     reference: &'static str,
+    /// LL, in hundredths of a hertz, and whether its PI regulator decides: no manual of this drive gives their addresses.
+    lower_limit: u16,
+    regulated: bool,
     readings: Readings,
     /// The slots that were configured at the last reset.
     read_slots: [u16; 5],
@@ -136,6 +140,8 @@ impl Atv21 {
         let mut drive = Self {
             bank,
             reference: "ATV21H075M3X",
+            lower_limit: 0,
+            regulated: false,
             readings: Readings::default(),
             read_slots: [0; 5],
             write_slots: [0; 2],
@@ -176,6 +182,22 @@ impl Atv21 {
     #[must_use]
     pub fn identified_as(mut self, reference: &'static str) -> Self {
         self.reference = reference;
+        self
+    }
+
+    /// The same drive with its lower limit LL set at the keypad: it turns no slower while a run is ordered, and FE02 shows the
+    /// reference as it was given.
+    #[must_use]
+    pub fn with_lower_limit(mut self, limit: Frequency) -> Self {
+        self.lower_limit = u16::try_from(limit.centihertz()).unwrap_or(u16::MAX);
+        self
+    }
+
+    /// The same drive with its PI regulator switched on at the keypad and a feedback that stays at 0: it turns as fast as it
+    /// may, unless bit 5 of FA00 switches the regulator off (§8.4 p. 31).
+    #[must_use]
+    pub fn regulated(mut self) -> Self {
+        self.regulated = true;
         self
     }
 
