@@ -5,9 +5,11 @@ use std::time::Duration;
 
 use drive_core::{Direction, Frequency, SerialSettings, StopMode};
 use drive_families::Family;
-use drive_fleet::{DriveSettings, GroupStart, Link, Periods, Received, Until};
+use drive_fleet::{
+    DriveSettings, GroupStart, Link, Periods, Received, Snapshot, Until, WatchdogCheck, WatchdogContract,
+};
 use support::plant::{Plant, Site, common_settings, contract};
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, timeout};
 
 const SECOND: Duration = Duration::from_secs(1);
 const LINES: usize = 8;
@@ -72,6 +74,51 @@ async fn eight_lines_of_31_drives_miss_no_deadline_in_an_hour_and_their_memory_i
         assert!(late <= early + 2_048, "{early} KiB grew to {late} KiB");
     }
     assert!(!plant.events_so_far().await.is_empty());
+}
+
+/// A full line whose drives trip unless they hear a frame between two polls.
+fn narrow(name: String) -> DriveSettings {
+    let every = Duration::from_millis(4_450);
+    let periods = Periods { running: every, rest: every, slow: Duration::ZERO, max_age: 3 * every };
+    let timeout = Duration::from_millis(3_800);
+    let watchdog = contract(Family::ATV312).map(|contract| WatchdogContract { timeout, ..contract });
+    DriveSettings { periods, watchdog, ..DriveSettings::controlled(name) }
+}
+
+/// Until every watchdog is verified; nothing has tripped meanwhile.
+async fn all_verified(plant: &Plant) {
+    for drive in plant.fleet.drives() {
+        let verified = |snapshot: &Snapshot| matches!(snapshot.watchdog, WatchdogCheck::Verified(_));
+        let verified = timeout(60 * SECOND, drive.wait_until(verified)).await;
+        assert!(verified.is_ok(), "{}: {:?}", drive.name(), drive.snapshot().watchdog);
+    }
+    for drive in plant.fleet.drives() {
+        assert_eq!(plant.machine_of(drive.name()).observe().trip, None, "{}", drive.name());
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_full_line_that_begins_and_begins_again_under_running_motors_trips_none_by_its_own_watchdogs() {
+    for turnaround in 1..=10 {
+        let member = |address: u8| (Family::ATV312, address, narrow(address.to_string()));
+        let site = Site::new(common_settings(), (1..=DRIVES).map(member).collect());
+        for address in 1..=DRIVES {
+            let machine = site.simulated.slave(address).expect("it is there");
+            machine.set_turnaround(Some(Duration::from_millis(turnaround)));
+        }
+        let plant = Plant::open(vec![site]).expect("it is planned to work");
+        all_verified(&plant).await;
+        sleep(30 * SECOND).await;
+        plant.fleet.all().start(start_at(20)).await.expect("all start");
+        let plant = plant.restarted().await;
+        all_verified(&plant).await;
+        sleep(30 * SECOND).await;
+        for drive in plant.fleet.drives() {
+            let seen = plant.machine_of(drive.name()).observe();
+            let name = drive.name();
+            assert_eq!((seen.trip, seen.running), (None, true), "{name}, answers after {turnaround} ms");
+        }
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -3,7 +3,7 @@
 
 use drive_atv58::{Atv58, CAPABILITIES};
 use drive_core::{Direction, Drive, Error, ErrorKind, Frequency, Setpoint};
-use drive_testing::words::{Asked, Words};
+use drive_testing::words::Words;
 
 const FORTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(40));
 /// Runs forward at 30 Hz by the line, with the words of the default map.

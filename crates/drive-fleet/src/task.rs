@@ -151,7 +151,7 @@ impl Task {
                     }
                 };
                 if drops || !talking {
-                    desk.supervisor.handle_dropped();
+                    desk.supervisor.handle_dropped(Instant::now());
                     break;
                 }
                 desk.publish();

@@ -46,6 +46,8 @@ pub(crate) struct Checks {
     armed: bool,
     /// As it was read first, before anything was written to it.
     found: Option<Watchdog>,
+    /// The time that it had when it was read last.
+    shown: Option<Duration>,
     /// It was written here.
     written: bool,
     /// The contract was written, once, and the drive has kept something else: it is not written again, for that may wear its EEPROM.
@@ -85,6 +87,7 @@ impl Checks {
             watchdog_at: None,
             armed: false,
             found: None,
+            shown: None,
             written: false,
             in_vain: false,
             in_vain_before: settings.eeprom_before.as_ref().and_then(|ledger| ledger.in_vain.clone()),
@@ -170,11 +173,11 @@ impl Checks {
     /// When the watchdog wants a frame of its own.
     pub(crate) fn feed_at(&self) -> Option<Instant> {
         let set = match self.watchdog {
-            WatchdogCheck::Verified(watchdog) | WatchdogCheck::WaitsForStandstill(watchdog) => {
-                watchdog.timeout
+            // Another run of the program, or a write whose outcome nobody has heard, may have set it up.
+            WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => {
+                self.shown.into_iter().chain(self.contract.map(|contract| contract.timeout)).min()
             }
-            WatchdogCheck::NoContract { found } => found.and_then(|watchdog| watchdog.timeout),
-            WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => None,
+            _ => self.shown,
         };
         let at = self.heard? + set.or(self.fixed)? / FEED_PART;
         Some(self.feed_again.map_or(at, |again| at.max(again)))
@@ -424,6 +427,9 @@ impl Checks {
         control: bool,
         result: Result<Watchdog>,
     ) -> Option<EventKind> {
+        if let Ok(watchdog) = &result {
+            self.shown = watchdog.timeout;
+        }
         let Some(contract) = self.contract else {
             self.adopt_watchdog(now, result);
             return None;
@@ -471,6 +477,12 @@ impl Checks {
                 self.broken(now, error.to_string())
             }
         }
+    }
+
+    /// Nobody has heard what became of the setting up: it is read at once.
+    pub(crate) fn arming_dropped(&mut self, now: Instant) {
+        self.watchdog_at = Some(now);
+        self.watchdog = WatchdogCheck::Unchecked;
     }
 
     /// Without a contract the watchdog is left as it is, and fed as it is.

@@ -310,6 +310,10 @@ impl Supervisor {
             return None;
         }
         self.turn = Turn::Unwanted;
+        // A write is not left half done for a poll, and its frames feed the drive as well.
+        if let Job::ArmWatchdog(..) | Job::Ask(Question::Write(..)) = job {
+            return Some((job, None));
+        }
         let holds = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
         Some((job, Some(self.checks.feed_at().map_or(holds, |at| at.min(holds)))))
     }
@@ -485,9 +489,31 @@ impl Supervisor {
         self.emit_shown(EventKind::ContractChanged(ground), Cause::Drive);
     }
 
-    /// The job in flight was dropped: because the machine asked for it, or because its time was over.
-    pub(crate) fn handle_dropped(&mut self) {
-        self.in_flight = None;
+    /// The job in flight was dropped: because the machine asked for it, or because its time was over. What it was to write may
+    /// have been written.
+    pub(crate) fn handle_dropped(&mut self, now: Instant) {
+        let Some(job) = self.in_flight.take() else { return };
+        if let Job::ArmWatchdog(..) = job {
+            self.changed = true;
+            self.checks.arming_dropped(now);
+        }
+        let asked = || self.questions.front().map_or(Cause::Drive, |(.., act)| Cause::Command(act.clone()));
+        let worn = match job {
+            Job::ArmWatchdog(..) if self.watchdog_wears => {
+                Some((EepromUse::Watchdog, Cause::policy(Policy::Watchdog)))
+            }
+            Job::RestoreWatchdog(_) if self.watchdog_wears => {
+                Some((EepromUse::Restore, Cause::policy(self.exits_by)))
+            }
+            Job::Persist => Some((EepromUse::Save, self.active.as_ref().map_or(Cause::Drive, Active::cause))),
+            Job::Ask(Question::Write(row, _)) if row.storage.may_wear() => {
+                Some((EepromUse::Parameter, asked()))
+            }
+            _ => None,
+        };
+        if let Some((by, cause)) = worn {
+            self.note_eeprom(now, by, cause);
+        }
     }
 
     /// What is to be told, in order.

@@ -1,7 +1,10 @@
 //! Connecting, losing, tripping, feeding.
 
 use super::*;
-use crate::snapshot::{Freshness, WatchdogCheck};
+use crate::{
+    Periods,
+    snapshot::{Freshness, WatchdogCheck},
+};
 
 #[test]
 fn a_connect_reads_the_state_then_the_identity_then_the_watchdog_and_only_then_arms_it() {
@@ -10,6 +13,18 @@ fn a_connect_reads_the_state_then_the_identity_then_the_watchdog_and_only_then_a
     let arm = Job::ArmWatchdog(CONTRACT.timeout, CONTRACT.reaction);
     assert_eq!(rig.drive.log[..4], [Job::Status { anew: true }, Job::Identify, Job::Watchdog, arm]);
     assert_eq!(rig.events(), ["connected", "identified", "watchdog verified"]);
+}
+
+#[test]
+fn a_watchdog_that_may_be_armed_is_fed_before_anybody_has_read_it() {
+    // The polls alone would be too seldom.
+    let seldom = 10 * CONTRACT.timeout;
+    let periods = Periods { running: seldom, rest: seldom, slow: Duration::ZERO, max_age: 3 * seldom };
+    let mut rig = Rig::new(DriveSettings { periods, ..settings() });
+    rig.others_have_the_turn = true;
+    rig.pass(CONTRACT.timeout);
+    assert_eq!(rig.snapshot().watchdog, WatchdogCheck::Unchecked);
+    assert_eq!(rig.drive.log, [Job::Status { anew: true }, Job::KeepAlive]);
 }
 
 #[test]

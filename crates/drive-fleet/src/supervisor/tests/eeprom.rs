@@ -119,3 +119,25 @@ fn parameters_and_saves_stand_in_the_same_ledger_and_what_changes_nothing_does_n
 }
 
 const ROW_IN_EEPROM: drive_core::Row = drive_core::Row { storage: Storage::Eeprom, ..super::questions::ROW };
+
+#[test]
+fn a_write_that_is_dropped_for_a_stop_may_have_been_one_and_is_counted() {
+    let mut rig = Rig::over(settings(), true);
+    let until = loop {
+        match rig.machine.next(rig.now) {
+            Step::Do { job: Job::ArmWatchdog(..), until, .. } => break until,
+            Step::Do { job, .. } => {
+                let reply = rig.drive.answer(job);
+                rig.machine.handle_reply(rig.now, reply);
+            }
+            Step::Wait(_) if rig.machine.turn() == Turn::Wanted => rig.machine.grant_turn(),
+            Step::Wait(at) => rig.now = at,
+            Step::Finished => panic!("it is not armed"),
+        }
+    };
+    assert_eq!(until, None, "no poll cuts it");
+    rig.stop(StopMode::Ramp);
+    rig.collect();
+    assert_eq!(ledger(&rig).map(|ledger| ledger.writes), Some(1));
+    assert_eq!(rig.snapshot().watchdog, crate::WatchdogCheck::Unchecked, "it is read again");
+}

@@ -320,6 +320,8 @@ struct Rig {
     now: Instant,
     outputs: Vec<Output>,
     next_call: u64,
+    /// Nothing is granted beside statuses, orders and frames for the watchdog.
+    others_have_the_turn: bool,
 }
 
 impl Rig {
@@ -332,7 +334,15 @@ impl Rig {
         let now = Instant::now();
         let watchdog = CAPABILITIES.watchdog.map(|watchdog| WatchdogCapability { wears, ..watchdog });
         let machine = Supervisor::new(now, settings, watchdog, CAPABILITIES.communication_fault);
-        Self { machine, drive: Paper::new(), stands: None, now, outputs: Vec::new(), next_call: 0 }
+        Self {
+            machine,
+            drive: Paper::new(),
+            stands: None,
+            now,
+            outputs: Vec::new(),
+            next_call: 0,
+            others_have_the_turn: false,
+        }
     }
 
     fn controlled() -> Self {
@@ -374,7 +384,9 @@ impl Rig {
                     self.machine.handle_lease(self.drive.lease);
                     self.machine.handle_reply(self.now, reply);
                 }
-                Step::Wait(_) if self.machine.turn() == Turn::Wanted => self.machine.grant_turn(),
+                Step::Wait(_) if self.machine.turn() == Turn::Wanted && !self.others_have_the_turn => {
+                    self.machine.grant_turn();
+                }
                 Step::Wait(at) => self.now = at.clamp(self.now + Duration::from_micros(1), until),
                 Step::Finished => self.now = until,
             }
@@ -402,7 +414,7 @@ impl Rig {
     fn stop(&mut self, order: impl Into<StopOrder>) -> CallId {
         let asker = self.asker();
         if self.machine.handle_stop(self.now, asker, order.into(), None) {
-            self.machine.handle_dropped();
+            self.machine.handle_dropped(self.now);
         }
         CallId(self.next_call)
     }

@@ -11,7 +11,7 @@ fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
     let waiting = rig.order(Order::Persist);
     let asker = rig.asker();
     assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp.into(), None));
-    rig.machine.handle_dropped();
+    rig.machine.handle_dropped(rig.now);
     let stop = CallId(rig.next_call);
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
     let reply = rig.drive.answer(Job::Stop(StopMode::Ramp));
@@ -267,7 +267,7 @@ fn the_exit_stops_what_was_started_here_and_leaves_what_was_not() {
         rig.pass(2_000 * MS);
         rig.drive.log.clear();
         rig.machine.handle_exit(rig.now, Policy::Exit);
-        rig.machine.handle_dropped();
+        rig.machine.handle_dropped(rig.now);
         rig.pass(5_000 * MS);
         assert_eq!(rig.machine.exit_action(), Some(&expected), "{started} {policy:?}");
         if matches!(expected, ExitAction::Left | ExitAction::LeftTurning) {
@@ -295,7 +295,7 @@ fn a_stop_under_way_keeps_its_mode_whatever_policy_or_group_stops_the_drive_besi
         let mut rig = unheard(mode);
         rig.machine.settings.on_exit = policy;
         rig.machine.handle_exit(rig.now, Policy::Exit);
-        rig.machine.handle_dropped();
+        rig.machine.handle_dropped(rig.now);
         rig.pass(1_000 * MS);
         assert_eq!(rig.machine.exit_action(), None, "{policy:?}: the stop goes on");
         rig.drive.failing = None;
@@ -333,7 +333,7 @@ fn the_exit_goes_on_stopping_a_mute_drive_until_its_own_limit() {
     rig.pass(1_000 * MS);
     rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
     rig.machine.handle_exit(rig.now, Policy::Exit);
-    rig.machine.handle_dropped();
+    rig.machine.handle_dropped(rig.now);
     rig.pass(30_000 * MS);
     assert_eq!(rig.machine.exit_action(), None);
     assert!(rig.events().contains(&"stop unconfirmed"));
