@@ -1,14 +1,18 @@
 //! The way to a folder, on which nobody but root and this user may have laid a link.
 
 use std::{
-    ffi::OsString,
+    ffi::{CString, OsString},
     io,
     path::{Component, Path},
 };
 
+#[cfg(target_os = "linux")]
+use rustix::fs::fstat;
+#[cfg(not(target_os = "linux"))]
+use rustix::fs::{AtFlags, statat};
 use rustix::{
     fd::OwnedFd,
-    fs::{AtFlags, CWD, FileType, Mode, OFlags, mkdirat, openat, readlinkat, statat},
+    fs::{CWD, FileType, Mode, OFlags, Stat, mkdirat, openat, readlinkat},
     io::Errno,
     process::geteuid,
 };
@@ -58,7 +62,7 @@ fn walk(path: &Path, makes: bool) -> io::Result<OwnedFd> {
                 rest.push(step);
             }
             Err(Errno::NOTDIR | Errno::LOOP) => {
-                let known = statat(&at, &step, AtFlags::SYMLINK_NOFOLLOW)?;
+                let (known, target) = look(&at, &step)?;
                 if FileType::from_raw_mode(known.st_mode) != FileType::Symlink {
                     return Err(io::ErrorKind::NotADirectory.into());
                 }
@@ -70,13 +74,26 @@ fn walk(path: &Path, makes: bool) -> io::Result<OwnedFd> {
                 if links > MOST_LINKS {
                     return Err(Errno::LOOP.into());
                 }
-                let target = readlinkat(&at, &step, Vec::new())?;
                 rest.extend(steps(Path::new(&super::text(&target))));
             }
             Err(error) => return Err(error.into()),
         }
     }
     Ok(at)
+}
+
+/// What stands there instead of a folder, and where it leads if it is a link. It is opened first: whoever owns the folder puts no link of
+/// his own in the place of another's between one question and the next.
+#[cfg(target_os = "linux")]
+fn look(at: &OwnedFd, step: &OsString) -> io::Result<(Stat, CString)> {
+    let it = openat(at, step, OFlags::PATH | OFlags::NOFOLLOW | OFlags::CLOEXEC, Mode::empty())?;
+    Ok((fstat(&it)?, readlinkat(&it, c"", Vec::new()).unwrap_or_default()))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn look(at: &OwnedFd, step: &OsString) -> io::Result<(Stat, CString)> {
+    let known = statat(at, step, AtFlags::SYMLINK_NOFOLLOW)?;
+    Ok((known, readlinkat(at, step, Vec::new()).unwrap_or_default()))
 }
 
 /// The steps of a way, the last first.

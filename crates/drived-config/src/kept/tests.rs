@@ -49,6 +49,29 @@ fn a_link_of_this_user_on_the_way_to_a_folder_is_followed_and_a_circle_is_not() 
     assert!(Kept::at(&folder.file("private/file/file")).read().is_err(), "a file is no folder");
 }
 
+/// As `/var/lib/drived` of a service with a dynamic user, which systemd lays as root to `private/drived`: the folder may be behind a link,
+/// but nothing in it.
+#[test]
+fn a_folder_behind_a_link_is_kept_in_as_it_is_and_no_link_in_it_is_followed() {
+    let folder = Folder::new("kept-dynamic");
+    fs::create_dir_all(folder.file("private/drived")).unwrap();
+    symlink("private/drived", folder.file("drived")).unwrap();
+    let kept = Kept::at(&folder.file("drived/tokens"));
+    kept.replace(b"one", Readers::Owner).unwrap();
+    assert_eq!(fs::read(folder.file("private/drived/tokens")).unwrap(), b"one");
+    assert!(fs::symlink_metadata(folder.file("drived")).unwrap().is_symlink(), "the link stays");
+    drop(kept.lock().unwrap());
+    fs::write(folder.file("precious"), "precious").unwrap();
+    fs::remove_file(folder.file("private/drived/tokens")).unwrap();
+    symlink("../../precious", folder.file("private/drived/tokens")).unwrap();
+    assert!(kept.read().is_err() && kept.open_to_append().is_err());
+    // Nor is one followed to a folder that is there no more: it is made where the link leads.
+    fs::remove_dir_all(folder.file("private/drived")).unwrap();
+    kept.replace(b"two", Readers::Owner).unwrap();
+    assert_eq!(fs::read(folder.file("private/drived/tokens")).unwrap(), b"two");
+    assert_eq!(fs::read_to_string(folder.file("precious")).unwrap(), "precious");
+}
+
 /// Only root can lay another's link.
 #[test]
 fn root_follows_no_link_of_another_and_opens_no_file_that_is_not_the_folders_owners() {
@@ -65,6 +88,9 @@ fn root_follows_no_link_of_another_and_opens_no_file_that_is_not_the_folders_own
     std::os::unix::fs::lchown(folder.file("service/way"), nobody, nobody).unwrap();
     let told = Kept::at(&folder.file("service/way/precious")).read().unwrap_err();
     assert_eq!(told.to_string(), "way is a link of user 65534");
+    assert!(Kept::at(&folder.file("service/way/new")).replace(b"x", Readers::Owner).is_err());
+    assert!(Kept::at(&folder.file("service/way/new")).lock().is_err());
+    assert!(!folder.file("new").exists());
     fs::hard_link(folder.file("precious"), folder.file("service/file")).unwrap();
     let kept = Kept::at(&folder.file("service/file"));
     assert!(kept.read().is_err() && kept.open_to_append().is_err());
