@@ -10,7 +10,7 @@ use tokio::{
 use drived_config::rights::Role;
 
 /// From one look to the next, beside those that a change in this program brings: another program changes the file of tokens.
-const LOOKED_AT_EVERY: Duration = Duration::from_secs(1);
+const LOOKED_AT_EVERY: Duration = Duration::from_millis(500);
 
 /// By what somebody was let in.
 #[derive(Debug, Clone, PartialEq, Eq)]

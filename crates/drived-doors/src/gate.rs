@@ -189,6 +189,10 @@ impl Gate {
         let gate = Arc::clone(self);
         let authority = authority.ends(move |authority| gate.holds(authority), self.changes.subscribe());
         protect(answer.headers_mut(), of_api, door.encrypted);
+        if goes_on {
+            // What ends it ends its connection, so that whoever reads it sees so at once.
+            answer.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+        }
         answer.map(|body| {
             Body::new(match goes_on {
                 true => Kept::stream(body, asking, self.end.clone(), authority),

@@ -288,6 +288,35 @@ async fn heard(stream: &mut DuplexStream, ticks: u32) -> Option<usize> {
     (!ended).then_some(all.len())
 }
 
+/// After how long whoever reads a stream sees that its connection has ended.
+async fn closed_after(mut stream: DuplexStream) -> Duration {
+    let since = Instant::now();
+    let ended = timeout(Duration::from_secs(60), stream.read_to_end(&mut Vec::new())).await;
+    ended.expect("it ends").unwrap();
+    since.elapsed()
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_an_event_stream_was_let_in_by_ends_and_its_connection_with_it_within_a_second() {
+    let rig = Rig::new("closed-at-once");
+    let secrets = ["here", "elsewhere", "panel"].map(|name| rig.token(name, Role::View));
+    let here = rig.stream(&format!("Authorization: Bearer {}", secrets[0])).await;
+    let remove = Asked { method: "DELETE", path: "/api/v1/tokens/here", body: "", headers: &[] };
+    assert_eq!(rig.ask_on_socket(&remove).await.status, StatusCode::OK);
+    assert!(closed_after(here).await < Duration::from_millis(50), "this program has removed it");
+
+    let login = format!("{{\"token\":\"{}\"}}", secrets[2]);
+    let begun = rig.ask(&Asked { path: "/api/v1/login", body: &login, ..START }).await;
+    let cookie = begun.headers[header::SET_COOKIE].to_str().unwrap().split(';').next().unwrap().to_owned();
+    let left = rig.stream(&format!("Cookie: {cookie}")).await;
+    rig.ask(&Asked { path: "/api/v1/logout", headers: &[("cookie", &cookie)], ..START }).await;
+    assert!(closed_after(left).await < Duration::from_millis(50), "this program has ended the session");
+
+    let elsewhere = rig.stream(&format!("Authorization: Bearer {}", secrets[1])).await;
+    Tokens::open(&rig.folder.file("tokens")).unwrap().remove("elsewhere").unwrap();
+    assert!(closed_after(elsewhere).await < Duration::from_secs(1), "another program has removed it");
+}
+
 #[tokio::test(start_paused = true)]
 async fn an_event_stream_ends_when_its_token_is_removed_and_others_go_on() {
     let rig = Rig::new("live");
