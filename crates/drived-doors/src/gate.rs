@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
     sync::watch,
-    time::{Instant, timeout},
+    time::{Instant, sleep, timeout},
 };
 use tower::ServiceExt as _;
 
@@ -35,6 +35,7 @@ use super::{
     host::{self, Hosts},
     kept::Kept,
     network::Network,
+    pace::Pace,
     refusal::Refusal,
     sessions::{self, Sessions},
     token_desk,
@@ -149,6 +150,8 @@ pub(super) struct Gate {
     pub(super) failures: Mutex<Failures<Option<IpAddr>>>,
     /// What somebody may not do and has asked for, by caller.
     pub(super) refused: Mutex<Failures<String>>,
+    /// How fast each address is refused.
+    pub(super) pace: Mutex<Pace>,
     /// Told when somebody may have lost what he was let in by.
     pub(super) changes: watch::Sender<()>,
     /// True when the server ends.
@@ -171,7 +174,21 @@ impl Gate {
         let (peer, proxied) = door.whose(peer, request.version(), request.headers());
         let mut authority = Authority::Freely;
         let passed = self.pass(door, (peer, proxied), request, &asking, &mut authority).await;
-        let mut answer = passed.unwrap_or_else(Refusal::into_response);
+        let mut answer = match passed {
+            Ok(answer) => answer,
+            Err(refusal) => {
+                // Its connection makes room for others meanwhile.
+                if refusal.is_of_the_caller()
+                    && let Some(address) = peer.address()
+                {
+                    let hold = lock(&self.pace).hold(address, Instant::now());
+                    if !hold.is_zero() {
+                        sleep(hold).await;
+                    }
+                }
+                refusal.into_response()
+            }
+        };
         let is_stream = |headers: &HeaderMap| {
             headers
                 .get(header::CONTENT_TYPE)
@@ -270,7 +287,7 @@ impl Gate {
         let Rights { stop, operate, engineer, .. } = caller.rights;
         if !(operate || engineer || stops && stop) {
             self.note_refused(&caller, &parts);
-            return Ok(Refusal::lacks_right(&caller, if stops { "stop" } else { "operate" }).into_response());
+            return Err(Refusal::lacks_right(&caller, if stops { "stop" } else { "operate" }));
         }
         let body = read(BODY).await?;
         let record = |kind| {

@@ -21,6 +21,7 @@ mod gate;
 mod host;
 mod kept;
 mod network;
+mod pace;
 mod patient;
 mod refusal;
 mod sessions;
@@ -160,7 +161,7 @@ impl Prepared {
         let (here, gone) = mpsc::channel(1);
         let (listens, listening) = watch::channel(self.http.is_none());
         let Self { tokens, audit, .. } = self;
-        let (sessions, failures, refused, changes) = Default::default();
+        let (sessions, failures, refused, pace, changes) = Default::default();
         let gate = Gate {
             router,
             tokens,
@@ -168,6 +169,7 @@ impl Prepared {
             sessions,
             failures,
             refused,
+            pace,
             changes,
             end: end.clone(),
         };

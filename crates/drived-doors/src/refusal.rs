@@ -47,6 +47,11 @@ impl Refusal {
         Self { after: Some(time), ..self }
     }
 
+    /// Whether it is for what the caller is or says, and not for what fails here.
+    pub(super) fn is_of_the_caller(&self) -> bool {
+        self.status.is_client_error()
+    }
+
     pub(super) fn into_response(self) -> Response {
         let Self { status, why, after, no_right } = self;
         let title = status.canonical_reason().unwrap_or("Refused");

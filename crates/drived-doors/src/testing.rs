@@ -68,7 +68,7 @@ impl Rig {
             encrypted: false,
         };
         let (end, ended) = watch::channel(false);
-        let (sessions, failures, refused, changes) = Default::default();
+        let (sessions, failures, refused, pace, changes) = Default::default();
         let tokens = Some(Arc::new(Tokens::open(&folder.file("tokens")).unwrap()));
         let audit = Audit::open(&folder.file("audit")).unwrap();
         let gate = Arc::new(Gate {
@@ -78,6 +78,7 @@ impl Rig {
             sessions,
             failures,
             refused,
+            pace,
             changes,
             end: ended,
         });

@@ -382,6 +382,50 @@ async fn an_event_stream_ends_with_its_session_by_logout_and_by_time() {
     assert_eq!(heard(&mut kept, 12 * 60 * 12 + 2).await, None);
 }
 
+#[tokio::test(start_paused = true)]
+async fn whoever_is_refused_again_and_again_is_answered_slower_and_no_stop_and_nobody_else_waits_for_it() {
+    let rig = Rig::new("paced");
+    let right = format!("Bearer {}", rig.token("panel", Role::Stop));
+    let since = Instant::now();
+    let wrong = Asked { headers: &[("authorization", "Bearer drv_wrong")], ..STOP };
+    for _ in 0..20 {
+        rig.ask(&wrong).await.assert_refused(401);
+    }
+    assert!(since.elapsed() < Duration::from_millis(50), "a page that does not know it yet");
+    for _ in 0..20 {
+        rig.ask(&wrong).await.assert_refused(401);
+    }
+    assert!(since.elapsed() >= Duration::from_millis(950), "twenty a second");
+    let since = Instant::now();
+    let flood: Vec<_> = (0..20).map(|_| rig.ask(&wrong)).collect();
+    let stop = async {
+        sleep(Duration::from_millis(1)).await;
+        let stopped = rig.ask(&Asked { headers: &[("authorization", &right)], ..STOP }).await;
+        rig.ask_from([10, 0, 0, 9], &wrong).await.assert_refused(401);
+        (stopped.status, since.elapsed())
+    };
+    let ((status, waited), _) = tokio::join!(stop, futures_util::future::join_all(flood));
+    assert_eq!(status, StatusCode::OK);
+    assert!(waited < Duration::from_millis(50), "{waited:?}");
+    assert!(since.elapsed() >= Duration::from_millis(950));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_refusal_that_is_held_back_makes_room_for_whoever_comes() {
+    let rig = Rig::new("paced-room");
+    let wrong = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer drv_wrong\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}";
+    let mut held = Vec::new();
+    for _ in 0..200 {
+        let mut stream = rig.connect();
+        stream.write_all(wrong.as_bytes()).await.unwrap();
+        sleep(Duration::from_millis(1)).await;
+        held.push(stream);
+    }
+    let since = Instant::now();
+    assert!(stops(&mut rig.connect(), "").await);
+    assert!(since.elapsed() < Duration::from_millis(50));
+}
+
 /// A whole stop, and whether it was answered.
 async fn stops(stream: &mut DuplexStream, bearer: &str) -> bool {
     let request = format!(
