@@ -1,8 +1,8 @@
 """Shows the page in a headless Chromium and presses its stop: stop_in_browser.py URL. Says "ready" when it is shown.
 
-For each line on the standard input, "pointer" or "key", it presses so and says how many milliseconds have passed from the browser's
-own time of the event until the answer was whole that the daemon has taken the stop, or "never" after five seconds. Both times are of one
-clock of the browser. An answer to what was sent before the press is not an answer to it: after a "never" the page goes on to send that
+For each line on the standard input, "pointer" or "key", it presses so and says the browser's own time of the event, in milliseconds since
+1970, and how many have passed from then until the answer was whole that the daemon has taken the stop; or "never" after five seconds. Both
+times are of one clock of the browser. An answer to what was sent before the press is not an answer to it: after a "never" the page goes on to send that
 stop, and it may be taken at any time."""
 
 import sys
@@ -21,7 +21,7 @@ MEASURE = """() => {
         };
         const seen = new PerformanceObserver(list => {
             const taken = list.getEntries().find(one => one.startTime >= pressed && /api.v1.stop/.test(one.name) && [200, 202].includes(one.responseStatus));
-            if (taken) over(taken.responseEnd - pressed);
+            if (taken) over([performance.timeOrigin + pressed, taken.responseEnd - pressed]);
         });
         const late = setTimeout(() => over(null), 5_000);
         for (const kind of ['pointerdown', 'keydown']) addEventListener(kind, note, true);
@@ -44,6 +44,6 @@ with sync_playwright() as playwright:
         else:
             page.mouse.down()
             page.mouse.up()
-        wait = page.evaluate("window.measured")
-        print("never" if wait is None else wait, flush=True)
+        taken = page.evaluate("window.measured")
+        print("never" if taken is None else "%f %f" % tuple(taken), flush=True)
     browser.close()

@@ -115,6 +115,8 @@ fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
     socket.bind(&SocketAddr::new(ATTACKER, 0).into())?;
     socket.connect_timeout(&to.into(), PATIENCE)?;
     socket.set_read_timeout(Some(PATIENCE))?;
+    // Where nobody reads, what is sent would wait for ever, and whoever waits for the attackers' end with it.
+    socket.set_write_timeout(Some(PATIENCE))?;
     Ok(socket.into())
 }
 

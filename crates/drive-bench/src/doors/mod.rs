@@ -2,8 +2,9 @@
 //! pointer or the key goes down, the request is sent) until the stop waits for its line. The program `drived` is looked for beside
 //! this one; the page is pressed in a Chromium over Playwright, and MQTT goes over a mosquitto, where they are installed.
 //!
-//! HTTP, socket and page: until the answer is whole that it was taken, which is given when it waits for its line. Gateway and MQTT,
-//! which are answered otherwise: until somebody on the socket has heard of the command. Both are a little later than the queue.
+//! It ends where the stop of each drive that is meant is in the queue of its line, as the daemon logs it with the time ([`queue`]);
+//! and each row says besides when whoever stops had the answer, which MQTT does not give. One stop after the other: the next begins when
+//! something has become of it, so that no repetition is taken for a stop.
 
 #![expect(clippy::disallowed_methods, reason = "there is no runtime here: each attacker is a thread")]
 
@@ -11,11 +12,12 @@ mod attacks;
 mod browser;
 mod observer;
 pub(crate) mod plant;
+mod queue;
 mod trivial;
 
 use std::{
     io::{Error as IoError, ErrorKind, Read as _, Write as _},
-    net::TcpStream,
+    net::{SocketAddr, TcpStream},
     os::unix::net::UnixStream,
     sync::atomic::{AtomicBool, Ordering},
     thread,
@@ -28,7 +30,8 @@ use self::{
     attacks::{ATTACKS, Attack, Target},
     browser::Browser,
     observer::Observer,
-    plant::{Plant, until},
+    plant::{DRIVES, Plant, until},
+    queue::{Act, Whom},
     trivial::Trivial,
 };
 use crate::{
@@ -44,6 +47,16 @@ const GOAL_MS: f64 = 50.0;
 /// Whoever has not answered by then has not taken it.
 const PATIENCE: Duration = Duration::from_secs(5);
 const BETWEEN: Duration = Duration::from_millis(20);
+/// After so many that were not taken, one after the other, the rest is not waited for.
+const IN_VAIN: usize = 5;
+
+/// What became of a stop.
+#[derive(Debug, Clone, Copy)]
+struct Taken {
+    /// It was in the queue of its line; where there is none, it was answered.
+    queued: Duration,
+    answered: Option<Duration>,
+}
 
 /// Which doors and attacks somebody wants to see; where nothing is named, all.
 #[derive(Debug, Default, Args)]
@@ -106,40 +119,58 @@ fn under(
     target: Target,
     doors: &[Door],
     stopper: &mut Stopper<'_>,
-    mut tell: impl FnMut(Door, Vec<f64>),
+    mut tell: impl FnMut(Door, &[Option<Taken>]),
 ) {
     let over = AtomicBool::new(false);
     thread::scope(|scope| {
         scope.spawn(|| (attack.act)(target, &over));
         thread::sleep(Duration::from_secs(1));
         for door in doors {
-            // What was not taken is later than everything.
-            let mut waits = Vec::with_capacity(STOPS);
-            for _ in 0..STOPS {
-                let waited = stopper.stop(*door).inspect_err(|error| {
+            let (mut all, mut in_vain) = (Vec::with_capacity(STOPS), 0);
+            while all.len() < STOPS {
+                let taken = stopper.stop(*door).inspect_err(|error| {
                     eprintln!("drive-bench: a stop by {} is not counted as taken: {error}", door.name());
                 });
-                waits.push(waited.map_or(f64::INFINITY, |wait| wait.as_secs_f64() * 1_000.0));
+                in_vain = if taken.is_ok() { 0 } else { in_vain + 1 };
+                all.push(taken.ok());
+                if in_vain == IN_VAIN {
+                    all.resize(STOPS, None);
+                }
                 thread::sleep(BETWEEN);
             }
-            tell(*door, waits);
+            tell(*door, &all);
         }
         over.store(true, Ordering::Relaxed);
     });
 }
 
-fn tell(report: &mut Report, attack: &str, door: Door, mut waits: Vec<f64>, goal: Goal) {
-    waits.sort_by(f64::total_cmp);
-    let at = |share: f64| {
+fn tell(report: &mut Report, attack: &str, door: Door, all: &[Option<Taken>], goal: Goal) {
+    // What was not taken is later than everything.
+    let sorted = |of: fn(&Taken) -> Option<Duration>| {
+        let ms = |taken: &Option<Taken>| {
+            let wait = taken.as_ref().and_then(of);
+            wait.map_or(f64::INFINITY, |wait| wait.as_secs_f64() * 1_000.0)
+        };
+        let mut waits: Vec<f64> = all.iter().map(ms).collect();
+        waits.sort_by(f64::total_cmp);
+        waits
+    };
+    let at = |waits: &[f64], share: f64| {
         let last = waits.len().saturating_sub(1);
         waits.get((last as f64 * share).round() as usize).copied().unwrap_or(f64::INFINITY)
     };
     let ms = |wait: f64| if wait.is_finite() { format!("{wait:.1} ms") } else { "never".to_owned() };
-    let lost = waits.iter().filter(|wait| wait.is_infinite()).count();
+    let (queued, answered) = (sorted(|taken| Some(taken.queued)), sorted(|taken| taken.answered));
+    let lost = all.iter().filter(|taken| taken.is_none()).count();
     let lost = if lost == 0 { String::new() } else { format!(", {lost} not taken") };
-    let (door, p50, worst) = (door.name(), ms(at(0.5)), ms(at(1.0)));
-    let what = format!("{attack}: a stop by {door}: p50 {p50}, worst {worst}{lost}; p99");
-    report.row(SECTION, what, Unit::Millis, at(0.99), goal);
+    let answers = match door {
+        Door::Mqtt | Door::Trivial => String::new(),
+        _ => format!(", answered at p99 after {}", ms(at(&answered, 0.99))),
+    };
+    let until = if door == Door::Trivial { "until answered" } else { "in the queue of its line" };
+    let (door, p50, worst) = (door.name(), ms(at(&queued, 0.5)), ms(at(&queued, 1.0)));
+    let what = format!("{attack}: a stop by {door}{answers}; {until}: p50 {p50}, worst {worst}{lost}; p99");
+    report.row(SECTION, what, Unit::Millis, at(&queued, 0.99), goal);
 }
 
 /// A way by which somebody stops.
@@ -219,46 +250,63 @@ impl<'a> Stopper<'a> {
         }
     }
 
-    /// Stops by a door: how long it took until it was on its way.
-    fn stop(&mut self, door: Door) -> std::io::Result<Duration> {
+    /// Stops by a door, and waits until something has become of it.
+    fn stop(&mut self, door: Door) -> std::io::Result<Taken> {
+        if door == Door::Trivial {
+            let began = Instant::now();
+            ask_http(connected(self.trivial.address)?)?;
+            let waited = began.elapsed();
+            return Ok(Taken { queued: waited, answered: Some(waited) });
+        }
+        self.observer.catch_up();
+        self.plant.queue.forget();
+        let (act, answered) = self.act(door)?;
+        let whom = if door == Door::Gateway { Whom::One(1) } else { Whom::All(&DRIVES) };
+        let queued = self.plant.queue.had(whom, act)?;
+        self.observer.has_settled_another()?;
+        Ok(Taken { queued, answered })
+    }
+
+    /// Stops by a door: when that was, and how long it took until it was answered, where it is.
+    fn act(&mut self, door: Door) -> std::io::Result<(Act, Option<Duration>)> {
         match (door, &mut self.browser) {
             (Door::Pointer, Some(browser)) => return browser.press("pointer"),
             (Door::Key, Some(browser)) => return browser.press("key"),
             _ => {}
         }
-        let began = Instant::now();
+        let (act, began) = (Act::now(), Instant::now());
         match door {
-            Door::Http | Door::Trivial => {
-                let to = if door == Door::Http { self.plant.http } else { self.trivial.address };
-                let stream = TcpStream::connect_timeout(&to, PATIENCE)?;
-                stream.set_read_timeout(Some(PATIENCE))?;
-                ask_http(stream)?;
-            }
+            Door::Http => ask_http(connected(self.plant.http)?)?,
             Door::Socket => {
                 let stream = UnixStream::connect(&self.plant.socket)?;
                 stream.set_read_timeout(Some(PATIENCE))?;
                 ask_http(stream)?;
             }
             Door::Gateway => {
-                let mut stream = TcpStream::connect_timeout(&self.plant.gateway, PATIENCE)?;
+                let mut stream = connected(self.plant.gateway)?;
                 // Altivar 312, CMD (8501) = 0000h: disable voltage, which stops whatever the motor does.
                 stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 6, 0x21, 0x35, 0, 0])?;
-                let heard = self.observer.heard_of("modbus ", began);
-                // As a client does, which sends its next request after the answer, whatever the drive has made of it by then.
-                stream.set_read_timeout(Some(PATIENCE))?;
                 let mut head = [0; 9];
                 stream.read_exact(&mut head)?;
-                return heard;
             }
             Door::Mqtt => {
                 let broker = self.plant.broker.ok_or(ErrorKind::NotFound)?;
-                let _connection = publish(TcpStream::connect_timeout(&broker, PATIENCE)?, "drived/all/stop")?;
-                return self.observer.heard_of("mqtt", began);
+                let _connection = publish(connected(broker)?, "drived/all/stop")?;
+                return Ok((act, None));
             }
-            Door::Pointer | Door::Key => return Err(ErrorKind::NotFound.into()),
+            Door::Trivial | Door::Pointer | Door::Key => return Err(ErrorKind::NotFound.into()),
         }
-        Ok(began.elapsed())
+        Ok((act, Some(began.elapsed())))
     }
+}
+
+/// A connection on which nothing lasts for ever.
+fn connected(to: SocketAddr) -> std::io::Result<TcpStream> {
+    let stream = TcpStream::connect_timeout(&to, PATIENCE)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    Ok(stream)
 }
 
 fn ask_http(mut stream: impl std::io::Read + std::io::Write) -> std::io::Result<()> {
@@ -275,8 +323,6 @@ fn ask_http(mut stream: impl std::io::Read + std::io::Write) -> std::io::Result<
 
 /// Publishes nothing on a topic as a client of MQTT 5.0 does that has just come, and keeps the connection.
 fn publish(mut stream: TcpStream, topic: &str) -> std::io::Result<TcpStream> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_nodelay(true)?;
     // CONNECT (3.1): "MQTT", version 5, a clean start, 60 s, no properties, a client id that the broker makes.
     stream.write_all(&[0x10, 13, 0, 4, b'M', b'Q', b'T', b'T', 5, 0x02, 0, 60, 0, 0, 0])?;
     // CONNACK (3.2), with properties.

@@ -1,4 +1,4 @@
-//! Somebody on the control socket who hears of each command as soon as it waits for its line.
+//! Somebody on the control socket who hears what becomes of each command.
 
 use std::{
     collections::HashSet,
@@ -7,15 +7,17 @@ use std::{
     path::Path,
     sync::mpsc::{Receiver, channel},
     thread,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use super::PATIENCE;
 
-/// What was heard, with its time.
+/// What was heard.
 pub(super) struct Observer {
-    heard: Receiver<(Instant, String)>,
-    /// The commands that are known: each is told again when something becomes of it.
+    heard: Receiver<String>,
+    /// The commands of which nothing is known yet.
+    pending: HashSet<String>,
+    /// Those that are known: each is told again when something becomes of it.
     known: HashSet<String>,
 }
 
@@ -28,25 +30,40 @@ impl Observer {
         thread::spawn(move || {
             for line in BufReader::new(stream).lines() {
                 let Ok(line) = line else { return };
-                if line.starts_with("data:") && tell.send((Instant::now(), line)).is_err() {
+                if line.starts_with("data:") && tell.send(line).is_err() {
                     return;
                 }
             }
         });
-        Ok(Self { heard, known: HashSet::new() })
+        Ok(Self { heard, pending: HashSet::new(), known: HashSet::new() })
     }
 
-    /// How long after that it was heard of another command which came from there, whatever has become of it by then.
-    pub(super) fn heard_of(&mut self, origin: &str, began: Instant) -> Result<Duration> {
-        let origin = format!("\"origin\":\"{origin}");
-        loop {
-            let left = PATIENCE.saturating_sub(began.elapsed());
-            let (at, data) = self.heard.recv_timeout(left).map_err(|_| Error::from(ErrorKind::TimedOut))?;
-            let id = data.split_once("\"id\":\"").and_then(|(_, rest)| rest.split_once('"'));
-            let is_new = id.is_some_and(|(id, _)| self.known.insert(id.to_owned()));
-            if is_new && at >= began && data.contains(&origin) {
-                return Ok(at - began);
-            }
+    /// Waits until something has become of one more command and of all others: what a line has in its queue then is of the next.
+    pub(super) fn has_settled_another(&mut self) -> Result<()> {
+        let (until, mut is_another) = (Instant::now() + PATIENCE, false);
+        while !(is_another && self.pending.is_empty()) {
+            let left = until.saturating_duration_since(Instant::now());
+            let data = self.heard.recv_timeout(left).map_err(|_| Error::from(ErrorKind::TimedOut))?;
+            is_another |= self.hear(&data);
         }
+        Ok(())
+    }
+
+    /// Hears of what has become of those that are not settled by now.
+    pub(super) fn catch_up(&mut self) {
+        while let Ok(data) = self.heard.try_recv() {
+            self.hear(&data);
+        }
+    }
+
+    /// Whether it tells of a command that was not known.
+    fn hear(&mut self, data: &str) -> bool {
+        let id = data.split_once("\"id\":\"").and_then(|(_, rest)| rest.split_once('"'));
+        let Some((id, rest)) = id.filter(|_| data.contains("\"command\":\"")) else { return false };
+        match rest.contains("\"outcome\":\"pending\"") {
+            true => self.pending.insert(id.to_owned()),
+            false => self.pending.remove(id),
+        };
+        self.known.insert(id.to_owned())
     }
 }

@@ -9,7 +9,7 @@ use std::{
     net::{SocketAddr, TcpListener, TcpStream},
     os::unix::process::CommandExt as _,
     path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
+    process::{Child, ChildStderr, Command, Stdio},
     sync::atomic::{AtomicU32, Ordering},
     thread,
     time::{Duration, Instant},
@@ -17,9 +17,15 @@ use std::{
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 
+use super::queue::Queue;
 use crate::Error;
 
-/// A daemon with four simulated drives and all its doors, in a folder of its own.
+/// The addresses of its drives: two, so that each stop is soon over.
+pub(super) const DRIVES: [u8; 2] = [1, 2];
+
+const FAMILY: &str = "atv312@1-2";
+
+/// A daemon with simulated drives and all its doors, in a folder of its own.
 pub(super) struct Plant {
     _folder: Folder,
     pub(super) http: SocketAddr,
@@ -27,6 +33,7 @@ pub(super) struct Plant {
     pub(super) socket: PathBuf,
     /// `None` where there is no mosquitto.
     pub(super) broker: Option<SocketAddr>,
+    pub(super) queue: Queue,
     _running: Vec<Running>,
 }
 
@@ -45,18 +52,18 @@ impl Plant {
             &config,
             format!(
                 "[http]\nlisten = \"{http}\"\n[socket]\npath = {socket:?}\n{mqtt}[lines.bench]\nport = {link:?}\n\
-                 [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-4\"\nname = \"pump {{}}\"\ncontrol = true\n\
+                 [[drives]]\nline = \"bench\"\ndrive = \"{FAMILY}\"\nname = \"pump {{}}\"\ncontrol = true\n\
                  [[gateways]]\nlisten = \"{gateway}\"\nline = \"bench\"\nwrites = \"stop\"\n"
             ),
         )?;
-        let run = |arguments: &[&str]| Running::start(&program, arguments);
-        let drives = run(&["sim", "--drive", "atv312@1-4", "--pty", text(&link)?])?;
+        let drives = ["sim", "--drive", FAMILY, "--pty", text(&link)?];
+        let drives = Running::start(&program, &drives)?;
         until(|| link.exists())?;
-        let daemon = run(&["run", "--config", text(&config)?])?;
+        let (daemon, log) = Running::start_heard(&program, &["run", "--config", text(&config)?])?;
         until(|| socket.exists() && TcpStream::connect(http).is_ok() && TcpStream::connect(gateway).is_ok())?;
         let broker = mosquitto.is_some().then_some(broker);
         let running = [drives, daemon].into_iter().chain(mosquitto).collect();
-        Ok(Self { _folder: folder, http, gateway, socket, broker, _running: running })
+        Ok(Self { _folder: folder, http, gateway, socket, broker, queue: Queue::of(log), _running: running })
     }
 }
 
@@ -96,6 +103,18 @@ pub(crate) fn become_one_that_ends_with_me(program: &[OsString]) -> Error {
 
 impl Running {
     pub(crate) fn start(program: &Path, arguments: &[&str]) -> Result<Self, Error> {
+        Ok(Self(Self::command(program, arguments)?.spawn()?))
+    }
+
+    /// The same, with its log, in which each stop stands that is in the queue of its line.
+    fn start_heard(program: &Path, arguments: &[&str]) -> Result<(Self, ChildStderr), Error> {
+        let mut command = Self::command(program, arguments)?;
+        let mut child = command.env("DRIVED_LOG", "warn,drive_bus=debug").stderr(Stdio::piped()).spawn()?;
+        let log = child.stderr.take().ok_or("it has no log")?;
+        Ok((Self(child), log))
+    }
+
+    fn command(program: &Path, arguments: &[&str]) -> Result<Command, Error> {
         let mut command = Command::new(env::current_exe()?);
         command
             .arg("--with-me")
@@ -104,7 +123,7 @@ impl Running {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        Ok(Self(command.spawn()?))
+        Ok(command)
     }
 }
 

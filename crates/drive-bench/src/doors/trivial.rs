@@ -4,15 +4,19 @@
 use std::{
     io::Result,
     net::{Ipv4Addr, SocketAddr},
+    time::Duration,
 };
 
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::{TcpListener, TcpStream},
     runtime::Runtime,
+    time::sleep,
 };
 
 const ANSWER: &[u8] = b"HTTP/1.1 202 Accepted\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}";
+
+const LATER: Duration = Duration::from_millis(10);
 
 /// It serves until it is dropped.
 pub(super) struct Trivial {
@@ -26,8 +30,12 @@ impl Trivial {
         let listener = runtime.block_on(TcpListener::bind((Ipv4Addr::LOCALHOST, 0)))?;
         let address = listener.local_addr()?;
         runtime.spawn(async move {
-            while let Ok((stream, _)) = listener.accept().await {
-                tokio::spawn(serve(stream));
+            loop {
+                // What cannot be let in now, such as without a descriptor, is let in later.
+                match listener.accept().await {
+                    Ok((stream, _)) => drop(tokio::spawn(serve(stream))),
+                    Err(_) => sleep(LATER).await,
+                }
             }
         });
         Ok(Self { _serves: runtime, address })

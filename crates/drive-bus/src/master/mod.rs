@@ -295,6 +295,10 @@ impl<C> Master<C> {
             self.drop_unsent(old, PortError::Superseded);
         }
         self.choose_at = None;
+        if terms.class == Class::Stop && is_write {
+            // By this line whoever measures sees when a stop is there.
+            tracing::debug!(slave, "a stop is in the queue of its line");
+        }
         Ok(ticket)
     }
 
