@@ -100,6 +100,19 @@ fn every_verb_goes_to_the_running_daemon_by_the_names_of_its_drives() {
 }
 
 #[test]
+fn a_stop_by_injection_goes_through_the_daemon_with_its_seconds() {
+    let daemon = Daemon::start("injection", "");
+    daemon.ask(&["start", "pump 1", "--setpoint", "30Hz"]).assert_done();
+    let stopped = daemon.ask(&["stop", "pump 1", "--injection", "2"]);
+    assert!(stopped.assert_done().contains("DC injection stop held for 2s"), "{stopped:?}");
+    daemon.ask(&["start", "pump 1", "--setpoint", "30Hz"]).assert_done();
+    let stopped = json(&daemon.ask(&["stop", "pump 1", "--injection", "3", "--json"]));
+    let modes = serde_json::json!({"asked": "dc_injection", "used": "dc_injection", "injection_asked_ms": 3_000, "injection_used_ms": 3_000});
+    assert_eq!((&stopped["outcome"], &stopped["stop"]), (&"confirmed".into(), &modes), "{stopped}");
+    daemon.ask(&["stop", "pump 1", "--injection", "31"]).assert_refused(2, "30");
+}
+
+#[test]
 fn an_answer_for_programs_is_the_object_of_the_api() {
     let daemon = Daemon::start("json", "");
     let state = json(&daemon.ask(&["status", "--json"]));
