@@ -122,6 +122,27 @@ async fn a_full_line_that_begins_and_begins_again_under_running_motors_trips_non
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_line_that_is_asked_for_far_more_than_it_carries_loses_no_drive_and_prefers_none() {
+    let every = Duration::from_millis(50);
+    let member = |address: u8| {
+        let periods = Periods { running: every, rest: every, slow: Duration::ZERO, max_age: 10 * SECOND };
+        (Family::ATV312, address, DriveSettings { periods, ..DriveSettings::controlled(address.to_string()) })
+    };
+    let site = Site::new(common_settings(), (1..=DRIVES).map(member).collect());
+    let plant = Plant::open_whatever_the_plan(vec![site]).expect("it is opened all the same");
+    sleep(60 * SECOND).await;
+    let counters = || plant.fleet.drives().iter().map(|drive| drive.snapshot().counters).collect::<Vec<_>>();
+    let before = counters();
+    sleep(120 * SECOND).await;
+    let after = counters();
+    let answered: Vec<_> =
+        after.iter().zip(&before).map(|(after, before)| after.answered - before.answered).collect();
+    let (least, most) = (answered.iter().min().unwrap(), answered.iter().max().unwrap());
+    assert!(least * 4 >= most * 3, "{answered:?}");
+    assert!(after.iter().all(|counters| counters.lost == 0), "{after:?}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_reader_that_is_slow_is_told_how_many_events_it_missed() {
     let member = |address| (Family::ATV312, address, DriveSettings::controlled(format!("drive {address}")));
     let site = Site::new(SerialSettings::MODBUS_DEFAULT, (1..=3).map(member).collect());

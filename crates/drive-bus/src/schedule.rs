@@ -5,7 +5,8 @@
 //!   for its slave's pause, nothing else starts.
 //! - **Inside a class** requests go in rounds. Each slave has one request in a round, so that the second of one waits until
 //!   every other slave has had its first, whatever their deadlines are; one that has not asked for a while begins in the
-//!   present round and has saved nothing up. Inside a round the earliest deadline goes first.
+//!   present round and has saved nothing up. Inside a round the earliest deadline goes first. What expires unsent has not had
+//!   its turn, so that a line that is too slow for what is asked of it still asks every slave as often as every other.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
 //!   ten times as fast and goes first among what has aged: behind a stream of commands its drive would trip.
 //! - **Background** gets every twentieth turn when it would otherwise get none.
@@ -232,9 +233,19 @@ impl<T> Schedule<T> {
         self.queued.extract_if(.., |entry| which(entry)).collect()
     }
 
-    /// Takes out what has outlived its lifetime.
+    /// Takes out what has outlived its lifetime. It has not had its turn: the next of that slave has it.
     pub fn expired(&mut self, now: Instant) -> Vec<Entry<T>> {
-        self.withdraw_all(|entry| entry.expires().is_some_and(|expires| expires <= now))
+        let expired = self.withdraw_all(|entry| entry.expires().is_some_and(|expires| expires <= now));
+        for entry in &expired {
+            let key = (entry.terms.class, entry.slave);
+            if self.last_rounds.get(&key) == Some(&entry.rank.0) {
+                match entry.rank.0.checked_sub(1) {
+                    Some(before) => self.last_rounds.insert(key, before),
+                    None => self.last_rounds.remove(&key),
+                };
+            }
+        }
+        expired
     }
 
     /// When the next request expires.

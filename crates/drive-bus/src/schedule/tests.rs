@@ -53,6 +53,48 @@ fn a_slave_with_many_requests_does_not_starve_the_others() {
     assert_eq!(order(&mut schedule, now), [0, 20, 30, 40, 1, 2, 3, 4]);
 }
 
+/// How often each of 31 slaves is asked in a minute whose status each wants every `period` and gives up when the next is due, on a
+/// line that has 28 ms for one.
+fn turns_on_a_line_that_is_too_slow(period: impl Fn(u8) -> Duration) -> Vec<u32> {
+    let (mut schedule, start) = (schedule(), Instant::now());
+    let mut due: Vec<Option<Instant>> = (1..=31).map(|slave| Some(start + slave * MS)).collect();
+    let mut turns = vec![0; 31];
+    let mut now = start;
+    while now < start + 60_000 * MS {
+        for entry in schedule.expired(now) {
+            due[usize::from(entry.slave) - 1] = Some(now);
+        }
+        for (slave, due) in (1..).zip(&mut due) {
+            if due.take_if(|due| *due <= now).is_some() {
+                push(&mut schedule, now, slave, Terms::of(Class::Status).within(period(slave)), 0);
+            }
+        }
+        match schedule.choose(now, |_| Readiness { at: now, takes: 28 * MS, holds_line: false }) {
+            Chosen::Send(entry) => {
+                turns[usize::from(entry.slave) - 1] += 1;
+                due[usize::from(entry.slave) - 1] = entry.expires();
+                now += 28 * MS;
+            }
+            Chosen::Wait(_) | Chosen::Idle => now += MS,
+        }
+    }
+    turns
+}
+
+#[test]
+fn a_request_that_expires_unsent_has_not_had_its_turn_so_nobody_starves_on_a_line_that_is_too_slow() {
+    for period in [50, 100, 500] {
+        for turns in [
+            turns_on_a_line_that_is_too_slow(|_| period * MS),
+            turns_on_a_line_that_is_too_slow(|slave| (period + u32::from(slave)) * MS),
+            turns_on_a_line_that_is_too_slow(|slave| if slave % 3 == 0 { 10 * MS } else { period * MS }),
+        ] {
+            // 2142 turns for 31.
+            assert!(turns.iter().all(|turns| (60..=80).contains(turns)), "every {period} ms: {turns:?}");
+        }
+    }
+}
+
 #[test]
 fn aging_never_lifts_a_poll_above_a_stop() {
     let (mut schedule, start) = (schedule(), Instant::now());

@@ -60,6 +60,8 @@ struct Paper {
     refuses_watchdog: bool,
     /// It refuses every stop: not now.
     refuses_stops: bool,
+    /// No stop leaves for its line in time.
+    expires_stops: bool,
     /// It takes every stop and goes on, because.
     denies_stops: Option<Refusal>,
     /// The run command of this side that it holds.
@@ -113,6 +115,7 @@ impl Paper {
             denies_watchdog: false,
             refuses_watchdog: false,
             refuses_stops: false,
+            expires_stops: false,
             denies_stops: None,
             lease: None,
             held: None,
@@ -187,6 +190,7 @@ impl Paper {
         self.log.push(job);
         let reached = self.failing.is_none();
         match job {
+            Job::Stop(_) if self.expires_stops => Reply::Stopped(Err(port_error(PortError::Expired))),
             Job::Stop(_) if self.refuses_stops => Reply::Stopped(Err(not_now(8501))),
             Job::Stop(mode) if self.denies_stops.is_some() => {
                 let (slave, command, because) = (slave(), Command::Stop(mode), self.denies_stops);

@@ -438,6 +438,19 @@ fn a_stop_that_the_drive_refuses_is_not_confirmed_by_a_motor_that_stands_anyway(
     assert!(rig.events().contains(&"stop confirmed"), "it was repeated until the drive took it");
 }
 
+#[test]
+fn an_injection_that_never_left_is_not_over_because_the_motor_stands() {
+    let mut rig = Rig::ready();
+    rig.drive.expires_stops = true;
+    rig.stop(StopMode::DcInjection);
+    rig.pass(10_000 * MS);
+    let injection = Job::Stop(StopMode::DcInjection);
+    assert!(rig.drive.log.contains(&injection) && !rig.drive.log.contains(&Job::Stop(StopMode::Ramp)));
+    rig.drive.expires_stops = false;
+    rig.pass(10_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"), "{:?}", rig.events());
+}
+
 /// A status that was read before now.
 fn read_before(rig: &Rig, status: Status) -> Reply {
     Reply::Status(Ok(Status { at: Some(rig.now), ..status }))
