@@ -184,7 +184,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
             Level::ERROR,
             &["north: back after up to 2", "pump 3 tripped: SLF, ", "by its communication watchdog"],
         ),
-        (Level::ERROR, &["north: pump ", " back after 2", " s, tripped: SLF, "]),
+        (Level::ERROR, &["north: pump 7 back after 2", " s, tripped: SLF, "]),
         // A trip with its mnemonic, and its reset.
         (Level::ERROR, &["north: pump 1 tripped at 30 Hz: OCF, "]),
         // Dead for ten minutes.
