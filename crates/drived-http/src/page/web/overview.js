@@ -5,7 +5,7 @@ import { confirmed } from './ask.js';
 import { arrange, el, setAttribute, setClass, setText } from './dom.js';
 import { quantity } from './format.js';
 import { command } from './orders.js';
-import { mayCommand, plant } from './plant.js';
+import { mayCommand, plant, quality } from './plant.js';
 import { COLUMNS, makeRow } from './row.js';
 import { named, t } from './texts.js';
 import { isTrouble, trouble } from './trouble.js';
@@ -16,11 +16,13 @@ import { stateWord } from './words.js';
 const ROWS_AT_ONCE = 24;
 
 const MOVING = new Set(['running', 'stopping', 'quick_stop', 'fault_reaction']);
+const STANDING = new Set(['at_rest', 'held']);
 const FILTERS = {
   all: () => true,
   trouble: drive => isTrouble(trouble(drive)),
   running_drives: drive => MOVING.has(drive.status?.state),
-  standing_drives: drive => !MOVING.has(drive.status?.state),
+  // What stands is known to: no output is not standstill, and of a drive that is lost nobody knows.
+  standing_drives: drive => quality(drive.status) === 'good' && STANDING.has(drive.status.motion),
 };
 
 /** What the user looks for stays when he comes back. */
