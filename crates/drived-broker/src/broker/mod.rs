@@ -8,6 +8,7 @@
 
 pub mod config;
 mod message;
+mod prompt;
 mod queue;
 mod session;
 #[cfg(test)]

@@ -25,7 +25,7 @@ use tokio::{
 
 use super::{
     Arrived, Attempt, Connection, EVENTS, Event, Goodbye, Message, Options, Properties, Qos, Shared,
-    Subscription, Then, Will,
+    Subscription, Then, Will, prompt,
     queue::{Limits, Waiting},
 };
 
@@ -274,7 +274,8 @@ fn client_options(options: &Options, attempt: Attempt, will: Option<Will>) -> Op
         .set_session_expiry_interval(Some(0))
         .set_receive_maximum(Some(UNACKNOWLEDGED))
         .set_max_packet_size(Some(LARGEST))
-        .set_connect_timeout(ANSWERED_WITHIN);
+        .set_connect_timeout(ANSWERED_WITHIN)
+        .set_socket_connector(prompt::connect);
     if let Some(Will { message }) = will {
         let properties = LastWillProperties {
             delay_interval: None,
