@@ -74,6 +74,7 @@ impl Job {
             Self::Measurements => Some(1),
             Self::Faults | Self::Ask(Question::Faults) => Some(2),
             Self::SelfRestarts => Some(3),
+            Self::Identify => Some(4),
             _ => None,
         }
     }

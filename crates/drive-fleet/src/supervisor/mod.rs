@@ -177,6 +177,8 @@ pub(crate) struct Supervisor {
     doubtful: bool,
     in_flight: Option<Job>,
     turn: Turn,
+    /// Until when what is done on its turn may go on.
+    turn_ends: Option<Instant>,
     /// A poll has given way to an order since the last status.
     yielded: bool,
     outputs: VecDeque<Output>,
@@ -228,6 +230,7 @@ impl Supervisor {
             doubtful: false,
             in_flight: None,
             turn: Turn::Unwanted,
+            turn_ends: None,
             yielded: false,
             outputs: VecDeque::new(),
             changed: true,
@@ -258,6 +261,7 @@ impl Supervisor {
         if let Exit::Done(_) = self.exit {
             return Step::Finished;
         }
+        self.turn_ends = None;
         let urgent = self.choose(now);
         let Some((job, until)) = urgent.or_else(|| self.choose_background(now)) else {
             return Step::Wait(self.wake_at(now));
@@ -314,8 +318,9 @@ impl Supervisor {
         if let Job::ArmWatchdog(..) | Job::Ask(Question::Write(..)) = job {
             return Some((job, None));
         }
-        let holds = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
-        Some((job, Some(self.checks.feed_at().map_or(holds, |at| at.min(holds)))))
+        let ends = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
+        self.turn_ends = Some(ends);
+        Some((job, Some(self.checks.feed_at().map_or(ends, |at| at.min(ends)))))
     }
 
     /// Whether the drive wants its turn.
@@ -455,11 +460,15 @@ impl Supervisor {
         self.checks.heard(at);
     }
 
-    /// Until when the job in flight goes on although its time is over: the frames of a status feed the drive as well, so it is
-    /// not cut for a keep-alive while they are answered.
+    /// Until when the job in flight goes on although its time is over: the frames of a status, or of what the drive does on its
+    /// turn, feed it as well, so it is not cut for a keep-alive while they are answered.
     pub(crate) fn goes_on(&self, now: Instant) -> Option<Instant> {
-        let status = matches!(self.in_flight, Some(Job::Status { .. }));
-        self.checks.feed_at().filter(|at| status && *at > now)
+        let fed_until = self.checks.feed_at()?;
+        let until = match self.in_flight? {
+            Job::Status { .. } => fed_until,
+            _ => fed_until.min(self.turn_ends?),
+        };
+        (until > now).then_some(until)
     }
 
     /// When a stop under way becomes an alarm or is over for those who wait for it, whatever is in flight.
