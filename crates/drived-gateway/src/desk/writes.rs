@@ -3,8 +3,7 @@
 use std::{net::IpAddr, time::Duration};
 
 use drive_core::{
-    Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, registers::Storage,
-    tokio_modbus::ExceptionCode,
+    Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, tokio_modbus::ExceptionCode,
 };
 use drive_families::Family;
 use drive_fleet::{DriveHandle, Link, Until};
@@ -363,8 +362,7 @@ impl Desk {
                 let why = format!("register {register} is no parameter of the family's list");
                 return Err(Refusal::new(ExceptionCode::IllegalDataAddress, why));
             };
-            let wears = matches!(row.storage, Storage::Eeprom | Storage::Unknown);
-            if wears && !self.config.eeprom_writes {
+            if row.storage.may_wear() && !self.config.eeprom_writes {
                 let why = format!("{} may be written to the EEPROM, and eeprom_writes is not set", row.code);
                 return Err(Refusal::rule(why));
             }

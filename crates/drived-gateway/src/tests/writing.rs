@@ -13,11 +13,12 @@ use drived_plant::plant::{
     testing::TestPlant,
 };
 
-/// CMD, LFr and CMI: BBV51701 p. 19 and 20. ACC: p. 37.
+/// CMD, LFr and CMI: BBV51701 p. 19 and 20. ACC: p. 37. COL: p. 53.
 const CMD: u16 = 8_501;
 const LFR: u16 = 8_502;
 const CMI: u16 = 8_504;
 const ACC: u16 = 9_001;
+const COL: u16 = 7_011;
 
 fn write(register: u16, word: u16) -> Vec<u8> {
     [&[0x06][..], &register.to_be_bytes(), &word.to_be_bytes()].concat()
@@ -158,6 +159,22 @@ async fn parameters_are_written_where_allowed_and_never_by_an_address_that_is_no
     assert_eq!(plant.machines[0].peek(ACC), Some(77));
     assert_eq!(peer.ask(1, &write(400, 0x000F)).await, [0x86, 0x02]);
     assert_eq!(peer.ask(1, &write(CMI, 0x0002)).await, [0x86, 0x04]);
+}
+
+/// A parameter that may stand in the drive's EEPROM, whatever a client that writes it every second does to that.
+#[tokio::test(start_paused = true)]
+async fn what_wears_the_eeprom_is_written_only_where_that_is_allowed_by_itself() {
+    for allowed in [false, true] {
+        let (plant, desk) = operated(1, |config| {
+            (config.raw_writes, config.eeprom_writes) = (true, allowed);
+        })
+        .await;
+        // Where it is kept, the manual does not print.
+        let before = plant.machines[0].requests(0x06) + plant.machines[0].requests(0x10);
+        let answer = Peer::of(&desk).ask(1, &write(COL, 6)).await;
+        let written = plant.machines[0].requests(0x06) + plant.machines[0].requests(0x10) > before;
+        assert_eq!((answer[0] == 0x06, written), (allowed, allowed), "allowed: {allowed}");
+    }
 }
 
 #[tokio::test(start_paused = true)]
