@@ -41,7 +41,6 @@ pub(super) enum Whom<'a> {
 pub(super) struct Act(pub(super) f64);
 
 impl Act {
-    #[expect(clippy::disallowed_methods, reason = "the log tells the time of day")]
     pub(super) fn now() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self(since.as_secs_f64() * 1_000.0)
