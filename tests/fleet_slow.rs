@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use drive_core::{Direction, Frequency, StopMode};
 use drive_families::Family;
 use drive_fleet::Periods;
+use drive_sim::Fault;
 use support::plant::{Plant, Site, common_settings, controlled};
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, sleep, timeout};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -43,4 +45,60 @@ async fn measurements_that_are_cut_at_every_turn_are_whole_within_as_many_turns_
             assert!(!measured.value.raw.is_empty(), "{name}: {:?}", measured.value);
         }
     }
+}
+
+/// An answer that comes when its question was given up, every twenty seconds: what it makes doubtful delays others, and neither the
+/// slow readings of a drive of many exchanges nor the commands expire for it.
+#[tokio::test(start_paused = true)]
+async fn one_late_answer_every_20_seconds_keeps_no_measurement_and_no_start_from_anybody() {
+    let families = [Family::ATV312, Family::ATV312, Family::ATV312, Family::ATV21];
+    let member =
+        |(family, address): (Family, u8)| (family, address, controlled(family, &address.to_string()));
+    let site = Site::new(common_settings(), families.into_iter().zip(1..).map(member).collect());
+    let plant = Plant::open(vec![site]).expect("it is planned to work");
+    for drive in plant.fleet.drives() {
+        drive.ready(BOUND).await.unwrap_or_else(|refused| panic!("{}: {refused}", drive.name()));
+    }
+    let [.., altivar_21] = ["1", "2", "3", "4"].map(|name| plant.drive(name));
+    for name in ["1", "2", "3"] {
+        let outcome = plant.drive(name).run(Direction::Forward, Frequency::from_hertz(30)).await;
+        assert!(outcome.is_confirmed(), "{name}: {outcome}");
+    }
+    let simulated = &plant.sites[0].simulated;
+    simulated.set_lateness(300 * MS);
+    let requests =
+        || ["1", "2", "3", "4"].iter().map(|name| plant.machine_of(name).all_requests()).sum::<u64>();
+    let slaves = || plant.lines[0].stats().slaves;
+    let in_vain = || slaves().values().map(|slave| slave.outcomes.timeouts).sum::<u64>();
+    for round in 0..30 {
+        let before = in_vain();
+        while in_vain() == before {
+            // One question, of whomever it is.
+            let asked = requests();
+            simulated.set_fault(Fault::Late, 1_000_000);
+            while requests() == asked {
+                sleep(MS).await;
+            }
+            sleep(10 * MS).await;
+            simulated.set_fault(Fault::Late, 0);
+            sleep(200 * MS).await;
+        }
+        // All reads of an Altivar 21 look alike, so that it is asked nothing until the answer is no more to be feared.
+        sleep(2_000 * MS).await;
+        if round % 3 == 0 {
+            let outcome = altivar_21.run(Direction::Forward, Frequency::from_hertz(20)).await;
+            assert!(outcome.is_confirmed(), "round {round}: {outcome}");
+            assert!(altivar_21.stop(StopMode::Ramp).await.is_confirmed(), "round {round}");
+        }
+        sleep(20_000 * MS).await;
+        for drive in plant.fleet.drives() {
+            let snapshot = drive.snapshot();
+            let measured = snapshot.measurements.as_ref().expect("they were read at the start");
+            let age = measured.at.elapsed();
+            assert!(age <= BOUND, "round {round}, {}: measured {age:?} ago", drive.name());
+            assert_eq!(snapshot.counters.lost, 0, "round {round}, {}", drive.name());
+        }
+    }
+    let late: u64 = slaves().values().map(|slave| slave.late).sum();
+    assert!(late >= 20, "{late} late answers were heard");
 }
