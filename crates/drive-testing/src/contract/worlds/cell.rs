@@ -98,9 +98,14 @@ pub(super) fn is_at(seen: &Observation, hundredths: i32) -> bool {
     (seen.output_frequency - hundredths).abs() <= TOLERANCE
 }
 
-/// Whether by this a panel takes over a motor that runs, whose twin does not.
+/// Whether by this a panel takes over a motor that runs, whose twin does not, or runs one whose twin has tripped and does not hear
+/// it.
 fn takes_over(deed: &str, seen: &Observation, twin: &Observation) -> bool {
-    deed == "panel takes" && seen.running && !twin.running
+    match deed {
+        "panel takes" => seen.running && !twin.running,
+        "panel run" => seen.local && seen.trip.is_none() && twin.trip.is_some(),
+        _ => false,
+    }
 }
 
 fn rests(seen: &Observation) -> bool {
