@@ -383,6 +383,18 @@ async fn a_drive_that_refuses_every_write_has_answered() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_withdrawal_is_not_confirmed_while_the_drive_holds_the_run_command() {
+    let lease = Lease::new(Direction::Forward, 1);
+    let mut words = running();
+    words.words.insert(1, 1);
+    words.deaf = true;
+    let mut drive = rig::drive(words);
+    drive.adopt(lease);
+    let error = drive.withdraw().await.unwrap_err();
+    assert_eq!((error.kind(), drive.lease()), (ErrorKind::NotConfirmed, Some(lease)), "{error}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_setpoint_in_hertz_under_a_unit_in_percent_says_what_to_write() {
     for unit in [2, 3] {
         let mut words = ready();

@@ -464,6 +464,8 @@ mod tests {
         own: OwnRun,
         /// The lease at each write.
         leases: Vec<Option<Lease>>,
+        /// The control word that it holds, whatever is written.
+        keeps: Option<u16>,
     }
 
     impl Chart {
@@ -482,6 +484,7 @@ mod tests {
                 classes: Vec::new(),
                 own: OwnRun::new(),
                 leases: Vec::new(),
+                keeps: None,
             }
         }
 
@@ -567,7 +570,7 @@ mod tests {
         }
 
         async fn read_control(&mut self) -> Result<u16> {
-            Ok(self.written.last().copied().unwrap_or(0))
+            Ok(self.keeps.or(self.written.last().copied()).unwrap_or(0))
         }
 
         fn withdrawal(&self, _: u16, _: &Status) -> Result<u16, &'static str> {
@@ -602,6 +605,25 @@ mod tests {
             start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap();
             assert_eq!(drive.written, written, "{eta:04X}h");
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stop_that_the_drive_refuses_is_not_confirmed_by_a_motor_that_stands_anyway() {
+        let mut drive = Chart { exceptions: vec![4; 100], ..Chart::at(0x0023) };
+        let refused = stop(&mut drive, StopMode::Ramp).await.unwrap_err();
+        assert!(matches!(refused, Error::Exception { code: 4, .. }), "{refused}");
+        assert_eq!(drive.written, []);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_withdrawal_is_not_confirmed_while_the_drive_holds_the_run_command() {
+        let lease = Lease::new(Direction::Forward, ENABLE_OPERATION);
+        let mut drive = Chart { keeps: Some(ENABLE_OPERATION), ..Chart::at(0x0027) };
+        drive.own.give(lease);
+        drive.own.was_written();
+        let kept = withdraw(&mut drive).await.unwrap_err();
+        assert!(matches!(kept, Error::NotConfirmed { command: Command::Withdraw, .. }), "{kept}");
+        assert_eq!((drive.written, drive.own.lease()), (vec![SWITCH_ON], Some(lease)));
     }
 
     #[tokio::test(start_paused = true)]
