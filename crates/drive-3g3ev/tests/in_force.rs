@@ -4,12 +4,13 @@ mod rig;
 
 use drive_3g3ev::broadcast;
 use drive_core::{
-    Class, Direction, Drive, Error, ErrorKind, Frequency, Percent, Refusal, Result, Setpoint, State, StopMode,
+    Class, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Percent, Refusal, Result,
+    Setpoint, State, StopMode, Verdict,
 };
 use drive_sim::{Panel, SimSlave};
 use drive_testing::{
     bench,
-    words::{Asked, Words},
+    words::{Asked, Words, lacks_within},
 };
 use rig::{Judged, RESET, Rig, one, ready, running, with};
 
@@ -144,6 +145,17 @@ async fn a_motor_that_is_turned_round_is_on_its_way_and_told_in_its_old_directio
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_motor_that_goes_on_turning_the_other_way_is_not_called_started() {
+    // 0001h takes "reverse run", and the drive goes on forward at its speed.
+    let mut drive = rig::drive(running_with(&[]));
+    let error = drive.start(Direction::Reverse).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
+    assert_eq!(drive.into_port().written(), [(1, 3)], "RUN and REVERSE");
+    drive = rig::drive(running_with(&[]));
+    drive.start(Direction::Forward).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_withdrawal_ends_our_run_command_and_nobody_elses() {
     let (mut drive, machine, _rig) = one();
     drive.set_setpoint(FIFTY).await.unwrap();
@@ -193,4 +205,36 @@ async fn a_status_is_as_old_as_its_first_answer() {
     let ended = tokio::time::Instant::now();
     assert!(status.at.is_some_and(|at| begun < at && at < ended));
     assert!(drive.measurements().await.unwrap().at.is_some_and(|at| ended < at));
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_status_names_what_keeps_our_run_command_from_acting() {
+    let told = async |more: &[(u16, u16)]| {
+        let mut drive = rig::drive(running_with(more));
+        drive.adopt(Lease::new(Direction::Forward, 1));
+        lacks_within(&mut drive, 10).await
+    };
+    for (more, lack, by) in [
+        (&[(0x2C, 0x0065 | LOCAL_REFERENCE)][..], Lack::Reference, "bit 9 of 002Ch"),
+        (&[(0x2C, 0x0065 | LOCAL_RUN)], Lack::Command, "bit A of 002Ch"),
+        // RUN is off in 0020h and 002Ch, and the output is not: 0 of bit 8.
+        (&[(0x20, 0x04), (0x2C, 0x0064)], Lack::Output, "a stop at the drive"),
+        (&[(0x2C, 0x0065 | 1 << 7)], Lack::Output, "bit 7 of 002Ch"),
+        (&[(0x2C, 0x0065 | 1 << 8)], Lack::Output, "bit 8 of 002Ch"),
+        (&[(0x0023, 150)], Lack::Reference, "0023h"),
+    ] {
+        let (lacks, because) = told(more).await.unwrap_or_else(|| panic!("{by}: told in force"));
+        assert!(lacks == lack && because.contains(by), "{because}");
+    }
+    assert_eq!(told(&[]).await, None);
+    // At a reference of 0 there is nothing to put out, and nobody has cut it.
+    let at_zero = [(0x02, 0), (0x23, 0), (0x24, 0), (0x2C, 0x0165)];
+    assert_eq!(told(&at_zero).await, None);
+    let mut drive = rig::drive(running_with(&at_zero));
+    drive.adopt(Lease::new(Direction::Forward, 1));
+    // 0001h and 0002h are read behind the first.
+    for verdict in [Verdict::NotKnown, Verdict::InForce] {
+        let status = drive.status().await.unwrap();
+        assert_eq!((status.motion, status.verdict), (Motion::Driven, Some(verdict)));
+    }
 }

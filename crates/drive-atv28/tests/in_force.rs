@@ -2,9 +2,10 @@
 
 use drive_atv28::{Atv28, CAPABILITIES};
 use drive_core::{
-    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Setpoint, State, StopMode,
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Refusal, Setpoint, State,
+    StopMode,
 };
-use drive_testing::words::{Asked, Words};
+use drive_testing::words::{Asked, Words, lacks_within};
 
 const CMD: u16 = 400;
 const THIRTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(30));
@@ -45,6 +46,15 @@ async fn a_start_and_a_setpoint_are_confirmed_only_by_the_reference_of_the_bus()
         assert_eq!(error.kind(), ErrorKind::NotConfirmed);
         assert!(matches!(because(&error), Some(Refusal::Overridden { .. })), "{error}");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_direct_current_brakes_in_a_quick_stop_is_not_let_coast_by_a_start() {
+    // "Quick stop active" (ETA xx0x111), and bit 4 of ETI: the motor is under current, at an output frequency of 0.
+    let mut drive = drive(&[&STANDS, &[(458, 0x0607), (459, 0x4012)]]);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(because(&error), Some(Refusal::State(State::QuickStop)), "{error}");
+    assert_eq!(drive.into_port().written(), []);
 }
 
 #[tokio::test(start_paused = true)]
@@ -103,8 +113,33 @@ async fn a_run_command_is_withdrawn_in_forced_local_mode_and_not_where_it_would_
 
 #[tokio::test(start_paused = true)]
 async fn no_fault_is_reset_while_the_terminals_ask_for_a_run() {
-    let mut drive = drive(&[&STANDS, &[(458, 0x0208), (459, 0x0006), (478, 1)]]);
-    let error = drive.reset_faults().await.unwrap_err();
-    assert!(matches!(because(&error), Some(Refusal::Overridden { .. })), "{error}");
-    assert_eq!(drive.into_port().written(), []);
+    // Command by the terminals, and by the bus with each of LI1 to LI6 closed (IOLR, bits 0 to 5), whichever gives a run command.
+    for (eti, inputs) in
+        [(0x0006, 0), (0x0006, 1)].into_iter().chain((0..6).map(|input| (0x4006, 1 << input)))
+    {
+        let mut drive = drive(&[&STANDS, &[(458, 0x0608), (459, eti), (478, inputs)]]);
+        let error = drive.reset_faults().await.unwrap_err();
+        assert!(matches!(because(&error), Some(Refusal::Overridden { .. })), "{eti:#06x} {inputs}: {error}");
+        assert_eq!(drive.into_port().written(), []);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_status_names_what_keeps_our_run_command_from_acting() {
+    for (more, lack, by) in [
+        // LFt 5 is OCF (p. 57, W457).
+        (&[(458, 0x0608), (457, 5), (459, 0x4002), (451, 0)][..], Lack::Output, "5"),
+        (&[(450, 500)], Lack::Reference, "FrH is not the reference of the bus"),
+        // Another master has taken the run command back; its word is read at once.
+        (&[(CMD, 0x0007), (459, 0x4002), (451, 0)], Lack::Command, ""),
+    ] {
+        let mut drive = drive(&[&STANDS, &RUNS, more]);
+        drive.adopt(Lease::new(Direction::Forward, 0x000F));
+        let told = lacks_within(&mut drive, 10).await;
+        let (lacks, because) = told.unwrap_or_else(|| panic!("{more:?}: told in force"));
+        assert!(lacks == lack && because.contains(by), "{more:?}: {because}");
+    }
+    let mut drive = drive(&[&STANDS, &RUNS]);
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    assert_eq!(lacks_within(&mut drive, 10).await, None);
 }

@@ -2,9 +2,10 @@
 
 use drive_atv312::{Atv312, CAPABILITIES};
 use drive_core::{
-    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Row, Setpoint, State, StopMode,
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Refusal, Row, Setpoint,
+    State, StopMode,
 };
-use drive_testing::words::{Asked, Words};
+use drive_testing::words::{Asked, Words, lacks_within};
 
 const CMD: u16 = 8501;
 const LFR: u16 = 8502;
@@ -217,6 +218,15 @@ async fn a_release_leaves_no_setpoint_to_the_terminals_that_command_already() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_motor_that_direct_current_brakes_in_a_quick_stop_is_not_let_coast_by_a_start() {
+    // "Quick stop active" (ETA xx0x111), and bit 4 of ETI: the motor is under current, at an output frequency of 0.
+    let mut drive = drive(&[&FOR_THE_BUS, &STANDS, &[(3201, 0x0607), (3206, 0x4012)]]);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(because(&error), Some(Refusal::State(State::QuickStop)), "{error}");
+    assert_eq!(drive.into_port().written(), []);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_is_refused_while_a_logic_input_asks_for_a_stop() {
     // p. 40 and 41: FSt and nSt stop while their input is 0, dCI while it is 1.
     for (function, stops, runs) in [(11204, 0, 1 << 3), (11202, 0, 1 << 3), (11203, 1 << 3, 0)] {
@@ -384,4 +394,44 @@ async fn the_reset_of_the_operating_time_is_done_when_it_has_fallen_back() {
     words.deaf = true;
     let mut drive = Atv312::new(words, 1.try_into().unwrap());
     assert!(drive.write_parameter(row("rPr"), 2).await.unwrap().changed);
+}
+
+/// The driver of a drive whose motor runs by our command and whose settings are known, with these words besides.
+async fn leased(more: &[(u16, u16)]) -> Atv312<Words> {
+    let mut drive = watched(&[&FOR_THE_BUS, &RUNS, more]).await;
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    drive
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_status_names_what_keeps_our_run_command_from_acting() {
+    let elsewhere = (3203, 500);
+    for (more, lack, by) in [
+        (&[elsewhere][..], Lack::Reference, "FrH"),
+        // p. 42: AI2 at 4 V is summed to Fr1. p. 35: LI5 switches to Fr2 = AI1, LRS3 bit 0. p. 43: PS2 on LI3.
+        (&[elsewhere, (11801, 2), (5243, 4_000)], Lack::Reference, "SA2"),
+        (&[elsewhere, (8411, 133), (8414, 1), (3252, 1)], Lack::Reference, "Fr2"),
+        (&[elsewhere, (11401, 131), (5240, 0b100)], Lack::Reference, "preset"),
+        (&[(11901, 1)], Lack::Reference, "PIF"),
+        // p. 40: nSt on LI4 stops while it is open; the drive has no output any more.
+        (&[(11202, 132), (5240, 0), (3201, 0x0627), (3202, 0), (3206, 0x4002)], Lack::Output, "nSt"),
+    ] {
+        let told = lacks_within(&mut leased(more).await, 20).await;
+        let (lacks, because) = told.unwrap_or_else(|| panic!("{more:?}: told in force"));
+        assert!(lacks == lack && because.contains(by), "{more:?}: {because}");
+    }
+    assert_eq!(lacks_within(&mut leased(&[]).await, 20).await, None);
+}
+
+#[tokio::test(start_paused = true)]
+async fn whatever_setting_was_learnt_is_read_again_in_its_turn() {
+    let mut drive = leased(&[]).await;
+    for _ in 0..1_500 {
+        drive.status().await.unwrap();
+    }
+    let asked = drive.into_port().asked;
+    // Behind what was read to learn them: LAC, Fr1, rFC, Stt, nSt, PS2, JOG, SA2, PIF, Atr.
+    for setting in [3006, 8413, 8411, 11201, 11202, 11401, 11110, 11801, 11901, 7122] {
+        assert!(asked[100..].iter().any(|asked| asked.reads(setting)), "{setting} was read once");
+    }
 }

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use drive_atv58::{ASCII_MESSAGE_WATCH, Atv58, Atv58Map, CAPABILITIES};
 use drive_core::{
-    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Refusal, Setpoint, StopMode,
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Refusal, Setpoint,
+    StopMode, Verdict,
 };
-use drive_testing::words::{Asked, Words};
+use drive_testing::words::{Asked, Words, lacks_within};
 
 const CMD: u16 = 400;
 const THIRTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(30));
@@ -92,4 +93,60 @@ async fn a_setpoint_in_forced_local_mode_is_not_confirmed() {
     let error = drive.set_setpoint(Frequency::from_hertz(30).into()).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed);
     assert_eq!(because(&error), Some(Refusal::NotInControl(Control::Local)));
+}
+
+/// The driver of a drive whose motor runs by our command, with these words besides.
+fn leased(more: &[(u16, u16)], map: Atv58Map) -> Atv58<Words> {
+    let mut drive = with_map(&[&RUNS, more], map);
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    drive
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_status_names_what_keeps_our_run_command_from_acting() {
+    for (more, lack, by) in [
+        // -30 Hz, which another master has written.
+        (&[(401, 0xFED4)][..], Lack::Reference, "sign of the reference W401"),
+        (&[(450, 500)], Lack::Reference, "not that of W401"),
+        // "Operation enabled" without an output beside a reference.
+        (&[(451, 0)], Lack::Output, "a stop at the drive"),
+        // The chart: "quick stop active", "switched on".
+        (&[(458, 0x0607)], Lack::Output, "quick stop"),
+        (&[(458, 0x0623)], Lack::Output, "disabled operation"),
+        (&[(458, 0x0608)], Lack::Output, ""),
+    ] {
+        let told = lacks_within(&mut leased(more, Atv58Map::default()), 10).await;
+        let (lacks, because) = told.unwrap_or_else(|| panic!("{more:?}: told in force"));
+        assert!(lacks == lack && because.contains(by), "{more:?}: {because}");
+    }
+    // The high speed, W250, bounds what follows W401: 60 Hz is followed at 50.
+    for more in [&[][..], &[(401, 600), (450, 500), (451, 500)]] {
+        let mut drive = leased(more, Atv58Map::default());
+        assert_eq!(lacks_within(&mut drive, 10).await, None, "{more:?}");
+        assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::InForce), "{more:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_passes_zero_is_not_told_to_be_stopped_at_the_drive_by_one_look() {
+    let mut drive = leased(&[(451, 0)], Atv58Map::default());
+    assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::NotKnown));
+    assert_eq!(lacks_within(&mut drive, 1).await.map(|(lack, _)| lack), Some(Lack::Output));
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_no_word_tells_who_commands_nothing_is_told_in_force() {
+    let mut drive = leased(&[], Atv58Map { remote: 0, ..Atv58Map::default() });
+    for _ in 0..10 {
+        assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::NotKnown));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_nobody_saw_brake_the_motor_is_not_told_as_rest() {
+    // Running, then without an output as soon as the run command is gone: that the normal stop is a ramp no manual says.
+    let mut drive = leased(&[(451, 0)], Atv58Map::default());
+    assert_eq!(drive.status().await.unwrap().motion, Motion::Driven);
+    let _ = drive.stop(StopMode::Ramp).await;
+    assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use async_trait::async_trait;
-use drive_core::{Capabilities, Class, Port, PortError, Terms};
+use drive_core::{Capabilities, Class, Drive, Lack, Port, PortError, Terms, Verdict};
 use tokio_modbus::{ExceptionCode, Request, Response, Slave, client::Client, slave::SlaveContext};
 
 /// A request that a [`Words`] was asked.
@@ -103,6 +103,22 @@ impl Words {
             None => Ok(Ok(answer)),
         }
     }
+}
+
+/// What so many statuses say that a run command of ours which stands in a drive lacks, the last that was told of it: the first may
+/// not know the reason yet. `None`: nothing was told in any of them.
+///
+/// # Panics
+/// When a status is not told.
+pub async fn lacks_within(drive: &mut dyn Drive, statuses: usize) -> Option<(Lack, String)> {
+    let mut told = None;
+    for _ in 0..statuses {
+        let status = drive.status().await.expect("these words are told");
+        if let Some(Verdict::NotInForce { lacks, because }) = status.verdict {
+            told = Some((lacks, because.to_string()));
+        }
+    }
+    told
 }
 
 impl Port for Words {

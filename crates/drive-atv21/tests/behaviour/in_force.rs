@@ -2,13 +2,13 @@
 
 use drive_atv21::{Atv21, Authority, CAPABILITIES, CommandWord, ROWS};
 use drive_core::{
-    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Reaction, Refusal, Result, Row, Setpoint,
-    Speed, State, StopMode,
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Reaction, Refusal,
+    Result, Row, Setpoint, Speed, State, StopMode, Verdict,
 };
 use drive_sim::{Panel, models::atv21::Atv21 as Model};
 use drive_testing::{
     bench,
-    words::{Asked, Words},
+    words::{Asked, Words, lacks_within},
 };
 
 use crate::support::{HALF_SPEED, Rig, SECOND, refusal};
@@ -186,13 +186,18 @@ async fn where_input_r_forces_local_control_no_run_command_is_written() {
 
 #[tokio::test(start_paused = true)]
 async fn a_start_with_st_off_is_refused_before_its_run_command() {
-    // §8.6 p. 34: bit 11; also where FA00 ordered a freewheel stop as well.
-    for held in [0xC000, 0xC800] {
+    // §8.6 p. 34: bit 11; also where FA00 ordered a freewheel stop as well, and where the bus would have to take command first.
+    for held in [0x0000, 0xC000, 0xC800] {
         let mut drive = driver(words(&[(0xFA00, held), (0xFD01, 0x4800), (0xFD00, 0)]));
         assert!(instead(drive.start(Direction::Forward).await).contains("ST"));
         let port = drive.into_port();
         assert_eq!(port.words.get(&0xFA00), Some(&held));
         assert!(port.written().iter().all(|(_, word)| word & 0x0400 == 0));
+        assert_eq!(
+            port.written().is_empty(),
+            held & 0x0800 == 0,
+            "only what the bus itself has ordered is taken back: {held:04X}h"
+        );
     }
 }
 
@@ -413,4 +418,55 @@ async fn the_keypad_keeps_what_it_has_taken() {
     assert_eq!(drive.status().await.unwrap().control, Some(Control::Panel));
     assert_ne!(drive.status().await.unwrap().state, State::Running);
     assert!(matches!(drive.set_setpoint(Setpoint::Frequency(HALF_SPEED)).await, Err(Error::Refused { .. })));
+}
+
+/// The driver of a drive whose motor runs by our command, with these words besides.
+fn leased(more: &[(u16, u16)]) -> Atv21<Words> {
+    let mut drive = driver(words(more));
+    drive.adopt(Lease::new(Direction::Forward, 0xC400));
+    drive
+}
+
+#[tokio::test(start_paused = true)]
+async fn each_status_names_what_keeps_our_run_command_from_acting() {
+    // FD01, bit by bit (§8.6 p. 34); FE45, FE46, FE02 (p. 36).
+    for (more, lack, by) in [
+        (&[(0xFD01, 0x6402)][..], Lack::Output, "trip"),
+        (&[(0xFD01, 0x7400)], Lack::Output, "bit 12"),
+        (&[(0xFD01, 0x6408)], Lack::Output, "bit 3"),
+        (&[(0xFD01, 0x6C00)], Lack::Output, "bit 11"),
+        (&[(0xFD01, 0x6480)], Lack::Output, "bit 7"),
+        (&[(0xFD01, 0x2400)], Lack::Output, "bit 14"),
+        (&[(0xFD01, 0x4400)], Lack::Output, "bits 10 and 13"),
+        (&[(0xFE45, 1)], Lack::Command, ""),
+        (&[(0xFE46, 1)], Lack::Reference, ""),
+    ] {
+        let told = lacks_within(&mut leased(more), 10).await;
+        let (lacks, because) = told.unwrap_or_else(|| panic!("{more:04X?}: told in force"));
+        assert!(lacks == lack && because.contains(by), "{more:04X?}: {because}");
+    }
+    assert_eq!(lacks_within(&mut leased(&[]), 10).await, None);
+    // Nobody has seen the motor of this trip brought down.
+    let status = leased(&[(0xFD01, 0x4002), (0xFD00, 0)]).status().await.unwrap();
+    assert_eq!(status.motion, Motion::Coasting);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_that_is_adopted_is_in_force_only_once_its_word_and_its_reference_were_read() {
+    let mut drive = leased(&[]);
+    // Of FE46, FA01, FE02 and FA00 one is read behind a status; after a lost line what was read before it proves nothing.
+    for round in ["at first", "after a lost line"] {
+        let mut told = Vec::new();
+        for _ in 0..20 {
+            let status = drive.status().await.unwrap();
+            told.push((status.verdict, status.reference));
+        }
+        assert_eq!(told[0], (Some(Verdict::NotKnown), None), "{round}");
+        let reads =
+            told.iter().position(|(_, reference)| *reference == Some(HALF_SPEED)).expect("FE02 was read");
+        let proven =
+            told.iter().position(|(verdict, _)| *verdict == Some(Verdict::InForce)).expect("it is in force");
+        assert!(reads <= 3 && reads <= proven, "{round}: {told:?}");
+        drive.forget();
+    }
 }
