@@ -2,11 +2,16 @@
 
 use std::time::Duration;
 
+use drive_bus::Protocol;
 use drive_core::{Direction, Frequency, StopMode};
 use drive_families::Family;
 use drive_fleet::Periods;
-use drive_sim::Fault;
-use support::plant::{Plant, Site, common_settings, controlled};
+use drive_sim::{Exception, Fault, SimSlave};
+use drive_testing::rig::Rig;
+use support::{
+    drives,
+    plant::{Plant, Site, common_settings, controlled},
+};
 use tokio::time::{Instant, sleep, timeout};
 
 const MS: Duration = Duration::from_millis(1);
@@ -44,6 +49,46 @@ async fn measurements_that_are_cut_at_every_turn_are_whole_within_as_many_turns_
             );
             assert!(!measured.value.raw.is_empty(), "{name}: {:?}", measured.value);
         }
+    }
+}
+
+/// A gateway that does not pass function 43/14 on answers an exception, and takes its time for it.
+#[tokio::test(start_paused = true)]
+async fn an_identification_that_is_cut_behind_each_exchange_ends_within_as_many_turns_as_it_has_exchanges() {
+    const JOB: u8 = 4;
+    for (family, refuses) in Family::BUILT_IN.into_iter().flat_map(|family| [(family, false), (family, true)])
+    {
+        let open = |port, slave| drives::drive(family, port, slave);
+        let mut rig = Rig::new(Protocol::Rtu, family.capabilities().factory, drives::machine(family), open);
+        // The first question of each is function 43/14.
+        let refuse = |machine: &SimSlave| {
+            if refuses {
+                machine.refuse_next(Exception::FAILURE);
+            }
+        };
+        refuse(&rig.machine);
+        let whole = rig.drive.identify().await;
+        let exchanges = rig.machine.all_requests();
+        rig.drive.forget();
+        refuse(&rig.machine);
+        let mut turns = 0;
+        let told = loop {
+            turns += 1;
+            let before = rig.machine.all_requests();
+            let second = async {
+                while rig.machine.all_requests() < before + 2 {
+                    sleep(MS).await;
+                }
+            };
+            if let Some(kept) = rig.drive.kept_mut() {
+                kept.begin(JOB);
+            }
+            tokio::select! {
+                told = rig.drive.identify() => break told,
+                () = second => assert!(turns <= exchanges, "{family}, refuses: {refuses}: {turns} turns"),
+            }
+        };
+        assert_eq!(told.ok(), whole.ok(), "{family}, refuses: {refuses}");
     }
 }
 

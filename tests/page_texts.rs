@@ -1,5 +1,8 @@
 //! The page tells the faults of the manuals, and why a drive refuses, in French too.
 
+use std::time::Duration;
+
+use drive_bus::evidence::{Alike, Certainty, Defect, Finding};
 use drive_core::{Control, FaultEntry, Refusal};
 use drive_fleet::{LimitProblem, Refused};
 
@@ -82,4 +85,59 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     let missing: Vec<String> =
         sentences.into_iter().filter(|sentence| !french.contains(&format!("  '{sentence}': '"))).collect();
     assert!(missing.is_empty(), "no French for: {missing:#?}");
+}
+
+/// One finding of every kind, and what each of those kinds is told by besides its share.
+fn findings() -> Vec<Finding> {
+    let every = Some(Duration::from_millis(4_500));
+    let kinds = [
+        Defect::FarEndFaster,
+        Defect::FirstByteCut,
+        Defect::LastByteCut,
+        Defect::BytesBehind,
+        Defect::OneAnswerBehind,
+        Defect::RefusesAll(0x02),
+        Defect::RefusesAll(0x06),
+        Defect::RefusesAll(0x0B),
+        Defect::TwoAtOneAddress,
+        Defect::AnswersTwice,
+        Defect::SecondMaster(every),
+        Defect::NumberZero,
+        Defect::FellSilent(Duration::from_secs(9)),
+        Defect::LinkTimeout,
+    ];
+    let of = |defect| Finding { defect, slave: None, share: (3, 4), certainty: Certainty::Certain };
+    kinds.map(of).to_vec()
+}
+
+#[test]
+fn what_a_line_finds_has_its_french_on_the_page_by_its_kind_with_as_many_steps() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/drived-http/src/page/web/findings_fr.js");
+    let french = std::fs::read_to_string(path).expect("it is read");
+    let block = |name: &str| {
+        let from = french.split(&format!("\n  {name}: {{\n")).nth(1)?;
+        from.split("\n  },").next()
+    };
+    let steps = |block: &str| match block.split("next: ").nth(1).expect("it has steps") {
+        "TWO," => french.split("const TWO = [").nth(1).map_or(0, |two| {
+            two.lines().take_while(|line| *line != "];").filter(|line| line.starts_with("  '")).count()
+        }),
+        steps => steps.matches("',\n").count() + steps.matches("']").count(),
+    };
+    for finding in findings() {
+        let name = finding.defect.name();
+        let kind = block(name).unwrap_or_else(|| panic!("{name} has no French"));
+        assert!(kind.contains("says: "), "{name}");
+        let of_code = match finding.defect {
+            Defect::RefusesAll(0x0A | 0x0B) => block("refuses_all_gateway").expect("it is there"),
+            Defect::RefusesAll(0x05 | 0x06) => block("refuses_all_busy").expect("it is there"),
+            _ => kind,
+        };
+        assert_eq!(steps(of_code), finding.next().len(), "{name}");
+    }
+    for alike in
+        [Alike::SpeedTooLow, Alike::NeverReplies, Alike::OldAnswers, Alike::DamagedCable, Alike::Twins]
+    {
+        assert!(french.contains(&format!("\n  {}: '", alike.name())), "{alike}");
+    }
 }

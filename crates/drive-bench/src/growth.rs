@@ -5,12 +5,12 @@ use std::{fs, path::Path, time::Duration};
 use drive_bus::{Line, LineConfig};
 use drive_core::serial::SerialSettings;
 use rustix::process::{Resource, getrlimit, setrlimit};
-use tokio::time::sleep;
+use tokio::{runtime::Runtime, time::sleep};
 
 use crate::{
     Error,
     far_end::{Book, FarEnd},
-    masters::saturate,
+    masters::{lawful_by_hand, saturate},
     plot::{Curve, plot},
     report::{Goal, Report, Unit, micros, millis},
     rig::DRIVES,
@@ -21,6 +21,9 @@ use crate::{
 const SECTION: &str = "growth";
 
 const COUNTS: [u16; 7] = [1, 3, 10, 30, 100, 300, 1_000];
+
+/// From so many lines on loops that are written by hand are measured beside them.
+const MANY: u16 = 100;
 
 /// Until the timeouts are learned and every line is in its stride.
 const SETTLE: Duration = Duration::from_secs(2);
@@ -52,6 +55,9 @@ pub(crate) fn measure(
     for lines in COUNTS.into_iter().filter(|lines| *lines < most).chain([most]) {
         let shown = one(lines, time / 3, before)?;
         describe(report, &shown, lines == most);
+        if lines >= MANY {
+            beside(report, &shown, &by_hand(lines, time / 3)?);
+        }
         all.push(shown);
     }
     if let Some(picture) = picture {
@@ -84,15 +90,8 @@ fn one(lines: u16, time: Duration, before: u64) -> Result<Shown, Error> {
             runtime.spawn(async move { saturate(&line, DRIVES, SETTLE + time).await })
         })
         .collect();
-    runtime.block_on(sleep(SETTLE));
-    for book in &books {
-        let _while_settling = book.take();
-    }
-    let used = processor_time();
-    runtime.block_on(sleep(time));
-    let used = processor_time().saturating_sub(used);
+    let (used, counted) = settled(&runtime, &books, time);
     let memory = memory_kib()?.saturating_sub(before) as f64 / f64::from(lines);
-    let counted: Vec<Counted> = books.iter().map(Book::take).collect();
     runtime.block_on(async {
         for poll in polls {
             poll.await??;
@@ -102,6 +101,43 @@ fn one(lines: u16, time: Duration, before: u64) -> Result<Shown, Error> {
         }
         Ok::<_, Error>(())
     })?;
+    shown(lines, (used, time), memory, &counted)
+}
+
+/// What as many loops reach on as many far ends, each a task of its own that does nothing else.
+fn by_hand(lines: u16, time: Duration) -> Result<Shown, Error> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let _inside = runtime.enter();
+    let books: Vec<Book> = (0..lines).map(|_| Book::default()).collect();
+    let spawn = |book: &Book| runtime.spawn(lawful_by_hand(FarEnd::new(book.clone()), DRIVES, SETTLE + time));
+    let loops: Vec<_> = books.iter().map(spawn).collect();
+    let (used, counted) = settled(&runtime, &books, time);
+    runtime.block_on(async {
+        for each in loops {
+            each.await??;
+        }
+        Ok::<_, Error>(())
+    })?;
+    shown(lines, (used, time), 0.0, &counted)
+}
+
+/// The processor time of so long, once all are in their stride, and what was counted in it.
+fn settled(runtime: &Runtime, books: &[Book], time: Duration) -> (Duration, Vec<Counted>) {
+    runtime.block_on(sleep(SETTLE));
+    for book in books {
+        let _while_settling = book.take();
+    }
+    let used = processor_time();
+    runtime.block_on(sleep(time));
+    (processor_time().saturating_sub(used), books.iter().map(Book::take).collect())
+}
+
+fn shown(
+    lines: u16,
+    (used, time): (Duration, Duration),
+    memory: f64,
+    counted: &[Counted],
+) -> Result<Shown, Error> {
     let shares: Vec<f64> = counted.iter().map(Counted::own_utilisation).collect();
     let mut sum = Counted::default();
     counted.iter().for_each(|counted| sum.add(counted));
@@ -114,6 +150,18 @@ fn one(lines: u16, time: Duration, before: u64) -> Result<Shown, Error> {
         memory,
         counted: sum,
     })
+}
+
+fn beside(report: &mut Report, shown: &Shown, by_hand: &Shown) {
+    let name = |what: &str| format!("{} loops by hand: {what}", by_hand.lines);
+    report.note(SECTION, name("utilisation, mean"), Unit::Share, by_hand.mean);
+    report.note(SECTION, name("utilisation, the least"), Unit::Share, by_hand.least);
+    report.note(SECTION, name("processors in use, drives included"), Unit::Times, by_hand.processors);
+    report.note(SECTION, name("processor time per transaction"), Unit::Micros, micros(by_hand.each));
+    let what = format!("{} lines by as many loops by hand: utilisation, mean", shown.lines);
+    report.note(SECTION, what, Unit::Times, shown.mean / by_hand.mean);
+    let what = format!("{} lines by as many loops by hand: processor time per transaction", shown.lines);
+    report.note(SECTION, what, Unit::Times, shown.each.as_secs_f64() / by_hand.each.as_secs_f64());
 }
 
 fn describe(report: &mut Report, shown: &Shown, last: bool) {

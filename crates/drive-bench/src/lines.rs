@@ -8,7 +8,7 @@ use tokio::time::sleep;
 
 use crate::{
     Error,
-    masters::saturate,
+    masters::{lawful_by_hand, open, saturate},
     report::{Goal, Report, Unit, micros, millis},
     rig::{DRIVES, Rig},
     simulator::{Counted, Order, Plant},
@@ -92,5 +92,43 @@ pub(crate) fn measure(report: &mut Report, time: Duration, lines: u16) -> Result
     let cores = |used: Duration| used.as_secs_f64() / time.as_secs_f64();
     report.note(SECTION, "processors in use, the lines", Unit::Times, cores(own));
     report.note(SECTION, "processors in use, the simulator", Unit::Times, cores(simulated));
+    drop(rig);
+    by_hand(report, time, lines, mean(&whole), each(own))
+}
+
+/// As many loops that do nothing else, on as many ports, beside `whole` and the processor time of lines.
+fn by_hand(report: &mut Report, time: Duration, lines: u16, whole: f64, own: f64) -> Result<(), Error> {
+    let mut rig = Rig::start(Plant { lines, drives: DRIVES, unpaced: false })?;
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let loops: Vec<_> = rig
+        .ports()
+        .iter()
+        .cloned()
+        .map(|port| runtime.spawn(async move { lawful_by_hand(open(&port)?, DRIVES, SETTLE + time).await }))
+        .collect();
+    runtime.block_on(async { sleep(SETTLE).await });
+    let _while_settling = rig.order(&Order::Take)?;
+    let before = processor_time();
+    runtime.block_on(async { sleep(time).await });
+    let used = processor_time().saturating_sub(before);
+    let counted = rig.order(&Order::Take)?.counted;
+    runtime.block_on(async {
+        for each in loops {
+            each.await??;
+        }
+        Ok::<_, Error>(())
+    })?;
+    let number = counted.len().max(1) as f64;
+    let mean = |share: fn(&Counted) -> f64| counted.iter().map(share).sum::<f64>() / number;
+    let requests: u64 = counted.iter().map(|line| line.requests).sum();
+    let each = micros(used) / requests.max(1) as f64;
+    let name = |what: &str| format!("{lines} loops by hand: {what}");
+    report.note(SECTION, name("utilisation, mean"), Unit::Share, mean(Counted::utilisation));
+    let own_share = mean(Counted::own_utilisation);
+    report.note(SECTION, name("without the simulator's own lateness, mean"), Unit::Share, own_share);
+    report.note(SECTION, name("processor time per transaction"), Unit::Micros, each);
+    let name = |what: &str| format!("{lines} lines by as many loops by hand: {what}");
+    report.note(SECTION, name("utilisation, mean"), Unit::Times, whole / mean(Counted::utilisation));
+    report.note(SECTION, name("processor time per transaction"), Unit::Times, own / each);
     Ok(())
 }

@@ -15,6 +15,7 @@ mod ledger;
 mod lines;
 mod machine;
 mod masters;
+mod parts;
 mod peers;
 mod plot;
 mod report;
@@ -38,6 +39,8 @@ use crate::report::{Report, Unit};
 enum Section {
     /// Utilisation and silences of a saturated line of 31 drives, beside the masters of others.
     Utilisation,
+    /// Where the time of a saturated line goes that is neither an exchange nor a silence.
+    Parts,
     /// The wait of a Stop behind saturated polling.
     Stop,
     /// The sweep of 28 living drives with 3 dead ones on the line.
@@ -58,8 +61,9 @@ enum Section {
     FirstLook,
 }
 
-const EVERYTHING: [Section; 8] = [
+const EVERYTHING: [Section; 9] = [
     Section::Utilisation,
+    Section::Parts,
     Section::Stop,
     Section::Dead,
     Section::Cpu,
@@ -152,6 +156,7 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
     let time = Duration::from_secs(arguments.seconds);
     match section {
         Section::Utilisation => utilisation::measure(report, time, arguments.transactions),
+        Section::Parts => parts::measure(report, time),
         Section::Stop => stop::measure(report, time, arguments.transactions),
         Section::Dead => dead::measure(report, time),
         Section::Cpu => cpu::measure(report, time),

@@ -6,9 +6,10 @@ use std::{
 };
 
 use drive_bus::{Line, Slave, exchange::rtu};
+use drive_clock::Timer;
 use drive_core::serial::SerialSettings;
 use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
+    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
     time::Instant,
 };
 use tokio_modbus::{Request, client, client::Client, prelude::*};
@@ -91,7 +92,7 @@ pub(crate) async fn sweeps(
     Ok(begin.elapsed() / count.max(1))
 }
 
-fn open(port: &Path) -> Result<SerialStream, Error> {
+pub(crate) fn open(port: &Path) -> Result<SerialStream, Error> {
     Ok(tokio_serial::new(port.to_string_lossy(), 19_200).parity(Parity::Even).open_native_async()?)
 }
 
@@ -131,6 +132,34 @@ pub(crate) async fn by_hand(port: PathBuf, drives: u8, time: Duration) -> Result
             }
             reads += 1;
         }
+    }
+    Ok(reads)
+}
+
+/// The same with the silence of the line before each request, by a timer as precise as that of a line, and no timeout: the least
+/// that a lawful task can do for a line. How many reads were answered.
+pub(crate) async fn lawful_by_hand(
+    mut port: impl AsyncRead + AsyncWrite + Unpin,
+    drives: u8,
+    time: Duration,
+) -> Result<u64, Error> {
+    let mut timer = Timer::precise();
+    let end = Instant::now() + time;
+    let [high, low] = FIRST.to_be_bytes();
+    let mut answer = [0; 5 + 2 * QUANTITY as usize];
+    let (mut reads, mut free_at) = (0, Instant::now());
+    for slave in (1..=drives).cycle() {
+        timer.until(free_at).await;
+        if Instant::now() >= end {
+            break;
+        }
+        port.write_all(&rtu::frame(slave, &[3, high, low, 0, QUANTITY as u8])).await?;
+        port.read_exact(&mut answer).await?;
+        free_at = Instant::now() + SETTINGS.t3_5();
+        if !rtu::is_frame(&answer) {
+            return Err("a damaged answer on a line without faults".into());
+        }
+        reads += 1;
     }
     Ok(reads)
 }

@@ -59,6 +59,11 @@ impl Rig {
         self.ports.first().ok_or_else(|| "the simulator has no line".into())
     }
 
+    /// The ports of all lines.
+    pub(crate) fn ports(&self) -> &[PathBuf] {
+        &self.ports
+    }
+
     /// The configurations of our lines to it.
     pub(crate) fn configs(&self) -> impl Iterator<Item = LineConfig> {
         self.ports.iter().map(|port| LineConfig {

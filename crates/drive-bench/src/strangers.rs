@@ -50,14 +50,19 @@ struct Plant {
 }
 
 fn plant(habits: Gateway) -> Result<Plant, Error> {
+    plant_by(habits, None)
+}
+
+/// Reached by so many connections; `None`: by as many as the line takes by itself.
+fn plant_by(habits: Gateway, connections: Option<u8>) -> Result<Plant, Error> {
     let simulated = SimLine::new(Wiring::rtu(SERIAL));
     let added = (1..=DRIVES).map(|address| simulated.add(address, Atv312::under_bus_control()));
     let drives = added.collect::<Result<_, _>>()?;
     let gateway = simulated.behind(habits);
     let protocol = if habits.rtu { Protocol::Rtu } else { Protocol::Tcp };
     let far = gateway.clone();
-    let config =
-        LineConfig { protocol, gateway: Some(drive_bus::Gateway::default()), ..LineConfig::stream(SERIAL) };
+    let gateway_config = Some(drive_bus::Gateway::default());
+    let config = LineConfig { protocol, gateway: gateway_config, connections, ..LineConfig::stream(SERIAL) };
     Ok(Plant { drives, gateway, line: Line::over_reopened(move || ready(Ok(far.connect())), config) })
 }
 
@@ -69,8 +74,53 @@ async fn word(line: &Line, slave: u8, spare: u8) -> Option<u16> {
     }
 }
 
+/// What is had of a gateway with a dead drive behind it.
+struct Had {
+    /// Values of the living.
+    values: u32,
+    /// How long the slowest of twenty stops took to be confirmed.
+    stop: Duration,
+}
+
+/// One dead drive of eight behind a gateway of 3 x 1 s, over one connection and over two, beside a blocking loop. The gateway
+/// serves one request at a time in all, or one of each connection.
 async fn behind_a_gateway(report: &mut Report) -> Result<(), Error> {
-    let plant = plant(Gateway::default())?;
+    let told = |what: &str| format!("{what}, one of 8 dead behind a gateway of 3 x 1 s");
+    for (one_line, serves) in [(true, "one wire"), (false, "a wire for each connection")] {
+        let habits = Gateway { one_line, ..Gateway::default() };
+        let mut loops = 0;
+        for patience in [SECOND, 4 * SECOND] {
+            loops = loops.max(by_a_loop(habits, patience).await?);
+        }
+        let what = told(&format!("a blocking loop on {serves}: values of the living in 30 s"));
+        report.note(SECTION, what, Unit::Count, f64::from(loops));
+        for (connections, times) in [(1, 1), (2, 5)] {
+            let Had { values, stop } = had(habits, connections).await?;
+            let over = format!("this line over {connections} on {serves}");
+            let goal = Goal::AtLeast(f64::from(loops * times));
+            report.row(
+                SECTION,
+                told(&format!("{over}: values of the living in 30 s")),
+                Unit::Count,
+                f64::from(values),
+                goal,
+            );
+            let goal = Goal::AtMost(millis(3 * SECOND + SECOND / 2));
+            report.row(
+                SECTION,
+                told(&format!("{over}: a stop confirmed within")),
+                Unit::Millis,
+                millis(stop),
+                goal,
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Over so many connections.
+async fn had(habits: Gateway, connections: u8) -> Result<Had, Error> {
+    let plant = plant_by(habits, Some(connections))?;
     let died = Instant::now() + 3 * SECOND;
     let mut polls = JoinSet::new();
     for address in 1..=DRIVES {
@@ -88,40 +138,21 @@ async fn behind_a_gateway(report: &mut Report) -> Result<(), Error> {
         });
     }
     sleep_until(died).await;
-    for drive in plant.drives.iter().filter(|drive| drive.address() == DEAD) {
-        drive.mute();
-    }
-    let mut worst = Duration::ZERO;
+    plant.drives.iter().filter(|drive| drive.address() == DEAD).for_each(SimSlave::mute);
+    let mut stop = Duration::ZERO;
     for _ in 0..20 {
         sleep(1_117 * SECOND / 1_000).await;
         let called = Instant::now();
         let mut slave = plant.line.slave(4).with_terms(Terms::of(Class::Stop));
         slave.call(Request::WriteSingleRegister(CMD, 0)).await??;
-        worst = worst.max(called.elapsed());
+        stop = stop.max(called.elapsed());
     }
-    let good: u32 = polls.join_all().await.into_iter().sum();
-    let mut loops = 0;
-    for patience in [SECOND, 4 * SECOND] {
-        loops = loops.max(by_a_loop(patience).await?);
-    }
-    let what = "a blocking loop: values of the living in 30 s, one of 8 dead behind a gateway of 3 x 1 s";
-    report.note(SECTION, what, Unit::Count, f64::from(loops));
-    let what = "this line: values of the living in 30 s, the same";
-    report.row(SECTION, what, Unit::Count, f64::from(good), Goal::AtLeast(f64::from(loops)));
-    let bound = millis(3 * SECOND + SECOND / 2);
-    report.row(
-        SECTION,
-        "a stop confirmed within, the same",
-        Unit::Millis,
-        millis(worst),
-        Goal::AtMost(bound),
-    );
-    Ok(())
+    Ok(Had { values: polls.join_all().await.into_iter().sum(), stop })
 }
 
 /// What a loop gets that asks one after another and waits so long for each.
-async fn by_a_loop(patience: Duration) -> Result<u32, Error> {
-    let plant = plant(Gateway::default())?;
+async fn by_a_loop(habits: Gateway, patience: Duration) -> Result<u32, Error> {
+    let plant = plant(habits)?;
     plant.drives.iter().filter(|drive| drive.address() == DEAD).for_each(SimSlave::mute);
     let mut stream = plant.gateway.connect();
     let (until, mut good, mut number) = (Instant::now() + TIME, 0, 0_u16);

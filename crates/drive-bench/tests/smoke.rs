@@ -87,8 +87,13 @@ fn behind_strangers_nothing_is_wrong_and_the_living_are_read() {
     let rows = rows("strangers");
     assert_eq!(row(&rows, "200 reconnects")["value"], 0.0);
     assert_eq!(row(&rows, "100 stalls")["value"], 0.0);
-    for goal in ["this line: values of the living", "a stop confirmed within", "a connection that goes mute"]
-    {
-        assert_eq!(row(&rows, goal)["met"], true, "{rows:?}");
+    assert_eq!(row(&rows, "a connection that goes mute")["met"], true, "{rows:?}");
+    for connections in [1, 2] {
+        for serves in ["one wire", "a wire for each connection"] {
+            for what in ["values of the living", "a stop confirmed within"] {
+                let goal = format!("this line over {connections} on {serves}: {what}");
+                assert_eq!(row(&rows, &goal)["met"], true, "{rows:?}");
+            }
+        }
     }
 }

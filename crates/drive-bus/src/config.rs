@@ -1,11 +1,18 @@
 //! What a line is: where it goes, its timing, its limits.
 
+mod far_end;
+mod text;
+
 #[cfg(feature = "serial")]
 use std::path::{Path, PathBuf};
 use std::{collections::BTreeMap, fmt, time::Duration};
 
 use drive_core::serial::SerialSettings;
 
+pub use self::{
+    far_end::{FarEndError, FarEndSettings, MOST_CONNECTIONS},
+    text::{CharacterText, LineText, LineTextError, SerialText, baud_of},
+};
 pub use crate::exchange::echo::Echo;
 use crate::{exchange::Machine, gateway::Gateway, pdu::MAX_PDU, protocol::Protocol};
 
@@ -188,7 +195,7 @@ impl LineConfig {
     #[cfg(feature = "serial")]
     #[must_use]
     pub fn serial(path: impl Into<PathBuf>, serial: SerialSettings) -> Self {
-        Self { echo: Echo::Auto, ..Self::to(Endpoint::Serial(path.into()), serial) }
+        Self::to(Endpoint::Serial(path.into()), serial)
     }
 
     /// RTU over TCP to `host:port`; `serial` is the far side's speed and format. Feature `tcp`.
@@ -213,6 +220,7 @@ impl LineConfig {
     }
 
     fn to(endpoint: Endpoint, serial: SerialSettings) -> Self {
+        let echo = if endpoint.is_serial() { Echo::Auto } else { Echo::Off };
         Self {
             endpoint,
             protocol: Protocol::Rtu,
@@ -228,7 +236,7 @@ impl LineConfig {
             slave_change_gap: Duration::ZERO,
             // FTDI's adapters deliver every 16 ms as delivered.
             chunk_gap: Duration::from_millis(20),
-            echo: Echo::Off,
+            echo,
             #[cfg(feature = "serial")]
             rs485: None,
             #[cfg(feature = "serial")]

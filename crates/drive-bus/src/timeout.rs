@@ -69,6 +69,11 @@ impl LearnedTimeout {
         self.floor = self.floor.min(ceiling);
     }
 
+    /// It may become as long as this, too.
+    pub fn allow(&mut self, longest: Duration) {
+        self.ceiling = self.ceiling.max(longest);
+    }
+
     /// An answer began `after` the end of its request.
     pub fn answered(&mut self, after: Duration) {
         self.doubled = 0;
@@ -109,6 +114,16 @@ mod tests {
         }
         let learned = timeout.current();
         assert!(learned > 80 * MS && learned < 100 * MS, "{learned:?}");
+    }
+
+    #[test]
+    fn a_ceiling_is_raised_and_never_lowered_by_what_is_allowed() {
+        let mut timeout = LearnedTimeout::new(50 * MS, 200 * MS);
+        timeout.allow(300 * MS);
+        timeout.allow(100 * MS);
+        assert_eq!(timeout.ceiling(), 300 * MS);
+        timeout.answered(240 * MS);
+        assert_eq!(timeout.current(), 300 * MS);
     }
 
     #[test]

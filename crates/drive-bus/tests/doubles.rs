@@ -6,11 +6,14 @@ mod support;
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::{Line, LineConfig, exchange::rtu};
 use drive_core::{Class, SerialSettings, Terms};
 use drive_sim::{Gateway, SimLine, Wiring, models::atv312::Atv312};
 use support::{MS, by_hand::ByHand, read, rig::Random};
-use tokio::time::sleep;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    time::sleep,
+};
 use tokio_modbus::Request;
 
 const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
@@ -49,6 +52,65 @@ async fn of_a_far_end_that_doubles_late_the_first_is_withdrawn_and_no_other_is_t
     }
     println!("{asked} asked, {told} told, {wrong} of them wrong and withdrawn");
     assert!(told * 10 > asked * 9, "{told} of {asked}");
+}
+
+/// A far end that answers reads of slave 1 after 20 ms with words of 1, and at times of its own says a frame of 1 word that
+/// nobody has asked for. Gives how many of so many reads of 1 word, or of 2, were answered by that.
+async fn taken_of_strays(reads: u32, pause: u64, seed: u64) -> u32 {
+    let (ours, far) = tokio::io::duplex(4_096);
+    let line = Line::over(ours, LineConfig { far_end_paces: Some(false), ..LineConfig::stream(SERIAL) });
+    let (mut from, mut to) = tokio::io::split(far);
+    tokio::spawn(async move {
+        let mut random = Random::new(seed);
+        let mut stray = tokio::time::Instant::now();
+        let mut bytes = [0; 256];
+        loop {
+            tokio::select! {
+                () = tokio::time::sleep_until(stray) => {
+                    stray += Duration::from_millis(200 + random.below(300));
+                    let _ = to.write_all(&rtu::frame(1, &[3, 2, 0xDE, 0xAD])).await;
+                }
+                Ok(len) = from.read(&mut bytes) => {
+                    if len != 8 {
+                        return;
+                    }
+                    let answer_at = tokio::time::Instant::now() + 20 * MS;
+                    while stray < answer_at {
+                        tokio::time::sleep_until(stray).await;
+                        let _ = to.write_all(&rtu::frame(1, &[3, 2, 0xDE, 0xAD])).await;
+                        stray += Duration::from_millis(200 + random.below(300));
+                    }
+                    tokio::time::sleep_until(answer_at).await;
+                    let words = usize::from(bytes[5]);
+                    let pdu = [&[3, (words * 2) as u8][..], &[0, 1].repeat(words)].concat();
+                    let _ = to.write_all(&rtu::frame(1, &pdu)).await;
+                }
+            }
+        }
+    });
+    let mut random = Random::new(seed + 1_000);
+    let mut slave = line.slave(1).with_terms(Terms::of(Class::Status).sparing(1));
+    let mut wrong = 0;
+    for _ in 0..reads {
+        if let Ok(words) = read(&mut slave, 3201, 1).await {
+            wrong += u32::from(words[0] != 1);
+        }
+        sleep(Duration::from_millis(pause + random.below(50))).await;
+    }
+    wrong
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stray_that_cannot_be_our_own_double_is_avoided_where_another_shape_costs_nothing() {
+    let (mut slow, mut quick) = (0, 0);
+    for seed in 0..10 {
+        slow += taken_of_strays(215, 100, seed).await;
+        quick += taken_of_strays(215, 0, seed).await;
+    }
+    println!("of 2150 reads with a pause {slow} were strays, without one {quick}");
+    // The first ones come before anything is known.
+    assert!(slow <= 10, "{slow}");
+    assert!(quick <= 100, "{quick}");
 }
 
 #[test]

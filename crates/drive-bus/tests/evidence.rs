@@ -13,6 +13,7 @@ use drive_bus::{
     exchange::{mbap, rtu},
 };
 use drive_core::{PortError, serial::SerialSettings};
+use drive_sim::{LinkHabits, SimLine, Wiring, models::atv58::Atv58};
 use support::{MS, characters};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -33,6 +34,16 @@ type Pieces = Vec<(Duration, Vec<u8>)>;
 
 /// A line whose far end gives back what `answer` says, and what is found when slave 3 was read for `time`, every `period`.
 async fn found(
+    config: LineConfig,
+    times: (Duration, Duration),
+    answer: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
+) -> (Line, Vec<Finding>) {
+    found_at(&[100], config, times, answer).await
+}
+
+/// The same, reading these registers in turn.
+async fn found_at(
+    registers: &[u16],
     config: LineConfig,
     (period, time): (Duration, Duration),
     mut answer: impl FnMut(usize, &[u8]) -> Pieces + Send + 'static,
@@ -57,9 +68,11 @@ async fn found(
     let begun = Instant::now();
     let mut slave = line.slave(3);
     let mut words = 0;
+    let mut registers = registers.iter().cycle();
     while begun.elapsed() < time {
         words = words % 8 + 1;
-        let _ = slave.call(Request::ReadHoldingRegisters(100, words)).await;
+        let register = *registers.next().unwrap();
+        let _ = slave.call(Request::ReadHoldingRegisters(register, words)).await;
         sleep(period).await;
     }
     let findings = line.findings();
@@ -257,6 +270,94 @@ async fn a_link_that_acknowledges_too_late_names_the_setting() {
     let (_, findings) = found(config, (100 * MS, 30 * SECOND), |_, _| vec![(150 * MS, vec![0x06])]).await;
     assert_eq!(defects(&findings), [Defect::LinkTimeout]);
     assert!(findings[0].next()[0].contains("link-timeout"), "{:?}", findings[0].next());
+}
+
+/// Altivar 58 at 1, 2 and 3 on UNI-TELWAY, of which the second acknowledges so late, read every second for a minute by a line that
+/// waits so long. The manual of the card (VVDED397054) prints no time for an acknowledgement: any is lawful.
+async fn with_a_slow_one(late: Duration, protocol: &str) -> (Line, [usize; 3]) {
+    let settings: SerialSettings = "19200 8O1".parse().unwrap();
+    let simulated =
+        SimLine::new(Wiring { protocol: drive_sim::Protocol::UniTelway, ..Wiring::rtu(settings) });
+    for address in 1..=3 {
+        let drive = simulated.add(address, Atv58::default()).unwrap();
+        if address == 2 {
+            drive.set_link_habits(LinkHabits { acknowledges_after: Some(late), ..LinkHabits::default() });
+        }
+    }
+    let config = LineConfig { protocol: protocol.parse().unwrap(), ..LineConfig::stream(settings) };
+    let line = Line::over(simulated.in_memory(), config);
+    let mut read = [0; 3];
+    for _ in 0..60 {
+        for (address, read) in (1..).zip(&mut read) {
+            let request = Request::ReadHoldingRegisters(401, 2);
+            *read += usize::from(line.slave(address).call(request).await.is_ok());
+        }
+        sleep(SECOND).await;
+    }
+    (line, read)
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_that_acknowledges_later_than_the_link_waits_is_named_among_others_and_read_when_it_waits() {
+    for late in [130, 150, 250] {
+        let (line, read) = with_a_slow_one(late * MS, "unitelway").await;
+        assert_eq!(read, [60, 0, 60], "{late} ms");
+        let [finding] = line.findings()[..] else { panic!("{late} ms: {:?}", line.findings()) };
+        assert_eq!((finding.defect, finding.slave), (Defect::LinkTimeout, Some(2)), "{late} ms");
+        assert!(finding.next()[0].contains("link-timeout"), "{late} ms");
+    }
+    let (line, read) = with_a_slow_one(150 * MS, "unitelway,link-timeout=200ms").await;
+    assert_eq!((read, line.findings()), ([60; 3], Vec::new()));
+    let (line, read) = with_a_slow_one(60 * MS, "unitelway").await;
+    assert_eq!((read, line.findings()), ([60; 3], Vec::new()), "within the time that the line waits");
+}
+
+#[tokio::test(start_paused = true)]
+async fn answers_to_another_master_are_no_second_answers_to_us() {
+    let asked = |others: bool| {
+        move |nth: usize, request: &[u8]| {
+            let mut pdu = proper(request);
+            pdu[3] ^= 0x10;
+            let other = rtu::frame(3, &pdu);
+            let first = at_once(whole(request));
+            let his = rtu::frame(3, &[3, 0, 7, 0, request[5]]).to_vec();
+            let second = vec![(5 * MS + characters(other.len()), other.to_vec())];
+            match (others, nth % 4) {
+                (true, 0) => [first, vec![(5 * MS + characters(8), his)], second].concat(),
+                (false, 0) => [first, second].concat(),
+                _ => first,
+            }
+        }
+    };
+    let (_, findings) = found(rtu_line(), TEN, asked(false)).await;
+    assert_eq!(defects(&findings), [Defect::TwoAtOneAddress]);
+    let (_, findings) = found(rtu_line(), TEN, asked(true)).await;
+    assert!(matches!(defects(&findings)[..], [Defect::SecondMaster(_)]), "{findings:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_question_that_is_damaged_whenever_it_is_asked_is_two_drives_and_one_bit_of_each_is_a_cable() {
+    // What two say at once that differ in the first word of register 200.
+    let differ = |_: usize, request: &[u8]| {
+        let mut frame = whole(request);
+        if request[3] == 200 {
+            let last = frame.len() - 1;
+            frame[4] ^= 0x41;
+            frame[last] ^= 0x17;
+        }
+        at_once(frame)
+    };
+    let (_, findings) = found_at(&[100, 100, 200], rtu_line(), (20 * MS, 60 * SECOND), differ).await;
+    assert_eq!(defects(&findings), [Defect::TwoAtOneAddress]);
+    let (line, findings) = found(rtu_line(), TEN, |nth, request| {
+        let mut frame = whole(request);
+        let bit = nth * 7 % (frame.len() * 8);
+        frame[bit / 8] ^= 1 << (bit % 8);
+        at_once(frame)
+    })
+    .await;
+    assert_eq!(findings, [], "{:?}", line.evidence());
+    assert!(line.evidence().iter().any(|fact| matches!(fact.what, What::OneBitWrong(_))));
 }
 
 #[tokio::test(start_paused = true)]

@@ -7,7 +7,11 @@ mod support;
 
 use std::{future::ready, time::Duration};
 
-use drive_bus::{Line, LineConfig, Protocol, stats::SecondConnection as Told};
+use drive_bus::{
+    Line, LineConfig, Protocol,
+    evidence::{Fact, Finding, Over, What},
+    stats::SecondConnection as Told,
+};
 use drive_core::{Class, SerialSettings, Terms};
 use drive_sim::{
     Gateway, GatewayInMemory, SecondConnection, SimLine, SimSlave, Wiring, models::atv312::Atv312,
@@ -355,4 +359,73 @@ async fn a_line_whose_drives_answer_opens_no_second_connection() {
     polled(&line, &[], begin, begin + 20 * SECOND).await;
     let stats = line.stats();
     assert_eq!((stats.opened, stats.far_end.unwrap().second), (1, Told::Unused));
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_comes_or_does_not_over_the_second_connection_stands_in_the_evidence_with_its_owner() {
+    let over_second = |line: &Line| {
+        let mut facts = line.evidence();
+        facts.retain(|fact| fact.over == Over::Second);
+        facts
+    };
+    for habits in kinds() {
+        // It serves the first only: who is asked over the second is silent there, and is not called dead for it.
+        let plant = plant(Gateway { second: SecondConnection::NeverServed, ..habits });
+        let line = plant.line_of_two(drive_bus::Gateway::default());
+        let died = Instant::now() + 3 * SECOND;
+        let stop = async {
+            sleep_until(died).await;
+            plant.drive(3).mute();
+            sleep(SECOND).await;
+            write(&mut line.slave(4).with_terms(Terms::of(Class::Stop)), CMD, 0).await
+        };
+        let (_, stopped) = tokio::join!(polled(&line, &[3], died, died + 20 * SECOND), stop);
+        assert!(stopped.is_ok(), "{stopped:?} {habits:?}");
+        let facts = over_second(&line);
+        assert!(
+            facts.iter().any(|fact| fact.what == What::Silence && fact.slave.is_some()),
+            "{facts:?} {habits:?}"
+        );
+        let findings = line.findings();
+        let living = |finding: &Finding| finding.slave != Some(3);
+        assert!(!findings.iter().any(living), "{findings:?} {habits:?}");
+
+        // It serves both, and says each answer twice.
+        let plant = self::plant(Gateway { doubles_after: Some(30 * MS), one_line: false, ..habits });
+        let line = plant.line_of_two(drive_bus::Gateway::default());
+        for address in 1..=DRIVES {
+            let _ = read(&mut line.slave(address), ETA, 1).await;
+        }
+        plant.drive(3).mute();
+        let _ = read(&mut line.slave(3).with_terms(Terms::of(Class::Status).within(20 * MS)), ETA, 1).await;
+        for _ in 0..3 {
+            let _ = write(&mut line.slave(4).with_terms(Terms::of(Class::Stop)), CMD, 0).await;
+            sleep(100 * MS).await;
+        }
+        let facts = over_second(&line);
+        let again = |fact: &Fact| fact.slave == Some(4) && fact.what == What::Doubled;
+        assert!(facts.iter().any(again), "{facts:?} {:?} {habits:?}", line.stats().far_end);
+    }
+}
+
+/// mbusd takes twice as long as for a read until it refuses what it does not pass on.
+#[tokio::test(start_paused = true)]
+async fn a_question_that_takes_longer_than_others_is_asked_twice_and_not_until_its_attempts_are_over() {
+    let plant = plant(Gateway::default());
+    // It is known to do one thing at a time, so that nothing is sent before what it still owes has come.
+    let gateway = drive_bus::Gateway { at_once: Some(1), wait: Some(2 * SECOND) };
+    let config = LineConfig::stream(SerialSettings::MODBUS_DEFAULT);
+    let config = LineConfig { protocol: Protocol::Tcp, response_timeout: 200 * MS, ..config };
+    let line = Line::over(plant.gateway.connect(), LineConfig { gateway: Some(gateway), ..config });
+    let drive = plant.drive(1);
+    drive.set_turnaround(Some(100 * MS));
+    let mut slave = line.slave(1);
+    for _ in 0..50 {
+        read(&mut slave, ETA, 1).await.unwrap();
+    }
+    drive.set_turnaround(Some(250 * MS));
+    let before = drive.all_requests();
+    timeout(10 * SECOND, read(&mut slave, ETA, 1)).await.expect("it ends").unwrap();
+    let asked = drive.all_requests() - before;
+    assert!(asked <= 2, "asked {asked} times");
 }

@@ -425,6 +425,25 @@ impl<P: Port> Calls<'_, P> {
     /// Asks what the device is, by function 43/14 from object 00 on.
     pub async fn identification(&mut self, code: ReadCode) -> Result<Identity> {
         let exchange = Exchange { function: 0x2B, register: None };
+        let is_kept = self.terms.class == Class::Background;
+        if is_kept && let Some((told, at)) = self.registers.kept.named(Instant::now()) {
+            self.registers.see(at);
+            return told.map_err(|code| self.exception(exchange, code));
+        }
+        let told = self.ask_identification(code, exchange).await;
+        let kept = match &told {
+            Ok(identity) => Some(Ok(identity.clone())),
+            Err(Error::Exception { code, .. }) => Some(Err(*code)),
+            Err(_) => None,
+        };
+        if let Some(kept) = kept.filter(|_| is_kept) {
+            let at = self.registers.port.asked_at().unwrap_or_else(Instant::now);
+            self.registers.kept.keep_named(&kept, at);
+        }
+        told
+    }
+
+    async fn ask_identification(&mut self, code: ReadCode, exchange: Exchange) -> Result<Identity> {
         let response = self.request(Request::ReadDeviceIdentification(code, 0), exchange).await?;
         let Response::ReadDeviceIdentification(response) = response else {
             return Err(self.answer(exchange, "the answer is of another function"));
@@ -474,11 +493,7 @@ impl<P: Port> Calls<'_, P> {
         }
         match outcome {
             Ok(Ok(response)) => Ok(response),
-            Ok(Err(exception)) => {
-                let code = u8::from(exception);
-                let meaning = (self.registers.meaning)(exchange.function, code);
-                Err(Error::Exception { slave: self.registers.slave, exchange, code, meaning })
-            }
+            Ok(Err(exception)) => Err(self.exception(exchange, exception.into())),
             Err(error) => Err(self.port_error(exchange, PortError::from_modbus(error))),
         }
     }
@@ -487,6 +502,11 @@ impl<P: Port> Calls<'_, P> {
     #[must_use]
     pub const fn answer(&self, exchange: Exchange, reason: &'static str) -> Error {
         Error::Answer { slave: self.registers.slave, exchange, reason }
+    }
+
+    fn exception(&self, exchange: Exchange, code: u8) -> Error {
+        let meaning = (self.registers.meaning)(exchange.function, code);
+        Error::Exception { slave: self.registers.slave, exchange, code, meaning }
     }
 
     const fn port_error(&self, exchange: Exchange, problem: PortError) -> Error {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use async_trait::async_trait;
+use auto_impl::auto_impl;
 
 use crate::{
     address::SlaveAddress,
@@ -68,10 +69,31 @@ pub struct BroadcastWrite {
 /// withdrawn by the port, but for the write of a stop, which is sent all the same where the port has a schedule. A dropped
 /// command may have been carried out, in part; read the status, and stop a drive whose start was dropped.
 ///
+/// # Drives of several families
+/// `Box<dyn Drive>` and `&mut dyn Drive` are drives as well, so that what takes `impl Drive` takes them:
+///
+/// ```
+/// use drive_core::{Drive, Result, State};
+///
+/// async fn is_at_rest(mut drive: impl Drive) -> Result<bool> {
+///     Ok(drive.status().await?.is_standstill())
+/// }
+///
+/// async fn are_at_rest(drives: &mut [Box<dyn Drive>]) -> Result<bool> {
+///     for drive in drives {
+///         if !is_at_rest(&mut *drive).await? {
+///             return Ok(false);
+///         }
+///     }
+///     Ok(true)
+/// }
+/// ```
+///
 /// # Errors
 /// Every method that talks to the drive returns [`Error::Port`] when no valid answer came and [`Error::Exception`]
 /// when the drive refused; the methods say what else they return.
 #[async_trait]
+#[auto_impl(&mut, Box)]
 pub trait Drive: Send {
     /// The slave that it talks to.
     fn slave(&self) -> SlaveAddress;

@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
+use crate::identity::Identity;
+
 /// For how long a reading of a job that was cut is as good as a new one. Its age is told all the same.
 const KEPT_FOR: Duration = Duration::from_secs(30);
 /// How many readings are kept at the most.
@@ -24,6 +26,8 @@ struct Reading {
 pub struct KeptReadings {
     job: Option<u8>,
     readings: Vec<Reading>,
+    /// What the drive said of itself, or the exception by which it refused to: of which job, and when it was asked.
+    named: Option<(u8, Result<Identity, u8>, Instant)>,
 }
 
 impl KeptReadings {
@@ -41,6 +45,7 @@ impl KeptReadings {
     pub fn end(&mut self, job: u8) {
         self.job = None;
         self.readings.retain(|reading| reading.job != job);
+        self.named.take_if(|(of, ..)| *of == job);
     }
 
     /// The drive may be another, or was switched off and on: nothing that was read counts.
@@ -56,6 +61,18 @@ impl KeptReadings {
                 && now.saturating_duration_since(reading.at) <= KEPT_FOR
         };
         self.readings.iter().find(is_it).map(|reading| (reading.words.clone(), reading.at))
+    }
+
+    /// What the drive has said of itself to the job that goes on, or the exception by which it refused, and when it was asked.
+    pub(crate) fn named(&self, now: Instant) -> Option<(Result<Identity, u8>, Instant)> {
+        let (job, told, at) = self.named.as_ref()?;
+        let is_it = self.job == Some(*job) && now.saturating_duration_since(*at) <= KEPT_FOR;
+        is_it.then(|| (told.clone(), *at))
+    }
+
+    /// The drive has told the job what it is, or refused it: a gateway that does not pass the function on takes its time for that.
+    pub(crate) fn keep_named(&mut self, told: &Result<Identity, u8>, at: Instant) {
+        self.named = self.job.map(|job| (job, told.clone(), at));
     }
 
     /// The job has read this.
@@ -76,6 +93,8 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_job_that_was_cut_goes_on_with_what_it_has_and_one_that_ended_begins_anew() {
         let (mut kept, now) = (KeptReadings::default(), Instant::now());
+        // The answers come later: what counts is when they were asked for.
+        tokio::time::advance(Duration::from_secs(5)).await;
         kept.keep(1, &[7], now);
         assert_eq!(kept.of(now, 1, 1), None, "of no job nothing is kept");
         kept.begin(1);
@@ -96,5 +115,8 @@ mod tests {
             kept.keep(register, &[1], now);
         }
         assert_eq!(kept.readings.len(), MOST);
+        kept.forget();
+        kept.begin(1);
+        assert_eq!(kept.of(now, 0, 1), None, "the drive may be another");
     }
 }

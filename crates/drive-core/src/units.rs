@@ -26,6 +26,36 @@ macro_rules! decimal_unit {
             pub const fn $to(self) -> $inner {
                 self.0
             }
+
+            #[doc = "The sum; `None` where this unit cannot hold it."]
+            #[must_use]
+            pub const fn checked_add(self, other: Self) -> Option<Self> {
+                match self.0.checked_add(other.0) {
+                    Some(sum) => Some(Self(sum)),
+                    None => None,
+                }
+            }
+
+            #[doc = "The difference; `None` where this unit cannot hold it, as one below zero of what has no sign."]
+            #[must_use]
+            pub const fn checked_sub(self, other: Self) -> Option<Self> {
+                match self.0.checked_sub(other.0) {
+                    Some(difference) => Some(Self(difference)),
+                    None => None,
+                }
+            }
+
+            #[doc = "The sum, or the most that this unit holds."]
+            #[must_use]
+            pub const fn saturating_add(self, other: Self) -> Self {
+                Self(self.0.saturating_add(other.0))
+            }
+
+            #[doc = "The difference, or the least that this unit holds."]
+            #[must_use]
+            pub const fn saturating_sub(self, other: Self) -> Self {
+                Self(self.0.saturating_sub(other.0))
+            }
         }
 
         impl fmt::Display for $name {
@@ -204,6 +234,19 @@ mod tests {
         assert_eq!(Frequency::from_centihertz(1_234).exact_decihertz(), None);
         assert_eq!(Frequency::from_centihertz(1_230).exact_decihertz(), Some(123));
         assert_eq!(Frequency::from_centihertz(u32::MAX / 10 * 10).exact_decihertz(), None);
+    }
+
+    #[test]
+    fn sums_and_differences_never_wrap() {
+        let (three, two) = (Frequency::from_hertz(3), Frequency::from_hertz(2));
+        assert_eq!(three.checked_sub(two), Some(Frequency::from_hertz(1)));
+        assert_eq!((two.checked_sub(three), two.saturating_sub(three)), (None, Frequency::ZERO));
+        let most = Frequency::from_centihertz(u32::MAX);
+        assert_eq!((most.checked_add(two), most.saturating_add(two)), (None, most));
+        assert_eq!(
+            Percent::from_percent(5).checked_sub(Percent::from_percent(8)),
+            Some(Percent::from_percent(-3))
+        );
     }
 
     #[test]

@@ -13,6 +13,8 @@
 //! # Ok::<_, serde_json::Error>(())
 //! ```
 
+mod finding;
+
 use std::{
     sync::Arc,
     time::{Duration, SystemTime},
@@ -36,6 +38,8 @@ use crate::{
     snapshot::{Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Trip, WatchdogCheck},
     watchdog::WatchdogBefore,
 };
+
+pub use self::finding::FindingFigures;
 
 /// What is known of a drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -425,10 +429,8 @@ pub enum Happened {
     LineFinding {
         /// What, by its name.
         defect: String,
-        /// How often it was seen.
-        part: u32,
-        /// Of how many.
-        of: u32,
+        #[serde(flatten)]
+        figures: FindingFigures,
         /// Whether it concerns the whole line.
         of_line: bool,
         present: bool,
@@ -526,8 +528,7 @@ impl From<&EventKind> for Happened {
             EventKind::ValueWithdrawn => Self::ValueWithdrawn,
             EventKind::LineFinding { finding, present } => Self::LineFinding {
                 defect: finding.defect.name().to_owned(),
-                part: finding.share.0,
-                of: finding.share.1,
+                figures: finding.into(),
                 of_line: finding.slave.is_none(),
                 present: *present,
                 next: finding.next().iter().map(|next| (*next).to_owned()).collect(),

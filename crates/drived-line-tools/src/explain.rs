@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 
+use drive_bus::config::SerialText;
 use drive_core::SerialSettings;
 use drive_families::Family;
 use serde_json::json;
@@ -15,7 +16,7 @@ use drived_words::{
     drive_spec::{DriveName, DriveSpec, on_one_line},
     failure::Failure,
     json,
-    line_spec::{self, LineSpec, SerialSpec, describe},
+    line_spec::{self, LineSpec, describe},
     output::{self, counted, milliseconds},
     signals::Ending,
 };
@@ -47,7 +48,7 @@ pub struct Args {
     drive: Vec<DriveSpec>,
     /// Speed and format of the line, by which the silences are judged, such as 19200,8E1
     #[arg(long, value_name = "BAUD[,FORMAT]")]
-    serial: Option<SerialSpec>,
+    serial: Option<SerialText>,
     /// The configuration that has the line: its drives, speed and format
     #[arg(long, value_name = "FILE", conflicts_with_all = ["drive", "serial"])]
     config: Option<PathBuf>,
@@ -176,8 +177,8 @@ fn say_counts(counts: Counts, late: Option<Duration>) -> Result<(), Failure> {
 }
 
 /// What the options say of the line.
-fn of_options(serial: Option<SerialSpec>, drives: &[DriveName]) -> Result<Known, Failure> {
-    let serial = serial.map(|serial| serial.settings(drives)).transpose();
+fn of_options(serial: Option<SerialText>, drives: &[DriveName]) -> Result<Known, Failure> {
+    let serial = serial.map(|serial| line_spec::settings(serial, drives)).transpose();
     let serial = serial.map_err(|error| Failure::Input(error.to_string()))?;
     Ok(Known { serial, late: None, drives: named(drives) })
 }

@@ -20,3 +20,5 @@ pub mod poll;
 pub mod replay;
 pub mod scan;
 pub mod sim;
+#[cfg(test)]
+mod testing;

@@ -6,7 +6,10 @@ use std::{
     thread,
 };
 
-use drive_bus::Protocol;
+use drive_bus::{
+    Protocol,
+    config::{CharacterText, SerialText, baud_of},
+};
 use drive_families::{Options, SetUp, simulated};
 use drive_sim::{Serving, SimLine, Wiring};
 use tokio::sync::mpsc;
@@ -14,8 +17,7 @@ use tokio::sync::mpsc;
 use drived_words::{
     drive_spec::{self, DriveName, DriveSpec},
     failure::Failure,
-    line_spec::{self, CharacterSpec, SerialSpec},
-    output,
+    line_spec, output,
     signals::Ending,
 };
 
@@ -32,12 +34,12 @@ pub struct Args {
     #[arg(long = "drive", value_name = "FAMILY@ADDRESSES", required = true)]
     drives: Vec<DriveSpec>,
     /// Speed in bit/s; the drives' factory setting when it is not given
-    #[arg(long, value_name = "N", value_parser = line_spec::speed)]
+    #[arg(long, value_name = "N", value_parser = baud_of)]
     baud: Option<u32>,
     /// Character format, such as 8E1, and with a comma the protocol, such as 7E1,ascii or 8O1,unitelway; the drives'
     /// factory setting and Modbus RTU when they are not given
     #[arg(long, value_name = "FORMAT[,PROTOCOL]")]
-    format: Option<CharacterSpec>,
+    format: Option<CharacterText>,
     /// Serve drives in their factory setting instead of drives set up for the bus (atv21: its blocks of registers;
     /// atv312: access level L3, commands from Modbus; 3g3ev: a function that resets faults)
     #[arg(long)]
@@ -47,8 +49,8 @@ pub struct Args {
 pub async fn run(args: Args) -> Result<(), Failure> {
     let input = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
     let drives = drive_spec::on_one_line(&args.drives).map_err(|error| input(&error))?;
-    let CharacterSpec { format, protocol } = args.format.unwrap_or_default();
-    let settings = SerialSpec { baud: args.baud, format, protocol }.settings(&drives);
+    let CharacterText { format, protocol } = args.format.unwrap_or_default();
+    let settings = line_spec::settings(SerialText { baud: args.baud, format, protocol }, &drives);
     let settings = settings.map_err(|error| input(&error))?;
     let mut ending = Ending::listen()?;
     let line = SimLine::new(Wiring { protocol: by(protocol), ..Wiring::rtu(settings) });

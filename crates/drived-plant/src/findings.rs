@@ -23,6 +23,18 @@ pub fn told(line: &Line, names: &[DriveName]) -> Vec<String> {
     line.findings().iter().map(|finding| words(finding, name)).collect()
 }
 
+/// What a line has found wrong that tells why this drive does not answer, with the first thing to do.
+pub fn why(line: &Line, name: DriveName) -> Option<String> {
+    let concerns = |finding: &Finding| {
+        finding.slave.is_none_or(|slave| slave == name.slave.number())
+            && !matches!(finding.defect, Defect::FellSilent(_))
+    };
+    line.findings()
+        .iter()
+        .find(|finding| concerns(finding))
+        .map(|finding| words(finding, |_| name.to_string()))
+}
+
 fn words(finding: &Finding, name: impl Fn(u8) -> String) -> String {
     let whom = finding.slave.map(|slave| format!("{}: ", name(slave))).unwrap_or_default();
     let next = finding.next().first().map_or_else(String::new, |next| format!(". Next: {next}"));

@@ -1,22 +1,22 @@
 //! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
 //! and the settings that the drives on it share.
 
-mod far_end;
+mod proposal;
 
 use std::{fmt, str::FromStr, time::Duration};
 
 use drive_bus::{
     Endpoint, LineConfig, Protocol, SlaveSettings,
-    protocol::{ProtocolError, ProtocolMismatch},
+    config::{FarEndError, FarEndSettings, LineText, LineTextError, SerialText},
+    protocol::ProtocolMismatch,
 };
 use drive_core::{
     WatchdogCapability,
-    serial::{BaudError, CharacterFormat, CharacterFormatError, SerialSettings},
+    serial::{BaudError, SerialSettings},
 };
 use drive_families::Options;
 
-use self::far_end::FarEndError;
-pub use self::far_end::{FarEndSpec, MOST_CONNECTIONS, proposal};
+pub use self::proposal::proposal;
 use crate::drive_spec::DriveName;
 
 /// What a line is, for the help of `--line`.
@@ -29,28 +29,9 @@ pub const HELP: &str = "The line: PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]..
 /// The same for a port that is only listened to.
 pub const TO_LISTEN_TO: &str = "A port to listen to: PATH[,BAUD[,FORMAT[,PROTOCOL]]] such as /dev/ttyUSB0,19200,8E1, or rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]";
 
-/// A line as a person names it.
+/// A line as a person names it; speed and format are the drives' factory setting where they are not said.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LineSpec {
-    target: Target,
-    serial: SerialSpec,
-    far_end: FarEndSpec,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Target {
-    Serial(String),
-    RtuOverTcp(String),
-    ModbusTcp(String),
-}
-
-/// Speed and format as far as they were said; the rest is the drives' factory setting.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SerialSpec {
-    pub baud: Option<u32>,
-    pub format: Option<CharacterFormat>,
-    pub protocol: Protocol,
-}
+pub struct LineSpec(LineText);
 
 /// The communication watchdog of a drive on a line with this protocol, asked of the driver itself.
 pub fn watchdog(name: DriveName, options: &Options, protocol: Protocol) -> Option<WatchdogCapability> {
@@ -60,34 +41,36 @@ pub fn watchdog(name: DriveName, options: &Options, protocol: Protocol) -> Optio
 impl LineSpec {
     /// What is spoken on it.
     pub const fn protocol(&self) -> Protocol {
-        self.serial.protocol
+        self.0.serial.protocol
     }
 
     /// The serial port whatever is said of its speed and format, and whether something is; `None` over TCP.
     pub fn port(&self) -> Option<(LineConfig, bool)> {
-        let Target::Serial(path) = &self.target else { return None };
+        let Endpoint::Serial(path) = &self.0.endpoint else { return None };
         let config = LineConfig::serial(path, SerialSettings::MODBUS_DEFAULT);
-        Some((self.far_end.on(config).ok()?, self.serial.baud.is_some()))
+        Some((self.0.far_end.on(config).ok()?, self.0.serial.baud.is_some()))
     }
 
     /// The configuration of this line for these drives, checked against what each family can be set to.
     pub fn config(&self, drives: &[DriveName]) -> Result<LineConfig, LineSpecError> {
-        let config = match &self.target {
-            Target::Serial(path) => {
-                let config = LineConfig::serial(path, self.serial.settings(drives)?);
-                LineConfig { protocol: self.serial.protocol, ..config }
-            }
-            Target::RtuOverTcp(address) => {
-                LineConfig::rtu_over_tcp(address.as_str(), self.serial.settings(drives)?)
-            }
-            Target::ModbusTcp(address) => LineConfig::modbus_tcp(address.as_str()),
+        let serial = match self.0.serial.protocol.is_paced() {
+            true => settings(self.0.serial, drives)?,
+            false => SerialSettings::MODBUS_DEFAULT,
         };
-        Ok(with_turnarounds(self.far_end.on(config)?, drives))
+        Ok(with_turnarounds(self.0.at(serial)?, drives))
     }
 
     /// The same line, with what a file says of its far end.
-    pub fn with_far_end(&self, said: FarEndSpec) -> Self {
-        Self { far_end: said.or(self.far_end), ..self.clone() }
+    pub fn with_far_end(&self, said: FarEndSettings) -> Self {
+        Self(self.0.with_far_end(said))
+    }
+}
+
+impl FromStr for LineSpec {
+    type Err = LineSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LineSpecError> {
+        Ok(Self(text.parse()?))
     }
 }
 
@@ -127,19 +110,6 @@ pub fn port(config: &LineConfig) -> String {
     }
 }
 
-/// A line as `--line` takes it.
-pub fn written(config: &LineConfig) -> String {
-    let (baud, format) = (config.serial.baud(), config.serial.format());
-    let port = match (&config.endpoint, config.protocol) {
-        (Endpoint::Serial(path), Protocol::Rtu) => format!("{},{baud},{format}", path.display()),
-        (Endpoint::Serial(path), protocol) => format!("{},{baud},{format},{protocol}", path.display()),
-        (Endpoint::Tcp(address), Protocol::Tcp) => format!("tcp://{address}"),
-        (Endpoint::Tcp(address), _) => format!("rtu+tcp://{address},{baud},{format}"),
-        _ => format!("{baud},{format}"),
-    };
-    port + &FarEndSpec::of(config).written()
-}
-
 /// The silence that the line's protocol needs before each request, and how it is called; `None` where it needs none.
 pub fn needed_silence(config: &LineConfig) -> Option<(Duration, String)> {
     let silence = config.silence();
@@ -160,23 +130,21 @@ pub fn with_turnarounds(config: LineConfig, drives: &[DriveName]) -> LineConfig 
     })
 }
 
-impl SerialSpec {
-    /// Speed and format for these drives: what was said, else what all of them have from the factory, if every drive
-    /// can be set to it.
-    pub fn settings(self, drives: &[DriveName]) -> Result<SerialSettings, LineSpecError> {
-        let factory = |name: &DriveName| name.family.capabilities().factory;
-        let baud = match self.baud {
-            Some(baud) => baud,
-            None => agreed(drives, |name| factory(name).baud())?,
-        };
-        let format = match self.format {
-            Some(format) => format,
-            None => agreed(drives, |name| factory(name).format())?,
-        };
-        let settings = SerialSettings::new(baud, format)?;
-        check_serial(settings, self.protocol, drives)?;
-        Ok(settings)
-    }
+/// Speed and format for these drives: what was said, else what all of them have from the factory, if every drive can be
+/// set to it.
+pub fn settings(said: SerialText, drives: &[DriveName]) -> Result<SerialSettings, LineSpecError> {
+    let factory = |name: &DriveName| name.family.capabilities().factory;
+    let baud = match said.baud {
+        Some(baud) => baud,
+        None => agreed(drives, |name| factory(name).baud())?,
+    };
+    let format = match said.format {
+        Some(format) => format,
+        None => agreed(drives, |name| factory(name).format())?,
+    };
+    let settings = SerialSettings::new(baud, format)?;
+    check_serial(settings, said.protocol, drives)?;
+    Ok(settings)
 }
 
 /// Whether every drive can live on a line; Modbus TCP has nothing that could not be.
@@ -225,114 +193,20 @@ fn agreed<T: PartialEq + fmt::Display>(
 /// A text that is no line, or a line that the drives cannot share.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LineSpecError {
-    #[error(
-        "expected PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]], rtu+tcp://HOST:PORT[,BAUD[,FORMAT]] or tcp://HOST:PORT"
-    )]
-    Form,
-    #[error("{0:?} is not HOST:PORT, such as gateway.local:502 or [::1]:502")]
-    Address(String),
-    #[error("{0:?} is not a speed: expected such as 9600, 19200 or 38400")]
-    Speed(String),
+    #[error(transparent)]
+    Text(#[from] LineTextError),
+    #[error(transparent)]
+    FarEnd(#[from] FarEndError),
     #[error(transparent)]
     Baud(#[from] BaudError),
     #[error(transparent)]
-    Format(#[from] CharacterFormatError),
-    #[error(transparent)]
-    Protocol(#[from] ProtocolError),
-    #[error(transparent)]
     ProtocolMismatch(#[from] ProtocolMismatch),
-    #[error("over TCP the serial server speaks Modbus RTU: expected rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]")]
-    TcpProtocol,
-    #[error("Modbus TCP has no speed and no format: expected tcp://HOST:PORT")]
-    TcpSettings,
-    #[error(transparent)]
-    FarEnd(#[from] FarEndError),
     #[error("say which speed and format the line has, such as 19200,8E1")]
     NoDrive,
     #[error("{0}: say which speed and format the line has, such as 19200,8E1")]
     FactorySettings(String),
     #[error("{0}: {1}")]
     Drive(DriveName, String),
-}
-
-impl FromStr for LineSpec {
-    type Err = LineSpecError;
-
-    fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        let (text, far_end) = FarEndSpec::take(text)?;
-        if let Some(address) = text.strip_prefix("tcp://") {
-            let (address, settings) = split_settings(address);
-            if settings.is_some() {
-                return Err(LineSpecError::TcpSettings);
-            }
-            let target = Target::ModbusTcp(host_and_port(address)?);
-            return Ok(Self { target, serial: SerialSpec::default(), far_end });
-        }
-        let (target, settings) = if let Some(rest) = text.strip_prefix("rtu+tcp://") {
-            let (address, settings) = split_settings(rest);
-            (Target::RtuOverTcp(host_and_port(address)?), settings)
-        } else {
-            let (path, settings) = split_settings(&text);
-            if path.is_empty() || path.contains("://") {
-                return Err(LineSpecError::Form);
-            }
-            (Target::Serial(path.to_owned()), settings)
-        };
-        let serial: SerialSpec = settings.map(str::parse).transpose()?.unwrap_or_default();
-        if matches!(target, Target::RtuOverTcp(_)) && serial.protocol != Protocol::Rtu {
-            return Err(LineSpecError::TcpProtocol);
-        }
-        Ok(Self { target, serial, far_end })
-    }
-}
-
-/// It is written `BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]`.
-impl FromStr for SerialSpec {
-    type Err = LineSpecError;
-
-    fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        let (baud, rest) = split_settings(text);
-        let characters: Option<CharacterSpec> = rest.map(str::parse).transpose()?;
-        let CharacterSpec { format, protocol } = characters.unwrap_or_default();
-        Ok(Self { baud: Some(speed(baud)?), format, protocol })
-    }
-}
-
-/// Format and protocol, as `FORMAT[,PROTOCOL[,SETTING=VALUE]...]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct CharacterSpec {
-    pub format: Option<CharacterFormat>,
-    pub protocol: Protocol,
-}
-
-impl FromStr for CharacterSpec {
-    type Err = LineSpecError;
-
-    fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        let (format, protocol) = split_settings(text);
-        let protocol = protocol.map(str::parse).transpose()?.unwrap_or_default();
-        Ok(Self { format: Some(format.parse()?), protocol })
-    }
-}
-
-/// A speed that a serial line can have.
-pub fn speed(text: &str) -> Result<u32, LineSpecError> {
-    let baud = text.parse().map_err(|_| LineSpecError::Speed(text.to_owned()))?;
-    SerialSettings::new(baud, CharacterFormat::F8E1)?;
-    Ok(baud)
-}
-
-fn split_settings(text: &str) -> (&str, Option<&str>) {
-    match text.split_once(',') {
-        Some((target, settings)) => (target, Some(settings)),
-        None => (text, None),
-    }
-}
-
-fn host_and_port(text: &str) -> Result<String, LineSpecError> {
-    let well_formed =
-        text.rsplit_once(':').is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
-    if well_formed { Ok(text.to_owned()) } else { Err(LineSpecError::Address(text.to_owned())) }
 }
 
 #[cfg(test)]
@@ -385,7 +259,7 @@ mod tests {
             "COM3,9600,8N1,far-end-paces=no",
             "COM3,19200,8O1,unitelway,header=simplified,link-timeout=200ms,far-end-paces=no",
         ] {
-            assert_eq!(written(&config(line, &["atv58@1"]).unwrap()), line);
+            assert_eq!(config(line, &["atv58@1"]).unwrap().to_string(), line);
         }
     }
 

@@ -12,6 +12,9 @@ pub(super) enum Came {
     WithoutFirst,
     /// The answer but for its last byte: the other half of the check fits.
     WithoutLast,
+    /// The answer but for one bit: with it turned round the check fits. Two that speak at once differ in more, at the least in
+    /// their checks.
+    ButForOneBit,
     /// Two whole answers of one length that differ.
     TwoThatDiffer,
     /// Whole frames and nothing else.
@@ -34,6 +37,9 @@ pub(super) fn what_came(came: &[u8], slave: u8, expected: usize) -> Came {
             return Came::WithoutLast;
         }
     }
+    if lens.contains(&came.len()) && rtu::is_frame_but_for_one_bit(came, slave) {
+        return Came::ButForOneBit;
+    }
     let len = expected + AROUND;
     if let (Some(first), Some(second)) = (came.get(..len), came.get(len..2 * len))
         && [first, second].iter().all(|frame| frame.first() == Some(&slave) && rtu::is_frame(frame))
@@ -53,6 +59,7 @@ pub(super) fn told(came: &[u8], slave: u8, expected: usize, is_early: bool) -> O
         _ if came.is_empty() => return None,
         Came::WithoutFirst => "the answer without its first byte",
         Came::WithoutLast => "the answer without its last byte",
+        Came::ButForOneBit => "the answer with one bit wrong",
         Came::TwoThatDiffer => "two answers that differ",
         // Somebody else's.
         Came::Frames if !is_early => return None,
@@ -105,6 +112,28 @@ mod tests {
         let refusal = rtu::frame(3, &[0x83, 2]);
         assert_eq!(what_came(&refusal[1..], 3, 4), Came::WithoutFirst);
         assert_eq!(what_came(&refusal[..4], 3, 4), Came::WithoutLast);
+    }
+
+    #[test]
+    fn one_bit_that_is_wrong_is_told_from_two_that_speak_at_once() {
+        let frame = rtu::frame(3, &[3, 2, 0x12, 0x34]);
+        for bit in 0..frame.len() * 8 {
+            let mut came = frame.to_vec();
+            came[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(what_came(&came, 3, 4), Came::ButForOneBit, "bit {bit}");
+            came[(bit / 8 + 1) % 7] ^= 4;
+            assert_eq!(what_came(&came, 3, 4), Came::Other, "and another");
+        }
+        // A line on which the low bits of either win.
+        let at_once =
+            |other: &[u8]| -> Vec<u8> { frame.iter().zip(other).map(|(one, other)| one & other).collect() };
+        let is_one_bit = |word: &u16| {
+            let other = rtu::frame(3, &[&[3, 2], &word.to_be_bytes()[..]].concat());
+            what_came(&at_once(&other), 3, 4) == Came::ButForOneBit
+        };
+        let mistaken = (0..=u16::MAX).filter(is_one_bit).count();
+        assert!(mistaken < 655, "{mistaken} of 65 536");
+        assert_eq!(what_came(&frame, 3, 4), Came::Frames);
     }
 
     #[test]

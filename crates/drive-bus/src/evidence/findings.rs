@@ -41,7 +41,49 @@ pub enum Certainty {
     /// It is likely.
     Likely,
     /// A master cannot tell it from this.
-    CannotBeToldFrom(&'static str),
+    CannotBeToldFrom(Alike),
+}
+
+/// What sounds like a defect and is none, or another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Alike {
+    /// A speed that is set too low.
+    SpeedTooLow,
+    /// Slaves that acknowledge everything and never reply.
+    NeverReplies,
+    /// Something between that gives old answers once more.
+    OldAnswers,
+    /// A cable that is damaged at that drive.
+    DamagedCable,
+    /// Two drives alike that have one address.
+    Twins,
+}
+
+impl Alike {
+    /// Its name, for programs.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SpeedTooLow => "speed_too_low",
+            Self::NeverReplies => "never_replies",
+            Self::OldAnswers => "old_answers",
+            Self::DamagedCable => "damaged_cable",
+            Self::Twins => "twins",
+        }
+    }
+}
+
+impl fmt::Display for Alike {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SpeedTooLow => "a speed that is set too low",
+            Self::NeverReplies => "slaves that acknowledge everything and never reply",
+            Self::OldAnswers => "something between that gives old answers once more",
+            Self::DamagedCable => "a cable that is damaged at that drive",
+            Self::Twins => "two drives alike that have one address",
+        })
+    }
 }
 
 /// One thing that is wrong.
@@ -79,6 +121,13 @@ impl Defect {
 }
 
 impl Finding {
+    /// Whether it says that two drives may answer for one. Where another master was heard their answers to him are no second
+    /// answers to us: then nothing says so.
+    #[must_use]
+    pub const fn is_of_two(&self) -> bool {
+        matches!(self.defect, Defect::TwoAtOneAddress | Defect::AnswersTwice)
+    }
+
     /// What to do next, the likeliest first.
     #[must_use]
     pub const fn next(&self) -> &'static [&'static str] {
@@ -199,7 +248,7 @@ impl fmt::Display for Finding {
             Defect::LinkTimeout => {
                 write!(
                     f,
-                    "to {part} of {of} questions came an acknowledgement and nothing else, after the line had given them up"
+                    "an acknowledgement came to {part} of {of} questions when the line had given them up, and nothing else"
                 )
             }
         }

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::{
     Evidence, Lately,
-    findings::{Certainty, Defect, Finding},
+    findings::{Alike, Certainty, Defect, Finding},
 };
 
 /// So few are chance, whatever share they are.
@@ -16,12 +16,18 @@ const FEW: u32 = 3;
 /// So many damaged answers as long as whole ones are no chance.
 const MANY: u32 = 8;
 
+/// So many whole answers of others say that the line is sound.
+const ENOUGH: u32 = 20;
+
 /// So many questions in a row in vain, to one that has answered so often.
 const SILENT: u32 = 6;
 const ANSWERED: u32 = 5;
 
 /// Those that fell silent within this have done it together.
 const TOGETHER: Duration = Duration::from_secs(5);
+
+/// So long after another master was heard he may still be there.
+const SHARED: Duration = Duration::from_secs(60);
 
 /// What the line knows besides.
 #[derive(Debug, Clone, Copy)]
@@ -34,16 +40,18 @@ impl Evidence {
     /// Everything that is wrong by what came lately.
     pub(crate) fn findings(&self, known: Known) -> Vec<Finding> {
         let mut findings: Vec<Finding> =
-            [self.faster(), self.number_zero(), self.link_timeout(known), self.second_master()]
-                .into_iter()
-                .flatten()
-                .collect();
+            [self.faster(), self.number_zero(), self.second_master()].into_iter().flatten().collect();
         if findings.is_empty()
             && let Some(silent) = self.fell_silent(known.now)
         {
             return vec![silent];
         }
-        findings.extend(self.slaves.iter().filter_map(|(slave, lately)| lately.judged(*slave, known)));
+        let is_shared = self.requests.is_some_and(|(.., last)| known.now < last + SHARED);
+        let judged = self
+            .slaves
+            .iter()
+            .filter_map(|(slave, lately)| lately.judged(*slave, known, self.others_are_whole(lately)));
+        findings.extend(judged.filter(|finding| !(is_shared && finding.is_of_two())));
         findings
     }
 
@@ -51,10 +59,17 @@ impl Evidence {
         self.slaves.values().map(|lately| of(lately)).fold(0, u32::saturating_add)
     }
 
+    /// Whether the answers of all others but this one come whole: then noise is not what damages its.
+    fn others_are_whole(&self, of: &Lately) -> bool {
+        let (asked, damaged) = (self.total(|lately| lately.questions), self.total(|lately| lately.damaged));
+        let in_time = self.total(Lately::in_time).saturating_sub(of.in_time());
+        in_time >= ENOUGH && damaged.saturating_sub(of.damaged) * 20 <= asked.saturating_sub(of.questions)
+    }
+
     fn faster(&self) -> Option<Finding> {
         let early = self.total(|lately| lately.early);
         let in_time = self.total(Lately::in_time);
-        let certainty = Certainty::CannotBeToldFrom("a speed that is set too low");
+        let certainty = Certainty::CannotBeToldFrom(Alike::SpeedTooLow);
         (early >= FEW && in_time == 0).then(|| line(Defect::FarEndFaster, (early, early), certainty))
     }
 
@@ -62,14 +77,6 @@ impl Evidence {
         let zero = self.number_zero;
         let is_it = zero >= FEW && self.total(Lately::in_time) * 10 <= zero;
         is_it.then(|| line(Defect::NumberZero, (zero, zero), Certainty::Certain))
-    }
-
-    fn link_timeout(&self, known: Known) -> Option<Finding> {
-        let (acknowledged, asked) = (self.acknowledged, self.total(|lately| lately.questions));
-        let is_it =
-            known.is_unitelway && acknowledged >= FEW && asked >= FEW && self.total(Lately::in_time) == 0;
-        let certainty = Certainty::CannotBeToldFrom("slaves that acknowledge everything and never reply");
-        is_it.then(|| line(Defect::LinkTimeout, (acknowledged, asked), certainty))
     }
 
     fn second_master(&self) -> Option<Finding> {
@@ -106,7 +113,7 @@ impl Lately {
         self.whole + self.refused_in_all()
     }
 
-    fn judged(&self, slave: u8, known: Known) -> Option<Finding> {
+    fn judged(&self, slave: u8, known: Known, others_are_whole: bool) -> Option<Finding> {
         let spoken = self.questions - self.silent.min(self.questions);
         let found = |defect, part, of, certainty| {
             Some(Finding { defect, slave: Some(slave), share: (part, of), certainty })
@@ -118,30 +125,39 @@ impl Lately {
         if is_most(self.without_last, spoken) {
             return found(Defect::LastByteCut, self.without_last, spoken, Certainty::Certain);
         }
+        if known.is_unitelway && self.acknowledged >= FEW && self.acknowledged > self.in_time() {
+            let certainty = Certainty::CannotBeToldFrom(Alike::NeverReplies);
+            return found(Defect::LinkTimeout, self.acknowledged, self.questions, certainty);
+        }
         if self.late_with_next > FEW && self.late_with_next * 5 >= self.late * 4 && self.late > self.in_time()
         {
             return found(Defect::OneAnswerBehind, self.late_with_next, self.late, Certainty::Certain);
+        }
+        if self.contradicted >= FEW && self.contradicted * 20 >= self.questions {
+            let certainty = Certainty::CannotBeToldFrom(Alike::OldAnswers);
+            return found(Defect::TwoAtOneAddress, self.contradicted, self.questions, certainty);
+        }
+        let damaged = if others_are_whole { self.damaged_long } else { self.damaged_begun };
+        if damaged >= MANY && damaged * 2 >= self.questions && self.silent * 20 <= self.questions {
+            let certainty = Certainty::CannotBeToldFrom(Alike::DamagedCable);
+            return found(Defect::TwoAtOneAddress, damaged, self.questions, certainty);
+        }
+        // What two that differ in something alone speak at once is damaged whenever it is asked.
+        let stuck = self.stuck.iter().find(|stuck| stuck.damaged >= MANY && stuck.others >= MANY);
+        if let Some(stuck) = stuck {
+            let of = stuck.damaged.saturating_add(stuck.others);
+            return found(Defect::TwoAtOneAddress, stuck.damaged, of, Certainty::Likely);
         }
         if self.whole == 0
             && let Some((code, count)) = self.exceptions.iter().max_by_key(|(_, count)| *count)
             && *count >= FEW
             && *count * 10 >= self.refused_in_all() * 9
+            && self.damaged * 10 <= *count
         {
             return found(Defect::RefusesAll(*code), *count, self.questions, Certainty::Certain);
         }
-        if self.contradicted >= FEW && self.contradicted * 20 >= self.questions {
-            let certainty = Certainty::CannotBeToldFrom("something between that gives old answers once more");
-            return found(Defect::TwoAtOneAddress, self.contradicted, self.questions, certainty);
-        }
-        if self.damaged_long >= MANY
-            && self.damaged_long * 2 >= self.questions
-            && self.silent * 20 <= self.questions
-        {
-            let certainty = Certainty::CannotBeToldFrom("a cable that is damaged at that drive");
-            return found(Defect::TwoAtOneAddress, self.damaged_long, self.questions, certainty);
-        }
         if self.doubled > FEW && self.doubled * 10 >= self.in_time() {
-            let certainty = Certainty::CannotBeToldFrom("two drives alike that have one address");
+            let certainty = Certainty::CannotBeToldFrom(Alike::Twins);
             return found(Defect::AnswersTwice, self.doubled, self.in_time(), certainty);
         }
         if self.behind >= MANY && self.behind * 2 >= self.in_time() {

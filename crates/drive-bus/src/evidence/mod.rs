@@ -5,30 +5,23 @@
 
 mod bytes;
 mod findings;
+mod hearing;
 mod judge;
+mod lately;
 
-use std::{
-    collections::{BTreeMap, VecDeque},
-    time::Duration,
-};
+use std::collections::{BTreeMap, VecDeque};
 
 use tokio::time::Instant;
 
-use self::bytes::Came;
-pub use self::findings::{Certainty, Defect, Finding};
+pub use self::findings::{Alike, Certainty, Defect, Finding};
 pub(crate) use self::judge::Known;
+use self::{
+    hearing::{Aside, Hearing},
+    lately::Lately,
+};
 
 /// So many facts are kept.
 const FACTS: usize = 64;
-
-/// What came lately: with so many questions to one slave everything that was counted for it counts half.
-const LATELY: u32 = 1_000;
-
-/// The most bytes of one exchange that are kept: the longest frame of Modbus RTU behind the longest echo.
-const LONGEST: usize = 520;
-
-/// Bytes that come so soon behind an answer belong to it.
-const BEHIND: Duration = Duration::from_millis(20);
 
 /// Something that was heard, or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +30,19 @@ pub struct Fact {
     pub at: Instant,
     /// Whose it is: who was asked, or whose address it bears; `None` for bytes of nobody.
     pub slave: Option<u8>,
+    /// Over which connection.
+    pub over: Over,
     /// What.
     pub what: What,
+}
+
+/// A connection of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Over {
+    /// Its own.
+    First,
+    /// The one that stops take besides. Who is silent there may never have been asked: a gateway may serve one only.
+    Second,
 }
 
 /// What was heard.
@@ -55,6 +59,8 @@ pub enum What {
     WithoutLastByte,
     /// So many bytes to a question that make no answer.
     Damaged(usize),
+    /// An answer of so many bytes with one bit wrong.
+    OneBitWrong(usize),
     /// So many bytes right behind an answer that is whole.
     Behind(usize),
     /// An answer that came after its question was given up; `with_next`: while the next question to that slave was waited for.
@@ -84,97 +90,10 @@ pub(crate) struct Evidence {
     /// Requests of another master: how many, the first and the last.
     requests: Option<(u32, Instant, Instant)>,
     number_zero: u32,
-    /// Pieces that are nothing but a character that acknowledges (UNI-TELWAY).
-    acknowledged: u32,
-    /// What came to the question that is under way came too soon.
-    early: bool,
-    sent: Vec<u8>,
-    heard: Vec<u8>,
-    /// Whose exchange ended last, and when, until what comes behind it is judged.
-    last: Option<(u8, Instant)>,
-    behind: Vec<u8>,
-}
-
-/// What came lately of one slave.
-#[derive(Debug, Clone, Default)]
-struct Lately {
-    questions: u32,
-    whole: u32,
-    /// Each code, and how often: the first few that there are.
-    exceptions: Vec<(u8, u32)>,
-    silent: u32,
-    without_first: u32,
-    without_last: u32,
-    damaged: u32,
-    /// Of those, as long as an answer.
-    damaged_long: u32,
-    behind: u32,
-    late: u32,
-    late_with_next: u32,
-    early: u32,
-    doubled: u32,
-    contradicted: u32,
-    /// How often it was silent since its last answer, and when that was.
-    silent_since: Option<(u32, Instant)>,
-}
-
-/// The most exceptions that one slave is kept apart for.
-const CODES: usize = 8;
-
-impl Lately {
-    fn counts(&mut self) -> [&mut u32; 12] {
-        let Self {
-            questions,
-            whole,
-            silent,
-            without_first,
-            without_last,
-            damaged,
-            damaged_long,
-            behind,
-            late,
-            late_with_next,
-            early,
-            doubled,
-            ..
-        } = self;
-        [
-            questions,
-            whole,
-            silent,
-            without_first,
-            without_last,
-            damaged,
-            damaged_long,
-            behind,
-            late,
-            late_with_next,
-            early,
-            doubled,
-        ]
-    }
-
-    /// One question more.
-    fn asked(&mut self) {
-        self.questions += 1;
-        if self.questions > LATELY {
-            self.contradicted /= 2;
-            self.exceptions.iter_mut().for_each(|(_, count)| *count /= 2);
-            self.counts().into_iter().for_each(|count| *count /= 2);
-        }
-    }
-
-    fn refused(&mut self, code: u8) {
-        if let Some((_, count)) = self.exceptions.iter_mut().find(|(known, _)| *known == code) {
-            *count += 1;
-        } else if self.exceptions.len() < CODES {
-            self.exceptions.push((code, 1));
-        }
-    }
-
-    fn answered(&mut self, now: Instant) {
-        self.silent_since = Some((0, now));
-    }
+    first: Hearing,
+    second: Hearing,
+    /// Of the exchanges that wait for their slaves.
+    aside: BTreeMap<u8, Aside>,
 }
 
 /// How an exchange ended, as far as that is evidence.
@@ -197,24 +116,45 @@ impl Evidence {
     }
 
     /// An exchange begins with these bytes, or goes on with them.
-    pub(crate) fn sent(&mut self, now: Instant, goes_on: bool, bytes: &[u8]) {
+    pub(crate) fn sent(&mut self, now: Instant, over: Over, goes_on: bool, bytes: &[u8]) {
         if goes_on {
             return;
         }
-        self.judge_behind(now);
-        self.early = false;
-        self.sent.clear();
-        self.heard.clear();
-        add(&mut self.sent, bytes);
+        if let Some((slave, count)) = self.hearing(over).sent(bytes) {
+            self.slaves.entry(slave).or_default().behind += 1;
+            self.keep(now, over, slave, What::Behind(count));
+        }
     }
 
     /// Bytes came; `under_way`: while an exchange was.
-    pub(crate) fn heard(&mut self, now: Instant, under_way: bool, bytes: &[u8]) {
-        self.acknowledged = self.acknowledged.saturating_add(u32::from(bytes == [ACK]));
-        if under_way {
-            add(&mut self.heard, bytes);
-        } else if self.last.is_some_and(|(_, at)| now <= at + BEHIND) {
-            add(&mut self.behind, bytes);
+    pub(crate) fn heard(&mut self, now: Instant, over: Over, under_way: bool, bytes: &[u8]) {
+        self.hearing(over).heard(now, under_way, bytes);
+        if !under_way
+            && bytes == [ACK]
+            && let Some(slave) = self.hearing(over).in_vain
+        {
+            self.slaves.entry(slave).or_default().acknowledged += 1;
+        }
+    }
+
+    /// An exchange with this slave waits while others are served.
+    pub(crate) fn put_aside(&mut self, slave: u8) {
+        let aside = self.first.put_aside();
+        self.aside.insert(slave, aside);
+    }
+
+    /// It goes on.
+    pub(crate) fn resume(&mut self, slave: u8) {
+        if let Some(aside) = self.aside.remove(&slave) {
+            self.first.resume(aside);
+        }
+    }
+
+    /// It is given up; of none: all are.
+    pub(crate) fn forsake(&mut self, slave: Option<u8>) {
+        match slave {
+            Some(slave) => _ = self.aside.remove(&slave),
+            None => self.aside.clear(),
         }
     }
 
@@ -222,97 +162,59 @@ impl Evidence {
     pub(crate) fn ended(
         &mut self,
         now: Instant,
-        slave: u8,
+        (over, slave): (Over, u8),
         is_rtu: bool,
         ended: Ended,
         expected: usize,
     ) -> Option<String> {
-        self.behind.clear();
-        self.last = None;
-        let heard = std::mem::take(&mut self.heard);
-        let echoed = self.sent.len() > 1 && heard.len() > self.sent.len();
-        let came = heard.strip_prefix(&self.sent[..]).filter(|_| echoed).unwrap_or(&heard);
-        let is_early = std::mem::take(&mut self.early);
+        let hearing = self.hearing(over);
+        let (came, question) = hearing.take();
+        let is_early = std::mem::take(&mut hearing.early);
+        hearing.in_vain = Some(slave).filter(|_| ended == Ended::InVain);
+        if let Ended::Answered(len) = ended
+            && is_rtu
+        {
+            hearing.answered(now, slave, &came, len);
+        }
         let instead = (is_rtu && ended == Ended::InVain)
-            .then(|| bytes::told(came, slave, expected, is_early))
+            .then(|| bytes::told(&came, slave, expected, is_early))
             .flatten();
-        let lately = self.slaves.entry(slave).or_default();
-        lately.asked();
-        let fact = match ended {
-            Ended::Answered(len) => {
-                lately.whole += 1;
-                lately.answered(now);
-                self.last = is_rtu.then_some((slave, now));
-                if is_rtu {
-                    add(&mut self.behind, bytes::behind(came, slave, len));
+        let fact = if ended == Ended::InVain && over == Over::Second {
+            Some(What::Silence).filter(|_| came.is_empty())
+        } else {
+            let lately = self.slaves.entry(slave).or_default();
+            lately.asked();
+            match ended {
+                Ended::Answered(_) => {
+                    lately.whole += 1;
+                    lately.answered(now);
+                    lately.came_whole(question.key);
+                    None
                 }
-                None
-            }
-            Ended::Exception(code) => {
-                lately.refused(code);
-                lately.answered(now);
-                Some(What::Exception(code))
-            }
-            Ended::InVain if came.is_empty() => {
-                lately.silent += 1;
-                if let Some((times, _)) = &mut lately.silent_since {
-                    *times = times.saturating_add(1);
+                Ended::Exception(code) => {
+                    lately.refused(code);
+                    lately.answered(now);
+                    lately.came_whole(question.key);
+                    Some(What::Exception(code))
                 }
-                Some(What::Silence)
-            }
-            Ended::Unclear => {
-                lately.answered(now);
-                None
-            }
-            Ended::InVain => {
-                let count = came.len();
-                let came = if is_rtu { bytes::what_came(came, slave, expected) } else { Came::Other };
-                match came {
-                    Came::WithoutFirst => {
-                        lately.without_first += 1;
-                        Some(What::WithoutFirstByte)
-                    }
-                    Came::WithoutLast => {
-                        lately.without_last += 1;
-                        Some(What::WithoutLastByte)
-                    }
-                    Came::TwoThatDiffer => {
-                        lately.contradicted += 1;
-                        Some(What::Contradicted)
-                    }
-                    // What is whole is told as what it is: late, another's.
-                    Came::Frames => None,
-                    Came::Other => {
-                        lately.damaged += 1;
-                        lately.damaged_long += u32::from(count > expected);
-                        Some(What::Damaged(count))
-                    }
+                Ended::Unclear => {
+                    lately.answered(now);
+                    lately.another_came_whole();
+                    None
                 }
+                Ended::InVain => lately.in_vain(question, &came, (slave, expected), is_rtu),
             }
         };
         if let Some(what) = fact {
-            self.keep(now, Some(slave), what);
+            self.keep(now, over, slave, what);
         }
-        self.heard = heard;
-        self.heard.clear();
+        self.hearing(over).give_back(came);
         instead
     }
 
-    /// What came behind the last answer has come.
-    fn judge_behind(&mut self, now: Instant) {
-        let Some((slave, _)) = self.last.take() else { return };
-        let behind = std::mem::take(&mut self.behind);
-        if !behind.is_empty() && !bytes::is_whole(&behind) {
-            self.slaves.entry(slave).or_default().behind += 1;
-            self.keep(now, Some(slave), What::Behind(behind.len()));
-        }
-        self.behind = behind;
-        self.behind.clear();
-    }
-
     /// An intact frame that was not asked for, or not now.
-    pub(crate) fn stray(&mut self, now: Instant, slave: u8, what: What) {
-        self.early |= what == What::Early;
+    pub(crate) fn stray(&mut self, now: Instant, over: Over, slave: u8, what: What) {
+        self.hearing(over).early |= what == What::Early;
         match what {
             What::OthersRequest => {
                 let (count, first) = self.requests.map_or((0, now), |(count, first, _)| (count, first));
@@ -334,21 +236,23 @@ impl Evidence {
                 }
             }
         }
-        self.keep(now, Some(slave), what);
+        self.keep(now, over, slave, what);
     }
 
-    fn keep(&mut self, at: Instant, slave: Option<u8>, what: What) {
+    fn hearing(&mut self, over: Over) -> &mut Hearing {
+        match over {
+            Over::First => &mut self.first,
+            Over::Second => &mut self.second,
+        }
+    }
+
+    fn keep(&mut self, at: Instant, over: Over, slave: u8, what: What) {
         if self.facts.len() >= FACTS {
             self.facts.pop_front();
         }
-        self.facts.push_back(Fact { at, slave, what });
+        self.facts.push_back(Fact { at, slave: Some(slave), over, what });
     }
 }
 
 /// UNI-TELWAY's acknowledgement.
 const ACK: u8 = 0x06;
-
-fn add(kept: &mut Vec<u8>, bytes: &[u8]) {
-    let room = LONGEST.saturating_sub(kept.len()).min(bytes.len());
-    kept.extend_from_slice(bytes.get(..room).unwrap_or_default());
-}

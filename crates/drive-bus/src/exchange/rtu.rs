@@ -14,7 +14,7 @@ use drive_core::serial::SerialSettings;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-pub(crate) use self::frame::{MAX_FRAME, OVERHEAD};
+pub(crate) use self::frame::{MAX_FRAME, OVERHEAD, is_frame_but_for_one_bit};
 pub use self::frame::{frame, is_frame};
 
 use super::{

@@ -21,6 +21,7 @@ impl<C> Master<C> {
         self.stats.busy += now.saturating_duration_since(flight.started);
         self.exchange_end = now;
         self.record.ended(now, flight.slave, flight.started, Ending::PutAside);
+        self.evidence.put_aside(flight.slave);
         self.aside.insert(flight.slave, Aside { flight, at });
     }
 
@@ -36,6 +37,7 @@ impl<C> Master<C> {
         self.flight = Some(flight);
         self.last_slave = Some(slave);
         self.resumed = true;
+        self.evidence.resume(slave);
         self.exchange.resume(slave)
     }
 
@@ -43,6 +45,7 @@ impl<C> Master<C> {
     pub(super) fn forsake(&mut self, now: Instant, slave: u8) {
         let Some(Aside { flight, .. }) = self.aside.remove(&slave) else { return };
         self.exchange.forsake(slave);
+        self.evidence.forsake(Some(slave));
         if let Purpose::Call(Some(entry)) = flight.purpose {
             self.fail(now, entry, Failure::Timeout, Duration::ZERO);
         }

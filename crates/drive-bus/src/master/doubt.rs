@@ -1,6 +1,6 @@
 //! What may still come from one slave, and what its next request therefore waits for or differs in.
 
-use std::time::Duration;
+use std::{collections::VecDeque, time::Duration};
 
 use tokio::time::Instant;
 
@@ -12,6 +12,9 @@ pub(super) const MEMORY: Duration = Duration::from_secs(60);
 
 /// What comes later than this is no second answer to what was taken.
 const LONGEST_DOUBLE: Duration = Duration::from_secs(1);
+
+/// How many answers are remembered by what they say: those of a second, where they are not asked for without a pause.
+const LATELY: usize = 32;
 
 /// How many shapes are remembered: the reads that a family has in rotation, in all their lengths, and some writes. There are
 /// thirty thousand slaves on a thousand lines.
@@ -26,6 +29,8 @@ pub(super) struct Doubt {
     unexplained_until: Option<Instant>,
     /// The answer that was taken last, and when the same came before.
     taken: Option<Taken>,
+    /// What was taken lately, and when, since something strange came: what may come once more.
+    lately: VecDeque<(Frame, Instant)>,
     held_until: Option<Instant>,
 }
 
@@ -59,6 +64,9 @@ struct Known {
     avoid: Instant,
     /// Such an answer will come to somebody: it is owed to us, or another master asks for it. Any other shape is better.
     will_come: bool,
+    /// Such a frame has come that was no answer of ours and cannot have been one once more: where another shape costs nothing it
+    /// is better.
+    stray: bool,
     /// Such an answer is owed and has not come.
     owed: bool,
     /// Something else was written since.
@@ -78,6 +86,7 @@ impl Doubt {
             wait: until,
             avoid,
             will_come: true,
+            stray: false,
             owed: true,
             overtaken: false,
             over_a_lost_port,
@@ -98,7 +107,8 @@ impl Doubt {
         }
         if shape != Shape::ANY {
             let heard = Known::come(shape, now + DOUBLE, now + MEMORY);
-            self.remember(Known { will_come: is_request, ..heard });
+            let stray = !was_owed && self.is_no_double(now, frame);
+            self.remember(Known { will_come: is_request, stray, ..heard });
         }
         if was_owed {
             return Heard { was_owed, ..Heard::default() };
@@ -122,8 +132,26 @@ impl Doubt {
         }
     }
 
+    /// Whether this is none of the answers that were taken lately, as far as they are all known.
+    fn is_no_double(&self, now: Instant, frame: Frame) -> bool {
+        let is_it = |(taken, at): &(Frame, Instant)| *taken == frame && *at + LONGEST_DOUBLE >= now;
+        let knows_all = match self.lately.front() {
+            Some((_, oldest)) => self.lately.len() < LATELY || *oldest + LONGEST_DOUBLE < now,
+            None => false,
+        };
+        knows_all && !self.lately.iter().any(is_it)
+    }
+
     /// This answer was taken.
     pub(super) fn took(&mut self, now: Instant, frame: Frame, asked_at: Instant) {
+        if self.is_strange(now) {
+            if self.lately.len() >= LATELY {
+                self.lately.pop_front();
+            }
+            self.lately.push_back((frame, now));
+        } else if !self.lately.is_empty() {
+            self.lately = VecDeque::new();
+        }
         let same = self.taken.filter(|taken| taken.frame == frame && now - taken.at <= LONGEST_DOUBLE);
         self.taken = Some(Taken { frame, at: now, asked_at, same_before: same.map(|same| same.at) });
     }
@@ -134,7 +162,8 @@ impl Doubt {
         if shape == Shape::ANY {
             return;
         }
-        self.known.retain(|known| known.avoid > now && (known.shape != shape || known.will_come));
+        self.known
+            .retain(|known| known.avoid > now && (known.shape != shape || known.will_come || known.stray));
         let strange = self.is_strange(now);
         // An answer that is late is late once, and then no reason any more to wait.
         let owes = self.known.iter().any(|known| known.owed);
@@ -167,11 +196,12 @@ impl Doubt {
                 self.known.iter().enumerate().filter(|(_, known)| known.shape == shape && known.avoid > now);
             let will_come =
                 same.clone().filter(|(_, known)| known.will_come).map(|(_, known)| known.avoid).max();
+            let stray = same.clone().filter(|(_, known)| known.stray).map(|(_, known)| known.avoid).max();
             let came = same.map(|(order, known)| (known.avoid, order)).max();
-            (will_come, self.wait(now, shape), came)
+            (will_come, self.wait(now, shape), stray, came)
         };
         let rated = shapes.map(rate).enumerate();
-        rated.min_by_key(|(_, rating)| *rating).map(|(index, (_, wait, _))| (index, wait))
+        rated.min_by_key(|(_, rating)| *rating).map(|(index, (_, wait, ..))| (index, wait))
     }
 
     /// Whether the confirmation of a write with this shape may be that of an earlier one and prove nothing: something else was
@@ -210,7 +240,7 @@ impl Doubt {
     fn remember(&mut self, known: Known) {
         if self.known.len() >= MOST {
             // What will come outlasts what has come: every value that is written has a shape of its own.
-            let least = self.known.iter().position(|known| !known.will_come).unwrap_or(0);
+            let least = self.known.iter().position(|known| !known.will_come && !known.stray).unwrap_or(0);
             self.known.remove(least);
         }
         // Nearly always it is one.
@@ -221,6 +251,15 @@ impl Doubt {
 
 impl Known {
     const fn come(shape: Shape, wait: Instant, avoid: Instant) -> Self {
-        Self { shape, wait, avoid, will_come: false, owed: false, overtaken: false, over_a_lost_port: false }
+        Self {
+            shape,
+            wait,
+            avoid,
+            will_come: false,
+            stray: false,
+            owed: false,
+            overtaken: false,
+            over_a_lost_port: false,
+        }
     }
 }

@@ -200,6 +200,15 @@ impl FarEnd {
         self.done_with_all(now)
     }
 
+    /// How long the late answer of this number has taken, where nothing else can have held it up: it was asked when nothing was
+    /// owed, and nothing is owed besides.
+    pub(super) fn took(&self, now: Instant, number: Option<u16>) -> Option<Duration> {
+        let [only] = self.owed.as_slice() else { return None };
+        let is_it = number.is_some() && only.number == number && !only.over_a_lost_port;
+        let alone = self.free_from.is_none_or(|free| free <= only.asked);
+        (is_it && alone).then(|| now.saturating_duration_since(only.asked))
+    }
+
     /// An intact frame came that was no answer to what was asked. `nobody`: the gateway says that nobody answered. `None`:
     /// it was not owed. Gives otherwise the slaves that the far end has waited for in vain to the end.
     pub(super) fn heard(
@@ -373,6 +382,20 @@ mod tests {
         assert_eq!(far.heard(now + 9 * SECOND, 2, Some(7), Shape::ANY, false), None);
         assert_eq!(far.heard(now + 9 * SECOND, 2, Some(2), Shape::ANY, false), Some(vec![1]));
         assert_eq!((far.owes(), far.wait()), (0, 9 * SECOND));
+    }
+
+    #[test]
+    fn a_late_answer_tells_its_own_time_only_where_nothing_held_it_up() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.owe(asked(1, 1, now));
+        assert_eq!(far.took(now + 250 * MS, Some(1)), Some(250 * MS));
+        assert_eq!(far.took(now + 250 * MS, Some(2)), None, "another question's");
+        assert_eq!(far.took(now + 250 * MS, None), None, "whose, nobody knows");
+        far.owe(asked(2, 2, now + 100 * MS));
+        assert_eq!(far.took(now + 250 * MS, Some(1)), None);
+        far.heard(now + 250 * MS, 1, Some(1), Shape::ANY, false);
+        assert_eq!(far.took(now + 500 * MS, Some(2)), None, "it has waited behind the first");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
     answer, config,
-    evidence::Ended,
+    evidence::{Ended, Over},
     exchange::{Answer, Failure, NOBODY_ANSWERED},
     protocol::Protocol,
     record::Ending,
@@ -41,7 +41,8 @@ impl<C> Master<C> {
             Err(Failure::Doubted(_) | Failure::Refused(_)) => Ended::Unclear,
             Err(_) => Ended::InVain,
         };
-        let instead = self.evidence.ended(now, slave, self.config.protocol == Protocol::Rtu, ended, expected);
+        let is_rtu = self.config.protocol == Protocol::Rtu;
+        let instead = self.evidence.ended(now, (Over::First, slave), is_rtu, ended, expected);
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
@@ -396,6 +397,7 @@ impl<C> Master<C> {
         if let Some(flight) = &self.flight {
             self.record.ended(now, flight.slave, flight.started, Ending::LineLost);
         }
+        self.evidence.forsake(None);
         let aside = std::mem::take(&mut self.aside).into_values().map(|aside| aside.flight);
         let flights: Vec<_> = self.flight.take().into_iter().chain(aside).collect();
         for flight in flights {

@@ -30,7 +30,7 @@ use tokio_modbus::Request;
 use crate::{
     answer,
     config::{self, LineConfig, SlaveSettings},
-    evidence::{Evidence, Fact, Finding, Known, What},
+    evidence::{Evidence, Fact, Finding, Known, Over, What},
     exchange::{Answer, Failure, Frame, Machine, Step, Stray},
     pdu,
     record::{Ending, Exchange, Record},
@@ -424,7 +424,7 @@ impl<C> Master<C> {
         if self.flight.is_some() {
             self.record.heard(bytes);
         }
-        self.evidence.heard(now, self.flight.is_some(), bytes);
+        self.evidence.heard(now, Over::First, self.flight.is_some(), bytes);
         let step = self.exchange.handle_bytes(now, bytes);
         self.act(now, step);
     }
@@ -521,15 +521,23 @@ impl<C> Master<C> {
                     let station = self.station(slave);
                     station.stats.early += 1;
                     let heard = station.doubt.heard(now, frame, false);
-                    self.evidence.stray(now, slave, What::Early);
+                    self.evidence.stray(now, Over::First, slave, What::Early);
                     self.note_heard(now, slave, heard);
                 }
                 Stray::Frame { slave, function, frame, is_request, number, nobody } => {
                     if number == Some(0) && self.exchange.number() != Some(0) {
-                        self.evidence.stray(now, slave, What::NumberZero);
+                        self.evidence.stray(now, Over::First, slave, What::NumberZero);
                     }
+                    let took = self.far_end.took(now, number).filter(|_| !nobody);
                     let given_up = self.far_end.heard(now, slave, number, frame.shape, nobody);
                     let was_owed = given_up.is_some();
+                    // Its number says which question it answers, so that what it has taken is what such a question takes. A
+                    // gateway is waited for so long all the same: the time that a stop waits behind it has it in it.
+                    let wait = self.far_end.wait();
+                    if let (Some(took), Some(station)) = (took, self.stations.get_mut(&slave)) {
+                        station.timeout.allow((took * 5 / 4).min(wait));
+                        station.timeout.answered(took);
+                    }
                     if was_owed && !nobody && number.is_some() && self.stations.contains_key(&slave) {
                         self.note_alive(now, slave);
                     }
@@ -557,13 +565,14 @@ impl<C> Master<C> {
         let Some(station) = self.stations.get_mut(&slave) else {
             self.stats.foreign += 1;
             let what = if is_request { What::OthersRequest } else { What::OthersAnswer };
-            self.evidence.stray(now, slave, what);
+            self.evidence.stray(now, Over::First, slave, what);
             return;
         };
         let heard = if confuses { station.doubt.heard(now, frame, is_request) } else { Heard::default() };
         let late = heard.was_owed;
         self.evidence.stray(
             now,
+            Over::First,
             slave,
             match &heard {
                 _ if is_request => What::OthersRequest,

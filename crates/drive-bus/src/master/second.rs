@@ -23,8 +23,10 @@ use super::{Asked, Flight, Master, Purpose, port::PortState, probing};
 use crate::{
     answer,
     config::LineConfig,
-    exchange::{Answer, Machine, Step},
+    evidence::{Ended, Over, What},
+    exchange::{Answer, Frame, Machine, Step, Stray},
     pdu,
+    protocol::Protocol,
     schedule::{Entry, Ticket},
     stats::SecondConnection,
 };
@@ -61,7 +63,9 @@ pub(super) struct Second {
     /// It is to be closed.
     close: bool,
     machine: Option<Box<dyn Machine>>,
-    flight: Option<Over>,
+    flight: Option<Going>,
+    /// Who answered over it last, and what.
+    taken: Option<(u8, Frame)>,
     /// When it is asked next, where a silence is to be kept before.
     free_at: Option<Instant>,
     /// Who answered over the first last, and when.
@@ -89,7 +93,7 @@ enum State {
 }
 
 /// What is under way over it.
-struct Over {
+struct Going {
     /// The stop; `None`: the question whether it is served.
     stop: Option<Ticket>,
     slave: u8,
@@ -106,6 +110,7 @@ impl Second {
             close: false,
             machine: None,
             flight: None,
+            taken: None,
             free_at: None,
             answered: None,
             heard: None,
@@ -129,6 +134,7 @@ impl Second {
         self.state = state;
         self.machine = None;
         self.flight = None;
+        self.taken = None;
     }
 
     fn give_up(&mut self, why: &'static str, until: Option<Instant>) {
@@ -281,7 +287,8 @@ impl<C> Master<C> {
         let pdu = pdu::encode(&request).ok()?;
         let machine = self.second.machine.as_mut()?;
         let bytes = machine.start(slave, Arc::clone(&request), &pdu);
-        self.second.flight = Some(Over { stop, slave, request, started: now, answer_by: None });
+        self.evidence.sent(now, Over::Second, false, &bytes);
+        self.second.flight = Some(Going { stop, slave, request, started: now, answer_by: None });
         Some(bytes)
     }
 
@@ -335,18 +342,66 @@ impl<C> Master<C> {
     /// Bytes came in over the second connection.
     pub fn handle_second_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let Some(machine) = &mut self.second.machine else { return };
+        self.evidence.heard(now, Over::Second, self.second.flight.is_some(), bytes);
         if let Step::Done(Ok(answer)) = machine.handle_bytes(now, bytes) {
             self.second_answered(now, answer);
         }
-        if let Some(machine) = &mut self.second.machine {
-            machine.take_strays();
+        self.second_strays(now);
+    }
+
+    /// What came over it and was no part of its exchange.
+    fn second_strays(&mut self, now: Instant) {
+        let Some(machine) = &mut self.second.machine else { return };
+        for stray in machine.take_strays() {
+            let (slave, what) = match stray {
+                Stray::Early { slave, .. } => (slave, What::Early),
+                Stray::Frame { slave, is_request: true, .. } => (slave, What::OthersRequest),
+                Stray::Frame { slave, number: Some(0), .. } if machine.number() != Some(0) => {
+                    (slave, What::NumberZero)
+                }
+                // A number is given once.
+                Stray::Frame { slave, number: Some(number), .. }
+                    if self.second.flight.is_none() && machine.number() == Some(number) =>
+                {
+                    (slave, What::Doubled)
+                }
+                Stray::Frame { slave, frame, .. } => {
+                    let again =
+                        self.second.taken.filter(|(of, taken)| *of == slave && taken.shape == frame.shape);
+                    let what = match again {
+                        Some((_, taken)) if taken == frame => What::Doubled,
+                        Some(_) => What::Contradicted,
+                        None => What::OthersAnswer,
+                    };
+                    (slave, what)
+                }
+                Stray::Noise(_) | Stray::Echo => continue,
+            };
+            self.evidence.stray(now, Over::Second, slave, what);
         }
+    }
+
+    /// What was under way over it is over.
+    fn note_second(&mut self, now: Instant, slave: u8, request: &Request<'_>, ended: Option<&Answer>) {
+        let expected = answer::likely_len(request);
+        let ended = match ended {
+            Some(Ok(_)) => Ended::Answered(expected),
+            Some(Err(code)) => Ended::Exception(u8::from(*code)),
+            None => Ended::InVain,
+        };
+        let is_rtu = self.config.protocol == Protocol::Rtu;
+        let _ = self.evidence.ended(now, (Over::Second, slave), is_rtu, ended, expected);
     }
 
     /// The time of what is under way over it may be over.
     pub(super) fn second_timeout(&mut self, now: Instant) {
         let Some(machine) = &mut self.second.machine else { return };
         let Step::Done(result) = machine.handle_timeout(now) else { return };
+        if result.is_err()
+            && let Some(going) = self.second.flight.take()
+        {
+            self.note_second(now, going.slave, &going.request, None);
+        }
         match (result, self.second.state) {
             (Ok(answer), _) => self.second_answered(now, answer),
             (Err(_), State::Open { serves: true, .. }) => {
@@ -358,6 +413,9 @@ impl<C> Master<C> {
 
     fn second_answered(&mut self, now: Instant, answer: Answer) {
         let Some(over) = self.second.flight.take() else { return };
+        self.note_second(now, over.slave, &over.request, Some(&answer));
+        let taken = self.second.machine.as_ref().and_then(|machine| machine.taken());
+        self.second.taken = taken.map(|frame| (over.slave, frame));
         if let State::Open { serves, .. } = &mut self.second.state {
             *serves = true;
         }

@@ -15,7 +15,9 @@ use super::{
     waits::{Waits, shape_of, wants_echo_read},
 };
 use crate::{
-    answer, pdu,
+    answer,
+    evidence::Over,
+    pdu,
     schedule::{Chosen, Entry, Readiness},
     shape,
 };
@@ -34,7 +36,7 @@ impl<C> Master<C> {
             None => self.next_exchange(now)?,
         };
         self.record.sent(&bytes);
-        self.evidence.sent(now, goes_on, &bytes);
+        self.evidence.sent(now, Over::First, goes_on, &bytes);
         self.sending = Some(Sending { since: now, characters: bytes.len() });
         Some(bytes)
     }

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Direction, Error, Faults, Identity, Measurements, Reaction, Recognised, Result, SelfRestart, Setpoint,
-    Status, StopMode, Stopped, Watchdog, Withdrawn,
+    Direction, Error, ErrorKind, Faults, Identity, Measurements, Reaction, Recognised, Result, SelfRestart,
+    Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn,
 };
 use tokio::time::Instant;
 
@@ -133,5 +133,17 @@ impl Reply {
         error.filter(|error| {
             matches!(error, Error::Port { .. } | Error::Exception { .. } | Error::Answer { .. })
         })
+    }
+
+    /// Whether what may wear an EEPROM was written, or may have been.
+    pub(crate) fn may_have_written(&self) -> bool {
+        let error = match self {
+            Self::Told(Ok(Told::Written(written))) => return written.changed,
+            Self::Saved(result) => result.as_ref().err(),
+            Self::Watchdog(result) => result.as_ref().err(),
+            Self::Told(told) => told.as_ref().err(),
+            _ => return false,
+        };
+        error.is_none_or(|error| matches!(error.kind(), ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed))
     }
 }

@@ -28,8 +28,7 @@ use std::{
 };
 
 use drive_core::{
-    Control, Error, ErrorKind, Ground, Lack, Lease, Measurements, PortError, Refusal, Status,
-    WatchdogCapability,
+    Control, Error, Ground, Lack, Lease, Measurements, PortError, Refusal, Status, WatchdogCapability,
 };
 use tokio::time::Instant;
 
@@ -176,6 +175,8 @@ pub(crate) struct Supervisor {
     /// A status has failed since the last that came: the drive may have been switched off and on.
     doubtful: bool,
     in_flight: Option<Job>,
+    /// What the job in flight writes to the EEPROM, if it does, and why.
+    wearing: Option<(EepromUse, Cause)>,
     turn: Turn,
     /// Until when what is done on its turn may go on.
     turn_ends: Option<Instant>,
@@ -229,6 +230,7 @@ impl Supervisor {
             last_error: None,
             doubtful: false,
             in_flight: None,
+            wearing: None,
             turn: Turn::Unwanted,
             turn_ends: None,
             yielded: false,
@@ -273,6 +275,7 @@ impl Supervisor {
             self.withdrawal = None;
         }
         self.note_act(job);
+        self.wearing = self.wears(job);
         self.in_flight = Some(job);
         self.changed = true;
         Step::Do { job, on_turn, lifetime, until }
@@ -387,6 +390,7 @@ impl Supervisor {
     /// The reply to the job in flight.
     pub(crate) fn handle_reply(&mut self, now: Instant, reply: Reply) {
         let job = self.in_flight.take();
+        let worn = self.wearing.take().filter(|_| reply.may_have_written());
         self.changed = true;
         if let Some(error) = reply.error() {
             self.last_error = Some(error.clone());
@@ -411,23 +415,14 @@ impl Supervisor {
                 self.adopt_run(now);
             }
             Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {
-                let wears = self.watchdog_wears && may_have_written(&result);
                 self.handle_restored(result);
-                if wears {
-                    self.note_eeprom(now, EepromUse::Restore, Cause::policy(self.exits_by));
-                }
             }
             Reply::Watchdog(result) => {
                 let armed = matches!(job, Some(Job::ArmWatchdog(..)));
-                let wears = self.watchdog_wears && armed && may_have_written(&result);
                 let control = self.settings.control;
                 if let Some(event) = self.checks.handle_watchdog(now, armed, control, result) {
                     let cause = if armed { Cause::policy(Policy::Watchdog) } else { Cause::Found };
                     self.emit_by(event, cause);
-                }
-                if wears {
-                    self.ledger.kept.in_vain = self.checks.in_vain();
-                    self.note_eeprom(now, EepromUse::Watchdog, Cause::policy(Policy::Watchdog));
                 }
                 self.tell_watchdog();
             }
@@ -436,23 +431,20 @@ impl Supervisor {
                     self.emit_by(event, Cause::Found);
                 }
             }
-            Reply::Told(told) => self.handle_told(now, told),
+            Reply::Told(told) => self.handle_told(told),
             Reply::Withdrawn(result) => self.handle_withdrawn(now, result),
             Reply::KeptAlive(result) => self.checks.handle_kept_alive(now, result.is_ok()),
             Reply::Stopped(result) => self.handle_stopped(now, result),
             Reply::Setpoint(result) => self.handle_setpoint_reply(now, result),
             Reply::Ordered(result) => self.handle_order_reply(now, result.map(Some)),
             Reply::Saved(result) => {
-                if may_have_written(&result) {
-                    let cause = self.active.as_ref().map_or(Cause::Drive, Active::cause);
-                    self.note_eeprom(now, EepromUse::Save, cause);
-                }
                 if let Ok(saves) = result {
                     self.counters.saves = u64::from(saves);
                 }
                 self.handle_order_reply(now, result.map(|_| None));
             }
         }
+        self.note_eeprom(now, worn);
     }
 
     /// The drive has heard a frame, and answered it. No reply of a job tells that: some take no exchange at all.
@@ -506,23 +498,8 @@ impl Supervisor {
             self.changed = true;
             self.checks.arming_dropped(now);
         }
-        let asked = || self.questions.front().map_or(Cause::Drive, |(.., act)| Cause::Command(act.clone()));
-        let worn = match job {
-            Job::ArmWatchdog(..) if self.watchdog_wears => {
-                Some((EepromUse::Watchdog, Cause::policy(Policy::Watchdog)))
-            }
-            Job::RestoreWatchdog(_) if self.watchdog_wears => {
-                Some((EepromUse::Restore, Cause::policy(self.exits_by)))
-            }
-            Job::Persist => Some((EepromUse::Save, self.active.as_ref().map_or(Cause::Drive, Active::cause))),
-            Job::Ask(Question::Write(row, _)) if row.storage.may_wear() => {
-                Some((EepromUse::Parameter, asked()))
-            }
-            _ => None,
-        };
-        if let Some((by, cause)) = worn {
-            self.note_eeprom(now, by, cause);
-        }
+        let worn = self.wearing.take();
+        self.note_eeprom(now, worn);
     }
 
     /// What is to be told, in order.
@@ -606,8 +583,26 @@ impl Supervisor {
         self.acted = cause.map(|cause| (job, cause));
     }
 
+    /// What a job writes to the EEPROM, and why: known while who asks for it stands, for a stop ends what it drops.
+    fn wears(&self, job: Job) -> Option<(EepromUse, Cause)> {
+        let watchdog = |by, policy| self.watchdog_wears.then(|| (by, Cause::policy(policy)));
+        match job {
+            Job::ArmWatchdog(..) => watchdog(EepromUse::Watchdog, Policy::Watchdog),
+            Job::RestoreWatchdog(_) => watchdog(EepromUse::Restore, self.exits_by),
+            Job::Persist => self.active.as_ref().map(|active| (EepromUse::Save, active.cause())),
+            Job::Ask(Question::Write(row, _)) if row.storage.may_wear() => {
+                self.questions.front().map(|(.., act)| (EepromUse::Parameter, Cause::Command(act.clone())))
+            }
+            _ => None,
+        }
+    }
+
     /// Its EEPROM was written, or may have been.
-    fn note_eeprom(&mut self, now: Instant, by: EepromUse, cause: Cause) {
+    fn note_eeprom(&mut self, now: Instant, worn: Option<(EepromUse, Cause)>) {
+        let Some((by, cause)) = worn else { return };
+        if by == EepromUse::Watchdog {
+            self.ledger.kept.in_vain = self.checks.in_vain();
+        }
         self.ledger.write(now);
         let ledger = self.ledger.kept.clone();
         self.emit_by(EventKind::EepromWritten { by, ledger }, cause);
@@ -634,14 +629,6 @@ impl Supervisor {
         let last = self.status.as_ref().map(|status| status.seen(now));
         Outcome::OutcomeUnknown(Unknown { error, last, stop: None })
     }
-}
-
-/// Whether a write may have been carried out.
-fn may_have_written<T>(result: &Result<T, Error>) -> bool {
-    result
-        .as_ref()
-        .err()
-        .is_none_or(|error| matches!(error.kind(), ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed))
 }
 
 /// Whether an error says that the drive cannot be reached at all now.

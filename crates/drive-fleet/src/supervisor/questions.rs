@@ -2,16 +2,9 @@
 
 use std::{collections::VecDeque, mem};
 
+use super::{CallId, Job, Output, Supervisor, permission::QUEUE};
+use crate::{cause::Act, outcome::Refused, snapshot::Link};
 use drive_core::{Faults, Result, Row, Written};
-use tokio::time::Instant;
-
-use super::{CallId, Job, Output, Supervisor, may_have_written, permission::QUEUE};
-use crate::{
-    cause::{Act, Cause},
-    eeprom::EepromUse,
-    outcome::Refused,
-    snapshot::Link,
-};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,15 +68,8 @@ impl Supervisor {
         self.questions.front().map(|(_, question, _)| Job::Ask(*question))
     }
 
-    pub(super) fn handle_told(&mut self, now: Instant, told: Result<Told>) {
-        if let Some((id, question, act)) = self.questions.pop_front() {
-            let is_written = match &told {
-                Ok(Told::Written(written)) => written.changed,
-                told => may_have_written(told),
-            };
-            if matches!(question, Question::Write(row, _) if row.storage.may_wear()) && is_written {
-                self.note_eeprom(now, EepromUse::Parameter, Cause::Command(act));
-            }
+    pub(super) fn handle_told(&mut self, told: Result<Told>) {
+        if let Some((id, ..)) = self.questions.pop_front() {
             self.outputs.push_back(Output::Told(id, told.map_err(Refused::from)));
         }
     }

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_bus::evidence::{Certainty, Defect, Finding};
+use drive_bus::evidence::{Alike, Certainty, Defect, Finding};
 use drive_core::{
     Command, Control, Current, Direction, Error, Fault, FaultEntry, Faults, Frequency, Ground, Identity,
     Lease, Measurements, Motion, Percent, PortError, RawWord, Reaction, Refusal, SelfRestart, SlaveAddress,
@@ -358,6 +358,15 @@ fn every_kind() -> Vec<EventKind> {
                 certainty: Certainty::Certain,
             },
             present: true,
+        },
+        EventKind::LineFinding {
+            finding: Finding {
+                defect: Defect::SecondMaster(Some(Duration::from_millis(4_500))),
+                slave: None,
+                share: (4, 4),
+                certainty: Certainty::CannotBeToldFrom(Alike::OldAnswers),
+            },
+            present: false,
         },
         EventKind::Reconfigured(vec!["periods"]),
         EventKind::Exit(ExitAction::Stopped(unknown)),

@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, ops::Range, time::Duration};
 
-use drive_bus::{Gateway, LineConfig, Protocol};
+use drive_bus::{
+    Gateway, LineConfig, Protocol,
+    config::{FarEndSettings, MOST_CONNECTIONS},
+};
 use drive_families::Options;
 use drive_fleet::{Demand, DriveSettings, LineBudget, Periods, plan};
 use toml::Spanned;
@@ -18,7 +21,7 @@ use super::{
 use drived_words::{
     drive_spec::DriveName,
     duration::Time,
-    line_spec::{self, FarEndSpec, LineSpec, MOST_CONNECTIONS},
+    line_spec::{self, LineSpec},
 };
 
 /// How long an answer may take unless the file says otherwise: the slowest family needs 50 ms.
@@ -175,7 +178,7 @@ pub fn line_part(
     };
     let names: Vec<DriveName> = group.iter().map(|member| member.drive).collect();
     let port = entry.port(source, span.clone())?;
-    let far_end = FarEndSpec {
+    let far_end = FarEndSettings {
         gateway: of(&entry.gateway).map(|gateway| gateway.0),
         connections: entry.connections(source)?,
         paces: of(&entry.far_end_paces).copied(),

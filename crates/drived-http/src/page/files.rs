@@ -49,6 +49,7 @@ macro_rules! files {
 files![
     SERVED: &[u8] = include_bytes("/"),
     "faults_fr.js",
+    "findings_fr.js",
     "icon.svg",
     "page.css",
     "sentences_fr.js",

@@ -26,6 +26,7 @@ fn module(name: &str) -> &'static str {
 fn modules() -> impl Iterator<Item = (&'static str, &'static str)> {
     let french = [
         ("faults_fr.js", include_str!("web/faults_fr.js")),
+        ("findings_fr.js", include_str!("web/findings_fr.js")),
         ("sentences_fr.js", include_str!("web/sentences_fr.js")),
     ];
     MODULES.iter().copied().chain([("stop.js", STOP_SCRIPT)]).chain(french)

@@ -90,7 +90,7 @@ impl Sheet<'_> {
         });
         json!({
             "line": self.line.name,
-            "port": line_spec::written(&self.line.config),
+            "port": self.line.config.to_string(),
             "gateway": self.line.behind_gateway(),
             "cases": self.cases.iter().map(case).collect::<Vec<_>>(),
             "drives": drives.collect::<Vec<_>>(),

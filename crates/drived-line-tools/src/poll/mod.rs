@@ -9,7 +9,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_bus::Stats;
+use drive_bus::{Line, Stats};
 use drive_core::{Drive, Error, ErrorKind, PortError, Status};
 use drive_fleet::FEED_PART;
 use tokio::{sync::mpsc, task::JoinSet, time};
@@ -106,7 +106,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         }
     }
     let proposal = line_spec::proposal(&config, &line.stats());
-    let findings = findings::told(&line, &names);
+    let (findings, why) = (findings::told(&line, &names), book.why(&line, &names));
     polls.shutdown().await;
     link::read_counters(&line, &names, &config).await;
     let stats = line.stats();
@@ -121,7 +121,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
             output::say(text)?;
         }
     }
-    book.verdict(&names)
+    book.verdict(&names, &why)
 }
 
 async fn reached(until: Option<time::Instant>) {
@@ -220,25 +220,32 @@ impl Book {
         }
     }
 
-    fn verdict(&self, names: &[DriveName]) -> Result<(), Failure> {
+    /// Why drives do not answer, as far as their line has found that.
+    fn why(&self, line: &Line, names: &[DriveName]) -> Vec<String> {
+        let silent = names.iter().filter(|name| !self.answered.contains_key(name));
+        silent.filter_map(|name| findings::why(line, *name)).collect()
+    }
+
+    fn verdict(&self, names: &[DriveName], why: &[String]) -> Result<(), Failure> {
         let silent = names.iter().filter(|name| !self.answered.contains_key(name));
         let silent: Vec<String> = silent.map(ToString::to_string).collect();
         if silent.is_empty() {
             return Ok(());
         }
-        Err(Failure::Drive(format!(
-            "no status from {}: see that it is switched on, wired, and set to this address, speed and format",
-            silent.join(", ")
-        )))
+        let next = match why {
+            [] => "see that it is switched on, wired, and set to this address, speed and format".to_owned(),
+            [why, ..] => why.clone(),
+        };
+        Err(Failure::Drive(format!("no status from {}: {next}", silent.join(", "))))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
+    use drive_bus::{LineConfig, Protocol, protocol::AsciiSettings};
     use drive_core::{Reaction, SlaveAddress};
     use drive_families::{Family, Options, SetUp, simulated};
-    use drive_sim::{SimLine, Wiring};
+    use drive_sim::{LinkHabits, SimLine, Wiring};
     use tokio::time::sleep;
 
     use super::*;
@@ -276,5 +283,32 @@ mod tests {
             sleep(2 * period).await;
             assert!(machine.observe().trip.is_some(), "{family} {protocol:?}: nobody feeds it any more");
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_drive_that_acknowledges_too_late_is_told_so_with_the_setting_and_not_to_be_switched_on() {
+        let settings = "19200 8O1".parse().unwrap();
+        let wiring = Wiring { protocol: drive_sim::Protocol::UniTelway, ..Wiring::rtu(settings) };
+        let simulated = SimLine::new(wiring);
+        let machine =
+            simulated.add_boxed(4, simulated::model(Family::ATV58, SetUp::ForTheBus).unwrap()).unwrap();
+        // The manual of the card prints no time for an acknowledgement: any is lawful.
+        let acknowledges_after = Some(Duration::from_millis(150));
+        machine.set_link_habits(LinkHabits { acknowledges_after, ..LinkHabits::default() });
+        let config = LineConfig { protocol: "unitelway".parse().unwrap(), ..LineConfig::stream(settings) };
+        let line = Line::over(simulated.in_memory(), config);
+        let name = DriveName { family: Family::ATV58, slave: SlaveAddress::try_from(4).unwrap() };
+        let drive = own_line::open_drive(&line, name, &Options::default());
+        let (readings, mut incoming) = mpsc::channel(WAITING);
+        let polls = tokio::spawn(poll(name, drive, Duration::from_secs(1), readings));
+        sleep(Duration::from_secs(15)).await;
+        let mut book = Book::default();
+        while let Ok(reading) = incoming.try_recv() {
+            book.note(&reading);
+        }
+        polls.abort();
+        let why = book.why(&line, &[name]);
+        let told = book.verdict(&[name], &why).unwrap_err().to_string();
+        assert!(told.contains("link-timeout=200ms") && !told.contains("switched on"), "{told}");
     }
 }

@@ -8,6 +8,7 @@ use std::{collections::BTreeSet, fs, path::PathBuf};
 
 use drive_bus::{
     capture::{self, Captured, Direction, Dissector, Recording},
+    config::SerialText,
     exchange::rtu,
 };
 use drive_core::{SerialSettings, serial::CharacterFormat};
@@ -20,7 +21,7 @@ use drived_words::explain::{Explainer, Known};
 use drived_words::{
     drive_spec::{DriveSpec, on_one_line},
     failure::Failure,
-    line_spec::SerialSpec,
+    line_spec,
     output::{self, counted},
     signals::Ending,
 };
@@ -42,7 +43,7 @@ pub struct Args {
     pty: PathBuf,
     /// Speed and format that the line had; 19200,8E1 when they are not given, and 19200,8O1 for UNI-TELWAY
     #[arg(long, value_name = "BAUD[,FORMAT]")]
-    serial: Option<SerialSpec>,
+    serial: Option<SerialText>,
     /// Which drives were on the line, for the words of what the capture does not have
     #[arg(long, value_name = "FAMILY@ADDRESSES")]
     drive: Vec<DriveSpec>,
@@ -58,7 +59,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let protocol =
         spoken(&recording).ok_or_else(|| named(&"Modbus TCP is no line that could be played back"))?;
     let settings = match args.serial {
-        Some(serial) => serial.settings(&drives).map_err(|error| input(&error))?,
+        Some(serial) => line_spec::settings(serial, &drives).map_err(|error| input(&error))?,
         None => usual(protocol),
     };
     let found = exchanges(&recording, settings);

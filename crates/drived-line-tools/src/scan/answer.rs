@@ -1,5 +1,6 @@
 //! What is at an address, and in which words it is told.
 
+use drive_bus::evidence::{Certainty, Defect, Finding};
 use drive_core::{Capabilities, Identity};
 use drive_families::Family;
 use serde_json::{Value, json};
@@ -11,12 +12,12 @@ pub(super) enum Answer {
     Damaged(String),
     /// Something answers, and it could be a drive of these families.
     Slave(Vec<Likeness>),
-    /// Two slaves answer.
+    /// Two slaves may answer, by what the line has found.
     Two {
         /// What one of them could be, as far as its answers come intact.
         alike: Vec<Likeness>,
         /// How that shows.
-        why: String,
+        finding: Finding,
     },
 }
 
@@ -73,13 +74,19 @@ impl Answer {
                 format!("{why}: something else is sending, or speed, format or protocol are others")
             }
             Self::Slave(alike) => described(alike),
-            Self::Two { alike, why } => {
+            Self::Two { alike, finding } => {
+                let what = match finding.defect {
+                    Defect::AnswersTwice => "EACH ANSWER COMES TWICE",
+                    _ => "TWO DRIVES SEEM TO HAVE THIS ADDRESS",
+                };
                 let seen =
                     if alike.is_empty() { String::new() } else { format!(", one {}", described(alike)) };
-                format!(
-                    "TWO DRIVES SEEM TO HAVE THIS ADDRESS{seen}: {why}. Switch one off, give the other another address, \
-                     and scan again; with one alone there, see its cable"
-                )
+                let other = match finding.certainty {
+                    Certainty::CannotBeToldFrom(other) => format!("; a master cannot tell it from {other}"),
+                    _ => String::new(),
+                };
+                let next = finding.next().first().copied().unwrap_or_default();
+                format!("{what}{seen}: {finding}{other}. Next: {next}")
             }
         }
     }
@@ -87,10 +94,10 @@ impl Answer {
     /// For a program.
     pub(super) fn object(&self) -> Value {
         let (verdict, alike, why) = match self {
-            Self::Damaged(why) => ("damaged", &[][..], Some(why)),
+            Self::Damaged(why) => ("damaged", &[][..], Some(why.clone())),
             Self::Slave(alike) if alike.is_empty() => ("unknown_slave", &[][..], None),
             Self::Slave(alike) => ("drive", &alike[..], None),
-            Self::Two { alike, why } => ("two_at_one_address", &alike[..], Some(why)),
+            Self::Two { alike, finding } => (finding.defect.name(), &alike[..], Some(finding.to_string())),
         };
         let families: Vec<Value> = alike.iter().map(Likeness::object).collect();
         let mut object = json!({ "verdict": verdict, "families": families });

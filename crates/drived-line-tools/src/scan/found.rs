@@ -15,7 +15,7 @@ use super::{
     plan::{Plan, Trial},
     sweep::Find,
 };
-use drived_words::{drive_spec::Addresses, failure::Failure, json, line_spec, output};
+use drived_words::{drive_spec::Addresses, failure::Failure, json, output};
 
 /// The finds of a scan, for a person or a program.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Finds {
 
     /// A line with the settings of a trial, as `--line` takes it.
     pub(super) fn written(&self, trial: &Trial) -> String {
-        line_spec::written(&trial.config(self.line.clone(), Duration::ZERO))
+        trial.config(self.line.clone(), Duration::ZERO).to_string()
     }
 
     /// Tells of one more.

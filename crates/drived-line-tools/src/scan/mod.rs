@@ -14,6 +14,7 @@ use std::{path::PathBuf, time::Duration};
 
 use drive_bus::{
     LineConfig, Protocol,
+    config::baud_of,
     listen::{Listener, Role},
 };
 use drive_core::serial::CharacterFormat;
@@ -80,7 +81,7 @@ pub struct What {
     #[arg(long)]
     standstill: bool,
     /// Of the other speeds only these, such as 9600,19200
-    #[arg(long, value_name = "SPEEDS", value_delimiter = ',', value_parser = line_spec::speed)]
+    #[arg(long, value_name = "SPEEDS", value_delimiter = ',', value_parser = baud_of)]
     speeds: Vec<u32>,
     /// Of the other formats only these, such as 8E1,8N1
     #[arg(long, value_name = "FORMATS", value_delimiter = ',')]
@@ -110,7 +111,7 @@ pub async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Result<(), 
     let mut sweep = Sweep::new(&plan, line.clone(), what.wait.0, own_line::open_line);
     what.announce(&line, &plan, is_json)?;
     tokio::select! {
-        () = listen_first(&line) => {}
+        is_shared = listen_first(&line) => sweep.is_shared = is_shared,
         () = ending.asked() => return Ok(()),
     }
     let began = Instant::now();
@@ -160,12 +161,12 @@ pub async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Result<(), 
 }
 
 /// Hears whether somebody else asks on this line before anything is asked: his questions and ours would destroy each other.
-async fn listen_first(line: &LineConfig) {
+async fn listen_first(line: &LineConfig) -> bool {
     if !line.protocol.is_paced() {
-        return;
+        return false;
     }
     // A port that cannot be listened to is told of when it is asked.
-    let Ok(mut listener) = Listener::open(line).await else { return };
+    let Ok(mut listener) = Listener::open(line).await else { return false };
     let mut requests = 0_u32;
     let listening = async {
         while let Ok(Some(heard)) = listener.next().await {
@@ -180,6 +181,7 @@ async fn listen_first(line: &LineConfig) {
              asking first, then scan again"
         ));
     }
+    requests > 0
 }
 
 impl What {

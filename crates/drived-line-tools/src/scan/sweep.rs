@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use drive_bus::{Line, LineConfig, SlaveSettings};
+use drive_bus::{
+    Line, LineConfig, SlaveSettings,
+    evidence::{Defect, Finding},
+};
 use drive_families::Family;
 use tokio::time::Instant;
 
@@ -24,6 +27,9 @@ const IDENTIFICATION: u8 = 0x2B;
 /// How much longer one is waited for whose answer came too late.
 const SLOWER: u32 = 10;
 
+/// So many are, of whom nothing is known but that the next was disturbed: where there is noise that is said of anybody.
+const DISTURBING: usize = 8;
+
 /// The scan of a line.
 pub(super) struct Sweep<'a, Open> {
     plan: &'a Plan,
@@ -33,6 +39,11 @@ pub(super) struct Sweep<'a, Open> {
     /// The line as it is open now, and at which of the trials.
     at: Option<(usize, Line)>,
     feeding: Feeding,
+    /// The last one that was silent, and those that were when the next was disturbed: by their late answers, may be.
+    silent: Option<Step>,
+    disturbing: Vec<Step>,
+    /// Another master was heard before anything was asked.
+    pub(super) is_shared: bool,
     began: Instant,
 }
 
@@ -54,6 +65,9 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             open,
             at: None,
             feeding: Feeding::default(),
+            silent: None,
+            disturbing: Vec::new(),
+            is_shared: false,
             began: Instant::now(),
         }
     }
@@ -81,12 +95,16 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// Asks those once more, and waits longer, whose answer came when another was asked.
     async fn ask_slow(&mut self, mut tell: impl FnMut(Told) -> Result<(), Failure>) -> Result<(), Failure> {
         let Some((trial, line)) = self.at.clone() else { return Ok(()) };
-        let is_late = |slave: u8| line.stats().slaves.get(&slave).is_some_and(|stats| stats.late > 0);
+        let is_late = |step: &Step| {
+            let stats = line.stats();
+            stats.slaves.get(&step.slave.number()).is_some_and(|stats| stats.late > 0)
+                || self.disturbing.contains(step)
+        };
         let steps: Vec<Step> = self
             .plan
             .steps
             .iter()
-            .filter(|step| step.trial == trial && is_late(step.slave.number()) && !self.feeding.has(**step))
+            .filter(|step| step.trial == trial && is_late(step) && !self.feeding.has(**step))
             .copied()
             .collect();
         for step in steps {
@@ -106,11 +124,15 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// What is wrong with the line by what was heard, and what its far end was seen to be like.
     pub(super) fn findings(&self) -> Vec<String> {
         let Some((_, line)) = &self.at else { return Vec::new() };
-        // What is wrong with one address is told of that.
-        let of_line = line.findings().into_iter().filter(|finding| finding.slave.is_none());
-        let told = of_line.map(|finding| {
+        // That two answer is told of their address, and most addresses refuse what families are known by.
+        let is_told = |finding: &Finding| {
+            let is_odd = matches!(finding.defect, Defect::RefusesAll(_) | Defect::FellSilent(_));
+            finding.slave.is_none() || !is_odd && !finding.is_of_two()
+        };
+        let told = line.findings().into_iter().filter(is_told).map(|finding| {
+            let whose = finding.slave.map_or_else(String::new, |slave| format!("address {slave}: "));
             let next = finding.next().first().map_or_else(String::new, |next| format!(": {next}"));
-            format!("{finding}{next}")
+            format!("{whose}{finding}{next}")
         });
         let proposal = line_spec::proposal(&line.config(), &line.stats());
         told.chain(proposal).collect()
@@ -125,11 +147,17 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
 
     async fn ask(&mut self, step: Step) -> Result<Option<Find>, Failure> {
         let line = self.fed_line(step).await?;
+        let before = look::unasked(&line);
         let heard = look::ask(&line, step.slave, self.wait).await?;
+        let silent = std::mem::replace(&mut self.silent, Some(step).filter(|_| heard == Heard::Nothing));
+        let is_disturbed = self.disturbing.len() < DISTURBING && look::unasked(&line) > before;
+        self.disturbing.extend(silent.filter(|silent| is_disturbed && silent.trial == step.trial));
         let (answer, interval) = match heard {
             Heard::Nothing => return Ok(None),
-            Heard::Damaged(answer @ Answer::Damaged(_)) => (answer, None),
-            Heard::Damaged(answer) => (answer, Some(Duration::from_secs(1))),
+            Heard::Damaged(why) => self.judged(step, Vec::new(), Some(why)).await?,
+            Heard::Somebody if self.found(&line, step).is_some() => {
+                self.judged(step, Vec::new(), None).await?
+            }
             Heard::Somebody => self.recognise(step).await?,
         };
         if let Some(interval) = interval {
@@ -153,6 +181,9 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 break;
             }
             let line = self.line_fed_for(step, LOOK).await?;
+            if self.found(&line, step).is_some_and(|finding| finding.is_of_two()) {
+                break;
+            }
             let config = line.config();
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
                 continue;
@@ -183,17 +214,35 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             false => longest <= likeness.family.capabilities().read_words,
         });
         intervals.retain(|(family, _)| alike.iter().any(|likeness| likeness.family == *family));
-        let unknown = alike.is_empty().then_some(Duration::from_secs(1));
-        let interval = intervals.into_iter().filter_map(|(_, interval)| interval).chain(unknown).min();
+        let interval = intervals.into_iter().filter_map(|(_, interval)| interval).min();
+        let damaged = is_damaged.then(|| "again and again its answers are damaged".to_owned());
+        let (answer, unknown) = self.judged(step, alike, damaged).await?;
+        Ok((answer, interval.or(unknown)))
+    }
+
+    /// What is there, by what the line has found, else by what it looks like; and how often it is fed where nobody knows that.
+    async fn judged(
+        &mut self,
+        step: Step,
+        alike: Vec<Likeness>,
+        damaged: Option<String>,
+    ) -> Result<(Answer, Option<Duration>), Failure> {
         let line = self.line(step.trial).await?;
-        if let Some(cut) = look::cut(&line, step.slave).filter(|_| is_damaged) {
-            return Ok((Answer::Damaged(cut), interval));
-        }
-        if is_damaged {
-            let why = "short answers come intact, longer ones are damaged every time".to_owned();
-            return Ok((Answer::Two { alike, why }, interval));
-        }
-        Ok((Answer::Slave(alike), interval))
+        let often = Some(Duration::from_secs(1));
+        Ok(match (self.found(&line, step), damaged) {
+            (Some(finding), _) if finding.is_of_two() => (Answer::Two { alike, finding }, often),
+            (Some(finding), Some(_)) => (Answer::Damaged(finding.to_string()), None),
+            (None, Some(why)) => (Answer::Damaged(why), None),
+            (_, None) => {
+                let often = often.filter(|_| alike.is_empty());
+                (Answer::Slave(alike), often)
+            }
+        })
+    }
+
+    /// What the line has found wrong at this address. Where another master was heard the answers to him are no second ones.
+    fn found(&self, line: &Line, step: Step) -> Option<Finding> {
+        look::found(line, step.slave).filter(|finding| !(self.is_shared && finding.is_of_two()))
     }
 
     /// The line at a step's settings, after those were fed who could not wait.

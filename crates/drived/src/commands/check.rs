@@ -65,7 +65,7 @@ fn object(file: &Path, config: &Config) -> Value {
     };
     let line = |line: &LinePart| {
         let drives: Vec<Value> = line.drives.iter().map(drive).collect();
-        json!({ "name": line.name, "port": line_spec::written(&line.config), "drives": drives })
+        json!({ "name": line.name, "port": line.config.to_string(), "drives": drives })
     };
     let gateway = |gateway: &GatewayConfig| {
         let meaning = texts(meaning_of_gateway(gateway));

@@ -36,6 +36,26 @@ pub(super) fn crc_fits(bytes: &[u8]) -> bool {
         .is_some_and(|(content, crc)| CRC.checksum(content) == u16::from_le_bytes(*crc))
 }
 
+/// Whether these bytes are a whole frame of this slave when one bit is turned round.
+pub(crate) fn is_frame_but_for_one_bit(bytes: &[u8], slave: u8) -> bool {
+    // What one bit does to the CRC depends on nothing but how many follow it. Over a frame with its CRC it is 0.
+    let wrong = CRC.checksum(bytes);
+    let mut turned: [u16; 8] = std::array::from_fn(|bit| behind_a_byte(1 << bit));
+    for (index, byte) in bytes.iter().enumerate().rev() {
+        if let Some(bit) = turned.iter().position(|of_bit| *of_bit == wrong) {
+            let first = if index == 0 { Some(byte ^ 1 << bit) } else { bytes.first().copied() };
+            return first == Some(slave);
+        }
+        turned = turned.map(behind_a_byte);
+    }
+    false
+}
+
+/// The register of the CRC after eight bits 0 more.
+fn behind_a_byte(register: u16) -> u16 {
+    (0..8).fold(register, |register, _| (register >> 1) ^ if register & 1 == 1 { 0xA001 } else { 0 })
+}
+
 /// How long the shortest frame is that these bytes begin with.
 pub(super) fn shortest_frame(bytes: &[u8]) -> Option<usize> {
     let mut digest = CRC.digest();

@@ -1,7 +1,7 @@
 //! What is written to a drive's EEPROM, and how often.
 
 use super::*;
-use crate::{ConcernKind, EEPROM_WRITES_A_DAY, EepromLedger};
+use crate::{ConcernKind, EEPROM_WRITES_A_DAY, EepromLedger, OnExitWatchdog, eeprom::EepromUse};
 
 const HOUR: Duration = Duration::from_secs(3_600);
 
@@ -120,24 +120,65 @@ fn parameters_and_saves_stand_in_the_same_ledger_and_what_changes_nothing_does_n
 
 const ROW_IN_EEPROM: drive_core::Row = drive_core::Row { storage: Storage::Eeprom, ..super::questions::ROW };
 
-#[test]
-fn a_write_that_is_dropped_for_a_stop_may_have_been_one_and_is_counted() {
-    let mut rig = Rig::over(settings(), true);
-    let until = loop {
+/// Goes on until a job of this kind is in flight, and stops the drive then. Until when it might have gone on.
+fn stop_amid(rig: &mut Rig, kind: fn(Job) -> bool) -> Option<Instant> {
+    for _ in 0..1_000 {
         match rig.machine.next(rig.now) {
-            Step::Do { job: Job::ArmWatchdog(..), until, .. } => break until,
+            Step::Do { job, until, .. } if kind(job) => {
+                rig.stop(StopMode::Ramp);
+                rig.collect();
+                return until;
+            }
             Step::Do { job, .. } => {
                 let reply = rig.drive.answer(job);
                 rig.machine.handle_reply(rig.now, reply);
             }
             Step::Wait(_) if rig.machine.turn() == Turn::Wanted => rig.machine.grant_turn(),
             Step::Wait(at) => rig.now = at,
-            Step::Finished => panic!("it is not armed"),
+            Step::Finished => break,
         }
-    };
+        rig.collect();
+    }
+    panic!("no such job in {:?}", rig.drive.log)
+}
+
+#[test]
+fn a_watchdog_whose_setting_up_is_dropped_for_a_stop_may_be_armed_and_is_counted() {
+    let mut rig = Rig::over(settings(), true);
+    let until = stop_amid(&mut rig, |job| matches!(job, Job::ArmWatchdog(..)));
     assert_eq!(until, None, "no poll cuts it");
-    rig.stop(StopMode::Ramp);
-    rig.collect();
     assert_eq!(ledger(&rig).map(|ledger| ledger.writes), Some(1));
     assert_eq!(rig.snapshot().watchdog, crate::WatchdogCheck::Unchecked, "it is read again");
+}
+
+#[test]
+fn whatever_write_is_dropped_for_a_stop_is_counted_once_with_who_wanted_it() {
+    let parameter = |rig: &mut Rig| {
+        rig.machine.handle_question(CallId(100), "tester", Question::Write(&ROW_IN_EEPROM, 7));
+        stop_amid(rig, |job| matches!(job, Job::Ask(_)));
+    };
+    let save = |rig: &mut Rig| {
+        rig.order(Order::Persist);
+        stop_amid(rig, |job| job == Job::Persist);
+    };
+    for (by, dropped) in [(EepromUse::Parameter, parameter as fn(&mut Rig)), (EepromUse::Save, save)] {
+        let mut rig = Rig::over(settings(), true);
+        rig.pass(1_500 * MS);
+        dropped(&mut rig);
+        assert_eq!(ledger(&rig).map(|ledger| ledger.writes), Some(2), "the watchdog, and this: {by:?}");
+        assert!(
+            rig.happened().any(|it| matches!(it.kind, EventKind::EepromWritten { by: is, .. } if is == by))
+        );
+        assert_eq!(rig.cause_of("eeprom written"), Some(Cause::Command(Act::of("tester"))), "{by:?}");
+    }
+}
+
+#[test]
+fn a_putting_back_that_is_dropped_for_a_stop_is_counted_as_the_exits() {
+    let mut rig = Rig::over(DriveSettings { on_exit_watchdog: OnExitWatchdog::Restore, ..settings() }, true);
+    rig.pass(1_500 * MS);
+    rig.machine.handle_exit(rig.now, Policy::Exit);
+    stop_amid(&mut rig, |job| matches!(job, Job::RestoreWatchdog(_)));
+    assert_eq!(ledger(&rig).map(|ledger| ledger.writes), Some(2));
+    assert_eq!(rig.cause_of("eeprom written"), Some(Cause::policy(Policy::Exit)));
 }

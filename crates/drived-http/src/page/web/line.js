@@ -6,7 +6,7 @@ import { duration, MISSING, quantity } from './format.js';
 import { lastExchanges } from './line_last.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
-import { told } from './told.js';
+import { foundWords, told } from './told.js';
 import { word } from './vocabulary.js';
 
 /** Kinds that a slave's exchanges have, and those that only the line can tell. */
@@ -70,16 +70,22 @@ export function line(root, name) {
     last.update();
     const findings = now.findings ?? [];
     found.hidden = findings.length === 0;
-    found.replaceChildren(el('h2', {}, t('line_findings')), el('ul', {}, ...findings.map(finding => el('li', {},
-      el('b', {}, [finding.drive ?? (finding.slave && `${t('slave')} ${finding.slave}`), word(finding.defect)].filter(Boolean).join(': ')),
-      ` ${t('of_traffic', { part: finding.part, of: finding.of })}. `,
-      el('span.hint', { lang: 'en' }, [finding.text, ...finding.next].join('; '))))));
+    found.replaceChildren(el('h2', {}, t('line_findings')), el('ul', {}, ...findings.map(foundItem)));
     setText(kinds, LINE_ERRORS.filter(kind => now.errors?.[kind] !== undefined).map(kind => named(word(kind), quantity(now.errors[kind], 0))).join(' · '));
     const rows = now.slaves ?? [];
     const longest = Math.max(1, ...rows.map(row => row.answer_ms?.max ?? 0));
     slaves.replaceChildren(table('', [[t('slave'), 'right'], t('drive'), t('state'), t('answer_times'), [t('usual'), 'right'], [t('of_hundred'), 'right'],
       [t('longest'), 'right'], [t('exchanges'), 'right'], ...ERRORS.map(kind => [word(kind), 'right'])], rows.map(row => slaveRow(row, longest))));
   }
+}
+
+/** What was found, of whom, and what to do next. */
+function foundItem(finding) {
+  const { text, alike, next, lang } = foundWords(finding);
+  const whose = finding.drive ?? (finding.slave && `${t('slave')} ${finding.slave}`);
+  return el('li', { lang }, el('b', {}, whose ? named(whose, word(finding.defect)) : word(finding.defect)),
+    el('p', {}, [text, alike].filter(Boolean).join(lang === 'fr' ? ' ; ' : '; ')),
+    el('ul.hint', {}, ...next.map(step => el('li', {}, step))));
 }
 
 function slaveRow(row, longest) {

@@ -85,6 +85,7 @@ export const SENTENCES_FR = {
   tripped: 'après un défaut',
 
   // What the line or the drive answered.
+  'another answer came to the same question': 'une autre réponse est arrivée à la même question',
   'the drive does not have this function': 'le variateur n’a pas cette fonction',
   'the drive does not have this register, or not for this access': 'le variateur n’a pas ce registre, ou pas pour cet accès',
   'the drive does not take this value or quantity': 'le variateur n’accepte pas cette valeur ou cette quantité',

@@ -193,7 +193,7 @@ const TABLE = {
   errors: ['Errors', 'Erreurs'],
   port: ['Port', 'Port'],
   line_findings: ['What is wrong with this line', 'Ce qui ne va pas sur cette ligne'],
-  of_traffic: ['({part} of {of})', '({part} sur {of})'],
+  to_do_next: ['Next', 'À faire'],
   exchange_times: ['Exchange times and errors by drive', 'Temps d’échange et erreurs par variateur'],
   usual: ['usual', 'usuel'],
   longest: ['longest', 'maximal'],

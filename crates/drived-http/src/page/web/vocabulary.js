@@ -103,6 +103,7 @@ const WORDS = {
   stop_confirmed: ['Stop confirmed', 'Arrêt confirmé'],
   command: ['Command', 'Commande'],
   eeprom_written: ['EEPROM written', 'EEPROM écrite'],
+  not_any_more: ['not any more', 'ce n’est plus le cas'],
   line_finding: ['Line finding', 'Constat sur la ligne'],
   far_end_faster: ['Answers sooner than the speed allows', 'Réponses plus rapides que la vitesse réglée'],
   first_byte_cut: ['First byte missing', 'Premier octet perdu'],

@@ -2,7 +2,7 @@
 
 import { quantity } from './format.js';
 import { language, named, t } from './texts.js';
-import { told } from './told.js';
+import { foundWords, told } from './told.js';
 import { word } from './vocabulary.js';
 
 const COMMANDS = [
@@ -37,7 +37,9 @@ export function command(given) {
 }
 
 /** What happened, without the kind of event that stands before it. */
-export function eventText({ event, text = '' }) {
+export function eventText(happened) {
+  const { event, text = '' } = happened;
+  if (event === 'line_finding' && language() === 'fr') return findingText(happened);
   const kind = String(event).replaceAll('_', ' ');
   const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^: /, '') : text;
   const change = rest.match(/^(\w+) to (\w+)$/);
@@ -49,6 +51,14 @@ export function eventText({ event, text = '' }) {
     return named(`${command({ command: what })}, ${told(who)}`, became);
   }
   return told(rest);
+}
+
+/** What a line has found, or does not find any more. */
+function findingText(happened) {
+  const { text, next } = foundWords(happened);
+  const whose = [happened.of_line && t('line_name'), !happened.present && word('not_any_more')].filter(Boolean).join(', ');
+  const first = happened.present && next[0] ? `. ${named(t('to_do_next'), next[0])}` : '';
+  return `${whose ? named(whose, text) : text}${first}`;
 }
 
 /** What a drive does, in the one word with which its row begins everywhere: the daemon says which. */

@@ -4,8 +4,9 @@ use super::Case;
 use crate::doctor::verdict::{Certainty, Defect, Verdict};
 
 /// Drives that should be there and have never answered, where others have.
-pub(super) fn absent(case: &Case<'_>) -> Option<Verdict> {
+pub(super) fn absent(case: &Case<'_>, explained: &[u8]) -> Option<Verdict> {
     let named = case.seen.expected.iter().map(|name| name.slave.number());
+    let named = named.filter(|slave| !explained.contains(slave));
     let absent: Vec<u8> = named
         .filter(|slave| {
             case.figures(*slave).is_some_and(|figures| {

@@ -37,10 +37,7 @@ pub(super) fn second_master(case: &Case<'_>) -> Option<Verdict> {
 /// Two drives that have one address, or one that answers twice. Where another master asks the same slaves their answers to him are
 /// no second answers to us.
 pub(super) fn two(case: &Case<'_>, slave: u8) -> Option<Verdict> {
-    let is_it = |finding: &&Finding| {
-        finding.slave == Some(slave)
-            && matches!(finding.defect, evidence::Defect::TwoAtOneAddress | evidence::Defect::AnswersTwice)
-    };
+    let is_it = |finding: &&Finding| finding.slave == Some(slave) && finding.is_of_two();
     let finding = case.seen.findings.iter().find(is_it).filter(|_| !case.is_shared)?;
     let told = format!("{}: {finding}", case.seen.name(slave));
     Some(Verdict::new(Defect::TwoAtOneAddress, &[slave], certainty(finding), told, finding.next()))
@@ -73,7 +70,7 @@ fn defect(case: &Case<'_>, finding: &Finding) -> Option<Defect> {
 fn certainty(finding: &Finding) -> Certainty {
     match finding.certainty {
         evidence::Certainty::Certain => Certainty::Certain,
-        evidence::Certainty::CannotBeToldFrom(other) => Certainty::CannotBeToldFrom(other.to_owned()),
+        evidence::Certainty::CannotBeToldFrom(other) => Certainty::CannotBeToldFrom(other.to_string()),
         _ => Certainty::Likely,
     }
 }

@@ -14,7 +14,7 @@ pub(super) use self::masters::{Habit, habits};
 
 use super::{
     observations::{Figures, Observations},
-    verdict::Verdict,
+    verdict::{Defect, Verdict},
 };
 
 /// So few failures are chance, whatever share they are.
@@ -62,12 +62,15 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
             verdicts.push(verdict);
         }
     };
+    let is_late_link = heard.iter().any(|verdict| verdict.defect == Defect::LinkTimeout);
     for verdict in heard {
         of_one(Some(verdict), &mut explained);
     }
-    of_one(address::absent(&case), &mut explained);
+    of_one(address::absent(&case, &explained), &mut explained);
     // Two that speak for one disturb whoever is asked next.
     let is_doubled = case.figures.iter().any(|figures| heard::two(&case, figures.slave).is_some());
+    // So does one that acknowledges when another is asked.
+    let is_disturbed = is_doubled || is_late_link;
     for figures in &case.figures {
         let slave = figures.slave;
         if explained.contains(&slave) {
@@ -76,7 +79,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         let found = timing::needs_pause(&case, slave)
             .or_else(|| cable::interference(&case, slave))
             .or_else(|| heard::two(&case, slave))
-            .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_doubled || figures.silent > FEW));
+            .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_disturbed || figures.silent > FEW));
         of_one(found, &mut explained);
     }
     let held = timing::adapter(&case);
@@ -86,7 +89,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     if !is_shared {
         of_one(timing::late(&case, &explained), &mut Vec::new());
         of_one(timing::slow(&case, is_held), &mut Vec::new());
-        if !is_doubled {
+        if !is_disturbed {
             of_one(cable::noise(&case, &explained), &mut Vec::new());
         }
     }

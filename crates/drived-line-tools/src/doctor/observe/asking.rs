@@ -77,6 +77,9 @@ pub(super) struct Asker {
     pub(super) soon: usize,
 }
 
+/// So much later than it is waited for an acknowledgement of UNI-TELWAY may come.
+const LATE: Duration = Duration::from_millis(400);
+
 /// The pause before a question.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Pause {
@@ -126,6 +129,7 @@ impl Asking {
                 if self.is_anybody_at(asker.slave) {
                     break;
                 }
+                self.hear_out(&asker).await;
             }
             if self.is_anybody_at(asker.slave) {
                 self.be_patient(task, slave);
@@ -171,6 +175,7 @@ impl Asking {
             // One that should be there and was silent may come; each of them in its turn.
             if let Some(mut asker) = silent.pop() {
                 self.ask(&mut asker, Pause::Rest).await?;
+                self.hear_out(&asker).await;
                 if let (true, Ok(slave)) =
                     (self.is_anybody_at(asker.slave), SlaveAddress::try_from(asker.slave))
                 {
@@ -221,6 +226,17 @@ impl Asking {
         let stats = self.line.stats();
         let late = stats.slaves.get(&slave).is_some_and(|stats| stats.late > 0);
         late || self.asked.iter().any(|asked| asked.slave == slave && (asked.is_good() || asked.is_garbled()))
+    }
+
+    /// Asks nobody for as long as one that should be there and was silent may be late: on UNI-TELWAY what it says then is one
+    /// character, which any other question would destroy.
+    async fn hear_out(&self, asker: &Asker) {
+        if asker.is_named
+            && self.line.config().protocol.name() == "unitelway"
+            && !self.is_anybody_at(asker.slave)
+        {
+            time::sleep(LATE).await;
+        }
     }
 
     /// How often a drive wants a message that has just answered. One whose watchdog nobody can read gets what its family always

@@ -3,40 +3,16 @@
 use drive_bus::{Gateway, Protocol};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
-    time::{Instant, sleep},
+    time::sleep,
 };
 
 use super::*;
-use crate::doctor::verdict::Certainty;
+use crate::{
+    doctor::verdict::Certainty,
+    testing::{Change, Through},
+};
 
 const SECOND: Duration = Duration::from_secs(1);
-
-/// What is done to what the slaves say, at a time since the beginning.
-type Change = fn(Duration, &mut Vec<u8>);
-
-/// A simulated line, behind something that changes what its slaves say.
-struct Through(SimLine, Change);
-
-impl Through {
-    fn stream(&self, serial: SerialSettings) -> DuplexStream {
-        let (ours, near) = tokio::io::duplex(4_096);
-        let (mut from_us, mut to_us) = tokio::io::split(near);
-        let (mut from_slaves, mut to_slaves) = tokio::io::split(self.0.in_memory_at(serial));
-        let (change, begun) = (self.1, Instant::now());
-        tokio::spawn(async move { tokio::io::copy(&mut from_us, &mut to_slaves).await });
-        tokio::spawn(async move {
-            let mut bytes = vec![0; 512];
-            while let Ok(len @ 1..) = from_slaves.read(&mut bytes).await {
-                let mut said = bytes[..len].to_vec();
-                change(begun.elapsed(), &mut said);
-                if to_us.write_all(&said).await.is_err() {
-                    return;
-                }
-            }
-        });
-        ours
-    }
-}
 
 impl Ways for Through {
     async fn open(&self, config: LineConfig) -> Result<Line, Failure> {
@@ -198,4 +174,25 @@ async fn a_gateway_that_answers_for_a_dead_drive_is_not_taken_for_the_drive() {
     let seen = observe::observe(&task, &Behind(gateway), |_| {}, std::future::pending()).await.unwrap();
     assert_eq!(kinds(&seen), [Defect::RefusesAll], "{}", told(&seen));
     assert!(judge(&seen)[0].finding.contains("0Bh"), "{}", told(&seen));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_acknowledges_later_than_the_link_waits_is_named_with_the_setting() {
+    let serial: SerialSettings = "19200 8O1".parse().unwrap();
+    let line = SimLine::new(Wiring { protocol: drive_sim::Protocol::UniTelway, ..Wiring::rtu(serial) });
+    let mut bench = Bench { line, names: Vec::new(), machines: Vec::new(), serial };
+    for number in [1, 2] {
+        let model = simulated::model(Family::ATV58, SetUp::Factory).unwrap();
+        bench.machines.push(bench.line.add_boxed(number, model).unwrap());
+        bench.names.push(DriveName { family: Family::ATV58, slave: SlaveAddress::try_from(number).unwrap() });
+    }
+    let late = drive_sim::LinkHabits { acknowledges_after: Some(3 * SECOND / 20), ..Default::default() };
+    bench.machine(2).set_link_habits(late);
+    let config = LineConfig { protocol: "unitelway".parse().unwrap(), ..LineConfig::stream(serial) };
+    let task = bench.task(config, 20 * SECOND);
+    let seen =
+        observe::observe(&task, &InMemory(bench.line.clone()), |_| {}, std::future::pending()).await.unwrap();
+    let verdicts = judge(&seen);
+    assert_eq!(defects(&verdicts), [(Defect::LinkTimeout, vec![2])], "{}", told(&seen));
+    assert!(verdicts[0].next[0].contains("link-timeout=200ms"), "{}", told(&seen));
 }

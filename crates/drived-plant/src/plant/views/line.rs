@@ -5,15 +5,12 @@ use drive_bus::{
     evidence::{Certainty, Finding},
     stats::{Histogram, SlaveStats, Stats},
 };
-use drive_fleet::{DriveHandle, LinePlan};
+use drive_fleet::{DriveHandle, LinePlan, view::FindingFigures};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::usage::Usage;
-use drived_words::{
-    json::{microseconds, milliseconds},
-    line_spec,
-};
+use drived_words::json::{microseconds, milliseconds};
 
 /// A line, and what was counted on it since it was opened.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -54,11 +51,9 @@ pub struct FindingView {
     /// The drive that has this address.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<String>,
-    /// How often it was seen.
-    pub part: u32,
-    /// Of how many.
-    pub of: u32,
-    /// From what it cannot be told; absent where it is certain.
+    #[serde(flatten)]
+    pub figures: FindingFigures,
+    /// From what it cannot be told, in words; absent where it is certain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cannot_be_told_from: Option<String>,
     pub text: String,
@@ -73,10 +68,9 @@ impl FindingView {
             defect: finding.defect.name().to_owned(),
             slave: finding.slave,
             drive: finding.slave.and_then(named).map(|drive| drive.name().to_string()),
-            part: finding.share.0,
-            of: finding.share.1,
+            figures: finding.into(),
             cannot_be_told_from: match finding.certainty {
-                Certainty::CannotBeToldFrom(what) => Some(what.to_owned()),
+                Certainty::CannotBeToldFrom(what) => Some(what.to_string()),
                 _ => None,
             },
             text: finding.to_string(),
@@ -151,7 +145,7 @@ impl LineView {
             stats.slaves.iter().map(|(&slave, of)| SlaveView::of(slave, of, drives)).collect();
         Self {
             name: name.to_owned(),
-            port: line_spec::written(&config),
+            port: config.to_string(),
             protocol: config.protocol.to_string(),
             link: if stats.opened > stats.lost { LineLink::Connected } else { LineLink::Away },
             error: stats.away.clone(),

@@ -7,7 +7,7 @@ use drive_core::{ErrorKind, Identity};
 
 use super::{Source, Unread};
 use crate::commands::param::file::{Backup, Entry, Head, is_kept};
-use drived_words::{failure::Failure, line_spec, output::Progress, values};
+use drived_words::{failure::Failure, output::Progress, values};
 
 /// A drive that does not answer so often in a row is not asked for the rest.
 const SILENT_AFTER: usize = 3;
@@ -71,7 +71,7 @@ impl Source {
                 Ok(Head {
                     name,
                     family,
-                    line: line_spec::written(one.config()),
+                    line: one.config().to_string(),
                     slave: one.name.slave.number(),
                     vendor: part(|identity| &identity.vendor),
                     model: part(|identity| &identity.model),

@@ -1,6 +1,9 @@
 //! What is at the far end of a line's port, as the text of a line and the keys of a file say it.
 
-use drive_bus::{Endpoint, Gateway, GatewayError, LineConfig, Stats, stats::WaitIs};
+use std::fmt;
+
+use super::LineConfig;
+use crate::gateway::{Gateway, GatewayError};
 
 /// The settings of it, as they stand anywhere behind the port.
 const GATEWAY: &str = "gateway=";
@@ -12,7 +15,7 @@ pub const MOST_CONNECTIONS: u8 = 2;
 
 /// What was said of the far end; the rest follows from the kind of port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FarEndSpec {
+pub struct FarEndSettings {
     /// The gateway between the port and the drives.
     pub gateway: Option<Gateway>,
     /// How many connections it grants us at once.
@@ -23,22 +26,29 @@ pub struct FarEndSpec {
 
 /// What cannot be said of a far end.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FarEndError {
+    /// No gateway.
     #[error("gateway={0}")]
     Gateway(#[from] GatewayError),
+    /// No number of connections.
     #[error("connections={0:?}: expected 1, or 2 where a stop may take a second connection")]
     Connections(String),
+    /// Connections of a serial port.
     #[error("a serial port has no connections: expected no {CONNECTIONS}")]
     NoConnections,
+    /// Neither yes nor no.
     #[error("far-end-paces={0:?}: expected yes or no")]
     Paces(String),
+    /// The setting.
     #[error("{0} is said twice")]
     Twice(&'static str),
+    /// A pace on Modbus TCP.
     #[error("Modbus TCP has no speed that its far end could keep: expected no {PACES}")]
     NoSpeed,
 }
 
-impl FarEndSpec {
+impl FarEndSettings {
     /// Takes its settings out of the text of a line, and gives the rest.
     pub(super) fn take(text: &str) -> Result<(String, Self), FarEndError> {
         let mut said = Self::default();
@@ -72,6 +82,7 @@ impl FarEndSpec {
     }
 
     /// What is said here, and of what is not said the other.
+    #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
             gateway: self.gateway.or(other.gateway),
@@ -81,11 +92,14 @@ impl FarEndSpec {
     }
 
     /// The line with this far end.
+    ///
+    /// # Errors
+    /// Where the line's port has no such thing.
     pub fn on(self, config: LineConfig) -> Result<LineConfig, FarEndError> {
         if self.paces.is_some() && !config.protocol.is_paced() {
             return Err(FarEndError::NoSpeed);
         }
-        if self.connections.is_some() && !matches!(config.endpoint, Endpoint::Tcp(_)) {
+        if self.connections.is_some() && !config.endpoint.is_connection() {
             return Err(FarEndError::NoConnections);
         }
         let Self { gateway, connections, paces } = self;
@@ -96,32 +110,20 @@ impl FarEndSpec {
     pub(super) fn of(config: &LineConfig) -> Self {
         Self { gateway: config.gateway, connections: config.connections, paces: config.far_end_paces }
     }
-
-    /// As it stands behind the port.
-    pub(super) fn written(self) -> String {
-        let gateway = self.gateway.map(|gateway| format!(",{GATEWAY}{gateway}"));
-        let connections = self.connections.map(|connections| format!(",{CONNECTIONS}{connections}"));
-        let paces = self.paces.map(|paces| format!(",{PACES}{}", if paces { "yes" } else { "no" }));
-        [gateway, connections, paces].into_iter().flatten().collect()
-    }
 }
 
-/// What the far end was seen to be like where the line is not set so, with the setting that says it.
-pub fn proposal(config: &LineConfig, stats: &Stats) -> Option<String> {
-    if config.far_end_paces != Some(false) && stats.is_faster_than_configured() {
-        return Some(format!(
-            "every answer came sooner than {} can carry it, and none was taken: an adapter without a UART or a program is faster than \
-             a line, say {PACES}no; or the speed is set too low",
-            config.serial
-        ));
+/// As it stands behind the port: each setting that was said behind a comma.
+impl fmt::Display for FarEndSettings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(gateway) = self.gateway {
+            write!(f, ",{GATEWAY}{gateway}")?;
+        }
+        if let Some(connections) = self.connections {
+            write!(f, ",{CONNECTIONS}{connections}")?;
+        }
+        match self.paces {
+            Some(paces) => write!(f, ",{PACES}{}", if paces { "yes" } else { "no" }),
+            None => Ok(()),
+        }
     }
-    let seen = stats.far_end.filter(|seen| seen.wait_is == WaitIs::Seen && config.gateway.is_none())?;
-    let wait = std::time::Duration::from_millis(
-        u64::try_from(seen.wait.as_millis().div_ceil(100)).unwrap_or(u64::MAX) * 100,
-    );
-    let gateway = Gateway { at_once: Some(seen.at_once), wait: Some(wait) };
-    Some(format!(
-        "a gateway was seen to wait {wait:?} for a drive that does not answer, and to serve {} at once: say {GATEWAY}{gateway}",
-        if seen.at_once == 1 { "one request".to_owned() } else { format!("{} requests", seen.at_once) }
-    ))
 }

@@ -1,5 +1,8 @@
 //! Scans of simulated lines, in virtual time.
 
+mod one;
+mod two;
+
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig, Protocol};
@@ -9,6 +12,7 @@ use drive_sim::{ALWAYS, Dialect, Fault, SimLine, SimSlave, Wiring};
 use tokio::time::Instant;
 
 use crate::sim;
+use drived_words::failure::Failure;
 
 use super::{
     answer::{Answer, Likeness},
@@ -35,7 +39,14 @@ fn at_one(settings: &str, numbers: impl IntoIterator<Item = u8>) -> Plan {
 }
 
 async fn scanned(simulated: &SimLine, plan: &Plan) -> Vec<Find> {
-    let open = async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
+    scanned_over(
+        async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config)),
+        plan,
+    )
+    .await
+}
+
+async fn scanned_over(open: impl AsyncFn(LineConfig) -> Result<Line, Failure>, plan: &Plan) -> Vec<Find> {
     let mut sweep = Sweep::new(plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open);
     let mut finds = Vec::new();
     let told = |told| {
@@ -245,77 +256,4 @@ async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() 
     tokio::time::sleep(Duration::from_secs(5)).await;
     assert!([&drive, &other].into_iter().all(|machine| machine.observe().trip.is_some()));
     assert_only_read(&[drive, other]);
-}
-
-mod two_at_one_address {
-    use super::*;
-
-    async fn verdict(simulated: &SimLine) -> Answer {
-        let mut finds = scanned(simulated, &at_one("19200 8N1", 3..=7)).await;
-        assert_eq!(finds.len(), 1, "{finds:?}");
-        finds.remove(0).answer
-    }
-
-    fn two(one: Family, other: Family) -> (SimLine, SimSlave, SimSlave) {
-        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
-        let [one, other] = [one, other].map(|family| {
-            simulated.add_beside(5, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap()
-        });
-        let turnaround = Some(Duration::from_millis(5));
-        one.set_turnaround(turnaround);
-        other.set_turnaround(turnaround);
-        (simulated, one, other)
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn two_of_one_family_are_known_by_what_they_differ_in() {
-        let (simulated, one, _) = two(Family::ATV312, Family::ATV312);
-        // The version of their firmware (UdP, W3302).
-        assert!(one.poke(3_302, 0x1305));
-        let answer = verdict(&simulated).await;
-        assert!(
-            matches!(&answer, Answer::Two { why, .. } if why.contains("longer ones are damaged")),
-            "{answer:?}"
-        );
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn two_that_say_the_same_at_the_same_moment_cannot_be_told_from_one() {
-        let (simulated, ..) = two(Family::ATV312, Family::ATV312);
-        assert!(matches!(verdict(&simulated).await, Answer::Slave(alike) if alike.len() == 1));
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn two_of_different_families_are_known() {
-        for (one, other) in [
-            (Family::ATV312, Family::ATV21),
-            (Family::ATV28, Family::OMRON_3G3EV),
-            (Family::ATV58, Family::ATV28),
-        ] {
-            let (simulated, ..) = two(one, other);
-            let answer = verdict(&simulated).await;
-            assert!(matches!(answer, Answer::Two { .. }), "{one} {other}: {answer:?}");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn a_second_answer_after_the_first_or_into_it_is_known() {
-        for millis in [6, 8, 15, 40, 90] {
-            let (simulated, _, other) = two(Family::ATV312, Family::ATV312);
-            other.set_turnaround(Some(Duration::from_millis(millis)));
-            let answer = verdict(&simulated).await;
-            assert!(matches!(answer, Answer::Two { .. }), "{millis} ms: {answer:?}");
-        }
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn noise_that_damages_one_answer_in_ten_is_not_taken_for_two_drives() {
-        for seed in 0..20 {
-            let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
-            simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, ALWAYS / 10));
-            simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
-            let answer = verdict(&simulated).await;
-            assert!(matches!(&answer, Answer::Slave(alike) if alike.len() == 1), "{seed}: {answer:?}");
-        }
-    }
 }

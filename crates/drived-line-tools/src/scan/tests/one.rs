@@ -1,0 +1,160 @@
+//! Lines with one drive at each address, on which nobody is named twice.
+
+use drive_sim::{Defects, Noise, SecondMaster};
+
+use super::{two::verdict, *};
+use crate::testing::{Change, Through};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// A line with an Altivar 312 at 5.
+fn one() -> (SimLine, SimSlave) {
+    let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+    let drive = simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
+    (simulated, drive)
+}
+
+/// What is found at 3 to 7 where something is done to all that the slaves say.
+async fn through(change: Change) -> Vec<Find> {
+    let (simulated, _) = one();
+    let through = Through(simulated, change);
+    let open = async |config: LineConfig| Ok(Line::over(through.stream(config.serial), config));
+    scanned_over(open, &at_one("19200 8N1", 3..=7)).await
+}
+
+fn assert_one(finds: &[Find], world: &str) {
+    let [Find { answer: Answer::Slave(alike), step, .. }] = finds else { panic!("{world}: {finds:?}") };
+    assert_eq!(step.slave.number(), 5, "{world}");
+    let [Likeness { family, certain: true, .. }] = alike[..] else { panic!("{world}: {alike:?}") };
+    assert_eq!(family, Family::ATV312, "{world}");
+}
+
+fn assert_nobody_twice(finds: &[Find], world: &str) {
+    assert!(!finds.iter().any(|find| matches!(find.answer, Answer::Two { .. })), "{world}: {finds:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn bytes_before_each_answer_are_no_second_drive() {
+    let worlds: [(&str, Change); 4] = [
+        ("00", |_, said| said.insert(0, 0)),
+        ("00 00", |_, said| _ = said.splice(0..0, [0, 0])),
+        ("FF", |_, said| said.insert(0, 0xFF)),
+        ("00 now and then", |at, said| {
+            if at.as_millis() % 3 == 0 {
+                said.insert(0, 0);
+            }
+        }),
+    ];
+    for (world, change) in worlds {
+        assert_one(&through(change).await, world);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn bytes_behind_each_answer_are_no_second_drive() {
+    let worlds: [(&str, Change); 4] = [
+        ("00", |_, said| said.push(0)),
+        ("FF 00", |_, said| said.extend([0xFF, 0])),
+        ("FF FF FF FF FF", |_, said| said.extend([0xFF; 5])),
+        ("FE now and then", |at, said| {
+            if at.as_millis() % 3 == 0 {
+                said.push(0xFE);
+            }
+        }),
+    ];
+    for (world, change) in worlds {
+        assert_one(&through(change).await, world);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_byte_that_is_cut_is_no_second_drive() {
+    let worlds: [(&str, Change); 2] =
+        [("first", |_, said| _ = said.remove(0)), ("last", |_, said| _ = said.pop())];
+    for (world, change) in worlds {
+        let finds = through(change).await;
+        let [Find { answer: Answer::Damaged(why), .. }] = &finds[..] else { panic!("{world}: {finds:?}") };
+        assert!(why.contains(world), "{why}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_master_is_no_second_drive() {
+    for every in [40, 90, 130, 250] {
+        for words in [1, 4] {
+            let (simulated, _) = one();
+            // He reads of the same drive what we read of it, and of one that is not there.
+            let requests = vec![(5, vec![3, 0x0C, 0x81, 0, words]), (9, vec![3, 0, 0, 0, 1])];
+            let second_master = Some(SecondMaster { requests, every: every * MS });
+            simulated.set_defects(Defects { second_master, ..Defects::default() });
+            let finds = scanned(&simulated, &at_one("19200 8N1", 3..=10)).await;
+            assert_nobody_twice(&finds, &format!("{words} words every {every} ms"));
+            assert!(
+                finds.iter().any(|find| find.step.slave.number() == 5),
+                "{words} every {every}: {finds:?}"
+            );
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_slow_neighbour_is_no_second_drive() {
+    for millis in [101, 105, 108, 111, 115, 120, 130, 150, 180, 300] {
+        let (simulated, drive) = one();
+        drive.set_turnaround(Some(Duration::from_millis(millis)));
+        for address in [4, 6, 7] {
+            simulated
+                .add_boxed(address, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap())
+                .unwrap();
+        }
+        let finds = scanned(&simulated, &at_one("19200 8N1", 3..=8)).await;
+        let mut found: Vec<u8> = finds.iter().map(|find| find.step.slave.number()).collect();
+        found.sort_unstable();
+        assert_eq!(found, [4, 5, 6, 7], "{millis} ms");
+        for find in &finds {
+            assert!(
+                matches!(&find.answer, Answer::Slave(alike) if alike.len() == 1),
+                "{millis} ms: {find:?}"
+            );
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_cable_that_damages_a_bit_of_each_answer_or_of_some_is_no_second_drive() {
+    for rate in [ALWAYS / 10, ALWAYS / 3, ALWAYS / 2, ALWAYS * 4 / 5, ALWAYS] {
+        for seed in 0..20 {
+            let (simulated, _) = one();
+            simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, rate));
+            let finds = scanned(&simulated, &at_one("19200 8N1", 3..=7)).await;
+            assert_nobody_twice(&finds, &format!("{rate}, seed {seed}"));
+            assert_eq!(finds.len(), 1, "{rate}, seed {seed}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn bursts_of_noise_are_no_second_drive() {
+    for share in [20_000, 50_000, 100_000, 200_000] {
+        for seed in 0..20 {
+            let (simulated, _) = one();
+            let noise = Some(Noise { share, burst: 2 * MS, seed });
+            simulated.set_defects(Defects { noise, ..Defects::default() });
+            assert_nobody_twice(
+                &scanned(&simulated, &at_one("19200 8N1", 3..=7)).await,
+                &format!("{share}, {seed}"),
+            );
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn noise_that_damages_one_answer_in_ten_is_not_taken_for_two_drives() {
+    for seed in 0..20 {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Flipped, ALWAYS / 10));
+        simulated.add_boxed(5, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
+        let answer = verdict(&simulated).await;
+        assert!(matches!(&answer, Answer::Slave(alike) if alike.len() == 1), "{seed}: {answer:?}");
+    }
+}
