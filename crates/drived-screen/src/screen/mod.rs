@@ -18,8 +18,12 @@ use self::terminal::Terminal;
 
 /// Between two drawings at the most.
 const FRAME: Duration = Duration::from_millis(250);
-/// How long a terminal may take to be given back.
-const GIVEN_BACK: Duration = Duration::from_millis(500);
+/// How often it is asked whether the terminal has been given back.
+const LOOK: Duration = Duration::from_millis(100);
+/// So many looks in a row at a terminal that takes nothing: somebody holds it.
+const HELD_LOOKS: u32 = 5;
+/// So many looks at one that takes what it is given, on a machine that has no time for it.
+const LOOKS: u32 = 100;
 
 /// The picture, while it is shown.
 pub struct Screen {
@@ -51,9 +55,18 @@ impl Screen {
         let _ = self.nudge.try_send(());
     }
 
-    /// Gives the terminal back, and with it the last of the log. One that is held is not waited for.
-    pub async fn close(self) {
+    /// Gives the terminal back, and with it the last of the log. One that is held is not waited for; a machine that is slow is.
+    pub async fn close(mut self) {
         drop(self.nudge);
-        let _ = tokio::time::timeout(GIVEN_BACK, self.ended).await;
+        let mut held = 0;
+        for _ in 0..LOOKS {
+            if tokio::time::timeout(LOOK, &mut self.ended).await.is_ok() {
+                return;
+            }
+            held = if terminal::is_held() { held + 1 } else { 0 };
+            if held == HELD_LOOKS {
+                return;
+            }
+        }
     }
 }

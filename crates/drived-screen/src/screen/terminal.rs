@@ -58,6 +58,20 @@ fn give_back() {
     logging::write_again();
 }
 
+/// Whether the terminal takes nothing now: somebody marks a text on it, or nobody reads it.
+#[cfg(unix)]
+pub(super) fn is_held() -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let stdout = io::stdout();
+    // An error is no reason to wait for it.
+    poll(&mut [PollFd::new(&stdout, PollFlags::OUT)], Some(&Timespec::default())) != Ok(1)
+}
+
+#[cfg(not(unix))]
+pub(super) fn is_held() -> bool {
+    true
+}
+
 /// Whether what is typed is shown, kept until the end of a line, and holds up or quotes what the terminal shows.
 #[cfg(unix)]
 mod keys {
