@@ -6,6 +6,8 @@
 mod support;
 
 use std::{
+    cell::{Cell, RefCell},
+    collections::BTreeSet,
     fs,
     io::{BufRead as _, BufReader},
     os::unix::fs::PermissionsExt as _,
@@ -492,4 +494,50 @@ fn a_paho_client_asks_and_is_answered_and_a_validator_that_is_not_ours_takes_the
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     assert!(!daemon.turns());
+}
+
+/// What a drive leaves at the broker goes when the daemon next starts without it, whoever has killed it.
+#[test]
+fn a_drive_that_left_while_the_daemon_was_down_is_taken_back_at_its_next_start_and_nothing_of_others() {
+    let Some(broker) = Mosquitto::start("mqtt-gone") else { return };
+    let mut ear = broker.hear(&["drived/#", "homeassistant/#"]);
+    let section = format!(
+        "servers = [\"mqtt://127.0.0.1:{}\"]\nheartbeat = \"1s\"\ndiscovery = \"device\"",
+        broker.port
+    );
+    let mut daemon = Daemon::start("mqtt-gone", &section);
+    let is_told = |topic: &str, said: &Value| {
+        topic == "homeassistant/device/drived_pump_2/config" && said["components"].get("stop").is_some()
+    };
+    ear.until(is_told);
+    ready(&mut ear, 2);
+    daemon.kill();
+    ear.until(|topic, said| topic == "drived/status" && said == "offline");
+    // Others have documents of names like it.
+    let others =
+        ["homeassistant/device/drived_pump_22/config", "homeassistant/sensor/drived_pump_2/power/config"];
+    let document = json!({
+        "origin": { "name": "drived" }, "availability": [{ "topic": "drived/north/status" }], "state_topic": "x",
+    });
+    for topic in others {
+        broker.publish(topic, &document.to_string(), &["-r"]);
+    }
+    let text = fs::read_to_string(daemon.file.path()).expect("it is ours");
+    fs::write(daemon.file.path(), text.replace("atv312@1-2", "atv312@1")).expect("it is ours");
+    daemon.start_again();
+    let own = "drived/drive/pump_2/";
+    ear.until(|topic, said| topic == format!("{own}availability") && said == "offline");
+    ear.until(|topic, said| topic == "homeassistant/device/drived_pump_2/config" && said == "");
+    ear.until(|topic, said| topic == format!("{own}availability") && said == "");
+    // What is left is what others have, and the drive that is there.
+    let mut late = broker.hear(&["drived/#", "homeassistant/#"]);
+    let (left, beats) = (RefCell::new(BTreeSet::new()), Cell::new(0));
+    late.until(|topic, _| {
+        if topic.contains("pump_2") {
+            left.borrow_mut().insert(topic.to_owned());
+        }
+        beats.set(beats.get() + u8::from(topic == "drived/daemon"));
+        beats.get() == 3
+    });
+    assert_eq!(left.into_inner().into_iter().collect::<Vec<_>>(), others);
 }

@@ -86,13 +86,23 @@ pub struct Login {
     pub password: Option<String>,
 }
 
-/// What the broker is to send. The flag of a retained message is kept as it was published.
+/// What the broker is to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Subscription {
     pub filter: String,
     pub qos: Qos,
-    /// Whether messages that the broker has retained are sent at the subscription.
-    pub retained: bool,
+    pub wanted: Wanted,
+}
+
+/// Which messages of a subscription.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    /// What is published from now on, with the flag of a retained message as it was published.
+    News,
+    /// That, after what the broker has retained.
+    NewsAndKept,
+    /// What others publish, after what the broker has retained, whoever has published it. Only this has the flag then.
+    Others,
 }
 
 /// One try to connect.
@@ -183,6 +193,12 @@ impl Broker {
             self.shared.work.notify_one();
         }
         taken
+    }
+
+    /// Asks for more, in the present connection only.
+    pub fn subscribe(&self, subscriptions: impl IntoIterator<Item = Subscription>) {
+        self.shared.queue().ask(subscriptions);
+        self.shared.work.notify_one();
     }
 
     pub fn counts(&self) -> Counts {

@@ -4,10 +4,16 @@ use std::collections::{HashMap, VecDeque};
 
 use tokio::time::Instant;
 
-use super::message::{Message, Qos};
+use super::{
+    Subscription,
+    message::{Message, Qos},
+};
 
 /// Topics of state that may wait: above what any daemon has.
 const STATES: usize = 1 << 17;
+/// Subscriptions that may wait, and that are sent together.
+const ASKED: usize = 4_096;
+const TOGETHER: usize = 32;
 /// A message whose connection has broken so often while it was on its way is taken for the reason.
 const TRIES: u8 = 3;
 
@@ -82,6 +88,7 @@ pub(super) struct Queue {
     /// The topics of `state` in the order in which they are sent.
     order: VecDeque<String>,
     state: HashMap<String, Message>,
+    asked: VecDeque<Subscription>,
     connection: Option<u64>,
     counts: Counts,
 }
@@ -94,6 +101,7 @@ impl Queue {
             news: VecDeque::new(),
             order: VecDeque::new(),
             state: HashMap::new(),
+            asked: VecDeque::new(),
             connection: None,
             counts,
         }
@@ -158,6 +166,24 @@ impl Queue {
         }
     }
 
+    /// Takes subscriptions of this connection. Above a bound they are lost: who asks does so again after the next connect.
+    pub(super) fn ask(&mut self, subscriptions: impl IntoIterator<Item = Subscription>) {
+        if self.connection.is_some() {
+            let room = ASKED.saturating_sub(self.asked.len());
+            self.asked.extend(subscriptions.into_iter().take(room));
+        }
+    }
+
+    /// Those that are sent next.
+    pub(super) fn asked(&self) -> Vec<Subscription> {
+        self.asked.iter().take(TOGETHER).cloned().collect()
+    }
+
+    /// So many of them have been sent.
+    pub(super) fn has_asked(&mut self, number: usize) {
+        self.asked.drain(..number.min(self.asked.len()));
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.news.is_empty() && self.order.is_empty()
     }
@@ -171,6 +197,7 @@ impl Queue {
     pub(super) fn disconnected(&mut self) -> bool {
         self.state.clear();
         self.order.clear();
+        self.asked.clear();
         self.news.retain(|waiting| waiting.kept == Kept::InOrder);
         self.counts.connected = false;
         self.connection.take().is_some()

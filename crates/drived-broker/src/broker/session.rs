@@ -16,7 +16,8 @@ use futures_util::{StreamExt as _, stream::FuturesOrdered};
 use rumqttc::{
     AsyncClient, ConnAck, ConnectionError, DisconnectProperties, DisconnectReasonCode, EventLoop, LastWill,
     LastWillProperties, MqttOptions, Packet, Publish, PublishOptions, PublishProperties, QoS,
-    RetainForwardRule, SubscribeFilterInput, SubscribeReasonCode, TlsConfiguration, Transport,
+    RetainForwardRule, SubscribeFilterInput, SubscribeNotice, SubscribeReasonCode, TlsConfiguration,
+    Transport,
 };
 use tokio::{
     sync::{mpsc, oneshot},
@@ -25,7 +26,7 @@ use tokio::{
 
 use super::{
     Arrived, Attempt, Connection, EVENTS, Event, Goodbye, Message, Options, Properties, Qos, Shared,
-    Subscription, Then, Will, prompt,
+    Subscription, Then, Wanted, Will, prompt,
     queue::{Limits, Waiting},
 };
 
@@ -111,7 +112,18 @@ impl Reader<'_> {
                         continue;
                     }
                 }
-                Packet::SubAck(answer) => self.look_at(&answer.return_codes),
+                Packet::SubAck(answer) if ready.is_some() => self.look_at(&answer.return_codes),
+                Packet::SubAck(answer) => {
+                    let refused =
+                        |code: &SubscribeReasonCode| !matches!(code, SubscribeReasonCode::Success(_));
+                    if answer.return_codes.iter().any(refused) {
+                        tracing::warn!(
+                            "MQTT: the broker does not let its own topics be read back: what was told of drives that were \
+                             taken out while this program did not run may stand there"
+                        );
+                    }
+                    continue;
+                }
                 Packet::Publish(publish) => {
                     match arrived(publish) {
                         Some(arrived) if ready.is_none() => self.pass_on(arrived),
@@ -181,8 +193,13 @@ impl Writer<'_> {
         };
         let mut notices = FuturesOrdered::new();
         let mut leaving: Option<(Goodbye, Then, Instant)> = None;
+        let mut answers = FuturesOrdered::new();
         loop {
-            while notices.len() < ON_THEIR_WAY {
+            while let Some(notice) = self.ask() {
+                answers.push_back(notice.wait_completion_async());
+            }
+            // What the broker has is told before it is replaced.
+            while answers.is_empty() && notices.len() < ON_THEIR_WAY {
                 let next = self.shared.queue().pop(Instant::now(), limits);
                 let Some(waiting) = next else { break };
                 let Message { topic, payload, .. } = waiting.message.clone();
@@ -209,6 +226,8 @@ impl Writer<'_> {
                         tracing::warn!("MQTT: the broker does not take {:?}: {error}", sent.message.topic);
                     }
                 }
+                // What the broker refuses is said where its answer is read.
+                Some(_) = answers.next() => {}
                 () = self.shared.work.notified(), if notices.len() < ON_THEIR_WAY => {}
                 (goodbye, then) = asked(leaves), if leaving.is_none() => {
                     leaving = Some((goodbye, then, Instant::now() + DRAINED_WITHIN));
@@ -216,6 +235,14 @@ impl Writer<'_> {
                 () = sleep_until(until) => {}
             }
         }
+    }
+
+    /// Sends subscriptions that wait; those for which the crate has no room now are sent when it has more.
+    fn ask(&self) -> Option<SubscribeNotice> {
+        let asked = Some(self.shared.queue().asked()).filter(|asked| !asked.is_empty())?;
+        let notice = self.client.try_subscribe_many_tracked(asked.iter().map(filter)).ok()?;
+        self.shared.queue().has_asked(asked.len());
+        Some(notice)
     }
 
     async fn say(&self, goodbye: Goodbye, then: Then) -> Then {
@@ -303,12 +330,13 @@ fn client_options(options: &Options, attempt: Attempt, will: Option<Will>) -> Op
 }
 
 fn filter(subscription: &Subscription) -> SubscribeFilterInput {
-    let rule = match subscription.retained {
-        true => RetainForwardRule::OnEverySubscribe,
-        false => RetainForwardRule::Never,
+    let rule = match subscription.wanted {
+        Wanted::News => RetainForwardRule::Never,
+        Wanted::NewsAndKept | Wanted::Others => RetainForwardRule::OnEverySubscribe,
     };
+    let others = subscription.wanted == Wanted::Others;
     let filter = SubscribeFilterInput::new(&subscription.filter, qos(subscription.qos));
-    filter.preserve_retain(true).retain_forward_rule(rule)
+    filter.no_local(others).preserve_retain(!others).retain_forward_rule(rule)
 }
 
 fn limits_of(answer: &ConnAck) -> Limits {

@@ -102,6 +102,12 @@ impl TestBroker {
         self.state().deliver(publish);
     }
 
+    /// Keeps a message as somebody else has published it.
+    pub fn retain(&self, topic: &str, payload: &str) {
+        let publish = Publish { retain: true, ..publish(topic, payload, Qos::AtLeastOnce) };
+        self.state().retained.insert(topic.to_owned(), publish);
+    }
+
     /// Holds up whatever is to be delivered.
     pub fn hold(&self) {
         self.state().held = Some(Vec::new());
@@ -253,6 +259,17 @@ impl Inner {
             }
             Packet::Subscribe(subscribe) => {
                 let granted = |filter: &rumqttc::SubscribeFilter| SubscribeReasonCode::Success(filter.qos);
+                let of_all = |filter: &rumqttc::SubscribeFilter| {
+                    filter.retain_forward_rule == rumqttc::RetainForwardRule::OnEverySubscribe
+                };
+                for filter in subscribe.filters.iter().filter(|filter| of_all(filter)) {
+                    let fits = |topic: &str| is_of(topic, &filter.path);
+                    let kept =
+                        state.retained.iter().filter(|(topic, _)| fits(topic)).map(|(_, kept)| kept.clone());
+                    for publish in kept.collect::<Vec<_>>() {
+                        state.deliver(Publish { pkid: 0, dup: false, ..publish });
+                    }
+                }
                 Packet::SubAck(SubAck {
                     pkid: subscribe.pkid,
                     return_codes: subscribe.filters.iter().map(granted).collect(),
@@ -282,6 +299,19 @@ impl Inner {
             _ => return keep(&mut state, packet, None),
         };
         keep(&mut state, packet, answers.then_some(answer))
+    }
+}
+
+/// Whether a topic is one of a filter.
+fn is_of(topic: &str, filter: &str) -> bool {
+    let (mut levels, mut wanted) = (topic.split('/'), filter.split('/'));
+    loop {
+        match (levels.next(), wanted.next()) {
+            (_, Some("#")) | (None, None) => return true,
+            (Some(_), Some("+")) => {}
+            (Some(level), Some(want)) if level == want => {}
+            _ => return false,
+        }
     }
 }
 

@@ -32,8 +32,9 @@ fn start(options: Options) -> (Broker, Receiver<Event>) {
 async fn it_subscribes_before_it_says_that_it_is_connected() {
     let far = TestBroker::default();
     let subscription =
-        |filter: &str, retained| Subscription { filter: filter.to_owned(), qos: Qos::AtLeastOnce, retained };
-    let subscriptions = vec![subscription("plant/+/command", false), subscription("state", true)];
+        |filter: &str, wanted| Subscription { filter: filter.to_owned(), qos: Qos::AtLeastOnce, wanted };
+    let subscriptions =
+        vec![subscription("plant/+/command", Wanted::News), subscription("state", Wanted::NewsAndKept)];
     let (_broker, mut events) = start(Options { subscriptions, ..far.options() });
     assert_eq!(connected(&mut events).await, Attempt { number: 1, server: 0 });
     let [Packet::Connect(connect, None, _), Packet::Subscribe(subscribe)] = &far.packets()[..] else {
@@ -254,7 +255,8 @@ async fn an_end_takes_no_longer_than_it_may_whatever_the_broker_does() {
 #[tokio::test(start_paused = true)]
 async fn a_flood_is_turned_away_and_what_is_urgent_gets_through() {
     let far = TestBroker::default();
-    let subscriptions = vec![Subscription { filter: "#".to_owned(), qos: Qos::AtLeastOnce, retained: false }];
+    let subscriptions =
+        vec![Subscription { filter: "#".to_owned(), qos: Qos::AtLeastOnce, wanted: Wanted::News }];
     let options = Options { subscriptions, is_urgent: |topic| topic == "stop", ..far.options() };
     let (broker, mut events) = start(options);
     connected(&mut events).await;

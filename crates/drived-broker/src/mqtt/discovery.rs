@@ -5,6 +5,7 @@
 //! taken back where it would not be; those that move a motor expire at the broker. A value that is not good is `None`.
 
 use std::{
+    borrow::Cow,
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, PoisonError},
 };
@@ -128,6 +129,8 @@ pub(super) struct Discovered(Arc<Mutex<Told>>);
 #[derive(Debug, Default)]
 struct Told {
     documents: BTreeMap<String, String>,
+    /// The components that they had, with their platforms.
+    components: BTreeMap<String, String>,
     /// The readings that the drive has shown so far.
     keys: BTreeSet<&'static str>,
 }
@@ -155,13 +158,39 @@ impl Discovered {
             told.keys.extend(READINGS.iter().filter(|one| shows(one.of, one.key)).map(|one| one.key));
             told.keys.clone()
         };
-        self.publish(face, &Device::of_drive(face, drive, snapshot, &keys), again);
+        self.publish(face, Device::of_drive(face, drive, snapshot, &keys), again);
     }
 
     /// Announces the daemon with its lines.
     pub(super) fn tell_daemon(&self, face: &Face, lines: &[LineView], again: bool) {
         if face.config.discovery != Discovery::Off {
-            self.publish(face, &Device::of_daemon(face, lines), again);
+            self.publish(face, Device::of_daemon(face, lines), again);
+        }
+    }
+
+    /// Takes a document of this device that the broker has for told, so that what is not in it any more is taken back from it. False: it
+    /// is told otherwise now.
+    pub(super) fn recall(&self, face: &Face, topic: &str, document: &Value) -> bool {
+        let Some(levels) =
+            topic.strip_prefix(&face.config.discovery_prefix).and_then(|rest| rest.strip_prefix('/'))
+        else {
+            return false;
+        };
+        let node = face.topics.node();
+        let mut told = self.told();
+        match (levels.split('/').collect::<Vec<_>>().as_slice(), face.config.discovery) {
+            (["device", device, _], Discovery::Device) if *device == node => {
+                for (id, component) in document["components"].as_object().into_iter().flatten() {
+                    let platform = component["platform"].as_str().unwrap_or_default().to_owned();
+                    told.components.entry(id.clone()).or_insert(platform);
+                }
+                true
+            }
+            ([platform, device, id, _], Discovery::Component) if *device == node => {
+                told.components.entry((*id).to_owned()).or_insert_with(|| (*platform).to_owned());
+                true
+            }
+            _ => false,
         }
     }
 
@@ -173,7 +202,18 @@ impl Discovered {
         }
     }
 
-    fn publish(&self, face: &Face, device: &Device, again: bool) {
+    fn publish(&self, face: &Face, mut device: Device, again: bool) {
+        {
+            let mut told = self.told();
+            for (id, platform) in &told.components {
+                if !device.components.iter().any(|known| known.id == *id) {
+                    let (id, platform) = (id.clone(), platform.clone().into());
+                    device.components.push(Component { id, platform, values: None });
+                }
+            }
+            let all = device.components.iter().map(|known| (known.id.clone(), known.platform.to_string()));
+            told.components = all.collect();
+        }
         for (topic, document) in device.documents(face) {
             let is_new = self.told().documents.get(&topic) != Some(&document);
             if is_new || again {
@@ -199,7 +239,7 @@ struct Device {
 /// One of its components; without values it is none, and is taken back.
 struct Component {
     id: String,
-    platform: &'static str,
+    platform: Cow<'static, str>,
     values: Option<Map<String, Value>>,
 }
 
@@ -208,7 +248,7 @@ fn component(id: impl Into<String>, platform: &'static str, values: Value) -> Co
         Value::Object(values) => Some(values),
         _ => None,
     };
-    Component { id: id.into(), platform, values }
+    Component { id: id.into(), platform: platform.into(), values }
 }
 
 impl Device {
@@ -366,7 +406,7 @@ impl Device {
             let mut components = Map::new();
             for one in &self.components {
                 let mut values = one.values.as_ref().map(|values| object(one, values)).unwrap_or_default();
-                values.insert("platform".to_owned(), one.platform.into());
+                values.insert("platform".to_owned(), one.platform.as_ref().into());
                 components.insert(one.id.clone(), Value::Object(values));
             }
             let document = json!({ "device": self.device, "origin": origin, "components": components });
@@ -405,6 +445,18 @@ impl Reading {
         }
         sensor
     }
+}
+
+/// Whether a document of Home Assistant is one of this daemon: it names the topic of its status.
+pub(super) fn is_of(face: &Face, document: &Value) -> bool {
+    let status = face.topics.status();
+    let names = |part: &Value| {
+        let topics = part["availability"].as_array().into_iter().flatten().map(|one| &one["topic"]);
+        topics.chain([&part["state_topic"]]).any(|topic| *topic == status)
+    };
+    let parts = document["components"].as_object();
+    document["origin"]["name"] == "drived"
+        && (names(document) || parts.into_iter().flatten().any(|(_, part)| names(part)))
 }
 
 /// A value while it is good, and `None` else.

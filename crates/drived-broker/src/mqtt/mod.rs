@@ -6,6 +6,7 @@
 mod commanding;
 mod counts;
 mod discovery;
+mod gone;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -20,10 +21,10 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use self::{commanding::Commanding, discovery::Discovered, telling::Teller, topics::Topics};
+use self::{commanding::Commanding, discovery::Discovered, gone::Gone, telling::Teller, topics::Topics};
 use crate::broker::{
-    Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Will,
-    config::{Address, Discovery, MqttConfig},
+    Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
+    config::{Address, Discovery, MqttConfig, host_name, topic_id},
 };
 use drived_doors::{audit::Audit, private};
 use drived_plant::{counts::Source, plant::Plant};
@@ -46,6 +47,9 @@ struct Face {
     config: MqttConfig,
     topics: Topics,
     broker: Broker,
+    /// By which a daemon that tells under the same base is known for another.
+    host: Option<String>,
+    instance: String,
     /// The newest line of the audit log.
     audited: watch::Receiver<Option<String>>,
     /// Rises when everything is to be told again.
@@ -165,7 +169,7 @@ fn subscriptions(config: &MqttConfig) -> Vec<Subscription> {
     let birth = (config.discovery != Discovery::Off).then(|| topics.birth());
     commands
         .chain(birth)
-        .map(|filter| Subscription { filter, qos: Qos::AtLeastOnce, retained: false })
+        .map(|filter| Subscription { filter, qos: Qos::AtLeastOnce, wanted: Wanted::News })
         .collect()
 }
 
@@ -177,7 +181,8 @@ impl Prepared {
         let will = Will { message: Message::new(topics.status(), "offline").retained() };
         let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
         let audited = audit.head();
-        let face = Arc::new(Face { plant, config, topics, broker, audited, anew: watch::Sender::new(0) });
+        let (host, instance, anew) = (host_name(), drawn(), watch::Sender::new(0));
+        let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
         let (closing, closes) = watch::channel(false);
         let commanding = Commanding::new(Arc::clone(&face), audit, closes);
         let closed = Arc::new(Notify::new());
@@ -196,7 +201,7 @@ async fn keep(
     let mut looks = interval(LOOKS);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut tellers: HashMap<Arc<str>, Watched> = HashMap::new();
-    let mut daemon = telling::Daemon::default();
+    let (mut daemon, mut gone) = (telling::Daemon::default(), Gone::new());
     let mut birth = None;
     let mut happened = Some(face.plant.fleet().events());
     loop {
@@ -215,6 +220,8 @@ async fn keep(
         tokio::select! {
             event = events.recv() => match event {
                 Some(Event::Connected(_)) => {
+                    // Before it is told anew what is there.
+                    gone.connected(&face);
                     face.tell_for_good(face.topics.status(), "online");
                     face.anew.send_modify(|number| *number += 1);
                     daemon.tell(&face, true);
@@ -226,7 +233,11 @@ async fn keep(
                         birth = Some(Instant::now() + some_of(BIRTH));
                     }
                 }
-                Some(Event::Message(arrived)) => commanding.handle(&arrived),
+                Some(Event::Message(arrived)) => {
+                    if !gone.hear(&face, &arrived, &daemon.discovered) {
+                        commanding.handle(&arrived);
+                    }
+                }
                 None => return events,
             },
             received = next => match received {
@@ -236,7 +247,8 @@ async fn keep(
             },
             () = closed.notified() => return events,
             _ = looks.tick() => {
-                look(&face, &mut tellers);
+                look(&face, &mut tellers, &mut gone);
+                gone.look(&face);
                 daemon.tell(&face, false);
                 commanding.call();
             }
@@ -263,7 +275,7 @@ impl Drop for Watched {
 }
 
 /// Tells the drives that have come, and takes back what was told of those that have gone.
-fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>) {
+fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>, taken_back: &mut Gone) {
     let mut there: Vec<(Arc<str>, Arc<str>, DriveHandle)> = Vec::new();
     for (line, _) in face.plant.fleet().lines() {
         for drive in face.plant.fleet().drives_on(&line) {
@@ -275,8 +287,8 @@ fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>) {
     for name in left {
         if let Some(watched) = tellers.remove(&name) {
             watched.task.abort();
-            telling::take_back(face, &name);
             watched.discovered.take_back(face);
+            taken_back.take_back(face, &topic_id(&name));
         }
     }
     for (name, line, drive) in there {
@@ -287,6 +299,14 @@ fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>) {
             tellers.insert(name, Watched { task: tokio::spawn(teller.run()), discovered });
         }
     }
+}
+
+/// A text that nobody else has drawn.
+fn drawn() -> String {
+    let mut bytes = [0; 8];
+    // Without randomness its host alone tells it from others.
+    let _ = getrandom::fill(&mut bytes);
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A part of a time, drawn.

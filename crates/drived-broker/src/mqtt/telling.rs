@@ -162,14 +162,6 @@ pub(super) fn tell_head(face: &Face) {
     }
 }
 
-/// Takes back what was told of a drive that is here no more.
-pub(super) fn take_back(face: &Face, name: &str) {
-    face.tell_for_good(face.topics.drive(name, "availability"), "offline");
-    for what in ["state", "measurements", "fault"] {
-        face.tell_for_good(face.topics.drive(name, what), "");
-    }
-}
-
 /// The daemon and its lines.
 #[derive(Default)]
 pub(super) struct Daemon {
@@ -178,7 +170,7 @@ pub(super) struct Daemon {
     head: Option<String>,
     /// Whether the port of each line was there.
     links: BTreeMap<String, Value>,
-    discovered: Discovered,
+    pub(super) discovered: Discovered,
 }
 
 impl Daemon {
@@ -213,6 +205,8 @@ impl Daemon {
             .collect();
         let daemon = json!({
             "version": env!("CARGO_PKG_VERSION"),
+            "host": face.host,
+            "instance": face.instance,
             "time_unix_ms": unix(now),
             "lines": lines.len(),
             "drives": face.plant.fleet().drives().len(),

@@ -46,7 +46,11 @@ impl Bench {
     }
 
     async fn with(plant: TestPlant, config: MqttConfig) -> Self {
-        let broker = TestBroker::default();
+        Self::on(TestBroker::default(), plant, config).await
+    }
+
+    /// The same on a broker that has something already.
+    async fn on(broker: TestBroker, plant: TestPlant, config: MqttConfig) -> Self {
         let mut prepared = Mqtt::prepare(config).unwrap_or_else(|failure| panic!("{failure}"));
         prepared.options.dial = broker.options().dial;
         let mqtt = prepared.open(plant.plant.clone(), Audit::default());
@@ -541,7 +545,12 @@ async fn nobody_commands_unless_the_configuration_says_so() {
         .flatten()
         .map(|filter| filter.path)
         .collect();
-    assert_eq!(subscribed, ["homeassistant/status"]);
+    let own = ["daemon", "drive/+/availability", "line/+"].map(|own| format!("plant/north/{own}"));
+    let documents =
+        ["device/plant_north", "+/plant_north/+"].map(|own| format!("homeassistant/{own}/config"));
+    let expected: Vec<String> =
+        ["homeassistant/status".to_owned()].into_iter().chain(own).chain(documents).collect();
+    assert_eq!(subscribed, expected);
     let document = bench.state("homeassistant/device/plant_north_pump_1/config");
     for control in ["setpoint", "start", "start_reverse", "stop", "reset"] {
         let keys: Vec<_> = document["components"][control].as_object().unwrap().keys().collect();
@@ -624,8 +633,139 @@ async fn a_drive_that_leaves_is_taken_back() {
     assert_eq!(topics(&bench.broker).len(), 5, "{:?}", topics(&bench.broker));
     let _ = bench.plant.plant.fleet().remove(&["pump 2"], Duration::from_secs(30)).await;
     a_while().await;
-    assert_eq!(topics(&bench.broker), ["plant/north/drive/pump_2/availability"]);
-    assert_eq!(bench.state("plant/north/drive/pump_2/availability"), "offline");
+    assert_eq!(topics(&bench.broker), Vec::<String>::new());
+    // Who reads the documents is rid of it before the values are gone.
+    let taken: Vec<(String, String)> = bench
+        .broker
+        .published()
+        .into_iter()
+        .filter(|(topic, payload)| topic.contains("pump_2") && (payload.is_empty() || payload == "offline"))
+        .collect();
+    let place = |topic: &str, payload: &str| {
+        taken.iter().position(|(to, said)| to.ends_with(topic) && said == payload).expect("it is told")
+    };
+    let document = place("plant_north_pump_2/config", "");
+    assert!(
+        document < place("state", "") && place("availability", "offline") < place("availability", ""),
+        "{taken:?}"
+    );
+}
+
+/// A document of Home Assistant as a daemon under this base makes it.
+fn document(base: &str) -> String {
+    let availability = json!([{ "topic": format!("{base}/status") }]);
+    json!({
+        "origin": { "name": "drived" }, "device": {},
+        "components": { "state": { "platform": "sensor", "availability": availability } },
+    })
+    .to_string()
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_left_while_the_daemon_was_away_is_taken_back_once_and_nothing_of_anybody_else() {
+    let far = TestBroker::default();
+    let gone = [
+        ("plant/north/drive/pump_7/availability", "online".to_owned()),
+        ("plant/north/drive/pump_7/state", "{}".to_owned()),
+        ("plant/north/line/south", "{}".to_owned()),
+        ("homeassistant/device/plant_north_pump_7/config", document("plant/north")),
+        ("homeassistant/sensor/plant_north_pump_7/state/config", {
+            json!({ "origin": { "name": "drived" }, "state_topic": "x", "availability": [{ "topic": "plant/north/status" }] })
+                .to_string()
+        }),
+        // As it was told before it was told by devices.
+        ("homeassistant/binary_sensor/plant_north/connected/config", {
+            json!({ "origin": { "name": "drived" }, "state_topic": "plant/north/status" }).to_string()
+        }),
+    ];
+    let others = [
+        ("plant/drive/pump_7/availability", "online".to_owned()),
+        ("plant/north/south/drive/pump_7/availability", "online".to_owned()),
+        ("homeassistant/device/plant_north_pump_8/config", document("plant/north")),
+        ("homeassistant/sensor/plant_north_pump_7/other/config", document("plant_north")),
+        ("homeassistant/sensor/plant_north_pump_7/strange/config", "no JSON".to_owned()),
+    ];
+    for (topic, payload) in gone.iter().chain(&others) {
+        far.retain(topic, payload);
+    }
+    let bench = Bench::on(far, TestPlant::of(1).await, config()).await;
+    a_while().await;
+    let published = bench.broker.published();
+    assert!(published.contains(&("plant/north/drive/pump_7/availability".into(), "offline".into())));
+    let retained = bench.broker.retained();
+    for (topic, _) in &gone {
+        assert!(!retained.contains_key(*topic), "{topic}");
+        let taken = published.iter().filter(|(to, payload)| to == topic && payload.is_empty()).count();
+        assert_eq!(taken, 1, "{topic}");
+    }
+    for (topic, payload) in &others {
+        assert_eq!(retained[*topic].payload, payload.as_bytes(), "{topic}");
+        assert!(published.iter().all(|(to, _)| to != topic), "{topic}");
+    }
+    assert_eq!(bench.drive("availability"), "online");
+    // Nor at the next connect.
+    let told = bench.broker.published().len();
+    bench.broker.cut();
+    a_while().await;
+    assert!(bench.broker.published()[told..].iter().all(|(topic, _)| !topic.contains("pump_7")));
+    assert!(bench.broker.published().len() > told);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_that_left_while_the_daemon_was_away_is_no_component_any_more() {
+    for discovery in [Discovery::Device, Discovery::Component] {
+        let far = TestBroker::default();
+        let status = json!([{ "topic": "plant/north/status" }]);
+        let old = json!({
+            "origin": { "name": "drived" }, "device": {},
+            "components": {
+                "line_south": { "platform": "binary_sensor", "availability": status },
+                "line_north": { "platform": "binary_sensor", "availability": status },
+            },
+        });
+        let single = json!({ "origin": { "name": "drived" }, "availability": status });
+        let topic = match discovery {
+            Discovery::Device => "homeassistant/device/plant_north/config",
+            _ => "homeassistant/binary_sensor/plant_north/line_south/config",
+        };
+        far.retain(topic, &if discovery == Discovery::Device { old } else { single }.to_string());
+        let bench = Bench::on(far, TestPlant::of(1).await, MqttConfig { discovery, ..config() }).await;
+        sleep(Duration::from_secs(60)).await;
+        match discovery {
+            Discovery::Device => {
+                let document = bench.state(topic);
+                assert_eq!(document["components"]["line_south"], json!({ "platform": "binary_sensor" }));
+                assert_eq!(document["components"]["line_north"]["name"], "Line north");
+            }
+            _ => assert!(!bench.broker.retained().contains_key(topic)),
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn while_another_daemon_may_tell_under_the_same_base_nothing_is_taken_back() {
+    let daemon = |host: &str| json!({ "host": host, "instance": "another" }).to_string();
+    let availability = "plant/north/drive/pump_7/availability";
+    let own = host_name().unwrap_or_default();
+    for (host, is_taken) in [(own.as_str(), true), ("elsewhere", false)] {
+        let far = TestBroker::default();
+        far.retain(availability, "online");
+        far.retain("plant/north/daemon", &daemon(host));
+        let bench = Bench::on(far, TestPlant::of(1).await, config()).await;
+        a_while().await;
+        assert_eq!(!bench.broker.retained().contains_key(availability), is_taken, "{host}");
+        // It lives, and is heard; what it tells is its own.
+        for _ in 0..10 {
+            bench.broker.deliver(publish("plant/north/daemon", &daemon(host), Qos::AtMostOnce));
+            bench.broker.deliver(publish("plant/north/drive/pump_8/availability", "online", Qos::AtMostOnce));
+            sleep(Duration::from_secs(30)).await;
+        }
+        assert_eq!(!bench.broker.retained().contains_key(availability), is_taken, "{host}");
+        assert!(bench.broker.published().iter().all(|(topic, _)| !topic.contains("pump_8")));
+        // Or it was this one under another name: then it says nothing any more.
+        sleep(Duration::from_secs(120)).await;
+        assert!(!bench.broker.retained().contains_key(availability), "{host}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -59,6 +59,18 @@ pub(super) struct Asking {
     pub(super) commander: Option<String>,
 }
 
+/// What stands at the broker in the daemon's own name, where it is read back.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Standing {
+    Daemon,
+    /// Of the drive of this id: whether it is there.
+    Drive(String),
+    /// Of the line of this id.
+    Line(String),
+    /// For Home Assistant.
+    Document,
+}
+
 /// The topics of a daemon.
 #[derive(Debug, Clone)]
 pub(super) struct Topics {
@@ -91,12 +103,22 @@ impl Topics {
     }
 
     pub(super) fn line(&self, name: &str) -> String {
-        format!("{}/line/{}", self.base, topic_id(name))
+        self.line_of(&topic_id(name))
+    }
+
+    /// The same of the line of an id.
+    pub(super) fn line_of(&self, id: &str) -> String {
+        format!("{}/line/{id}", self.base)
     }
 
     /// Something of a drive.
     pub(super) fn drive(&self, name: &str, what: &str) -> String {
-        format!("{}/drive/{}/{what}", self.base, topic_id(name))
+        self.drive_of(&topic_id(name), what)
+    }
+
+    /// The same of the drive of an id.
+    pub(super) fn drive_of(&self, id: &str, what: &str) -> String {
+        format!("{}/drive/{id}/{what}", self.base)
     }
 
     /// Where it is told what became of commands.
@@ -160,6 +182,25 @@ impl Topics {
     /// Where Home Assistant looks for something.
     pub(super) fn discovery(&self, levels: &str) -> String {
         format!("{}/{levels}/config", self.prefix)
+    }
+
+    /// Where Home Assistant looks for a device, in both forms.
+    pub(super) fn documents(&self, device: &str) -> [String; 2] {
+        [self.discovery(&format!("device/{device}")), self.discovery(&format!("+/{device}/+"))]
+    }
+
+    /// What stands at a topic; `None`: nothing that is read back.
+    pub(super) fn standing(&self, topic: &str) -> Option<Standing> {
+        let below = |levels: &str| topic.strip_prefix(levels)?.strip_prefix('/');
+        let is_id = |id: &&str| !id.is_empty() && topic_id(id) == **id;
+        if let Some(rest) = below(&self.base) {
+            let line = rest.strip_prefix("line/").filter(is_id);
+            let drive = rest.strip_prefix("drive/").and_then(|rest| rest.strip_suffix("/availability"));
+            let drive = drive.filter(is_id).map(|id| Standing::Drive(id.to_owned()));
+            let daemon = (rest == "daemon").then_some(Standing::Daemon);
+            return drive.or_else(|| line.map(|id| Standing::Line(id.to_owned()))).or(daemon);
+        }
+        below(&self.prefix)?.ends_with("/config").then_some(Standing::Document)
     }
 
     /// The id of this daemon at Home Assistant.

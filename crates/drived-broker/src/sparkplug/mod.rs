@@ -27,7 +27,7 @@ use tokio::{
 use self::{bd_seq::Kept as KeptBdSeq, commanding::Commanding};
 use crate::{
     broker::config::{MqttConfig, SparkplugConfig},
-    broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Will},
+    broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Wanted, Will},
     mqtt,
 };
 use drived_doors::audit::Audit;
@@ -110,7 +110,7 @@ impl Sparkplug {
         let subscribe = |of: drive_sparkplug::Subscription| Subscription {
             filter: of.filter,
             qos: Qos::AtLeastOnce,
-            retained: of.wants_retained,
+            wanted: if of.wants_retained { Wanted::NewsAndKept } else { Wanted::News },
         };
         let subscriptions = node.subscriptions().into_iter().map(subscribe).collect();
         let options = Options { subscriptions, queue: QUEUE, ..options };

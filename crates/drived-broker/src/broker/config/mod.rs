@@ -5,5 +5,5 @@ mod sparkplug;
 
 pub use self::{
     mqtt::{Address, Discovery, MqttConfig, MqttEntry, topic_id},
-    sparkplug::SparkplugConfig,
+    sparkplug::{SparkplugConfig, host_name},
 };

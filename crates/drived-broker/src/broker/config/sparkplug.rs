@@ -118,7 +118,7 @@ fn alike<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
 }
 
 /// The name of this machine, without its domain; `None` where the system keeps none in a file.
-fn host_name() -> Option<String> {
+pub fn host_name() -> Option<String> {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok()?;
     name.trim().split('.').next().filter(|name| !name.is_empty()).map(str::to_owned)
 }

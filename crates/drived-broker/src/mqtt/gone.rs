@@ -1,0 +1,173 @@
+//! What the broker still has of drives and lines that left the configuration while the daemon was not running: read back after each
+//! connect, and taken back once.
+//!
+//! What stands under the base is the daemon's own, unless another daemon tells there too: while there may be one, nothing is taken
+//! back, and where there is one it is said who. A document of Home Assistant is taken back only if it names this daemon.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
+
+use serde_json::Value;
+use tokio::time::Instant;
+
+use super::{
+    Face,
+    discovery::{self, Discovered},
+    topics::Standing,
+};
+use crate::broker::{
+    Arrived, Qos, Subscription, Wanted,
+    config::{Discovery, topic_id},
+};
+
+/// How long after a connect the broker may take to say what it has.
+const SETTLED: Duration = Duration::from_secs(2);
+/// After the availability and the documents, the rest is taken back: a reader of the documents does not read that any more.
+const REST: Duration = Duration::from_secs(3);
+/// Drives and lines that are looked after at once; the others at the next connect.
+const MOST: usize = 1_024;
+
+/// What is being taken back.
+pub(super) struct Gone {
+    /// What has been read back may be judged from then on.
+    from: Instant,
+    drives: BTreeSet<String>,
+    lines: BTreeSet<String>,
+    /// The drives whose rest is taken back then.
+    rest: BTreeMap<String, Instant>,
+    /// Which other daemon was told of.
+    other: Option<String>,
+}
+
+impl Gone {
+    pub(super) fn new() -> Self {
+        Self {
+            from: Instant::now(),
+            drives: BTreeSet::new(),
+            lines: BTreeSet::new(),
+            rest: BTreeMap::new(),
+            other: None,
+        }
+    }
+
+    /// Asks a new connection for what it has.
+    pub(super) fn connected(&mut self, face: &Face) {
+        self.from = Instant::now() + SETTLED;
+        self.drives.clear();
+        self.lines.clear();
+        let topics = &face.topics;
+        let own = [topics.daemon(), topics.drive_of("+", "availability"), topics.line_of("+")];
+        let documents = is_discovered(face).then(|| topics.documents(&topics.node())).into_iter().flatten();
+        ask(face, own.into_iter().chain(documents));
+    }
+
+    /// Hears what the broker has, and what others tell. False: it is none of that.
+    pub(super) fn hear(&mut self, face: &Face, arrived: &Arrived, daemon: &Discovered) -> bool {
+        let Some(standing) = face.topics.standing(&arrived.topic) else { return false };
+        if arrived.payload.is_empty() {
+            return true;
+        }
+        match standing {
+            Standing::Daemon => self.hear_daemon(face, arrived),
+            // What others tell now is theirs.
+            _ if !arrived.retain => {}
+            Standing::Drive(id) if self.drives.len() < MOST => drop(self.drives.insert(id)),
+            Standing::Line(id) if self.lines.len() < MOST => drop(self.lines.insert(id)),
+            Standing::Drive(_) | Standing::Line(_) => {}
+            Standing::Document => {
+                if let Ok(document) = serde_json::from_slice::<Value>(&arrived.payload)
+                    && discovery::is_of(face, &document)
+                    && !daemon.recall(face, &arrived.topic, &document)
+                {
+                    face.tell_for_good(arrived.topic.clone(), "");
+                }
+            }
+        }
+        true
+    }
+
+    /// A daemon tells under this base, or has done so.
+    fn hear_daemon(&mut self, face: &Face, arrived: &Arrived) {
+        let said = serde_json::from_slice::<Value>(&arrived.payload).unwrap_or_default();
+        if said["instance"] == face.instance {
+            return;
+        }
+        let host = said["host"].as_str();
+        if arrived.retain && host.is_none_or(|host| Some(host) == face.host.as_deref()) {
+            // This one, before its restart.
+            return;
+        }
+        // If it is there, it tells so again before that is over.
+        let left = arrived.expires_in_s.map(|seconds| Duration::from_secs(seconds.into()));
+        self.from = self.from.max(Instant::now() + left.unwrap_or(face.config.heartbeat * 3) + SETTLED);
+        let host = host.unwrap_or("of a host that it does not name");
+        if !arrived.retain && self.other.as_deref() != Some(host) {
+            tracing::error!(
+                "MQTT: another daemon, {host}, tells under {:?} too: who reads there cannot tell their drives apart, and both hear what \
+                 is asked; give each its own base",
+                face.config.base
+            );
+            self.other = Some(host.to_owned());
+        }
+    }
+
+    /// Takes back what is not there any more.
+    pub(super) fn look(&mut self, face: &Face) {
+        let now = Instant::now();
+        let due: Vec<String> =
+            self.rest.iter().filter(|(_, at)| **at <= now).map(|(id, _)| id.clone()).collect();
+        for id in due {
+            self.rest.remove(&id);
+            if !has_drive(face, &id) {
+                for what in ["state", "measurements", "fault", "availability"] {
+                    face.tell_for_good(face.topics.drive_of(&id, what), "");
+                }
+            }
+        }
+        if now < self.from {
+            return;
+        }
+        for id in std::mem::take(&mut self.drives) {
+            if !has_drive(face, &id) && !self.rest.contains_key(&id) {
+                tracing::info!("MQTT: there is no drive {id:?} any more: what was told of it is taken back");
+                if is_discovered(face) {
+                    let device = format!("{}_{id}", face.topics.node());
+                    ask(face, face.topics.documents(&device));
+                }
+                self.take_back(face, &id);
+            }
+        }
+        let lines = face.plant.lines();
+        for id in std::mem::take(&mut self.lines) {
+            if !lines.iter().any(|line| topic_id(&line.name) == id) {
+                face.tell_for_good(face.topics.line_of(&id), "");
+            }
+        }
+    }
+
+    /// Takes back what was told of a drive that is here no more: first that it is there, then the rest.
+    pub(super) fn take_back(&mut self, face: &Face, id: &str) {
+        face.tell_for_good(face.topics.drive_of(id, "availability"), "offline");
+        self.rest.insert(id.to_owned(), Instant::now() + REST);
+    }
+}
+
+fn has_drive(face: &Face, id: &str) -> bool {
+    face.plant.fleet().drives().iter().any(|drive| topic_id(drive.name()) == id)
+}
+
+fn is_discovered(face: &Face) -> bool {
+    face.config.discovery != Discovery::Off
+}
+
+/// Asks the broker for what it has of these topics.
+fn ask(face: &Face, filters: impl IntoIterator<Item = String>) {
+    let asked = filters.into_iter().map(|filter| Subscription {
+        filter,
+        qos: Qos::AtLeastOnce,
+        wanted: Wanted::Others,
+    });
+    face.broker.subscribe(asked);
+}
