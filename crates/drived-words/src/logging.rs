@@ -22,10 +22,11 @@ use std::{
 
 use tracing::{Event, Level, Subscriber, field::Field};
 use tracing_subscriber::{
-    EnvFilter,
-    filter::LevelFilter,
+    filter::{LevelFilter, Targets},
     fmt::{FmtContext, FormatEvent, FormatFields, format},
+    layer::SubscriberExt as _,
     registry::LookupSpan,
+    util::SubscriberInitExt as _,
 };
 
 pub use self::tail::{is_shown, may_be_shown, show, shown, write_again};
@@ -43,36 +44,48 @@ const LAST_WORDS: Duration = Duration::from_millis(500);
 /// What the environment says is no level.
 pub fn start(level: Option<Level>) -> Result<Option<Log>, Failure> {
     let said = std::env::var(VARIABLE).unwrap_or_default();
-    check(&said)?;
+    let said = wanted(&said)?;
     let Some(level) = level else { return Ok(None) };
-    let filter =
-        EnvFilter::builder().with_default_directive(LevelFilter::from_level(level).into()).parse_lossy(said);
+    let filter = filter(said, level);
     let log = Log::to(tail::Tail);
     let lines = log.lines.clone();
     tracing_subscriber::fmt()
-        .with_env_filter(filter)
+        .with_max_level(LevelFilter::TRACE)
         .with_writer(move || lines.clone())
         .with_ansi(output::is_coloured(&io::stderr()))
         // It would be told on stderr, by a panic where nobody reads that.
         .log_internal_errors(false)
         .event_format(Form)
+        .finish()
+        .with(filter)
         .init();
     Ok(Some(log))
 }
 
-/// Checks what the environment says: `LEVEL` or `PART=LEVEL`, several with commas.
-fn check(said: &str) -> Result<(), Failure> {
-    let directives = said.split(',').map(str::trim).filter(|directive| !directive.is_empty());
-    for directive in directives {
-        let level = directive.split_once('=').map_or(directive, |(_, level)| level);
-        if level.trim().parse::<LevelFilter>().is_err() {
+/// What is said of one part says nothing of the others.
+fn filter(said: Targets, level: Level) -> Targets {
+    if said.default_level().is_some() { said } else { said.with_default(level) }
+}
+
+/// What the environment says: `LEVEL` or `PART=LEVEL`, several with commas.
+fn wanted(said: &str) -> Result<Targets, Failure> {
+    let mut directives = said.split(',').map(str::trim).filter(|directive| !directive.is_empty());
+    directives.try_fold(Targets::new(), |wanted, directive| {
+        let (part, level) = match directive.split_once('=') {
+            Some((part, level)) => (Some(part.trim()), level.trim()),
+            None => (None, directive),
+        };
+        let Ok(level) = level.parse::<LevelFilter>() else {
             return Err(Failure::Input(format!(
                 "{VARIABLE}: {directive:?} is no level: expected off, error, warn, info, debug or trace, or a part of the \
                  program with one, such as drive_bus=debug"
             )));
-        }
-    }
-    Ok(())
+        };
+        Ok(match part {
+            Some(part) => wanted.with_target(part, level),
+            None => wanted.with_default(level),
+        })
+    })
 }
 
 /// How a line of the log looks.
@@ -268,8 +281,22 @@ mod tests {
             ("loud", false),
             ("drive_bus=loud", false),
         ] {
-            assert_eq!(check(said).is_ok(), is_right, "{said}");
+            assert_eq!(wanted(said).is_ok(), is_right, "{said}");
         }
+    }
+
+    #[test]
+    fn what_is_said_of_one_part_says_nothing_of_the_others() {
+        let shows = |said: &str, part: &str, level: Level| {
+            filter(wanted(said).expect("it is right"), Level::INFO).would_enable(part, &level)
+        };
+        assert!(shows("drive_bus=trace", "drive_bus::task", Level::TRACE));
+        assert!(shows("drive_bus=trace", "drived", Level::INFO));
+        assert!(!shows("drive_bus=trace", "drived", Level::DEBUG));
+        assert!(shows(" drive_bus = trace , warn", "drive_bus", Level::TRACE));
+        assert!(!shows("drive_bus=trace,warn", "drived", Level::INFO));
+        assert!(!shows("off", "drived", Level::ERROR));
+        assert!(shows("", "drived", Level::INFO) && !shows("", "drived", Level::DEBUG));
     }
 
     #[test]
