@@ -12,7 +12,7 @@ use crate::{
 
 /// What a family can do. What stands here the drive does; what does not is
 /// [`Error::Unsupported`](crate::Error::Unsupported), never a silent no-op.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Capabilities {
     /// The name that configurations use, such as `atv312`.
     pub key: &'static str,
@@ -94,7 +94,7 @@ pub struct Capabilities {
 }
 
 /// A setting by which a drive waits before it answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AnswerDelay {
     /// The manual's mnemonic of its register, which counts milliseconds.
     pub code: &'static str,
@@ -231,7 +231,7 @@ impl Capabilities {
 }
 
 /// What a family's communication watchdog can be set to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct WatchdogCapability {
     /// The shortest time.
     pub min: Duration,

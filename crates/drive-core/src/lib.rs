@@ -27,6 +27,7 @@ mod error;
 mod faults;
 mod identity;
 mod intent;
+pub mod interned;
 mod kept_readings;
 mod lease;
 mod motion;

@@ -1,5 +1,7 @@
 //! What a family consists of: [`Definition`].
 
+use std::fmt;
+
 use drive_core::{Capabilities, Drive, Port, SlaveAddress};
 
 #[cfg(feature = "sim")]
@@ -10,7 +12,10 @@ use crate::{
 };
 
 /// Makes the drive of this address behind a port, as its owner says that it is. Nothing is sent by it.
-pub type Open = fn(Box<dyn Port>, SlaveAddress, &Options) -> Box<dyn Drive>;
+pub type Open = dyn Fn(Box<dyn Port>, SlaveAddress, &Options) -> Box<dyn Drive> + Send + Sync;
+
+/// The bits that the manual names of the register at an address, the lowest first.
+pub type Bits = dyn Fn(u16) -> Vec<Bit> + Send + Sync;
 
 /// What a family of drives consists of, for whoever chooses drives by name.
 ///
@@ -27,11 +32,11 @@ pub type Open = fn(Box<dyn Port>, SlaveAddress, &Options) -> Box<dyn Drive>;
 ///     todo!("Fan1::new(port, slave)")
 /// }
 ///
-/// static FAN1: Definition = Definition::new(&CAPABILITIES, open).with_options(&[OptionEntry::new(
+/// static FAN1: Definition = Definition::new(&CAPABILITIES, &open).with_options(&[OptionEntry::new(
 ///     "blades",
 ///     "a whole number",
 ///     "how many blades its fan has (default 6)",
-///     |text| text.parse::<u8>().is_ok(),
+///     &|text| text.parse::<u8>().is_ok(),
 /// )]);
 ///
 /// // Once, where the program begins.
@@ -39,12 +44,15 @@ pub type Open = fn(Box<dyn Port>, SlaveAddress, &Options) -> Box<dyn Drive>;
 /// assert_eq!("fan1".parse::<Family>().unwrap().capabilities().name, "Somebody's fan drive");
 /// # Ok::<(), drive_families::NameTaken>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
+///
+/// One that is read from a file has its tables by [`drive_core::interned`], and functions that hold what was read. A function from a
+/// file is kept for the life of the program: whoever reads files again keeps the definition of each content once.
+#[derive(Clone, Copy)]
 pub struct Definition {
     pub(crate) capabilities: &'static Capabilities,
-    pub(crate) open: Open,
+    pub(crate) open: &'static Open,
     pub(crate) options: &'static [OptionEntry],
-    pub(crate) bits: fn(u16) -> Vec<Bit>,
+    pub(crate) bits: &'static Bits,
     #[cfg(feature = "sim")]
     pub(crate) twin: Option<Twin>,
 }
@@ -52,12 +60,12 @@ pub struct Definition {
 impl Definition {
     /// A family that can do this, and how a drive of it is made.
     #[must_use]
-    pub const fn new(capabilities: &'static Capabilities, open: Open) -> Self {
+    pub const fn new(capabilities: &'static Capabilities, open: &'static Open) -> Self {
         Self {
             capabilities,
             open,
             options: &[],
-            bits: |_| Vec::new(),
+            bits: &|_| Vec::new(),
             #[cfg(feature = "sim")]
             twin: None,
         }
@@ -71,7 +79,7 @@ impl Definition {
 
     /// The same with the bits that the manual names of the register at an address, the lowest first.
     #[must_use]
-    pub const fn with_bits(self, bits: fn(u16) -> Vec<Bit>) -> Self {
+    pub const fn with_bits(self, bits: &'static Bits) -> Self {
         Self { bits, ..self }
     }
 
@@ -80,5 +88,14 @@ impl Definition {
     #[must_use]
     pub const fn with_twin(self, twin: Twin) -> Self {
         Self { twin: Some(twin), ..self }
+    }
+}
+
+impl fmt::Debug for Definition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Definition")
+            .field("capabilities", &self.capabilities)
+            .field("options", &self.options)
+            .finish_non_exhaustive()
     }
 }

@@ -35,11 +35,11 @@ use std::{
 use drive_core::{Capabilities, Drive, Port, SlaveAddress, WatchdogCapability};
 
 #[cfg(feature = "sim")]
-pub use crate::twin::{SetUp, Twin};
+pub use crate::twin::{Machine, SetUp, Twin};
 pub use crate::{
     bits::Bit,
-    definition::{Definition, Open},
-    options::{OptionEntry, OptionError, Options},
+    definition::{Bits, Definition, Open},
+    options::{IsValue, OptionEntry, OptionError, Options},
 };
 use crate::{
     five::{atv21, atv28, atv58, atv312, omron_3g3ev},

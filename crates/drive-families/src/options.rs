@@ -1,11 +1,11 @@
 //! What only its owner knows of a drive: options that one family has and the bus cannot tell.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
 use crate::Family;
 
 /// One option of a family.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct OptionEntry {
     /// Its name.
     pub name: &'static str,
@@ -13,7 +13,19 @@ pub struct OptionEntry {
     pub value: &'static str,
     /// What it says of the drive, and its default.
     pub meaning: &'static str,
-    is_value: fn(&str) -> bool,
+    is_value: &'static IsValue,
+}
+
+/// Whether a text is a value of an option.
+pub type IsValue = dyn Fn(&str) -> bool + Send + Sync;
+
+impl fmt::Debug for OptionEntry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OptionEntry")
+            .field("name", &self.name)
+            .field("value", &self.value)
+            .finish_non_exhaustive()
+    }
 }
 
 impl OptionEntry {
@@ -23,7 +35,7 @@ impl OptionEntry {
         name: &'static str,
         value: &'static str,
         meaning: &'static str,
-        is_value: fn(&str) -> bool,
+        is_value: &'static IsValue,
     ) -> Self {
         Self { name, value, meaning, is_value }
     }

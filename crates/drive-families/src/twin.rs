@@ -15,17 +15,20 @@ pub enum SetUp {
 }
 
 /// How drives of a family are simulated.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Twin {
-    pub(crate) machine: fn(SetUp) -> Box<dyn Model>,
+    pub(crate) machine: &'static Machine,
     pub(crate) options: &'static [(&'static str, &'static str)],
     pub(crate) trip: Option<u16>,
 }
 
+/// Makes a simulated drive.
+pub type Machine = dyn Fn(SetUp) -> Box<dyn Model> + Send + Sync;
+
 impl Twin {
     /// By these machines.
     #[must_use]
-    pub const fn new(machine: fn(SetUp) -> Box<dyn Model>) -> Self {
+    pub const fn new(machine: &'static Machine) -> Self {
         Self { machine, options: &[], trip: None }
     }
 

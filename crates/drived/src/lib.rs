@@ -8,7 +8,7 @@
 //! # use drive_core::Capabilities;
 //! # use drive_families::{Definition, Family};
 //! # static CAPABILITIES: Capabilities = Capabilities::least("fan1", "Somebody's fan drive");
-//! # static FAN1: Definition = Definition::new(&CAPABILITIES, |_, _, _| unimplemented!());
+//! # static FAN1: Definition = Definition::new(&CAPABILITIES, &|_, _, _| unimplemented!());
 //! fn main() -> ExitCode {
 //!     Family::new(&FAN1).add().expect("no other family has its name");
 //!     drived::program()

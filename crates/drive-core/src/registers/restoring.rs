@@ -25,7 +25,7 @@ pub enum Part {
 
 /// What a family's manual says of putting a drive's settings back. What is not named is written one by one in the order of
 /// the map, after [`first`](Self::first) and before [`last`](Self::last).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Restoring {
     /// What goes before all other settings, in this order.
     pub first: &'static [Step],
@@ -49,7 +49,7 @@ pub struct Restoring {
 }
 
 /// Registers that are written together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Step {
     /// The registers. Where there are several, none may pass the next one, or none can be without the next one: what is
     /// lowered is written in this order, what is raised in the opposite order after it.
@@ -59,7 +59,7 @@ pub struct Step {
 }
 
 /// Registers whose unit another register chooses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Scaled {
     /// The registers.
     pub registers: &'static [u16],
@@ -137,7 +137,7 @@ impl Restoring {
 }
 
 /// A value that a drive holds and the one that it is to hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Change {
     /// The register.
     pub row: &'static Row,

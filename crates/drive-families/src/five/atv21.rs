@@ -13,15 +13,15 @@ use crate::{
 };
 
 pub(crate) const DEFINITION: &Definition = &{
-    let definition = Definition::new(&CAPABILITIES, |port, slave, options| {
+    let definition = Definition::new(&CAPABILITIES, &|port, slave, options| {
         Box::new(Atv21::new(port, slave).with_authority(of(options)))
     })
     .with_options(&[OptionEntry::new(
         "authority",
         "priority or settings",
         "by what right the bus commands: its priority bits (default), or the drive's settings CMOD = 2 and FMOD = 4 alone",
-        |text| authority(text).is_some(),
-    )]).with_bits(bits::of_atv21);
+        &|text| authority(text).is_some(),
+    )]).with_bits(&bits::of_atv21);
     #[cfg(feature = "sim")]
     let definition = definition.with_twin(TWIN);
     definition
@@ -29,7 +29,7 @@ pub(crate) const DEFINITION: &Definition = &{
 
 /// Its simulated twin, with a code for an overcurrent or an overload, which a reset clears.
 #[cfg(feature = "sim")]
-const TWIN: Twin = Twin::new(|set_up| match set_up {
+const TWIN: Twin = Twin::new(&|set_up| match set_up {
     SetUp::ForTheBus => Box::new(models::atv21::Atv21::new().with_blocks()),
     SetUp::Factory => Box::new(models::atv21::Atv21::new()),
 })

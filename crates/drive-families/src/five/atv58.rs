@@ -14,11 +14,11 @@ use crate::{
 };
 
 pub(crate) const DEFINITION: &Definition = &{
-    let definition = Definition::new(&CAPABILITIES, |port, slave, options| {
+    let definition = Definition::new(&CAPABILITIES, &|port, slave, options| {
         Box::new(Atv58::with_map(port, slave, map(options)))
     })
     .with_options(OPTIONS)
-    .with_bits(bits::of_atv58);
+    .with_bits(&bits::of_atv58);
     #[cfg(feature = "sim")]
     let definition = definition.with_twin(TWIN);
     definition
@@ -26,12 +26,12 @@ pub(crate) const DEFINITION: &Definition = &{
 
 /// Its simulated twin, with a code for an overcurrent or an overload, which a reset clears.
 #[cfg(feature = "sim")]
-const TWIN: Twin = Twin::new(|_| Box::new(models::atv58::Atv58::new())).tripping(5);
+const TWIN: Twin = Twin::new(&|_| Box::new(models::atv58::Atv58::new())).tripping(5);
 
 /// The options, each once: its name, its values, what it says and its default, and what it sets.
 macro_rules! words {
     ($($name:literal, $value:expr, $meaning:literal, |$map:ident, $text:ident| $set:expr;)*) => {
-        const OPTIONS: &[OptionEntry] = &[$(OptionEntry::new($name, $value, $meaning, |$text| {
+        const OPTIONS: &[OptionEntry] = &[$(OptionEntry::new($name, $value, $meaning, &|$text| {
             let $map = &mut Atv58Map::default();
             let set: Option<()> = $set;
             set.is_some()

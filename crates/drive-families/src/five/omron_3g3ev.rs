@@ -12,7 +12,7 @@ const FAULT_RESET_FUNCTION: &str = "fault-reset-function";
 const SAVES: &str = "saves";
 
 pub(crate) const DEFINITION: &Definition = &{
-    let definition = Definition::new(&CAPABILITIES, |port, slave, options| {
+    let definition = Definition::new(&CAPABILITIES, &|port, slave, options| {
         let saves = options.get(SAVES).and_then(|text| text.parse().ok());
         let drive = Drive3g3ev::new(port, slave).with_saves(saves.unwrap_or_default());
         Box::new(match options.get(FAULT_RESET_FUNCTION).and_then(word) {
@@ -25,15 +25,15 @@ pub(crate) const DEFINITION: &Definition = &{
             FAULT_RESET_FUNCTION,
             "a number up to 65535, or hexadecimal such as 01CAh",
             "the number of \"fault reset\" in n06 to n08, from the drive's user manual; without it a fault cannot be reset",
-            |text| word(text).is_some(),
+            &|text| word(text).is_some(),
         ),
         OptionEntry::new(
             SAVES,
             "a whole number",
             "how often its EEPROM was saved before; counted on from there (default 0)",
-            |text| text.parse::<u32>().is_ok(),
+            &|text| text.parse::<u32>().is_ok(),
         ),
-    ]).with_bits(bits::of_3g3ev);
+    ]).with_bits(&bits::of_3g3ev);
     #[cfg(feature = "sim")]
     let definition = definition.with_twin(TWIN);
     definition
@@ -43,7 +43,7 @@ pub(crate) const DEFINITION: &Definition = &{
 #[cfg(feature = "sim")]
 const TWIN: Twin =
     // Its n08 holds this number from the factory, which the simulator takes for "fault reset".
-    Twin::new(|set_up| {
+    Twin::new(&|set_up| {
         let drive = models::drive_3g3ev::Drive3g3ev::new();
         Box::new(match set_up {
             SetUp::ForTheBus => drive.with_fault_reset_function(3),

@@ -13,7 +13,7 @@ use crate::{
 const HIGHEST_FREQUENCY: &str = "highest-frequency";
 
 /// The family: `Family::new(&FAN1).add()` makes it known by its name.
-pub static FAN1: Definition = Definition::new(&CAPABILITIES, |port, slave, options| {
+pub static FAN1: Definition = Definition::new(&CAPABILITIES, &|port, slave, options| {
     let highest = options.get(HIGHEST_FREQUENCY).and_then(frequency);
     Box::new(Fan1::new(port, slave).with_highest(highest.unwrap_or(HIGHEST)))
 })
@@ -21,15 +21,15 @@ pub static FAN1: Definition = Definition::new(&CAPABILITIES, |port, slave, optio
     HIGHEST_FREQUENCY,
     "a frequency of 1 Hz to 60 Hz, such as 45Hz",
     "the highest setpoint that its fan bears (default 60 Hz)",
-    |text| frequency(text).is_some(),
+    &|text| frequency(text).is_some(),
 )])
-.with_bits(|register| match register {
+.with_bits(&|register| match register {
     address::CONTROL => named::<ControlWord>(),
     address::STATUS => named::<StatusWord>(),
     _ => Vec::new(),
 })
 .with_twin(
-    Twin::new(|set_up| {
+    Twin::new(&|set_up| {
         // From the factory its panel commands.
         Box::new(if set_up == SetUp::Factory { Machine::at_the_panel() } else { Machine::new() })
     })
