@@ -11,6 +11,7 @@ pub(crate) const MEI_IDENTIFICATION: u8 = 0x0E;
 
 /// A request that has no form on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EncodeError {
     /// A quantity outside what the function allows.
     #[error("function {function:02X}h carries 1 to {most}, not {quantity}")]

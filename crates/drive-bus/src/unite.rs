@@ -37,6 +37,7 @@ pub struct UniTe {
 
 /// Why a UNI-TE request brought nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UniTeError {
     /// The negative reply FDh, which has no reason, as exception 03; or 0Ah when the network could not deliver it.
     #[error("the slave refuses the request ({0})")]

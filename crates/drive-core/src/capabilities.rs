@@ -315,6 +315,7 @@ pub struct Watchdog {
 
 /// A drive that cannot live on this line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LineMismatch {
     /// The address.
     #[error("address {slave}: a {family} has addresses 1 to {highest}")]

@@ -191,6 +191,7 @@ impl fmt::Display for SerialSettings {
 
 /// A text that is no setting of a serial line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SerialSettingsError {
     /// It is not a speed and a character format.
     #[error("{0:?} is not a speed in bit/s and a character format, as in 19200 8E1")]

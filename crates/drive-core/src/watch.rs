@@ -12,6 +12,7 @@ use crate::{
 /// The run command of this side, the shaft, and what a contract rests on: looked at with every status, and what no ordinary
 /// status carries by [`Turns`]. [`watched_by!`](crate::watched_by) tells it as a [`Drive`](crate::Drive) has to.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Watch {
     /// The run command of this side that stands, or may.
     pub run: OwnRun,

@@ -6,6 +6,7 @@ use crate::Family;
 
 /// One option of a family.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct OptionEntry {
     /// Its name.
     pub name: &'static str,

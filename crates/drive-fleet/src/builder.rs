@@ -38,6 +38,7 @@ const EVENTS: usize = 4_096;
 
 /// Why a fleet cannot be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FleetError {
     /// Two drives or two lines have one name.
     #[error("{0:?}: the name is taken")]
@@ -113,6 +114,7 @@ pub enum FleetError {
 /// A setting that contradicts another one or the family.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}")]
+#[non_exhaustive]
 pub struct SettingProblem {
     /// The field of [`DriveSettings`].
     pub setting: &'static str,

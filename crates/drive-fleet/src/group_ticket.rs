@@ -91,6 +91,7 @@ impl IntoFuture for GroupStop {
 #[must_use = "a stop that is not confirmed is an alarm"]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct StopReport {
     /// Drives that show standstill.
     pub confirmed: Vec<Arc<str>>,

@@ -241,6 +241,7 @@ impl fmt::Display for Outcome {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Started {
     /// Which way.
     pub direction: Direction,
@@ -271,6 +272,7 @@ impl fmt::Display for Started {
 
 /// How a stop was asked for, and how the drive stops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct StopModes {
     /// The mode that was asked for.
     pub asked: StopMode,
@@ -326,6 +328,7 @@ impl fmt::Display for StopModes {
 
 /// A status that may be old.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LastSeen {
     /// The status.
     pub status: Arc<Status>,

@@ -16,6 +16,7 @@ const KEPT_WITHIN: Duration = Duration::from_millis(400);
 /// What is to be kept of a drive's run command from now on, in the order in which it is told. **A start waits until its record is
 /// kept**, 0.4 s at the most, so that a program that is killed has told the next one of every motor that it started.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct RunKept {
     /// The drive.
     pub drive: Arc<str>,

@@ -286,6 +286,7 @@ pub struct Alarms {
 /// Else somebody else has started the motor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[non_exhaustive]
 pub struct RunRecord {
     /// Which drive it was, as [`Identity`] is displayed; `None` where it does not say.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]

@@ -44,6 +44,7 @@ pub use self::finding::FindingFigures;
 /// What is known of a drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SnapshotView {
     /// Its name.
     pub name: Arc<str>,
@@ -144,6 +145,7 @@ impl From<&Snapshot> for SnapshotView {
 /// Why something is not so, as programs read it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct RefusalView {
     /// In one word.
     pub reason: String,
@@ -179,6 +181,7 @@ impl<T> Judged<T> {
 /// Something that troubles a drive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct ConcernView {
     /// What.
     pub kind: ConcernKind,
@@ -221,6 +224,7 @@ impl ConcernView {
 /// A trip.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct TripView {
     /// What it tripped by; absent while the drive has not said.
     #[serde(flatten)]
@@ -259,6 +263,7 @@ impl From<&Trip> for TripView {
 /// Something that happened to a drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct EventView {
     /// Its place among all events of the fleet.
     pub order: u64,
@@ -547,6 +552,7 @@ impl From<&EventKind> for Happened {
 /// A command that has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct CommandedView {
     /// Which.
     #[serde(flatten)]
@@ -564,6 +570,7 @@ pub struct CommandedView {
 /// What became of a command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct OutcomeView {
     /// In one word.
     pub outcome: Became,
@@ -611,6 +618,7 @@ impl From<&Outcome> for OutcomeView {
 /// How a stop was asked for, and how the drive stops.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct StopModesView {
     /// The mode that was asked for.
     pub asked: StopMode,
@@ -643,6 +651,7 @@ impl From<StopModes> for StopModesView {
 /// A status that may be old.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SeenView {
     /// How old it was then.
     pub seen_before_ms: u64,
@@ -663,6 +672,7 @@ impl From<&LastSeen> for SeenView {
 /// What went wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct ErrorView {
     /// Of which kind.
     pub kind: ErrorKind,
@@ -679,6 +689,7 @@ impl From<&Error> for ErrorView {
 /// What was done to a drive when it ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct ExitView {
     /// In one word.
     pub action: Ended,
@@ -717,6 +728,7 @@ impl From<&ExitAction> for ExitView {
 /// What became of a drive of a group.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct OfDrive {
     /// The drive.
     pub drive: Arc<str>,

@@ -33,6 +33,7 @@ pub struct Reading {
 
 /// Why a metric cannot be defined or set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MetricError {
     /// Two names that differ in nothing but case, or one of the specification's own.
     #[error("there is already a metric {0:?}: expected a name that differs in more than case")]

@@ -48,6 +48,7 @@ pub struct Metric {
 
 /// Why bytes are no payload that is read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Malformed {
     /// It is longer than [`LONGEST_PAYLOAD`].
     #[error("a payload of {0} bytes: expected {LONGEST_PAYLOAD} at the most")]

@@ -132,6 +132,7 @@ fn pad(block: &mut Vec<u8>) {
 
 /// A file that is no capture of ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// It does not begin as a pcapng file of this byte order does.
     #[error("not a little-endian pcapng file")]

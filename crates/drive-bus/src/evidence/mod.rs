@@ -25,6 +25,7 @@ const FACTS: usize = 64;
 
 /// Something that was heard, or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Fact {
     /// When.
     pub at: Instant,

@@ -39,6 +39,7 @@ const MAX_RECEIVED: usize = 4 * MAX_FRAME;
 
 /// What a line in Modbus ASCII can be set to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct AsciiSettings {
     /// The longest pause between two characters of a frame (p. 17: 1 s, and 4 to 5 s over wide-area networks).
     pub character_gap: Duration,

@@ -49,6 +49,7 @@ const JUST: Duration = Duration::from_millis(100);
 
 /// What the task is to do with the second connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SecondPort {
     /// Open it.
     Open,

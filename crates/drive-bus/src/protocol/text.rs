@@ -18,6 +18,7 @@ const NAMES: &[&str] = &[
 
 /// A text that is no protocol.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProtocolError {
     /// No protocol has this name.
     #[error("{0:?} is not a protocol: expected {expected}", expected = or(NAMES))]

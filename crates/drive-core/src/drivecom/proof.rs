@@ -42,6 +42,7 @@ pub enum Followed {
 
 /// What is known of a run command of this side, and of the shaft. `L` are the family's further exchanges.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Proof<L> {
     /// The run command of this side, the shaft, turns and grounds.
     pub watch: Watch,

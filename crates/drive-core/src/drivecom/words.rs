@@ -224,6 +224,7 @@ impl ExtendedStatus {
 
 /// `ETA` and `ETI` as they were read together: what the drive says of its state and of who commands it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct StatusWords {
     /// The status word.
     pub eta: StatusWord,

@@ -48,6 +48,7 @@ pub struct Written {
 
 /// One value of a list-type register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Choice {
     /// The word.
     pub value: u16,

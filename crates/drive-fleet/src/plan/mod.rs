@@ -30,6 +30,7 @@ const COMMANDS_PPM: u64 = 100_000;
 
 /// What a line will be like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LinePlan {
     /// One status of every living drive, one after the other, with what proves their run commands and with the frames that their
     /// watchdogs get between two of them, and what the probes of dead ones take meanwhile.
@@ -137,6 +138,7 @@ impl LinePlan {
 
 /// How a watchdog is fed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Feed {
     /// The watchdog's time.
     pub timeout: Duration,

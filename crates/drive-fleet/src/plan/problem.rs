@@ -7,6 +7,7 @@ use crate::supervisor::checks::FEED_PART;
 
 /// Why a plan does not work, with the arithmetic.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlanProblem {
     /// More drives than one of them allows on a segment.
     Stations {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// What a sentence about a finding is made of, besides its kind.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct FindingFigures {
     /// How often it was seen.
     pub part: u32,

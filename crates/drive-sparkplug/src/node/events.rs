@@ -101,6 +101,7 @@ pub struct Write {
 
 /// Why a metric of a command is not written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// Neither its name nor its alias was in a birth.
     #[error("no birth has told of a metric {0}")]
@@ -115,6 +116,7 @@ pub enum WriteError {
 
 /// Why a message is not used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Ignored {
     /// It is for somebody else.
     #[error("a message on {0:?}, which is not of this node")]
@@ -135,6 +137,7 @@ pub enum Ignored {
 
 /// Why a device cannot be added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DeviceError {
     /// Its name cannot be in a topic.
     #[error(transparent)]
