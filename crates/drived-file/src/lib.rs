@@ -96,16 +96,7 @@ impl Config {
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups(source, of(&raw.groups), names)?;
         let broker = of(&raw.mqtt);
-        let mqtt = broker.map(|entry| {
-            let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
-            let drives = drives.map(|drive| drive.settings.name.as_str()).collect();
-            let names = [
-                ("lines", lines.iter().map(|line| line.name.as_str()).collect()),
-                ("drives", drives),
-                ("groups", groups.iter().map(|group| group.name.as_str()).collect()),
-            ];
-            MqttConfig::read(source, entry, names)
-        });
+        let mqtt = broker.map(|entry| MqttConfig::read(source, entry));
         let sparkplug = broker.and_then(|entry| entry.sparkplug.as_ref()).map(|entry| {
             let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
             let drives = drives.map(|drive| drive.settings.name.as_str());

@@ -476,12 +476,17 @@ fn what_is_wrong_with_a_broker_is_told_with_its_place() {
 }
 
 #[test]
-fn names_that_would_have_one_topic_are_refused() {
-    let text = format!(
-        "[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}[[drives]]\nline = \"a\"\ndrive = \"atv312@3\"\nname = \"pump/1\"\n"
-    );
-    let told = read(&text).expect_err("two names");
-    assert!(told.contains("\"pump 1\" and \"pump/1\" would have one topic"), "{told}");
+fn a_slot_is_given_to_one_drive_and_several_of_one_entry_follow_each_other() {
+    let with = |drives: &str| read(&format!("[lines.a]\nport = \"/dev/ttyUSB0,19200,8E1\"\n{drives}"));
+    let several = "[[drives]]\nline = \"a\"\ndrive = \"atv312@1-3\"\nslot = 10\n";
+    let config = with(several).unwrap_or_else(|told| panic!("{told}"));
+    let slots: Vec<_> = config.lines[0].drives.iter().map(|drive| drive.slot).collect();
+    assert_eq!(slots, [Some(10), Some(11), Some(12)]);
+    let again = "[[drives]]\nline = \"a\"\ndrive = \"atv312@9\"\nname = \"fan\"\nslot = 11\n";
+    let told = with(&format!("{several}{again}")).expect_err("two drives");
+    assert!(told.contains("slot 11 is given to \"a 2\" and to \"fan\""), "{told}");
+    let told = with(&format!("[defaults]\nslot = 1\n{several}")).expect_err("a default");
+    assert!(told.contains("a default names no line and no drive"), "{told}");
 }
 
 fn with_edge_node(section: &str) -> Result<SparkplugConfig, String> {

@@ -541,3 +541,46 @@ fn a_drive_that_left_while_the_daemon_was_down_is_taken_back_at_its_next_start_a
     });
     assert_eq!(left.into_inner().into_iter().collect::<Vec<_>>(), others);
 }
+
+#[test]
+fn a_drive_that_was_renamed_while_the_daemon_was_down_keeps_its_topics_and_any_script_has_some() {
+    let Some(broker) = Mosquitto::start("mqtt-names") else { return };
+    let mut ear = broker.hear(&["drived/#", "homeassistant/#"]);
+    let folder = path("mqtt-names-state");
+    let section = format!(
+        "servers = [\"mqtt://127.0.0.1:{}\"]\nheartbeat = \"1s\"\ndiscovery = \"device\"",
+        broker.port
+    );
+    let head = format!("state = {:?}\n", folder.to_str().expect("the path is text"));
+    let mut daemon = Daemon::start_with("mqtt-names", &head, &section);
+    let document = "homeassistant/device/drived_pump_2/config";
+    ear.until(|topic, said| topic == document && said["device"]["name"] == "pump 2");
+    daemon.kill();
+    let text = fs::read_to_string(daemon.file.path()).expect("it is ours");
+    fs::write(daemon.file.path(), text.replace("pump {}", "насос {}")).expect("it is ours");
+    daemon.start_again();
+    let taken = Cell::new(false);
+    ear.until(|topic, said| {
+        taken.set(taken.get() || topic.contains("pump_2") && said == "");
+        topic == document && said["device"]["name"] == "насос 2"
+    });
+    ear.until(|topic, said| topic == "drived/drive/pump_2/state" && said["name"] == "насос 2");
+    assert!(!taken.get(), "nothing of it is taken back");
+    // Where nothing is kept, two of one topic are told from each other all the same.
+    daemon.kill();
+    fs::remove_dir_all(&folder).expect("it is ours");
+    let (before, _) = text.split_once("[[drives]]").expect("there are drives");
+    let drive = |number: u8, name: &str| {
+        format!("[[drives]]\nline = \"bench\"\ndrive = \"atv312@{number}\"\nname = \"{name}\"\n")
+    };
+    let both = format!("{before}{}{}", drive(1, "насос"), drive(2, "котёл"));
+    fs::write(daemon.file.path(), both).expect("it is ours");
+    daemon.start_again();
+    for (name, topic) in [("насос", "_____-ac43"), ("котёл", "_____-3e36")] {
+        let mut ear = broker.hear(&["drived/#"]);
+        ear.until(|to, said| to == format!("drived/drive/{topic}/state") && said["name"] == name);
+        broker.publish(&format!("drived/drive/{topic}/stop"), r#"{"id": "s"}"#, &["-q", "1"]);
+        assert_eq!(ear.outcome("s")["outcome"], "confirmed");
+    }
+    let _ = fs::remove_dir_all(folder);
+}

@@ -14,9 +14,10 @@ use super::{
     topics::{Asking, Meant, Verb},
 };
 use crate::{
-    broker::{Arrived, Kept, Message, Qos, config::topic_id},
+    broker::{Arrived, Kept, Message, Qos},
     desk::{self, Answer, Answers, Desk, Refusal},
 };
+use drived_config::names::Kind;
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::{
     follow::SETTLES_FOR,
@@ -189,11 +190,15 @@ fn target(face: &Face, meant: &Meant) -> Option<Target> {
         Meant::All => Some(Target::All),
         Meant::Drive(id) => {
             let drives = face.plant.fleet().drives();
-            let drive = drives.iter().find(|drive| topic_id(drive.name()) == *id)?;
+            let drive = drives.iter().find(|drive| face.topics.id(Kind::Drive, drive.name()) == *id)?;
             Some(Target::Drive(drive.name().to_string()))
         }
         Meant::Group(id) => {
-            let group = face.plant.groups().into_iter().find(|group| topic_id(&group.name) == *id)?;
+            let group = face
+                .plant
+                .groups()
+                .into_iter()
+                .find(|group| face.topics.id(Kind::Group, &group.name) == *id)?;
             Some(Target::Group(group.name))
         }
     }

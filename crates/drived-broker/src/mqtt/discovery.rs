@@ -18,7 +18,8 @@ use super::{
     Face,
     topics::{Meant, Verb},
 };
-use crate::broker::config::{Discovery, topic_id};
+use crate::broker::config::Discovery;
+use drived_config::names::Kind;
 use drived_doors::{Rights, Role};
 use drived_plant::plant::views::LineView;
 
@@ -253,8 +254,8 @@ fn component(id: impl Into<String>, platform: &'static str, values: Value) -> Co
 
 impl Device {
     fn of_drive(face: &Face, drive: &DriveHandle, snapshot: &Snapshot, keys: &BTreeSet<&str>) -> Self {
-        let (name, id) = (drive.name(), topic_id(drive.name()));
-        let topics = &face.topics;
+        let (name, topics) = (drive.name(), &face.topics);
+        let id = topics.id(Kind::Drive, name);
         let mut device = json!({
             "identifiers": [format!("{}_{id}", topics.node())],
             "name": name.as_ref(),
@@ -357,7 +358,7 @@ impl Device {
             }),
         )];
         for line in lines {
-            let (id, topic) = (topic_id(&line.name), topics.line(&line.name));
+            let (id, topic) = (topics.id(Kind::Line, &line.name), topics.line(&line.name));
             components.push(component(
                 format!("line_{id}"),
                 "binary_sensor",

@@ -17,10 +17,8 @@ use super::{
     discovery::{self, Discovered},
     topics::Standing,
 };
-use crate::broker::{
-    Arrived, Qos, Subscription, Wanted,
-    config::{Discovery, topic_id},
-};
+use crate::broker::{Arrived, Qos, Subscription, Wanted, config::Discovery};
+use drived_config::names::Kind;
 
 /// How long after a connect the broker may take to say what it has.
 const SETTLED: Duration = Duration::from_secs(2);
@@ -141,7 +139,7 @@ impl Gone {
         }
         let lines = face.plant.lines();
         for id in std::mem::take(&mut self.lines) {
-            if !lines.iter().any(|line| topic_id(&line.name) == id) {
+            if !lines.iter().any(|line| face.topics.id(Kind::Line, &line.name) == id) {
                 face.tell_for_good(face.topics.line_of(&id), "");
             }
         }
@@ -154,8 +152,14 @@ impl Gone {
     }
 }
 
-fn has_drive(face: &Face, id: &str) -> bool {
-    face.plant.fleet().drives().iter().any(|drive| topic_id(drive.name()) == id)
+/// Whether there is a drive of this id, or will be in a moment.
+pub(super) fn has_drive(face: &Face, id: &str) -> bool {
+    face.topics.has(Kind::Drive, id) || is_here(face, id)
+}
+
+/// Whether there is a drive of this id.
+pub(super) fn is_here(face: &Face, id: &str) -> bool {
+    face.plant.fleet().drives().iter().any(|drive| face.topics.id(Kind::Drive, drive.name()) == id)
 }
 
 fn is_discovered(face: &Face) -> bool {

@@ -24,8 +24,9 @@ use tokio::{
 use self::{commanding::Commanding, discovery::Discovered, gone::Gone, telling::Teller, topics::Topics};
 use crate::broker::{
     Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
-    config::{Address, Discovery, MqttConfig, host_name, topic_id},
+    config::{Address, Discovery, MqttConfig, host_name},
 };
+use drived_config::names::{Kind, Names};
 use drived_doors::{audit::Audit, private};
 use drived_plant::{counts::Source, plant::Plant};
 use drived_words::failure::Failure;
@@ -163,7 +164,7 @@ fn login(config: &MqttConfig) -> Result<Option<Login>, Failure> {
 /// Commands are never taken from what the broker has kept: it is asked not to send that, and what comes with the flag is
 /// refused.
 fn subscriptions(config: &MqttConfig) -> Vec<Subscription> {
-    let topics = Topics::new(config);
+    let topics = Topics::new(config, Names::default());
     let commands = config.commands.then(|| topics.command_filters().into_iter().chain([topics.echo()]));
     let commands = commands.into_iter().flatten();
     let birth = (config.discovery != Discovery::Off).then(|| topics.birth());
@@ -175,9 +176,9 @@ fn subscriptions(config: &MqttConfig) -> Vec<Subscription> {
 
 impl Prepared {
     /// Connects, and tells and asks from now on. Nothing waits for the broker.
-    pub fn open(self, plant: Plant, audit: Audit) -> Mqtt {
+    pub fn open(self, plant: Plant, audit: Audit, names: Names) -> Mqtt {
         let Self { config, options } = self;
-        let topics = Topics::new(&config);
+        let topics = Topics::new(&config, names);
         let will = Will { message: Message::new(topics.status(), "offline").retained() };
         let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
         let audited = audit.head();
@@ -264,6 +265,8 @@ async fn keep(
 
 /// A drive that is told.
 struct Watched {
+    /// By which it was told.
+    id: String,
     task: JoinHandle<()>,
     discovered: Discovered,
 }
@@ -283,20 +286,29 @@ fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>, taken_back: 
         }
     }
     let gone = |name: &Arc<str>| !there.iter().any(|(known, ..)| known == name);
-    let left: Vec<Arc<str>> = tellers.keys().filter(|name| gone(name)).cloned().collect();
-    for name in left {
-        if let Some(watched) = tellers.remove(&name) {
-            watched.task.abort();
-            watched.discovered.take_back(face);
-            taken_back.take_back(face, &topic_id(&name));
+    tellers.retain(|name, watched| {
+        if !gone(name) {
+            return true;
         }
-    }
+        watched.task.abort();
+        if gone::is_here(face, &watched.id) {
+            // It is told by another name.
+            return false;
+        }
+        if face.topics.has(Kind::Drive, &watched.id) {
+            // It will be in a moment, or is gone then.
+            return true;
+        }
+        watched.discovered.take_back(face);
+        taken_back.take_back(face, &watched.id);
+        false
+    });
     for (name, line, drive) in there {
         // A drive that ended and began anew is another one.
         if tellers.get(&name).is_none_or(|watched| watched.task.is_finished()) {
-            let discovered = Discovered::default();
+            let (id, discovered) = (face.topics.id(Kind::Drive, &name), Discovered::default());
             let teller = Teller::new(Arc::clone(face), line, drive, discovered.clone());
-            tellers.insert(name, Watched { task: tokio::spawn(teller.run()), discovered });
+            tellers.insert(name, Watched { id, task: tokio::spawn(teller.run()), discovered });
         }
     }
 }

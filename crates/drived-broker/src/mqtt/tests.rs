@@ -12,6 +12,7 @@ use crate::{
     broker::testing::{Conduct, TestBroker, publish},
     desk::testing::{NO_OBJECTS, REFUSED, STOPS},
 };
+use drived_config::names::{Configured, Named};
 use drived_doors::Role;
 use drived_plant::plant::testing::TestPlant;
 
@@ -51,9 +52,14 @@ impl Bench {
 
     /// The same on a broker that has something already.
     async fn on(broker: TestBroker, plant: TestPlant, config: MqttConfig) -> Self {
+        Self::called(broker, plant, config, Names::default()).await
+    }
+
+    /// The same with what is kept of who is who.
+    async fn called(broker: TestBroker, plant: TestPlant, config: MqttConfig, names: Names) -> Self {
         let mut prepared = Mqtt::prepare(config).unwrap_or_else(|failure| panic!("{failure}"));
         prepared.options.dial = broker.options().dial;
-        let mqtt = prepared.open(plant.plant.clone(), Audit::default());
+        let mqtt = prepared.open(plant.plant.clone(), Audit::default(), names);
         broker.until(|broker| broker.retained().contains_key("plant/north/status")).await;
         sleep(Duration::from_secs(2)).await;
         Self { plant, broker, mqtt }
@@ -649,6 +655,39 @@ async fn a_drive_that_leaves_is_taken_back() {
         document < place("state", "") && place("availability", "offline") < place("availability", ""),
         "{taken:?}"
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_by_another_name_keeps_its_topics_and_its_device() {
+    let there = |name: &str| Configured {
+        drives: vec![Named { name: name.to_owned(), place: "a 1".to_owned(), slot: None }],
+        ..Configured::default()
+    };
+    let names = Names::default();
+    names.take_up(&there("old")).unwrap();
+    names.take_up(&there("pump 1")).unwrap();
+    let broker = TestBroker::default();
+    // As it was told by its old name.
+    broker.retain("plant/north/drive/old/availability", "online");
+    broker.retain("homeassistant/device/plant_north_old/config", &document("plant/north"));
+    let bench = Bench::called(broker, TestPlant::of(1).await, config(), names.clone()).await;
+    a_while().await;
+    assert_eq!(bench.state("plant/north/drive/old/state")["name"], "pump 1");
+    let told = bench.state("homeassistant/device/plant_north_old/config");
+    assert_eq!(told["device"]["name"], "pump 1");
+    assert!(
+        bench
+            .broker
+            .published()
+            .iter()
+            .all(|(topic, payload)| !topic.contains("pump_1") && payload != "offline")
+    );
+    bench.ask("drive/old/command", &start("a").to_string());
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers_on("plant/north/drive/old/outcome"));
+    bench.ask("drive/old/stop", "");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!bench.runs(0));
 }
 
 /// A document of Home Assistant as a daemon under this base makes it.

@@ -1,6 +1,8 @@
 //! The topics: `<base>/status`, `<base>/line/<id>`, `<base>/drive/<id>/…`, `<base>/group/<id>/…`, `<base>/all/…`.
 
-use crate::broker::config::{MqttConfig, topic_id};
+use drived_config::names::{Kind, Names, topic_id};
+
+use crate::broker::config::MqttConfig;
 
 /// What asks for something: the last levels before the commander.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,11 +78,22 @@ pub(super) enum Standing {
 pub(super) struct Topics {
     base: String,
     prefix: String,
+    names: Names,
 }
 
 impl Topics {
-    pub(super) fn new(config: &MqttConfig) -> Self {
-        Self { base: config.base.clone(), prefix: config.discovery_prefix.clone() }
+    pub(super) fn new(config: &MqttConfig, names: Names) -> Self {
+        Self { base: config.base.clone(), prefix: config.discovery_prefix.clone(), names }
+    }
+
+    /// By which something is known in topics and to Home Assistant.
+    pub(super) fn id(&self, kind: Kind, name: &str) -> String {
+        self.names.topic(kind, name)
+    }
+
+    /// Whether something that is configured has this id.
+    pub(super) fn has(&self, kind: Kind, id: &str) -> bool {
+        self.names.has(kind, id)
     }
 
     /// Whether the daemon is there.
@@ -103,7 +116,7 @@ impl Topics {
     }
 
     pub(super) fn line(&self, name: &str) -> String {
-        self.line_of(&topic_id(name))
+        self.line_of(&self.id(Kind::Line, name))
     }
 
     /// The same of the line of an id.
@@ -113,7 +126,7 @@ impl Topics {
 
     /// Something of a drive.
     pub(super) fn drive(&self, name: &str, what: &str) -> String {
-        self.drive_of(&topic_id(name), what)
+        self.drive_of(&self.id(Kind::Drive, name), what)
     }
 
     /// The same of the drive of an id.

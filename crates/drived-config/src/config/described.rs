@@ -24,6 +24,7 @@ impl LinePart {
             drive,
             settings: DriveSettings { periods, ..DriveSettings::watched(drive.to_string()) },
             options: options.of(drive.family),
+            slot: None,
             has_own_periods: false,
         };
         let members: Vec<Member> = drives.iter().map(member).collect();
@@ -33,6 +34,7 @@ impl LinePart {
             name: member.drive,
             settings: member.settings_with(stretch),
             options: member.options,
+            slot: member.slot,
         };
         let drives = members.into_iter().map(part).collect();
         Self { name: name.to_owned(), config, budget, drives, problem: None }

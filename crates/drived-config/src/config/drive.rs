@@ -33,7 +33,7 @@ pub struct Draft {
 }
 
 settings! {
-    /// `[[drives]]`, and `[defaults]` without the first three.
+    /// `[[drives]]`, and `[defaults]` without the first four.
     DriveEntry sets Draft;
 
     /// the name of its line
@@ -42,6 +42,8 @@ settings! {
     drive: Parsed<DriveSpec> = "must be given";
     /// its name; `{}` stands for the address
     name: String = "line and address";
+    /// its number, from 0, in the [virtual unit](#the-virtual-unit); of several drives that of the first, and the others follow
+    slot: u16 = "the next that nobody has had";
     /// whether it may be commanded; otherwise it is only read
     control: bool = "`false`",
         |to, said| to.settings.control = *said,

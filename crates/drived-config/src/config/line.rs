@@ -107,6 +107,7 @@ pub(super) struct Member {
     pub(super) drive: DriveName,
     pub(super) settings: DriveSettings,
     pub(super) options: Options,
+    pub(super) slot: Option<u16>,
     /// Whether the file says how often it is asked.
     pub(super) has_own_periods: bool,
 }
@@ -121,14 +122,15 @@ impl Members {
     ) -> Result<Self, ConfigError> {
         let none = DriveEntry::default();
         let defaults = defaults.unwrap_or(&none);
-        if let Some(span) = ["line", "drive", "name"].into_iter().find_map(|key| defaults.place(key)) {
+        if let Some(span) = ["line", "drive", "name", "slot"].into_iter().find_map(|key| defaults.place(key))
+        {
             return Err(source.error(span, "a default names no line and no drive: expected in [[drives]]"));
         }
         if drives.is_empty() {
             return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
         }
         let mut groups: BTreeMap<String, Vec<Member>> = BTreeMap::new();
-        let mut names = BTreeMap::new();
+        let (mut names, mut slots) = (BTreeMap::new(), BTreeMap::new());
         for entry in drives {
             let (span, entry) = (entry.span(), entry.get_ref());
             let Some(line) = &entry.line else {
@@ -143,7 +145,7 @@ impl Members {
                 return Err(source.error(span, "expected drive = \"FAMILY@ADDRESSES\", such as atv312@1-31"));
             };
             let named: Vec<DriveName> = drive.get_ref().0.names().collect();
-            for name in &named {
+            for (name, number) in named.iter().zip(0_u16..) {
                 let place = entry.name.as_ref().map_or(drive.span(), Spanned::span);
                 let options = drive::options(source, entry, defaults, *name)?;
                 let watchdog = line_spec::watchdog(*name, &options, protocol);
@@ -152,13 +154,22 @@ impl Members {
                     let problem = format_args!("two drives are named {:?}", settings.name);
                     return Err(source.error(place, problem));
                 }
+                let slot = entry.slot.as_ref().map(|said| (said, said.get_ref().saturating_add(number)));
+                if let Some((said, slot)) = slot
+                    && let Some(other) = slots.insert(slot, settings.name.clone())
+                {
+                    let problem =
+                        format_args!("slot {slot} is given to {other:?} and to {:?}", settings.name);
+                    return Err(source.error(said.span(), problem));
+                }
+                let slot = slot.map(|(_, slot)| slot);
                 let group = groups.entry(line.get_ref().clone()).or_default();
                 if group.iter().any(|other| other.drive.slave == name.slave) {
                     let problem = format_args!("address {} of this line is taken", name.slave);
                     return Err(source.error(drive.span(), problem));
                 }
                 let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
-                group.push(Member { drive: *name, settings, options, has_own_periods });
+                group.push(Member { drive: *name, settings, options, slot, has_own_periods });
             }
         }
         Ok(Self(groups))
@@ -207,6 +218,7 @@ pub fn line_part(
         name: member.drive,
         settings: member.settings_with(stretch),
         options: member.options.clone(),
+        slot: member.slot,
     };
     let drives = group.iter().map(part).collect();
     let line = LinePart { name: name.to_owned(), config, budget, drives, problem: None };

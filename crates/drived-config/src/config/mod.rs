@@ -51,6 +51,8 @@ pub struct DrivePart {
     pub name: DriveName,
     pub settings: DriveSettings,
     pub options: Options,
+    /// Its number, where the file says it.
+    pub slot: Option<u16>,
 }
 
 impl LinePart {
@@ -71,7 +73,7 @@ pub fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
 
 /// Adds a drive of a line, of which a run before has left this.
 pub fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left) -> FleetBuilder {
-    let DrivePart { name, settings, options } = drive;
+    let DrivePart { name, settings, options, .. } = drive;
     let settings = settings.clone().after(left);
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, options)

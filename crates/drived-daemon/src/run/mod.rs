@@ -27,8 +27,8 @@ use self::{
 };
 use drived_broker::{mqtt::Mqtt, sparkplug::Sparkplug};
 use drived_config::{
-    config::{LinePart, add},
-    names::Names,
+    config::{Group, LinePart, add},
+    names::{self, Names, Told},
     records::{self, Records, in_folder},
 };
 use drived_doors::{
@@ -122,13 +122,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
     let names = Names::in_folder(config.doors.state.folder.as_deref());
-    tell_names(&names, &config.lines);
+    tell_names(&names, &config.lines, &config.groups);
     let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit(), &names);
     let shutdown = config.shutdown;
-    let reloader = Reloader::new(plant.clone(), notify.clone(), names, args.config, config);
+    let reloader = Reloader::new(plant.clone(), notify.clone(), names.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
     let mut sources: Vec<Arc<dyn drived_plant::counts::Source>> = vec![Arc::new(reloader.clone())];
-    let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit()));
+    let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit(), names));
     sources.extend(mqtt.iter().map(Mqtt::source));
     sources.extend(gateways.sources());
     let sparkplug = sparkplug.map(|sparkplug| sparkplug.open(plant.clone(), doors.audit()));
@@ -197,11 +197,17 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     ended.and(read.unwrap_or(Ok(())))
 }
 
-/// Gives each drive its number, and says in the log what has changed.
-fn tell_names(names: &Names, lines: &[LinePart]) {
-    match names.take_up(lines) {
-        Ok(told) if told.is_empty() => {}
-        Ok(told) => tracing::info!("numbers of drives: {}", told.join("; ")),
+/// Gives what there is its numbers and topics, and says in the log what has changed.
+fn tell_names(names: &Names, lines: &[LinePart], groups: &[Group]) {
+    match names.take_up(&names::configured(lines, groups)) {
+        Ok(Told { changed, refused }) => {
+            if !changed.is_empty() {
+                tracing::info!("numbers of drives: {}", changed.join("; "));
+            }
+            for why in refused {
+                tracing::error!("numbers of drives: {why}");
+            }
+        }
         Err(why) => tracing::error!("{why}"),
     }
     let places = names.slots().map_or(0, |slots| slots.len());

@@ -91,11 +91,13 @@ impl Reloader {
         // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
         config.groups = std::mem::take(&mut new.groups);
         plant.set_groups(config.groups.clone());
+        // Who comes has his identity when he is there.
+        super::tell_names(&self.0.names, &new.lines, &config.groups);
         let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
             .map(|()| settle(&fleet, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
-        super::tell_names(&self.0.names, &config.lines);
+        super::tell_names(&self.0.names, &config.lines, &config.groups);
         if !changes.is_empty() {
             plant.revisions().begin_anew();
         }

@@ -19,7 +19,7 @@ use tokio::{
 
 use super::{client, desk::Desk};
 use crate::config::{GatewayConfig, Units};
-use drived_config::names::{Named, Names};
+use drived_config::names::{Configured, Named, Names};
 use drived_doors::{
     Role,
     audit::Audit,
@@ -57,20 +57,23 @@ fn config() -> GatewayConfig {
 /// The numbers of a plant's drives, in the order of its configuration.
 fn names(plant: &TestPlant) -> Names {
     let names = Names::default();
-    names.take(&named(plant)).unwrap();
+    names.take_up(&named(plant)).unwrap();
     names
 }
 
 /// Gives numbers to those who are there now.
 fn take_up(desk: &Desk, plant: &TestPlant) {
-    desk.names.take(&named(plant)).unwrap();
+    desk.names.take_up(&named(plant)).unwrap();
 }
 
-fn named(plant: &TestPlant) -> Vec<Named> {
+fn named(plant: &TestPlant) -> Configured {
     let drives = plant.plant.fleet().drives();
-    let named =
-        drives.iter().map(|drive| Named { name: drive.name().to_string(), place: drive.slave().to_string() });
-    named.collect()
+    let named = drives.iter().map(|drive| Named {
+        name: drive.name().to_string(),
+        place: drive.slave().to_string(),
+        slot: None,
+    });
+    Configured { drives: named.collect(), ..Configured::default() }
 }
 
 /// A client that checks what every answer has to have.

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use drived_config::{
     kept::Kept,
-    names::{self, Table},
+    names::{self, Configured, Known, Table},
 };
 use drived_file::Config;
 use drived_words::{
@@ -81,7 +81,12 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
             json.say(|| object(&table), || say(&table))
         }
         Command::Give { name, number, place, json } => {
-            let (table, ()) = change(&place.config()?, |table| table.give(&name, number))?;
+            let config = place.config()?;
+            if configured(&config).drives.iter().any(|drive| drive.name == name && drive.slot.is_some()) {
+                let why = format!("the configuration gives {name} its slot: change it there");
+                return Err(Failure::Input(why));
+            }
+            let (table, ()) = change(&config, |table| table.give(&name, number))?;
             let told = || {
                 output::say(format_args!(
                     "{name} has the number {number}; drived reload tells a running daemon"
@@ -91,11 +96,12 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Forget { name, place, json } => {
             let (table, number) = change(&place.config()?, |table| table.forget(&name))?;
-            json.say(|| object(&table), || output::say(format_args!("{name} is forgotten; {number} is free")))
+            let free = number.map(|number| format!("; {number} is free")).unwrap_or_default();
+            json.say(|| object(&table), || output::say(format_args!("{name} is forgotten{free}")))
         }
         Command::Renew { place, json } => {
             let config = place.config()?;
-            let renewed = names::renewed(&file(&config)?, &config.lines);
+            let renewed = names::renewed(&file(&config)?, &configured(&config));
             let (table, aside) = renewed.map_err(Failure::Input)?;
             let told = || {
                 if let Some(aside) = &aside {
@@ -110,17 +116,30 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
 
 /// The numbers for a program.
 fn object(table: &Table) -> Value {
-    let drives = table.drives.iter().map(
-        |known| json!({ "name": known.name, "number": known.slot, "place": known.place, "gone": known.gone }),
-    );
-    json!({ "drives": drives.collect::<Vec<_>>() })
+    let of = |all: &[Known]| {
+        let one = |known: &Known| {
+            let mut said =
+                json!({ "name": known.name, "topic": known.topic, "place": known.place, "gone": known.gone });
+            if let Some(slot) = known.slot {
+                said["number"] = slot.into();
+            }
+            said
+        };
+        all.iter().map(one).collect::<Vec<_>>()
+    };
+    json!({ "drives": of(&table.drives), "lines": of(&table.lines), "groups": of(&table.groups) })
+}
+
+fn configured(config: &Config) -> Configured {
+    names::configured(&config.lines, &config.groups)
 }
 
 fn say(table: &Table) -> Result<(), Failure> {
-    let mut rows = output::Table::new(["number", "drive", "where", ""]);
+    let mut rows = output::Table::new(["number", "drive", "topic", "where", ""]);
     for known in &table.drives {
         let gone = if known.gone { "gone" } else { "" };
-        rows.row([known.slot.to_string(), known.name.clone(), known.place.clone(), gone.to_owned()]);
+        let number = known.slot.map(|slot| slot.to_string()).unwrap_or_default();
+        rows.row([number, known.name.clone(), known.topic.clone(), known.place.clone(), gone.to_owned()]);
     }
     output::say_table(rows)
 }
@@ -134,7 +153,7 @@ pub(crate) fn numbered(config: &Config) -> Result<Table, Failure> {
         Some(folder) => names::read(&Kept::at(&names::place(folder))).map_err(Failure::Input)?,
         None => Table::default(),
     };
-    table.take_up(&names::of_lines(&config.lines));
+    table.take_up(&configured(config));
     table.drives.sort_by_key(|known| known.slot);
     Ok(table)
 }
@@ -145,7 +164,7 @@ fn change<T>(
     change: impl FnOnce(&mut Table) -> Result<T, String>,
 ) -> Result<(Table, T), Failure> {
     let changed = names::changed(&file(config)?, |table| {
-        table.take_up(&names::of_lines(&config.lines));
+        table.take_up(&configured(config));
         change(table)
     });
     changed.map_err(Failure::Input)

@@ -4,6 +4,6 @@ mod mqtt;
 mod sparkplug;
 
 pub use self::{
-    mqtt::{Address, Discovery, MqttConfig, MqttEntry, topic_id},
+    mqtt::{Address, Discovery, MqttConfig, MqttEntry},
     sparkplug::{SparkplugConfig, host_name},
 };

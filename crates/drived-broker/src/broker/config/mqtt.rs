@@ -15,6 +15,7 @@ use toml::Spanned;
 use super::sparkplug::SparkplugEntry;
 use drived_config::{
     config::{ConfigError, Parsed, Source},
+    names::topic_id,
     rights::Role,
 };
 use drived_doors::config::TlsFiles;
@@ -157,26 +158,10 @@ pub struct MqttEntry {
 }
 
 impl MqttConfig {
-    /// The section of a file with these lines, drives and groups. Files that it names stand beside the file, where their paths are
-    /// not whole.
-    pub fn read(
-        source: Source<'_>,
-        entry: &MqttEntry,
-        names: [(&str, Vec<&str>); 3],
-    ) -> Result<Self, ConfigError> {
+    /// The section of a file. Files that it names stand beside the file, where their paths are not whole.
+    pub fn read(source: Source<'_>, entry: &MqttEntry) -> Result<Self, ConfigError> {
         let folder = source.file.parent().unwrap_or(Path::new(""));
         let servers = servers(source, entry)?;
-        for (kind, names) in names {
-            let mut known = BTreeMap::new();
-            for name in names {
-                if let Some(other) = known.insert(topic_id(name), name) {
-                    let problem = format_args!(
-                        "{kind} {other:?} and {name:?} would have one topic: expected names that differ in more than punctuation"
-                    );
-                    return Err(source.error(entry.servers.span(), problem));
-                }
-            }
-        }
         let base = levels(source, entry.base.as_ref(), BASE)?;
         let client_id = entry.client_id.as_ref().map(|id| (id.get_ref().clone(), id.span()));
         if let Some((_, span)) = client_id.as_ref().filter(|(id, _)| !is_plain(id) || id.is_empty()) {
@@ -255,10 +240,4 @@ fn levels(source: Source<'_>, said: Option<&Spanned<String>>, usually: &str) -> 
 /// Whether a text has nothing but characters that are seen.
 fn is_plain(text: &str) -> bool {
     !text.chars().any(|character| character.is_control() || character.is_whitespace())
-}
-
-/// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.
-pub fn topic_id(name: &str) -> String {
-    let allowed = |character: char| character.is_ascii_alphanumeric() || character == '-' || character == '_';
-    name.chars().map(|character| if allowed(character) { character } else { '_' }).collect()
 }
