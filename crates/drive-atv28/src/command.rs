@@ -4,8 +4,8 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Control, Direction, Effect, OwnRun, Port, Refusal, Result, SlaveAddress, State,
     Status, StopMode, Verdict,
-    drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
+use drive_drivecom::{self as drivecom, ChartState, Drivecom, RunShown, StopWord};
 
 use crate::{
     Atv28,

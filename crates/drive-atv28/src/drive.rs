@@ -6,8 +6,9 @@ use async_trait::async_trait;
 use drive_core::{
     Absent, BroadcastWrite, Class, Direction, Drive, Fault, Faults, Frequency, Identity, Intent, Lease,
     Measurements, Percent, Port, RawWord, Result, Row, Setpoint, Speed, Status, StopMode, Stopped, Voltage,
-    Withdrawn, Written, drivecom,
+    Withdrawn, Written,
 };
+use drive_drivecom as drivecom;
 
 use crate::{
     Atv28, FAULTS, WARNINGS, command,

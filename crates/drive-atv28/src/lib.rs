@@ -16,8 +16,9 @@ pub mod words;
 
 use drive_core::{
     Absent, Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress,
-    Speed, StopMode, drivecom::Proof, serial::CharacterFormat,
+    Speed, StopMode, serial::CharacterFormat,
 };
+use drive_drivecom::Proof;
 
 use crate::proof::Look;
 pub use crate::{faults::FAULTS, faults::WARNINGS, registers::ROWS};

@@ -1,10 +1,8 @@
 //! What proves a run command of this side from status to status: what the ordinary exchanges carry, and what takes a further one,
 //! never more than one behind a status.
 
-use drive_core::{
-    Class, Evidence, Port, Refusal, Result, RunWord, Status, Told,
-    drivecom::{Followed, StatusWords},
-};
+use drive_core::{Class, Evidence, Port, Refusal, Result, RunWord, Status, Told};
+use drive_drivecom::{Followed, StatusWords};
 
 use crate::{
     Atv28,

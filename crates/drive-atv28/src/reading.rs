@@ -1,9 +1,7 @@
 //! The words of the fast set, and what they say.
 
-use drive_core::{
-    Absent, Calls, Current, Frequency, Port, RawWord, Result, Status, drivecom::StatusWords,
-    registers::Register,
-};
+use drive_core::{Absent, Calls, Current, Frequency, Port, RawWord, Result, Status, registers::Register};
+use drive_drivecom::StatusWords;
 
 use crate::{
     registers::{CMD, ETA, ETI, ETI2, FRH, LCR, LFT, RFR, THD, THR, ULN, W452},

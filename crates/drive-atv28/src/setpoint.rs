@@ -2,8 +2,8 @@
 
 use drive_core::{
     Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
-    drivecom::{self, ChartState, Drivecom, Limits, follows_frequency, follows_speed},
 };
+use drive_drivecom::{self as drivecom, ChartState, Drivecom, Limits, follows_frequency, follows_speed};
 
 use crate::{
     Atv28,

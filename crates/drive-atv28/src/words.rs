@@ -6,7 +6,7 @@ use bitflags::bitflags;
 
 /// `CMD` (W400, twin W8501) and `CMDD` (W601, twin W8601); `ETI` (W459, twin W3206); `ETA` (W458, twin W3201) and `ETAD`
 /// (W602, twin W8603).
-pub use drive_core::drivecom::{ControlWord, ExtendedStatus, StatusWord};
+pub use drive_drivecom::{ControlWord, ExtendedStatus, StatusWord};
 
 bitflags! {
     /// `IOLR` (W478, twin W5240), BBV51701 p. 23.

@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 
 use drive_core::{
     Class, Command, Confirming, Control, Effect, Error, Port, Result, Status,
-    drivecom::{self, Drivecom, StatusWords},
     registers::{Register, access::WriteStopped},
 };
+use drive_drivecom::{self as drivecom, Drivecom, StatusWords};
 
 use crate::{
     Atv312,

@@ -1,13 +1,13 @@
 //! Start, stop, reset: the control words of this drive, and how they are seen to act. The chart itself is
-//! [`drive_core::drivecom`].
+//! [`drive_drivecom`].
 
 use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result,
     SlaveAddress, State, Status, StopMode, Stopped, Verdict,
-    drivecom::{self, ChartState, Drivecom, RunShown, StatusWords, StopWord},
     registers::{Register, access::ReadWrite},
 };
+use drive_drivecom::{self as drivecom, ChartState, Drivecom, RunShown, StatusWords, StopWord};
 
 use crate::{
     Atv312,

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use drive_core::{
     Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Recognised,
-    Result, Row, Setpoint, Speed, Voltage, drivecom::StatusWords,
+    Result, Row, Setpoint, Speed, Voltage,
 };
+use drive_drivecom::StatusWords;
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{

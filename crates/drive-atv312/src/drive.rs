@@ -6,8 +6,8 @@ use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Class, Direction, Drive, Faults, Identity, Intent, Lease, Measurements, Port, Reaction,
     Recognised, Result, Row, SelfRestart, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
-    drivecom,
 };
+use drive_drivecom as drivecom;
 
 use crate::{
     Atv312, command,

@@ -20,10 +20,10 @@ pub mod words;
 
 use drive_core::{
     Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SlaveAddress, StopMode,
-    drivecom::Proof,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
+use drive_drivecom::Proof;
 
 use crate::{facts::Facts, proof::Look, settings::Known};
 pub use crate::{

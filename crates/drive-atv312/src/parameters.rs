@@ -5,9 +5,9 @@ use std::time::Duration;
 use drive_core::{
     Class, Command, Confirming, Control, Error, ErrorKind, Port, Reaction, Refusal, Result, Row, State,
     Watchdog, WatchdogCapability, Written,
-    drivecom::ChartState,
     registers::{Access, Storage, refuse_commands},
 };
+use drive_drivecom::ChartState;
 
 use crate::{
     Atv312,

@@ -3,8 +3,8 @@
 
 use drive_core::{
     Class, Error, Evidence, Frequency, Ground, Output, Port, Refusal, RunWord, State, Status, StopMode, Told,
-    drivecom::Followed,
 };
+use drive_drivecom::Followed;
 
 use crate::{
     Atv312,

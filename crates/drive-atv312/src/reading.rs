@@ -6,9 +6,9 @@
 
 use drive_core::{
     Current, Frequency, RawWord, Refusal, Status,
-    drivecom::StatusWords,
     registers::{Register, access::Kind},
 };
+use drive_drivecom::StatusWords;
 
 use crate::{
     registers::{CMD, ETA, ETI, FRH, LCR, OTR, RFR},
@@ -147,7 +147,8 @@ pub(crate) const fn raw_command(value: u16) -> RawWord {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::{State, drivecom::ChartState};
+    use drive_core::State;
+    use drive_drivecom::ChartState;
 
     use super::*;
 

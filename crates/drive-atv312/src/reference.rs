@@ -1,9 +1,7 @@
 //! Which reference the drive follows: that of the bus, or another one, and which.
 
-use drive_core::{
-    Class, Port, Refusal, Result,
-    drivecom::{follows_frequency, follows_speed},
-};
+use drive_core::{Class, Port, Refusal, Result};
+use drive_drivecom::{follows_frequency, follows_speed};
 
 use crate::{
     Atv312,

@@ -3,8 +3,8 @@
 use drive_core::{
     Class, Command, Confirming, Control, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem,
     Speed,
-    drivecom::{self, ChartState, follows_frequency},
 };
+use drive_drivecom::{self as drivecom, ChartState, follows_frequency};
 
 use crate::{
     Atv312,

@@ -5,9 +5,9 @@
 use drive_core::{
     Absent, Class, Error, ErrorKind, Frequency, Ground, Port, Recognised, Refusal, Result, SelfRestart,
     Speed, StopMode,
-    drivecom::{self, Limits, StopWord},
     registers::{Register, access::Kind},
 };
+use drive_drivecom::{self as drivecom, Limits, StopWord};
 
 use crate::{
     Atv312,

@@ -4,7 +4,7 @@ use bitflags::bitflags;
 use drive_core::Control;
 
 /// `CMD` (W8501) and `CMDD` (W8601); `ETI` (W3206); `ETA` (W3201) and `ETAD` (W8603).
-pub use drive_core::drivecom::{ControlWord, ExtendedStatus, StatusWord};
+pub use drive_drivecom::{ControlWord, ExtendedStatus, StatusWord};
 
 bitflags! {
     /// `CMI` (W8504), p. 20. Bits 2, 5 to 8 and 10 to 12 are reserved.

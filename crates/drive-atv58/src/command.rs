@@ -4,8 +4,8 @@ use async_trait::async_trait;
 use drive_core::{
     Class, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result, SlaveAddress, Status,
     StopMode, Verdict,
-    drivecom::{self, ChartState, Drivecom, RunShown, StopWord},
 };
+use drive_drivecom::{self as drivecom, ChartState, Drivecom, RunShown, StopWord};
 
 use crate::{
     Atv58, CAPABILITIES,

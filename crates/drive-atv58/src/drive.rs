@@ -4,8 +4,9 @@ use async_trait::async_trait;
 use drive_core::{
     Absent, BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease,
     Measurements, Port, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
-    WatchdogCapability, Withdrawn, Written, drivecom, registers::refuse_commands,
+    WatchdogCapability, Withdrawn, Written, registers::refuse_commands,
 };
+use drive_drivecom as drivecom;
 use tokio_modbus::prelude::ReadCode;
 
 use crate::{

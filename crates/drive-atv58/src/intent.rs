@@ -1,6 +1,7 @@
 //! What another master's writes ask.
 
-use drive_core::{Frequency, Intent, Port, Result, drivecom::ControlWord};
+use drive_core::{Frequency, Intent, Port, Result};
+use drive_drivecom::ControlWord;
 
 use crate::{
     Atv58,

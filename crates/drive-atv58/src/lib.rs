@@ -16,8 +16,9 @@ use std::time::Duration;
 
 use drive_core::{
     Absent, Capabilities, Class, ExceptionMeaning, Port, Registers, Result, Row, SerialSettings,
-    SlaveAddress, StopMode, WatchdogCapability, drivecom::Proof, serial::CharacterFormat,
+    SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
+use drive_drivecom::Proof;
 
 pub use crate::{diagnostics::Counters, registers::ROWS, settings::Atv58Map};
 use crate::{proof::Look, reading::Words, registers::W483, words::FaultRegister};

@@ -1,10 +1,8 @@
 //! What proves a run command of this side from status to status, and what the shaft does: what the ordinary exchange carries, and
 //! what takes a further one, never more than one behind a status.
 
-use drive_core::{
-    Class, Direction, Evidence, Frequency, Output, Port, Refusal, Result, State, Status, Told,
-    drivecom::{ChartState, ControlWord, follows_frequency},
-};
+use drive_core::{Class, Direction, Evidence, Frequency, Output, Port, Refusal, Result, State, Status, Told};
+use drive_drivecom::{ChartState, ControlWord, follows_frequency};
 
 use crate::{Atv58, command::OTHER_REFERENCE, registers::CMD};
 

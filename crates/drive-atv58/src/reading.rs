@@ -2,8 +2,9 @@
 
 use drive_core::{
     Absent, Calls, Control, Current, Direction, Frequency, Measurements, Percent, Port, RawWord, Result, Row,
-    Setpoint, State, Status, Voltage, drivecom::ChartState,
+    Setpoint, State, Status, Voltage,
 };
+use drive_drivecom::ChartState;
 
 use crate::{
     Atv58Map, CAPABILITIES, ROWS,

@@ -2,8 +2,8 @@
 
 use drive_core::{
     Class, Command, Confirming, Error, Frequency, Port, Refusal, Result, Setpoint, SetpointProblem, Status,
-    drivecom::{ChartState, Drivecom, ENABLE_OPERATION, Limits, follows_frequency},
 };
+use drive_drivecom::{ChartState, Drivecom, ENABLE_OPERATION, Limits, follows_frequency};
 
 use crate::{Atv58, command::OTHER_REFERENCE, reading::Words, registers::W401};
 

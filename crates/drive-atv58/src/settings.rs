@@ -67,7 +67,7 @@ impl Default for Atv58Map {
             speed_limits: Some((251, 250)),
             reference_counts_per_hertz: 10,
             reverse_command: 1 << 11,
-            ramp_stop: Some(drive_core::drivecom::SWITCH_ON),
+            ramp_stop: Some(drive_drivecom::SWITCH_ON),
             reverse_status: 1 << 15,
             alarm: 1 << 7,
             remote: 1 << 9,

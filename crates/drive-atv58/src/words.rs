@@ -1,4 +1,4 @@
-//! The fault register. The bits of `CMD` and `ETA` are those of the chart, [`drive_core::drivecom`]; what the drive has
+//! The fault register. The bits of `CMD` and `ETA` are those of the chart, [`drive_drivecom`]; what the drive has
 //! beyond them is a setting, [`Atv58Map`](crate::Atv58Map).
 //!
 //! The card's manual writes 6 to `CMD` (VVDED397054 p. 21/45), which is DRIVECOM's "shutdown", and a user's report has 7

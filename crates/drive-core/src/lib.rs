@@ -22,7 +22,6 @@ mod calls;
 mod capabilities;
 mod confirm;
 mod drive;
-pub mod drivecom;
 mod error;
 mod faults;
 mod identity;

@@ -4,7 +4,7 @@ use bitflags::Flags;
 use drive_3g3ev::words as omron;
 use drive_atv28::words::LogicIo as Atv28Io;
 use drive_atv312::words as atv312;
-use drive_core::drivecom;
+use drive_drivecom as drivecom;
 
 use crate::Family;
 

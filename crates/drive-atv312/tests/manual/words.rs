@@ -7,9 +7,8 @@ use drive_atv312::{
         StatusWord,
     },
 };
-use drive_core::{
-    Control, SerialSettings, SlaveAddress, StopMode, drivecom::ChartState, serial::CharacterFormat,
-};
+use drive_core::{Control, SerialSettings, SlaveAddress, StopMode, serial::CharacterFormat};
+use drive_drivecom::ChartState;
 
 #[test]
 fn the_states_are_those_of_the_table_of_page_13() {

@@ -2,7 +2,8 @@
 
 use std::{collections::BTreeMap, fmt::Write as _};
 
-use drive_core::{Row, drivecom::ChartState, registers::Form};
+use drive_core::{Row, registers::Form};
+use drive_drivecom::ChartState;
 use drive_families::{Bit, Family};
 
 /// What was last seen in each register of each slave.

@@ -1,10 +1,8 @@
 //! The referee beside a drive: everything that is written on the wire or happens around the machine is told to the manual, by its own
 //! transcription, which is asked then what it makes of the motor.
 
-use drive_core::{
-    drivecom::ChartState,
-    registers::{Row, Storage},
-};
+use drive_core::registers::{Row, Storage};
+use drive_drivecom::ChartState;
 use drive_sim::{Act, Intervened, Intervention, Observation, Panel, SimSlave};
 use tokio::time::Instant;
 

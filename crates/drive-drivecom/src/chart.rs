@@ -1,6 +1,6 @@
 //! The chart itself, as pure functions.
 
-use crate::state::State;
+use drive_core::State;
 
 /// A state of the chart, from the status word ETA under the mask 006Fh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,11 +1,7 @@
 //! The limits of a setpoint in rpm, as the Altivar 28 and 312 hold them, and whether the drive follows a setpoint.
 
-use crate::{
-    calls::Calls,
-    error::{Result, SetpointProblem},
-    port::Port,
-    registers::{Register, access::Readable},
-    units::{Frequency, Speed},
+use drive_core::{
+    Calls, Frequency, Port, Result, SetpointProblem, Speed, access::Readable, registers::Register,
 };
 
 /// The word `FrH` counts tenths of a hertz, whatever the reference counts.

@@ -6,20 +6,23 @@ use bitflags::bitflags;
 
 use super::{
     chart::{ChartState, ENABLE_OPERATION},
-    ladder::RunShown,
     proof::Question,
 };
-use crate::{
-    intent::Intent,
-    lease::Lease,
-    motion::Output,
-    own_run::{Evidence, RunWord, Told},
-    refusal::Refusal,
-    setpoint::{Direction, StopMode},
-    state::{Control, State},
-    status::Status,
-    units::Frequency,
+use drive_core::{
+    Control, Direction, Evidence, Frequency, Intent, Lease, Output, Refusal, RunWord, State, Status,
+    StopMode, Told,
 };
+
+/// How a run command shows in a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunShown {
+    /// It is in force.
+    InForce,
+    /// It is in force, and the motor still turns in the other direction: it comes down first.
+    TurningRound,
+    /// It is not in force, or not yet.
+    NotYet,
+}
 
 bitflags! {
     /// `CMD` and `CMDD`, p. 16 and 19. Bits 4 to 6 and 8 to 10 are reserved and stay 0. Bits 11 to 14 have these meanings
@@ -520,7 +523,7 @@ impl StatusWords {
 
 #[cfg(test)]
 mod tests {
-    use crate::drivecom::{DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON};
+    use crate::{DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON};
 
     use super::*;
 

@@ -9,13 +9,7 @@ use super::{
     chart::ChartState,
     limits::{follows_frequency, follows_speed},
 };
-use crate::{
-    lease::{Ground, Lease},
-    motion::{Motion, Output},
-    own_run::RunWord,
-    units::Frequency,
-    watch::Watch,
-};
+use drive_core::{Frequency, Ground, Lease, Motion, Output, RunWord, Watch};
 
 /// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
 /// change them.
@@ -256,7 +250,7 @@ impl<L: Copy + PartialEq> Proof<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setpoint::Direction;
+    use drive_core::Direction;
 
     const RUN: Lease = Lease::new(Direction::Forward, 0x000F);
 
