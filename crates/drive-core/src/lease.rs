@@ -8,7 +8,7 @@ use std::fmt;
 
 use crate::{refusal::Refusal, setpoint::Direction};
 
-#[cfg(feature = "serde")]
+#[cfg(feature = "schemars")]
 pub(crate) use object::VerdictObject;
 
 /// What a drive's own words say of the run command that this side has given. The family alone decides it; whoever sits
