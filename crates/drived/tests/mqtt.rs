@@ -420,7 +420,7 @@ fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commander
     let mut users = Command::new("sh");
     let (port, file) = (free_port(), place("users"));
     let add = format!(
-        "touch {file}; for user in drived hmi panel; do mosquitto_passwd -b {file} $user $user-secret; done"
+        "touch {file}; for user in drived hmi panel homeassistant; do mosquitto_passwd -b {file} $user $user-secret; done"
     );
     if !users.args(["-c", &add]).status().is_ok_and(|status| status.success()) {
         assert!(std::env::var_os("CI").is_none(), "mosquitto_passwd works");
@@ -440,7 +440,7 @@ fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commander
     let section = |authorities: &str| {
         format!(
             "servers = [\"mqtts://localhost:{port}\"]\n{authorities}user = \"drived\"\npassword = \"{}\"\nheartbeat = \"1s\"\n\
-             [mqtt.commanders]\nhmi = \"operate\"\npanel = \"stop\"",
+             discovery = \"device\"\n[mqtt.commanders]\nhmi = \"operate\"\npanel = \"stop\"\nhomeassistant = \"operate\"",
             place("password")
         )
     };
@@ -467,6 +467,23 @@ fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commander
     broker.publish("drived/all/stop/panel", "", &as_panel);
     let told = ear.until(|to, said| to == "drived/all/outcome" && said["outcome"] == "confirmed").1;
     assert_eq!(told["caller"], "panel");
+    assert!(!daemon.turns());
+
+    // Home Assistant finds the drive, says that it has begun, and commands by what it has found.
+    let as_home = ["-u", "homeassistant", "-P", "homeassistant-secret"];
+    let mut home = broker.hear_as(&["homeassistant/#", "drived/status", "drived/drive/+/outcome"], &as_home);
+    let document = home.until(|to, _| to == "homeassistant/device/drived_pump_1/config").1;
+    broker.publish("homeassistant/status", "online", &as_home);
+    let (_, _, retained) = home.until(|to, said| to == "homeassistant/status" && said == "online");
+    assert!(!retained);
+    home.until(|to, said| to == "drived/status" && said == "online");
+    for (component, action) in [("setpoint", "setpoint"), ("start", "start"), ("stop", "stop")] {
+        let of = |key: &str| document["components"][component][key].as_str().map(str::to_owned);
+        let payload = of("payload_press").unwrap_or_else(|| "30".to_owned());
+        broker.publish(&of("command_topic").expect("a topic"), &payload, &as_home);
+        let told = home.until(|to, said| to.ends_with("/outcome") && said["outcome"] == "confirmed").1;
+        assert_eq!((&told["caller"], &told["action"]), (&"homeassistant".into(), &action.into()), "{told}");
+    }
     assert!(!daemon.turns());
     let _ = fs::remove_dir_all(folder);
 }
@@ -583,4 +600,23 @@ fn a_drive_that_was_renamed_while_the_daemon_was_down_keeps_its_topics_and_any_s
         assert_eq!(ear.outcome("s")["outcome"], "confirmed");
     }
     let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn two_daemons_of_one_name_are_named_and_do_not_throw_each_other_out_again_and_again() {
+    let Some(broker) = Mosquitto::start("mqtt-two") else { return };
+    let mut first = Daemon::on("mqtt-two-first", &broker);
+    first.log_until("MQTT: connected");
+    let mut second = Daemon::on("mqtt-two-second", &broker);
+    second.log_until("this one stands aside");
+    // The first tells on, and nobody throws it out: the beats after the second has gone.
+    first.log_until("this one stays");
+    let mut ear = broker.hear(&["drived/#"]);
+    let (told, gone) = (Cell::new(0), Cell::new(0));
+    ear.until(|topic, said| {
+        gone.set(gone.get() + u8::from(topic == "drived/status" && said == "offline"));
+        told.set(told.get() + u8::from(topic == "drived/daemon"));
+        told.get() == 12
+    });
+    assert!(gone.get() <= 2, "{} times", gone.get());
 }

@@ -39,6 +39,9 @@ use self::{queue::Queue, session::Ended};
 /// that many daemons do not come back together.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(30);
+/// Until somebody who stands aside looks again whether he is alone: at first, and at the longest.
+const FIRST_ASIDE: Duration = Duration::from_secs(60);
+const LONGEST_ASIDE: Duration = Duration::from_secs(600);
 /// A connection that has held for so long was a good one: the next pause is short again.
 const GOOD_AFTER: Duration = Duration::from_secs(30);
 /// Events that wait for whoever reads them. The last quarter is for those that are urgent.
@@ -145,6 +148,8 @@ pub enum Then {
     End,
     /// The next server is tried.
     NextServer,
+    /// Another has the place: it is tried again much later.
+    StandAside,
 }
 
 /// The connection, as those have it who publish; cheap to clone. It goes on until [`Self::end`], or until its events are
@@ -211,6 +216,12 @@ impl Broker {
         let _ = self.leave.try_send((goodbye, Then::NextServer));
     }
 
+    /// Leaves the place to another who has it too, and looks again later.
+    pub fn stand_aside(&self) {
+        // Who is leaving already is not asked again.
+        let _ = self.leave.try_send((Goodbye::Normal, Then::StandAside));
+    }
+
     /// Says goodbye after what has been published so far, for good. It takes no longer than `within`.
     pub async fn end(mut self, goodbye: Goodbye, within: Duration) {
         let _ = self.leave.try_send((goodbye, Then::End));
@@ -230,7 +241,7 @@ struct Connection {
 impl Connection {
     async fn keep(mut self, mut will: impl FnMut(Attempt) -> Option<Will>) {
         let (mut attempt, mut pause) = (Attempt { number: 0, server: 0 }, FIRST_PAUSE);
-        let mut told = None;
+        let (mut told, mut aside) = (None, FIRST_ASIDE);
         loop {
             attempt.number += 1;
             let begun = Instant::now();
@@ -242,13 +253,18 @@ impl Connection {
                 }
             }
             pause = if begun.elapsed() >= GOOD_AFTER { FIRST_PAUSE } else { pause };
+            let mut wait = pause;
             match ended {
                 Ended::Left(Then::End) => return,
                 Ended::Left(Then::NextServer) => {}
+                Ended::Left(Then::StandAside) => {
+                    wait = aside;
+                    aside = (aside * 2).min(LONGEST_ASIDE);
+                }
                 Ended::Lost(why) => self.tell(attempt, why, &mut told),
             }
             attempt.server = (attempt.server + 1) % self.options.servers.len().max(1);
-            let pausing = sleep(jittered(pause));
+            let pausing = sleep(jittered(wait));
             pause = (pause * 2).min(LONGEST_PAUSE);
             tokio::select! {
                 () = pausing => {}

@@ -16,8 +16,8 @@ use futures_util::{StreamExt as _, stream::FuturesOrdered};
 use rumqttc::{
     AsyncClient, ConnAck, ConnectionError, DisconnectProperties, DisconnectReasonCode, EventLoop, LastWill,
     LastWillProperties, MqttOptions, Packet, Publish, PublishOptions, PublishProperties, QoS,
-    RetainForwardRule, SubscribeFilterInput, SubscribeNotice, SubscribeReasonCode, TlsConfiguration,
-    Transport,
+    RetainForwardRule, StateError, SubscribeFilterInput, SubscribeNotice, SubscribeReasonCode,
+    TlsConfiguration, Transport,
 };
 use tokio::{
     sync::{mpsc, oneshot},
@@ -132,7 +132,6 @@ impl Reader<'_> {
                     }
                     continue;
                 }
-                Packet::Disconnect(goodbye) => return format!("it says goodbye: {:?}", goodbye.reason_code),
                 _ => continue,
             }
             let Some(ready) = ready.take() else { continue };
@@ -400,6 +399,12 @@ fn in_words(error: &ConnectionError) -> String {
         ConnectionError::Io(error) => error.to_string(),
         ConnectionError::ConnectionRefused(code) => format!("it does not let us in: {code:?}"),
         ConnectionError::Timeout(_) => "it does not answer".to_owned(),
+        ConnectionError::MqttState(StateError::ServerDisconnect { reason_code, .. }) => match reason_code {
+            DisconnectReasonCode::SessionTakenOver => {
+                "another client of our client_id has connected in our place".to_owned()
+            }
+            reason => format!("it says goodbye: {reason:?}"),
+        },
         error => error.to_string(),
     }
 }

@@ -35,6 +35,9 @@ pub(super) struct Gone {
     lines: BTreeSet<String>,
     /// The drives whose rest is taken back then.
     rest: BTreeMap<String, Instant>,
+    connects: u32,
+    /// Which other daemon the broker had last, and when it had told that.
+    seen: Option<(String, Option<u64>)>,
     /// Which other daemon was told of.
     other: Option<String>,
 }
@@ -46,12 +49,15 @@ impl Gone {
             drives: BTreeSet::new(),
             lines: BTreeSet::new(),
             rest: BTreeMap::new(),
+            connects: 0,
+            seen: None,
             other: None,
         }
     }
 
     /// Asks a new connection for what it has.
     pub(super) fn connected(&mut self, face: &Face) {
+        self.connects = self.connects.saturating_add(1);
         self.from = Instant::now() + SETTLED;
         self.drives.clear();
         self.lines.clear();
@@ -86,28 +92,41 @@ impl Gone {
         true
     }
 
-    /// A daemon tells under this base, or has done so.
+    /// A daemon tells under this base, or has done so. Of two that are there the one that began later stands aside: a broker throws out
+    /// the one when the other of its name comes, and who commands a drive means that of the first.
     fn hear_daemon(&mut self, face: &Face, arrived: &Arrived) {
         let said = serde_json::from_slice::<Value>(&arrived.payload).unwrap_or_default();
-        if said["instance"] == face.instance {
+        let Some(instance) = said["instance"].as_str().filter(|instance| *instance != face.instance) else {
             return;
-        }
+        };
+        // What the broker has of it was told since this one has been here.
+        let seen = Some((instance.to_owned(), said["time_unix_ms"].as_u64()));
+        let is_new = self.connects > 1 && self.seen != seen;
+        self.seen = seen;
+        let lives = is_new || !arrived.retain;
         let host = said["host"].as_str();
-        if arrived.retain && host.is_none_or(|host| Some(host) == face.host.as_deref()) {
+        if !lives && host == face.host.as_deref() {
             // This one, before its restart.
             return;
         }
         // If it is there, it tells so again before that is over.
         let left = arrived.expires_in_s.map(|seconds| Duration::from_secs(seconds.into()));
         self.from = self.from.max(Instant::now() + left.unwrap_or(face.config.heartbeat * 3) + SETTLED);
-        let host = host.unwrap_or("of a host that it does not name");
-        if !arrived.retain && self.other.as_deref() != Some(host) {
+        if !lives {
+            return;
+        }
+        let stays = *face.instance < *instance;
+        let (host, base) = (host.unwrap_or("of a host that it does not name"), &face.config.base);
+        let who = if stays { "this one stays" } else { "it was there first, and this one stands aside" };
+        if self.other.as_deref() != Some(instance) {
             tracing::error!(
-                "MQTT: another daemon, {host}, tells under {:?} too: who reads there cannot tell their drives apart, and both hear what \
-                 is asked; give each its own base",
-                face.config.base
+                "MQTT: another daemon, on {host}, tells under {base:?} too, and its drives cannot be told from those of this one: {who}; \
+                 give each its own base"
             );
-            self.other = Some(host.to_owned());
+            self.other = Some(instance.to_owned());
+        }
+        if !stays {
+            face.broker.stand_aside();
         }
     }
 

@@ -29,7 +29,7 @@ use crate::broker::{
 use drived_config::names::{Kind, Names};
 use drived_doors::{audit::Audit, private};
 use drived_plant::{counts::Source, plant::Plant};
-use drived_words::failure::Failure;
+use drived_words::{failure::Failure, json::unix};
 
 /// The longest silence before the broker is asked for a sign of life; half as much again, and the broker publishes the will.
 const KEEP_ALIVE: Duration = Duration::from_secs(20);
@@ -182,7 +182,7 @@ impl Prepared {
         let will = Will { message: Message::new(topics.status(), "offline").retained() };
         let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
         let audited = audit.head();
-        let (host, instance, anew) = (host_name(), drawn(), watch::Sender::new(0));
+        let (host, instance, anew) = (host_name(), instance(), watch::Sender::new(0));
         let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
         let (closing, closes) = watch::channel(false);
         let commanding = Commanding::new(Arc::clone(&face), audit, closes);
@@ -313,12 +313,13 @@ fn look(face: &Arc<Face>, tellers: &mut HashMap<Arc<str>, Watched>, taken_back: 
     }
 }
 
-/// A text that nobody else has drawn.
-fn drawn() -> String {
+/// A text that no other daemon has, the lesser the earlier it began.
+fn instance() -> String {
     let mut bytes = [0; 8];
-    // Without randomness its host alone tells it from others.
+    // Without randomness its time alone tells it from others.
     let _ = getrandom::fill(&mut bytes);
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    let drawn: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("{:015}-{drawn}", unix(Instant::now()))
 }
 
 /// A part of a time, drawn.

@@ -1,7 +1,7 @@
 //! What is told: each drive by a task of its own, from its watch, as the API has it.
 //!
 //! What a person has to know at once (state, link, fault, stop) is told at once; values that change all the time at most
-//! once in an interval; everything at each heartbeat, though nothing has changed.
+//! once in an interval, and only those topics in which one has changed; everything at each heartbeat, though nothing has changed.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -61,24 +61,25 @@ impl Teller {
     pub(super) async fn run(self) {
         let (mut watch, mut anew) = (self.drive.watch(), self.face.anew.subscribe());
         let (heartbeat, interval) = (self.face.config.heartbeat, self.face.config.interval);
-        let mut told: Option<(Head, Gist, Instant)> = None;
+        let mut told: Option<Told> = None;
         loop {
             let snapshot = Arc::clone(&watch.borrow_and_update());
             let (now, again) = (Instant::now(), anew.has_changed().unwrap_or(false));
             anew.mark_unchanged();
             let (head, gist) = (Head::of(&snapshot, now), Gist::of(&snapshot, now));
             let due = match &told {
+                Some(last) if again || last.head != head => now,
+                Some(last) if last.gist != gist => (last.at + interval).min(last.whole_at + heartbeat),
+                Some(last) => last.whole_at + heartbeat,
                 None => now,
-                Some((last, ..)) if again || *last != head => now,
-                Some((_, last, at)) if *last != gist => *at + interval,
-                Some((.., at)) => *at + heartbeat,
             };
             let due = if due <= now {
-                let values_only =
-                    told.as_ref().is_some_and(|(last, _, at)| *last == head && now < *at + heartbeat);
-                self.tell(&snapshot, again, values_only && !again);
-                told = Some((head, gist, now));
-                now + heartbeat
+                // Of what was told in this heartbeat only what has changed is told again.
+                let before = told.filter(|last| !again && now < last.whole_at + heartbeat);
+                let told_now = self.tell(&snapshot, again, before.as_ref().map(|last| &last.values));
+                let whole_at = before.map_or(now, |last| last.whole_at);
+                told = Some(Told { head, gist, at: now, whole_at, values: told_now });
+                whole_at + heartbeat
             } else {
                 due
             };
@@ -98,20 +99,50 @@ impl Teller {
         }
     }
 
-    fn tell(&self, snapshot: &Snapshot, again: bool, values_only: bool) {
+    /// Tells all of it, or what is not as it was before. Gives what it is now.
+    fn tell(&self, snapshot: &Snapshot, again: bool, before: Option<&Values>) -> Values {
         let (face, name) = (&self.face, self.drive.name());
         let reachable = if snapshot.link == Link::Connected { "online" } else { "offline" };
         let Parts { state, measurements, fault } = Parts::of(&DriveView::of(&self.line, &self.drive));
         self.discovered.tell(face, &self.drive, snapshot, &state, &measurements, again);
-        let topic = |what| face.topics.drive(name, what);
-        for (what, part) in [("state", state), ("measurements", measurements)] {
-            face.tell(topic(what), Value::Object(part).to_string());
+        let parts = [state, measurements, fault].map(Value::Object);
+        let values = (reachable, parts.clone().map(ageless));
+        for (at, (what, part)) in ["state", "measurements", "fault"].into_iter().zip(parts).enumerate() {
+            if before.is_none_or(|(_, before)| before[at] != values.1[at]) {
+                face.tell(face.topics.drive(name, what), part.to_string());
+            }
         }
-        if !values_only {
-            face.tell(topic("fault"), Value::Object(fault).to_string());
-            face.tell_for_good(topic("availability"), reachable);
+        if before.is_none_or(|(before, _)| *before != reachable) {
+            face.tell_for_good(face.topics.drive(name, "availability"), reachable);
         }
+        values
     }
+}
+
+/// Whether a drive answers, and its state, measurements and fault without their ages.
+type Values = (&'static str, [Value; 3]);
+
+/// What was told of a drive.
+struct Told {
+    head: Head,
+    gist: Gist,
+    /// When anything was told last, and when everything.
+    at: Instant,
+    whole_at: Instant,
+    values: Values,
+}
+
+/// The same without what changes as time goes by.
+fn ageless(mut value: Value) -> Value {
+    match &mut value {
+        Value::Object(members) => {
+            members.retain(|key, _| key != "age_ms" && key != "time_unix_ms");
+            members.values_mut().for_each(|member| *member = ageless(member.take()));
+        }
+        Value::Array(all) => all.iter_mut().for_each(|one| *one = ageless(one.take())),
+        _ => {}
+    }
+    value
 }
 
 /// A drive as it is told, by topic.

@@ -783,7 +783,8 @@ async fn a_line_that_left_while_the_daemon_was_away_is_no_component_any_more() {
 
 #[tokio::test(start_paused = true)]
 async fn while_another_daemon_may_tell_under_the_same_base_nothing_is_taken_back() {
-    let daemon = |host: &str| json!({ "host": host, "instance": "another" }).to_string();
+    // It began later.
+    let daemon = |host: &str| json!({ "host": host, "instance": "z", "time_unix_ms": 1 }).to_string();
     let availability = "plant/north/drive/pump_7/availability";
     let own = host_name().unwrap_or_default();
     for (host, is_taken) in [(own.as_str(), true), ("elsewhere", false)] {
@@ -801,6 +802,10 @@ async fn while_another_daemon_may_tell_under_the_same_base_nothing_is_taken_back
         }
         assert_eq!(!bench.broker.retained().contains_key(availability), is_taken, "{host}");
         assert!(bench.broker.published().iter().all(|(topic, _)| !topic.contains("pump_8")));
+        assert!(
+            !bench.broker.packets().iter().any(|packet| matches!(packet, Packet::Disconnect(_))),
+            "it stays"
+        );
         // Or it was this one under another name: then it says nothing any more.
         sleep(Duration::from_secs(120)).await;
         assert!(!bench.broker.retained().contains_key(availability), "{host}");
@@ -911,6 +916,48 @@ async fn the_documents_fit_the_schema_of_what_home_assistant_checks() {
         wrong.pointer_mut(parent).unwrap()[key] = value;
         assert!(refused(&wrong), "{path}");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn of_two_daemons_under_one_base_the_one_that_began_later_stands_aside_and_looks_again() {
+    let bench = Bench::of(1).await;
+    let connects = |broker: &TestBroker| {
+        broker.packets().iter().filter(|packet| matches!(packet, Packet::Connect(..))).count()
+    };
+    let other = |time: u64| json!({ "host": "elsewhere", "instance": "0", "time_unix_ms": time }).to_string();
+    // The broker has thrown this one out for the other, which has told since.
+    bench.broker.retain("plant/north/daemon", &other(1));
+    bench.broker.cut();
+    bench.broker.until(|broker| connects(broker) == 2).await;
+    bench.broker.until(|broker| matches!(broker.packets().last(), Some(Packet::Disconnect(_)))).await;
+    sleep(Duration::from_secs(25)).await;
+    assert_eq!(connects(&bench.broker), 2, "it leaves the other alone");
+    // What it finds later is old: the other is there no more.
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(connects(&bench.broker), 3);
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(connects(&bench.broker), 3);
+    assert_eq!(bench.drive("availability"), "online");
+}
+
+#[tokio::test(start_paused = true)]
+async fn of_a_drive_that_moves_only_what_has_changed_is_told_and_its_fault_does_not_expire() {
+    let bench = Bench::of(1).await;
+    bench.command(&start("a"));
+    a_while().await;
+    let told = bench.broker.published().len();
+    for second in 0..120_u32 {
+        let hertz = if second % 10 < 5 { 20.0 } else { 40.0 };
+        bench.ask("drive/pump_1/set/frequency", &format!("{hertz}"));
+        sleep(Duration::from_secs(1)).await;
+    }
+    let published = bench.broker.published().split_off(told);
+    let count = |what: &str| published.iter().filter(|(topic, _)| topic.ends_with(what)).count();
+    let (state, measurements, fault) = (count("/state"), count("/measurements"), count("/fault"));
+    assert!((60..=160).contains(&state), "{state}: it moves");
+    // They are read each 10 s, and all is told each 30 s, also while it moves: what is not told for three of these expires.
+    assert!((4..=18).contains(&measurements), "{measurements} of measurements, {state} of state");
+    assert!((4..=5).contains(&fault), "{fault} of fault");
 }
 
 /// A day on a broker that is cut off each hour, and away for ten minutes of it: nothing grows.
