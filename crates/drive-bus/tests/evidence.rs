@@ -179,6 +179,22 @@ async fn exceptions_to_everything_name_who_gives_them() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn it_is_all_that_were_refused_only_where_none_was_lost() {
+    for (lost, said) in [(usize::MAX, "all "), (20, " of ")] {
+        let (_, findings) = found(rtu_line(), TEN, move |nth, request| match nth % lost {
+            7 if lost != usize::MAX => Vec::new(),
+            _ => at_once(rtu::frame(request[0], &[request[1] | 0x80, 2]).to_vec()),
+        })
+        .await;
+        assert_eq!(defects(&findings), [Defect::RefusesAll(2)]);
+        let (refused, asked) = findings[0].share;
+        let told = findings[0].to_string();
+        assert_eq!(refused == asked, lost == usize::MAX, "{told}");
+        assert!(told.split("questions").next().is_some_and(|begin| begin.contains(said)), "{told}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn one_that_refuses_some_and_answers_others_is_healthy() {
     let (_, findings) = found(rtu_line(), TEN, |nth, request| match nth % 3 {
         0 => at_once(rtu::frame(request[0], &[request[1] | 0x80, 2]).to_vec()),

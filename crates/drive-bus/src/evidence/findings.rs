@@ -217,10 +217,11 @@ impl fmt::Display for Finding {
                 write!(f, "{part} of {of} answers came with the next question: something holds each one back")
             }
             Defect::RefusesAll(code) => {
+                let all = if part == of { format!("all {of}") } else { format!("{part} of {of}") };
+                let meaning = meaning(code);
                 write!(
                     f,
-                    "all {part} questions were answered by exception {code:02X}h ({}), none by a value",
-                    meaning(code)
+                    "{all} questions were answered by exception {code:02X}h ({meaning}), none by a value"
                 )
             }
             Defect::TwoAtOneAddress => {

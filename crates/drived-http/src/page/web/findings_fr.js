@@ -65,7 +65,8 @@ const KINDS = {
     ],
   },
   refuses_all: {
-    says: ({ part, code }) => `les ${part} questions ont toutes eu pour réponse l’exception ${hex(code)} (${EXCEPTIONS[code] ?? 'que la spécification ne nomme pas'}), aucune n’a eu de valeur`,
+    says: ({ part, of, code }) =>
+      `${part === of ? `les ${of} questions ont toutes` : `${part} questions sur ${of} ont`} eu pour réponse l’exception ${hex(code)} (${EXCEPTIONS[code] ?? 'que la spécification ne nomme pas'}), aucune n’a eu de valeur`,
     next: [
       'une autre famille que celle qui est nommée, ou un autre appareil, par exemple un compteur, a cette adresse : voir ce qui s’y trouve',
       'drived scan dit quelles familles ce pourrait être',
