@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     Face,
-    topics::{Meant, Verb},
+    topics::{Meant, Topics, Verb},
 };
 use crate::broker::config::Discovery;
 use drived_config::names::Kind;
@@ -324,6 +324,8 @@ impl Device {
                     // Whatever else happens is none: Home Assistant ignores an empty text.
                     "value_template": "{{ {'event_type': value_json.event, 'text': value_json.text} | to_json \
                                        if value_json.alarm and value_json.event != 'exit' else '' }}",
+                    // That it is lost is an alarm too, and told while it is.
+                    "availability": while_the_daemon_is(topics), "availability_mode": "all",
                 }),
             ),
             component(
@@ -332,7 +334,7 @@ impl Device {
                 json!({
                     "name": "Answers", "device_class": "connectivity", "entity_category": "diagnostic",
                     "state_topic": topic("availability"), "payload_on": "online", "payload_off": "offline",
-                    "availability": [{ "topic": topics.status() }], "availability_mode": "all",
+                    "availability": while_the_daemon_is(topics), "availability_mode": "all",
                 }),
             ),
         ]);
@@ -497,20 +499,28 @@ fn controls(face: &Face, drive: &DriveHandle, id: &str) -> [Component; 5] {
              value_json.status.quality == 'good' and hertz is not none and {low} <= hertz <= {high} else none }}}}"
         ),
     });
+    let mut stop = button("Stop", topic(Verb::Stop), "ramp");
+    stop["availability"] = while_the_daemon_is(&face.topics);
+    stop["availability_mode"] = "all".into();
     let start = |name, word| moving(button(name, topic(Verb::Run), word));
     let when = |may: bool, values: Value| if may { values } else { Value::Null };
     [
         component("setpoint", "number", when(may_operate, moving(setpoint))),
         component("start", "button", when(may_operate, start("Start", "forward"))),
         component("start_reverse", "button", when(may_operate, start("Start in reverse", "reverse"))),
-        // A stop is never too late.
-        component("stop", "button", when(rights.stop, button("Stop", topic(Verb::Stop), "ramp"))),
+        // A stop is never too late, and goes to a drive that is lost as soon as it is back.
+        component("stop", "button", when(rights.stop, stop)),
         component(
             "reset",
             "button",
             when(may_operate, moving(button("Reset fault", topic(Verb::Reset), "reset"))),
         ),
     ]
+}
+
+/// What is there for as long as the daemon is, whether the drive answers or not.
+fn while_the_daemon_is(topics: &Topics) -> Value {
+    json!([{ "topic": topics.status() }])
 }
 
 fn button(name: &str, topic: String, word: &str) -> Value {

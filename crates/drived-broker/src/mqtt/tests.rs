@@ -866,6 +866,24 @@ async fn home_assistant_is_told_the_real_limits_and_only_what_the_drive_has() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stop_and_the_alarms_of_a_lost_drive_are_there_for_as_long_as_the_daemon_is() {
+    let bench = Bench::with(TestPlant::of(1).await, config()).await;
+    a_while().await;
+    let document = bench.state("homeassistant/device/plant_north_pump_1/config");
+    for id in ["stop", "alarm", "answers"] {
+        let needs = &document["components"][id]["availability"];
+        assert_eq!(needs, &json!([{ "topic": "plant/north/status" }]), "{id}");
+    }
+    bench.plant.machines[0].mute();
+    sleep(Duration::from_secs(60)).await;
+    assert_eq!(bench.drive("availability"), "offline");
+    let alarms = bench.broker.published();
+    let lost =
+        |(topic, text): &&(String, String)| topic.ends_with("pump_1/event") && text.contains("\"lost\"");
+    assert!(alarms.iter().any(|told| lost(&told)), "it is told while it is lost");
+}
+
+#[tokio::test(start_paused = true)]
 async fn the_documents_fit_the_schema_of_what_home_assistant_checks() {
     const SCHEMA: &str = include_str!("home_assistant.schema.json");
     let schema: Value = serde_json::from_str(SCHEMA).expect("the schema is JSON");
