@@ -248,7 +248,7 @@ pub struct Counters {
     pub failures: u64,
     /// How often it was lost.
     pub lost: u64,
-    /// Trips.
+    /// Trips; not one that stood when the program saw the drive for the first time.
     pub trips: u64,
     /// Saves to EEPROM that were asked for here.
     pub saves: u64,

@@ -208,7 +208,8 @@ impl Supervisor {
     }
 
     fn record_trip(&mut self, now: Instant, trip: Trip) {
-        self.counters.trips += 1;
+        // One that stood when the program began was counted by the one before, if it ran then.
+        self.counters.trips += u64::from(trip.before.is_some());
         self.explanations = EXPLANATIONS;
         let cause = if trip.found { Cause::Found } else { Cause::Drive };
         self.emit_shown(EventKind::Tripped(Box::new(trip.clone())), cause);

@@ -94,7 +94,7 @@ metrics! {
     DriveWarning: Gauge, "drived_drive_warning", ["line", "drive"], "Whether the drive shows an alarm that does not trip it.";
     DriveFault: Gauge, "drived_drive_fault", ["line", "drive", "code", "mnemonic"],
         "1 while the drive is tripped, with the manual's mnemonic; absent otherwise.";
-    DriveTrips: Counter, "drived_drive_trips_total", ["line", "drive"], "Trips.";
+    DriveTrips: Counter, "drived_drive_trips_total", ["line", "drive"], "Trips; not one that stood at the start.";
     DriveInControl: Gauge, "drived_drive_in_control", ["line", "drive", "by"],
         "1 for who has control of the drive: bus, terminals, panel, local or other bus.";
     DriveStopPending: Gauge, "drived_drive_stop_pending_seconds", ["line", "drive"],

@@ -85,6 +85,21 @@ fn what_is_seen_after_a_silence_is_found_and_not_seen_happening() {
 }
 
 #[test]
+fn a_trip_that_stood_at_the_start_is_told_and_counted_by_whoever_saw_it_come() {
+    let mut rig = Rig::controlled();
+    rig.drive.trip(9);
+    rig.pass(1_500 * MS);
+    assert_eq!(rig.cause_of("tripped"), Some(Cause::Found));
+    let snapshot = rig.snapshot();
+    assert_eq!((snapshot.trips.len(), snapshot.counters.trips), (1, 0));
+    rig.drive.status = Rig::controlled().drive.status;
+    rig.pass(1_500 * MS);
+    rig.drive.trip(9);
+    rig.pass(1_500 * MS);
+    assert_eq!(rig.snapshot().counters.trips, 1, "the next one was seen");
+}
+
+#[test]
 fn a_trip_that_is_seen_happening_is_not_found() {
     let mut rig = Rig::ready();
     rig.drive.trip(9);
