@@ -44,6 +44,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod alarms;
 mod builder;
 mod cause;
 mod concern;

@@ -1,6 +1,6 @@
 //! What troubles a drive now, read off its snapshot: by the table of [`ConcernKind`] and nowhere else.
 
-use drive_core::Motion;
+use drive_core::{Control, Motion};
 use tokio::time::Instant;
 
 use crate::{
@@ -22,7 +22,7 @@ impl Snapshot {
         ConcernKind::ALL.iter().filter_map(|kind| self.concern_of(*kind, now)).collect()
     }
 
-    fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
+    pub(crate) fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
         let status = self.status.as_ref();
         let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_standstill());
         let heard = status.map(|status| status.at);
@@ -107,5 +107,37 @@ impl Snapshot {
         };
         let noted = || self.since.iter().find(|(noted, _)| *noted == kind).map(|(_, since)| *since);
         Some(Concern { kind, since: since.or_else(noted), detail })
+    }
+
+    /// Whether something would be seen at `now` if it troubled the drive: only then it troubles nobody any more where it is not seen. A
+    /// drive that does not answer shows nothing, and one that has just been found has not shown all of it yet.
+    pub(crate) fn would_show(&self, kind: ConcernKind, now: Instant) -> bool {
+        let Some(status) = self.fresh_status(now) else {
+            // That it answers is seen even where it is not heard often enough.
+            let answers =
+                matches!(kind, ConcernKind::Lost | ConcernKind::LostRunning | ConcernKind::NeverSeen);
+            return answers && self.link == Link::Connected;
+        };
+        let is_here = status.control.is_none_or(|control| control == Control::Bus);
+        match kind {
+            // A program that was started anew knows of no stop, and one more stop begins its time anew.
+            ConcernKind::StopUnconfirmed => status.is_undriven(),
+            ConcernKind::RunCommandStands | ConcernKind::ControlTaken => is_here,
+            ConcernKind::IdentityChanged | ConcernKind::OtherFamily => {
+                self.identity != IdentityCheck::Unchecked
+            }
+            ConcernKind::WatchdogBroken | ConcernKind::WatchdogNotInForce => {
+                self.watchdog != WatchdogCheck::Unchecked
+            }
+            ConcernKind::RestartsItself => self.self_restarts.is_some(),
+            ConcernKind::LimitExceeded => match self.measurements_freshness(now) {
+                Freshness::Fresh => true,
+                Freshness::Stale => false,
+                // They are never asked for where they have no period.
+                Freshness::Never => self.measurements_max_age <= self.max_age,
+            },
+            ConcernKind::Warning => status.warning.is_some(),
+            _ => true,
+        }
     }
 }
