@@ -1,0 +1,256 @@
+//! Actions: a stop that is one write and runs nothing, a start that runs, a reset that does neither.
+
+use toml::Spanned;
+
+use super::Check;
+use crate::{
+    format::{Action, File, Step},
+    profile::Written,
+};
+
+/// The most steps of an action.
+const STEPS: usize = 16;
+
+/// The longest pause or wait, in ms.
+const LONGEST_WAIT: u16 = 10_000;
+
+impl Check<'_> {
+    pub(super) fn actions(&mut self) {
+        let file = self.file;
+        if let Some(command) = file.command.given() {
+            self.source(&command.get_ref().source);
+            for run in &command.get_ref().runs {
+                // A register that is a command when written may be another thing when read.
+                self.register(&run.get_ref().register);
+                self.source(&run.get_ref().source);
+                self.mask(run.get_ref());
+            }
+        }
+        for (name, action) in file.actions() {
+            self.source(&action.get_ref().source);
+            self.steps(name, action);
+            match name.split_once('.') {
+                Some(("stop", _)) => self.stop(name, action),
+                Some(_) => self.start(name, action),
+                None => self.runs_nothing(name, action),
+            }
+        }
+        if let Some(reset) = file.reset.given() {
+            self.reset(reset);
+        }
+        let unread = &file.stop.unread;
+        let has_stops = file.actions().any(|(name, _)| name.starts_with("stop."));
+        if has_stops && file.stop.of(*unread.get_ref()).given().is_none() {
+            self.refuse(
+                &unread.span(),
+                "the stop of a drive that was not read is none that is known",
+                "unread = one of the stops above that is a stop whatever the guards say",
+            );
+        }
+    }
+
+    fn steps(&mut self, name: &str, action: &Spanned<Action>) {
+        let steps = &action.get_ref().steps;
+        if steps.is_empty() || steps.len() > STEPS {
+            self.refuse(
+                &action.span(),
+                format!("{name} has no steps, or too many"),
+                format!("1 to {STEPS} steps"),
+            );
+        }
+        for spanned in steps {
+            let step = spanned.get_ref();
+            let kinds = [step.write.is_some(), step.pause_ms.is_some(), step.awaits.is_some()];
+            let belongs = step.words.is_some() as u8 + step.coils.is_some() as u8
+                == u8::from(step.write.is_some())
+                && step.within_ms.is_some() == step.awaits.is_some()
+                && (step.function.is_none() || step.write.is_some());
+            if kinds.into_iter().filter(|kind| *kind).count() != 1 || !belongs {
+                self.refuse(
+                    &spanned.span(),
+                    "a step is one thing",
+                    "{ write, words or coils }, { pause_ms } or { await, within_ms }",
+                );
+            }
+            for time in [&step.pause_ms, &step.within_ms].into_iter().flatten() {
+                if !(1..=LONGEST_WAIT).contains(time.get_ref()) {
+                    self.refuse(&time.span(), "nobody waits so long", format!("1 to {LONGEST_WAIT} ms"));
+                }
+            }
+            if let Some(awaited) = &step.awaits {
+                self.bits(awaited);
+            }
+            self.write(name, spanned);
+        }
+    }
+
+    fn write(&mut self, name: &str, spanned: &Spanned<Step>) {
+        let step = spanned.get_ref();
+        let Some(to) = &step.write else { return };
+        let Some(register) = self.register(to) else { return };
+        let Some((space, _)) = self.file.place(register) else { return };
+        let count = step.words.as_ref().map_or(0, Vec::len) + step.coils.as_ref().map_or(0, Vec::len);
+        let link = self.file.link.get_ref();
+        let most = if space.is_bit() { &link.write_coils } else { &link.write_words };
+        let most = usize::from(most.given().copied().unwrap_or(1));
+        if count == 0 || count > most || space.is_bit() != step.coils.is_some() {
+            self.refuse(
+                &spanned.span(),
+                format!("{name} writes what {} does not take", to.get_ref()),
+                format!("1 to {most} words of a register, or coils of a coil"),
+            );
+        }
+        let by = space.written_by();
+        let usual = by.map(|[one, several]| if count == 1 && self.has(one) { one } else { several });
+        let function = step.function.as_ref().map(|function| *function.get_ref()).or(usual);
+        let fits = |function| by.is_some_and(|by| by.contains(&function)) && self.has(function);
+        if !function.is_some_and(fits) || function == by.map(|[one, _]| one) && count != 1 {
+            self.refuse(
+                &spanned.span(),
+                format!(
+                    "{name} writes {} by a function that the drive has not, or that cannot",
+                    to.get_ref()
+                ),
+                "one of `functions` for so many of them",
+            );
+        }
+        if register.parameter && name != "setup" {
+            self.refuse(
+                &spanned.span(),
+                format!("{name} writes {}, which is a parameter", to.get_ref()),
+                "parameter = false: a command is no parameter",
+            );
+        }
+        if let Some(why) = self.forbidden(register) {
+            self.refuse(
+                &spanned.span(),
+                format!("{name} writes {}, which is never written: {why}", to.get_ref()),
+                "another register, or take it out of never_written",
+            );
+        }
+        if register.access == crate::format::Access::Read {
+            self.refuse(
+                &spanned.span(),
+                format!("{} can only be read", to.get_ref()),
+                "access = \"read_write\"",
+            );
+        }
+        if name != "setup" {
+            self.is_volatile(name, to, register);
+        }
+    }
+
+    fn has(&self, function: u8) -> bool {
+        self.file.link.get_ref().functions.iter().any(|has| *has.get_ref() == function)
+    }
+
+    /// One write, and nothing before it: a stop that reads or unlocks first is late, or never comes.
+    fn stop(&mut self, name: &str, action: &Spanned<Action>) {
+        let steps = &action.get_ref().steps;
+        let first = steps.first().map(Spanned::get_ref);
+        if first.is_some_and(|step| step.awaits.is_some() || step.pause_ms.is_some()) {
+            self.refuse(
+                &action.span(),
+                format!("{name} reads or waits before it stops"),
+                "the one write that stops, whatever the drive does",
+            );
+        } else if steps.len() > 1 {
+            self.refuse(
+                &action.span(),
+                format!("{name} is more than one write: what unlocks first stops late, or never"),
+                "the one write that stops; \"unknown\" where the drive has none",
+            );
+        }
+        self.runs_nothing(name, action);
+        if action.get_ref().seen.as_ref().is_none_or(|seen| seen.get_ref().is_empty()) {
+            self.refuse(
+                &action.span(),
+                format!("what shows that {name} is done is left in silence"),
+                "seen = [\"ready\", ...], the states in which no run command acts",
+            );
+        }
+        let seen = action.get_ref().seen.iter().flat_map(toml::Spanned::get_ref);
+        if seen.clone().any(|state| *state == crate::format::StateName::Running) {
+            self.refuse(
+                &action.span(),
+                format!("{name} is said to be done while the motor runs"),
+                "other states",
+            );
+        }
+    }
+
+    /// No word of it runs the motor, or is one of a start's that does.
+    fn runs_nothing(&mut self, name: &str, action: &Spanned<Action>) {
+        let file = self.file;
+        for written in file.writes(action.get_ref()) {
+            if file.runs(written) {
+                self.refuse(
+                    &action.span(),
+                    format!("{name} writes {:04X}h, which holds a run bit", written.value),
+                    format!("a word by which {name} starts nothing"),
+                );
+            } else if started(file).any(|run| run == written) {
+                self.refuse(
+                    &action.span(),
+                    format!("{name} writes {:04X}h, by which a start ends", written.value),
+                    "words that tell a start from a stop",
+                );
+            }
+        }
+    }
+
+    /// It ends with a word that runs, and has none before it.
+    fn start(&mut self, name: &str, action: &Spanned<Action>) {
+        let file = self.file;
+        let steps = &action.get_ref().steps;
+        let runs = |step: &Step| file.written(step).into_iter().any(|written| file.runs(written));
+        let (last, before) = match steps.split_last() {
+            Some((last, before)) => (runs(last.get_ref()), before.iter().any(|step| runs(step.get_ref()))),
+            None => return,
+        };
+        if !last {
+            self.refuse(
+                &action.span(),
+                format!("{name} does not end with a word that runs the motor, as [command] says it"),
+                "the run command last, and every form of it in [command] runs",
+            );
+        }
+        if before {
+            self.refuse(
+                &action.span(),
+                format!("{name} runs the motor before its last step"),
+                "what has to be written first, then the run command",
+            );
+        }
+    }
+
+    /// An edge is cleared: by the drive, or by a word that stops.
+    fn reset(&mut self, reset: &Spanned<Action>) {
+        let file = self.file;
+        let action = reset.get_ref();
+        let last = action.steps.iter().rev().find_map(|step| file.written(step.get_ref()).pop());
+        let stops = |written: Written| {
+            let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
+            stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)
+        };
+        match action.clears_itself {
+            None => self.refuse(
+                &reset.span(),
+                "whether the reset clears itself is left in silence",
+                "clears_itself = true or false",
+            ),
+            Some(false) if !last.is_some_and(stops) => self.refuse(
+                &reset.span(),
+                "the reset is left standing: some drives reset again and again, or restart",
+                "a last step with the word of a stop",
+            ),
+            Some(_) => {}
+        }
+    }
+}
+
+/// What starts end with.
+fn started(file: &File) -> impl Iterator<Item = Written> {
+    let starts = file.actions().filter(|(name, _)| name.starts_with("start."));
+    starts.filter_map(|(_, start)| file.writes(start.get_ref()).pop())
+}

@@ -1,0 +1,277 @@
+//! The checker: what is malformed or lies is refused, each with its line, the reason and what to write.
+
+mod actions;
+mod registers;
+mod setpoint;
+mod states;
+mod text;
+mod who;
+
+use std::{fmt, ops::Range};
+
+use toml::Spanned;
+
+use crate::{
+    format::{File, Mark, Register, VERSION},
+    ladder,
+    profile::Profile,
+};
+
+/// The longest text that is read, in bytes: ten times the longest profile that is shipped.
+pub const LONGEST: usize = 256 * 1024;
+
+/// The most refusals that are told of one text.
+const TOLD: usize = 100;
+
+/// The longest text of one value, in bytes.
+const LONGEST_VALUE: usize = 2_000;
+
+/// Framings that are not Modbus, by the words that a file may say, and what they are.
+const NO_MODBUS: &[(&str, &str)] = &[
+    (
+        "huanyang",
+        "the old Huanyang protocol has Modbus' check and functions of its own, whose third byte is a length",
+    ),
+    ("isaver", "the iSaver pump has functions C3h and D0h, which are none of Modbus"),
+    (
+        "h2a",
+        "an H2A set to its non-standard protocol answers with a length of two bytes: set the drive to standard Modbus",
+    ),
+    (
+        "computer_link",
+        "Mitsubishi's computer link is a protocol of letters: set the drive to Modbus (Pr. 549 = 1)",
+    ),
+    ("uss", "USS is another protocol: set the drive to Modbus RTU"),
+];
+
+/// Why a text is no profile.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {reason}; write {write}")]
+#[non_exhaustive]
+pub struct Refusal {
+    /// The line, from 1.
+    pub line: usize,
+    /// What is wrong.
+    pub reason: String,
+    /// What to write instead.
+    pub write: String,
+}
+
+/// Everything for which a text is refused, in the order of its lines; at most a hundred.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct Refusals(pub Vec<Refusal>);
+
+impl fmt::Display for Refusals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, refusal) in self.0.iter().enumerate() {
+            if index > 0 {
+                f.write_str("\n")?;
+            }
+            refusal.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+/// Reads a profile and checks it.
+///
+/// # Errors
+/// [`Refusals`] of a text that is malformed or lies.
+pub fn read(text: &str) -> Result<Profile, Refusals> {
+    let file = text::parse(text).map_err(|refusal| Refusals(vec![refusal]))?;
+    let mut check = Check { text, file: &file, refusals: Vec::new() };
+    check.all();
+    let mut refusals = check.refusals;
+    if refusals.is_empty() {
+        let (level, gaps) = ladder::climb(text, &file);
+        return Ok(Profile { file, level, gaps });
+    }
+    refusals.sort_by_key(|refusal| refusal.line);
+    refusals.dedup();
+    refusals.truncate(TOLD);
+    Err(Refusals(refusals))
+}
+
+/// The line in which a place of a text stands, from 1.
+pub(crate) fn line(text: &str, span: &Range<usize>) -> usize {
+    let before = text.get(..span.start.min(text.len())).unwrap_or(text);
+    before.bytes().filter(|byte| *byte == b'\n').count() + 1
+}
+
+/// A file under check.
+struct Check<'a> {
+    text: &'a str,
+    file: &'a File,
+    refusals: Vec<Refusal>,
+}
+
+impl<'a> Check<'a> {
+    fn all(&mut self) {
+        let file = self.file;
+        if *file.format.get_ref() != VERSION {
+            self.refuse(
+                &file.format.span(),
+                format!("format {} is not read here", file.format.get_ref()),
+                format!("format = {VERSION}, once the file is what this format says"),
+            );
+        }
+        self.key();
+        self.link();
+        self.texts();
+        self.sources();
+        self.registers();
+        self.who();
+        self.states();
+        self.actions();
+        self.setpoint();
+    }
+
+    fn refuse(&mut self, at: &Range<usize>, reason: impl Into<String>, write: impl Into<String>) {
+        if self.refusals.len() < 4 * TOLD {
+            let line = line(self.text, at);
+            self.refusals.push(Refusal { line, reason: reason.into(), write: write.into() });
+        }
+    }
+
+    fn key(&mut self) {
+        let key = &self.file.key;
+        let fits = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'-';
+        let text = key.get_ref();
+        if text.is_empty() || text.len() > 32 || !text.bytes().all(fits) {
+            self.refuse(
+                &key.span(),
+                "the key is the name in configurations",
+                "small letters, digits and hyphens, at most 32, such as key = \"wj200\"",
+            );
+        }
+    }
+
+    /// The framing, the functions and the settings of the line.
+    fn link(&mut self) {
+        let spanned = &self.file.link;
+        let link = spanned.get_ref();
+        let protocol = link.protocol.get_ref();
+        if protocol != "modbus_rtu" {
+            let known = NO_MODBUS.iter().find(|(word, _)| protocol.to_ascii_lowercase().contains(word));
+            let what = known.map_or("it is no framing that is spoken here", |(_, what)| *what);
+            self.refuse(
+                &link.protocol.span(),
+                format!("\"{protocol}\" is not Modbus RTU: {what}"),
+                "protocol = \"modbus_rtu\" for a drive that speaks it; another cannot be driven by a profile",
+            );
+        }
+        if link.functions.is_empty() {
+            self.refuse(
+                &spanned.span(),
+                "no function is named",
+                "functions = [3, 6], as the manual lists them",
+            );
+        }
+        for function in &link.functions {
+            if !matches!(function.get_ref(), 1..=6 | 15 | 16 | 23) {
+                self.refuse(
+                    &function.span(),
+                    format!("function {} reads or writes no register", function.get_ref()),
+                    "those of 1 to 6, 15, 16 and 23 that the drive answers",
+                );
+            }
+        }
+        for (what, limit, most) in [
+            ("read_words", &link.read_words, 125),
+            ("write_words", &link.write_words, 123),
+            ("read_coils", &link.read_coils, 2_000),
+            ("write_coils", &link.write_coils, 1_968),
+        ] {
+            if limit.given().is_some_and(|limit| !(1..=most).contains(limit)) {
+                self.refuse(
+                    &spanned.span(),
+                    format!("{what} is outside of what Modbus allows"),
+                    format!("{what} = 1 to {most}, \"none\" or \"unknown\""),
+                );
+            }
+        }
+        for format in link.formats.given().into_iter().flatten() {
+            if format.get_ref().parse::<drive_core::serial::CharacterFormat>().is_err() {
+                self.refuse(&format.span(), "this is no character format", "one such as \"8E1\"");
+            }
+        }
+        if let Some(factory) = link.factory.given()
+            && factory.get_ref().parse::<drive_core::SerialSettings>().is_err()
+        {
+            self.refuse(&factory.span(), "this is no setting of a line", "one such as \"19200 8E1\"");
+        }
+        if link.highest_address.given().is_some_and(|highest| !(1..=247).contains(highest)) {
+            self.refuse(&spanned.span(), "this is no slave address", "highest_address = 1 to 247");
+        }
+    }
+
+    /// Names that people read: short, and of printable characters.
+    fn texts(&mut self) {
+        let file = self.file;
+        for text in [&file.maker, &file.name, &file.models] {
+            let said = text.get_ref();
+            if said.trim().is_empty() || said.len() > LONGEST_VALUE || said.chars().any(char::is_control) {
+                self.refuse(
+                    &text.span(),
+                    "this is no name that a person can read",
+                    "a short text of one line",
+                );
+            }
+        }
+    }
+
+    fn sources(&mut self) {
+        let file = self.file;
+        for (name, source) in &file.sources {
+            let said = source.get_ref();
+            if said.document.trim().is_empty() || said.page.trim().is_empty() {
+                self.refuse(
+                    &source.span(),
+                    format!("source \"{name}\" names no document or no page"),
+                    "document = \"...\", page = \"...\", so that another can open it",
+                );
+            }
+        }
+    }
+
+    /// The grade of a fact: that of the weakest source that it names. What names none that is listed is refused.
+    fn source(&mut self, source: &Spanned<String>) {
+        for name in names(source.get_ref()) {
+            if !self.file.sources.contains_key(name) {
+                self.refuse(
+                    &source.span(),
+                    format!("\"{name}\" is no source"),
+                    format!("a table [sources.{name}], or the name of one that is there"),
+                );
+            }
+        }
+        if names(source.get_ref()).next().is_none() {
+            self.refuse(&source.span(), "a fact without a source", "source = \"...\", one of [sources]");
+        }
+    }
+
+    /// A register by its name; one that is not listed is refused.
+    fn register(&mut self, name: &Spanned<String>) -> Option<&'a Register> {
+        let found = self.file.named(name.get_ref());
+        if found.is_none() {
+            self.refuse(
+                &name.span(),
+                format!("there is no register \"{}\"", name.get_ref()),
+                format!("a table [register.{}], or the name of one that is there", name.get_ref()),
+            );
+        }
+        found
+    }
+}
+
+/// The names in a text of sources.
+pub(crate) fn names(source: &str) -> impl Iterator<Item = &str> {
+    source.split_whitespace()
+}
+
+/// The grade of a fact: that of the weakest source that it names.
+pub(crate) fn grade(file: &File, source: &Spanned<String>) -> Mark {
+    let marks =
+        names(source.get_ref()).map(|name| file.sources.get(name).map_or(Mark::W, |of| of.get_ref().mark));
+    marks.max().unwrap_or(Mark::W)
+}

@@ -1,0 +1,103 @@
+//! States: none that covers another, none that hides a trip, and none that nobody can leave.
+
+use super::Check;
+use crate::format::{Bits, Deed, StateIs, StateName};
+
+/// Whether a word can fit both.
+fn overlap(one: &StateIs, other: &StateIs) -> bool {
+    let (one, other) = (one.bits.get_ref(), other.bits.get_ref());
+    one.register.get_ref() == other.register.get_ref()
+        && !is_contrary(one, other)
+        && (one.differs
+            || other.differs
+            || (one.value ^ other.value) & one.mask.get_ref() & other.mask.get_ref() == 0)
+}
+
+/// Whether one says what the other denies.
+fn is_contrary(one: &Bits, other: &Bits) -> bool {
+    one.differs != other.differs && one.mask.get_ref() == other.mask.get_ref() && one.value == other.value
+}
+
+/// Whether every word that fits the second fits the first.
+fn covers(first: &StateIs, second: &StateIs) -> bool {
+    let alike = first.bits.get_ref().differs == second.bits.get_ref().differs;
+    let plain = !first.bits.get_ref().differs || first.bits.get_ref().value == second.bits.get_ref().value;
+    alike
+        && plain
+        && overlap(first, second)
+        && first.bits.get_ref().mask.get_ref() & !second.bits.get_ref().mask.get_ref() == 0
+}
+
+const fn is_fault(state: StateName) -> bool {
+    matches!(state, StateName::Fault | StateName::FaultReaction)
+}
+
+impl Check<'_> {
+    pub(super) fn states(&mut self) {
+        let file = self.file;
+        let all = &file.state.is;
+        for (index, spanned) in all.iter().enumerate() {
+            let state = spanned.get_ref();
+            self.bits(state.bits.get_ref());
+            for earlier in all.iter().take(index) {
+                let before = earlier.get_ref();
+                if covers(before, state) {
+                    self.refuse(
+                        &spanned.span(),
+                        format!(
+                            "this state is never seen: {:?} before it takes all of its words",
+                            before.state
+                        ),
+                        "masks that tell them apart, the narrower one first",
+                    );
+                } else if is_fault(state.state) && !is_fault(before.state) && overlap(before, state) {
+                    self.refuse(
+                        &spanned.span(),
+                        format!("a trip may be told as {:?}, which stands before it", before.state),
+                        "the fault first",
+                    );
+                }
+            }
+        }
+        self.ladder();
+    }
+
+    /// From each rung something leads on, and one leads to the run command.
+    fn ladder(&mut self) {
+        let Some(rungs) = self.file.start.ladder.given() else { return };
+        for spanned in rungs {
+            let rung = spanned.get_ref();
+            self.bits(&rung.bits);
+            let writes = rung.register.is_some() && rung.word.is_some();
+            let none = rung.register.is_none() && rung.word.is_none();
+            if !(if rung.deed == Deed::Write { writes } else { none }) {
+                self.refuse(
+                    &spanned.span(),
+                    "a state that nobody can leave: it is not said what is written there",
+                    "do = \"write\" with register and word, or do = \"wait\" or \"run\" without them",
+                );
+            }
+            if let (Some(register), Some(word)) = (&rung.register, rung.word) {
+                let found = self.register(register);
+                let place = found.and_then(|register| self.file.place(register));
+                if let Some((space, address)) = place
+                    && self.file.runs(crate::profile::Written { space, address, value: word })
+                {
+                    self.refuse(
+                        &spanned.span(),
+                        format!("{word:04X}h on the ladder runs the motor before it is asked to"),
+                        "the words that lead to the run command, and not the run command",
+                    );
+                }
+            }
+        }
+        let leads = |deed| rungs.iter().any(|rung| rung.get_ref().deed == deed);
+        if let (Some(first), false) = (rungs.first(), leads(Deed::Run)) {
+            self.refuse(
+                &first.span(),
+                "a state that nobody can leave: no rung leads to the run command",
+                "a rung with do = \"run\" for the state in which it is due",
+            );
+        }
+    }
+}

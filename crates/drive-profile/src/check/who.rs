@@ -1,0 +1,143 @@
+//! Guards, fingerprints, and every other place that names a register.
+
+use toml::Spanned;
+
+use super::Check;
+use crate::format::{Access, Answer, Bits, Guard};
+
+impl Check<'_> {
+    pub(super) fn who(&mut self) {
+        let file = self.file;
+        for guards in [&file.who.fingerprints, &file.who.guards] {
+            for guard in guards.given().into_iter().flatten() {
+                self.guard(guard);
+            }
+        }
+        let set_up = file.who.guards.given().into_iter().flatten().find(|guard| guard.get_ref().set_up);
+        if let (Some(guard), None) = (set_up, file.setup.given()) {
+            self.refuse(
+                &guard.span(),
+                "a guard is said to be made true by `setup`, and there is none",
+                "a table [setup], or set_up = false",
+            );
+        }
+        let see = &file.see;
+        for seen in [
+            &see.output,
+            &see.setpoint,
+            &see.current,
+            &see.speed,
+            &see.output_voltage,
+            &see.dc_bus_voltage,
+            &file.faults.present,
+        ] {
+            if let Some(name) = seen.given() {
+                self.readable(name);
+            }
+        }
+        for bits in [&see.at_setpoint, &see.warning, &file.state.standstill] {
+            if let Answer::Given(bits) = bits {
+                self.bits(bits.get_ref());
+            }
+        }
+        for owner in
+            [&file.ownership.command, &file.ownership.reference].into_iter().filter_map(Answer::given)
+        {
+            self.bits(&owner.get_ref().bits);
+        }
+        if let Some(read) = file.ownership.reads_back.given() {
+            self.readable(&read.get_ref().register);
+            self.source(&read.get_ref().source);
+        }
+        if let Some(codes) = file.faults.codes.given() {
+            self.source(&codes.get_ref().source);
+        }
+        self.direction();
+        self.watchdog();
+    }
+
+    fn guard(&mut self, spanned: &Spanned<Guard>) {
+        let guard = spanned.get_ref();
+        self.readable(&guard.register);
+        self.source(&guard.source);
+        let outside = |words: &Option<Vec<u16>>| {
+            let mask = guard.mask.unwrap_or(u16::MAX);
+            words.iter().flatten().any(|word| word & !mask != 0)
+        };
+        let said = [&guard.is, &guard.is_not].into_iter().flatten().map(Vec::len).sum::<usize>();
+        if said == 0
+            || guard.is.is_some() == guard.is_not.is_some()
+            || outside(&guard.is)
+            || outside(&guard.is_not)
+        {
+            self.refuse(
+                &spanned.span(),
+                "it is not said what this register has to hold",
+                "is = [...] or is_not = [...], of the bits in its mask",
+            );
+        }
+    }
+
+    fn direction(&mut self) {
+        let Some(spanned) = self.file.see.direction.given() else { return };
+        let direction = spanned.get_ref();
+        let is_signed = self.readable(&direction.register).is_none_or(|register| register.signed);
+        self.source(&direction.source);
+        let told = match (&direction.mask, direction.forward, direction.reverse) {
+            (None, None, None) => is_signed,
+            (Some(mask), Some(forward), Some(reverse)) => {
+                let mask = *mask.get_ref();
+                mask != 0 && forward != reverse && (forward | reverse) & !mask == 0
+            }
+            _ => false,
+        };
+        if !told {
+            self.refuse(
+                &spanned.span(),
+                "it is not said how forward and reverse look",
+                "mask, forward and reverse, two values of its bits; or a signed register and none of them",
+            );
+        }
+    }
+
+    fn watchdog(&mut self) {
+        let Some(spanned) = self.file.watchdog.given() else { return };
+        let watchdog = spanned.get_ref();
+        self.source(&watchdog.source);
+        for name in [&watchdog.time, &watchdog.action].into_iter().filter_map(Answer::given) {
+            self.register(name);
+        }
+    }
+
+    /// Bits that say something: of a register that can be read, and possible.
+    pub(super) fn bits(&mut self, bits: &Bits) {
+        self.readable(&bits.register);
+        self.source(&bits.source);
+        self.mask(bits);
+    }
+
+    /// A mask that has bits, and a value that has no others.
+    pub(super) fn mask(&mut self, bits: &Bits) {
+        let mask = *bits.mask.get_ref();
+        if mask == 0 || bits.value & !mask != 0 {
+            self.refuse(
+                &bits.mask.span(),
+                format!("mask {mask:04X}h and value {:04X}h never fit", bits.value),
+                "a mask of the bits that count, and the value of these bits alone",
+            );
+        }
+    }
+
+    /// A register that can be read.
+    pub(super) fn readable(&mut self, name: &Spanned<String>) -> Option<&crate::format::Register> {
+        let register = self.register(name)?;
+        if register.access == Access::Write {
+            self.refuse(
+                &name.span(),
+                format!("{} can only be written", name.get_ref()),
+                "a register that the drive lets be read, or \"none\"",
+            );
+        }
+        Some(register)
+    }
+}

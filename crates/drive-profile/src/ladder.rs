@@ -1,0 +1,392 @@
+//! The ladder: with what a drive can be trusted by its profile, and what keeps it from more.
+
+use std::fmt;
+
+use toml::Spanned;
+
+use crate::{
+    check::{grade, line},
+    format::{Action, Answer, File, Proves, Register, Space, StateName, Storage},
+};
+
+/// Registers of commands that several makers have, each with words of its own: what stops one maker's drive runs another's.
+const SHARED: &[u16] = &[0x1000, 0x2000];
+
+/// With what a drive can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Level {
+    /// It is read, and nothing else.
+    Watch,
+    /// It is read, and stopped.
+    Stop,
+    /// It is driven.
+    Motion,
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Watch => "watch",
+            Self::Stop => "stop",
+            Self::Motion => "motion",
+        })
+    }
+}
+
+/// Something that is not known, and the question that comes next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Gap {
+    /// The level from which it keeps the drive; `None`: it is said to whom it matters, and keeps from nothing.
+    pub keeps_from: Option<Level>,
+    /// The line, from 1.
+    pub line: usize,
+    /// What is not known.
+    pub what: String,
+    /// What would tell.
+    pub question: String,
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(level) = self.keeps_from {
+            write!(f, "below {level}, line {}: ", self.line)?;
+        }
+        write!(f, "{}: {}", self.what, self.question)
+    }
+}
+
+/// The level of a file that was checked, and its gaps: first what keeps it from the next level.
+pub(crate) fn climb(text: &str, file: &File) -> (Level, Vec<Gap>) {
+    let mut ladder = Ladder { text, file, gaps: Vec::new() };
+    ladder.stop();
+    ladder.motion();
+    ladder.said();
+    let mut gaps = ladder.gaps;
+    gaps.sort_by_key(|gap| (gap.keeps_from.unwrap_or(Level::Watch) != Level::Stop, gap.keeps_from.is_none()));
+    let below = gaps.iter().filter_map(|gap| gap.keeps_from).min();
+    let level = match below {
+        Some(Level::Stop | Level::Watch) => Level::Watch,
+        Some(Level::Motion) => Level::Stop,
+        None => Level::Motion,
+    };
+    (level, gaps)
+}
+
+struct Ladder<'a> {
+    text: &'a str,
+    file: &'a File,
+    gaps: Vec<Gap>,
+}
+
+impl<'a> Ladder<'a> {
+    fn stop(&mut self) {
+        let file = self.file;
+        let link = file.link.get_ref();
+        self.sound(Level::Stop, "the line and its functions", &link.source);
+        let stops: Vec<_> = file.actions().filter(|(name, _)| name.starts_with("stop.")).collect();
+        if stops.is_empty() {
+            self.keep(
+                Level::Stop,
+                0,
+                "no stop of one write is known",
+                "which one word stops it, whatever it does?",
+            );
+        }
+        for (name, stop) in stops {
+            self.action(Level::Stop, name, stop);
+        }
+    }
+
+    fn motion(&mut self) {
+        let file = self.file;
+        for (state, name) in [(StateName::Running, "that it runs"), (StateName::Fault, "that it has tripped")]
+        {
+            let mut shows = file.state.is.iter().filter(|is| is.get_ref().state == state).peekable();
+            if shows.peek().is_none() {
+                let question = "which bits, or which number, of which register?";
+                self.keep(Level::Motion, 0, &format!("nothing shows {name}"), question);
+            }
+        }
+        for is in &file.state.is {
+            let bits = is.get_ref().bits.get_ref();
+            self.sound(Level::Motion, &format!("state {:?}", is.get_ref().state), &bits.source);
+            self.register(Level::Motion, bits.register.get_ref());
+        }
+        self.seen();
+        self.ownership();
+        self.commands();
+        self.who();
+    }
+
+    /// A way to see the setpoint or the output.
+    fn seen(&mut self) {
+        let see = &self.file.see;
+        let ways: Vec<_> = [&see.output, &see.setpoint].into_iter().filter_map(Answer::given).collect();
+        if ways.is_empty() {
+            self.keep(
+                Level::Motion,
+                0,
+                "neither its setpoint nor its output can be seen",
+                "which register holds the output frequency?",
+            );
+        }
+        for name in ways {
+            self.register(Level::Motion, name.get_ref());
+        }
+        if let Some(direction) = see.direction.given() {
+            self.sound(Level::Motion, "which way it turns", &direction.get_ref().source);
+        }
+    }
+
+    fn ownership(&mut self) {
+        let owner = &self.file.ownership;
+        for (answer, what) in
+            [(&owner.command, "who commands it"), (&owner.reference, "who gives its reference")]
+        {
+            match answer {
+                Answer::Given(owner) => {
+                    self.sound(Level::Motion, what, &owner.get_ref().bits.source);
+                    if owner.get_ref().proves == Proves::Nothing {
+                        self.say(
+                            &format!("the drive tells {what} only where it is not the bus"),
+                            "see that nothing else commands it",
+                        );
+                    }
+                }
+                Answer::None => {
+                    self.say(&format!("the drive does not tell {what}"), "see that nothing else commands it");
+                }
+                Answer::Unknown => {
+                    self.say(
+                        &format!("whether the drive tells {what} is not known"),
+                        "which bit or register tells it?",
+                    );
+                }
+            }
+        }
+        if let Some(read) = owner.reads_back.given() {
+            self.sound(Level::Motion, "that its command reads back", &read.get_ref().source);
+        } else {
+            self.say(
+                "its command does not read back, as far as is known",
+                "which register holds the command in force?",
+            );
+        }
+    }
+
+    fn commands(&mut self) {
+        let file = self.file;
+        match file.command.given() {
+            Some(command) => {
+                self.sound(Level::Motion, "its command word", &command.get_ref().source);
+                for run in &command.get_ref().runs {
+                    self.sound(Level::Motion, "a form of its run command", &run.get_ref().source);
+                }
+                if command.get_ref().runs.is_empty() {
+                    self.keep(
+                        Level::Motion,
+                        command.span().start,
+                        "no word is said to run it",
+                        "which words do?",
+                    );
+                }
+            }
+            None => self.keep(
+                Level::Motion,
+                0,
+                "which words run it is not known",
+                "which bits of which register run it?",
+            ),
+        }
+        match file.start.forward.given() {
+            Some(start) => self.action(Level::Motion, "start.forward", start),
+            None => self.keep(
+                Level::Motion,
+                0,
+                "how it is started is not known",
+                "what is written, in which order?",
+            ),
+        }
+        match file.start.reverse.given() {
+            Some(start) => self.action(Level::Motion, "start.reverse", start),
+            None => self
+                .say("how it is started in reverse is not known, or it does not turn so", "what is written?"),
+        }
+        match &file.start.ladder {
+            Answer::Given(rungs) => {
+                for rung in rungs {
+                    self.sound(Level::Motion, "a rung of its ladder", &rung.get_ref().bits.source);
+                }
+            }
+            Answer::None => {}
+            Answer::Unknown => self.keep(
+                Level::Motion,
+                0,
+                "whether something has to be written before the run command is not known",
+                "from which states does a run command act?",
+            ),
+        }
+        if file.stop.ramp.given().is_none() {
+            self.keep(
+                Level::Motion,
+                0,
+                "no stop along the ramp is known",
+                "which one word stops it along its ramp?",
+            );
+        }
+        match file.setpoint.given() {
+            Some(setpoint) => {
+                self.sound(Level::Motion, "its setpoint", &setpoint.get_ref().source);
+                self.register(Level::Motion, setpoint.get_ref().register.get_ref());
+            }
+            None => {
+                self.keep(Level::Motion, 0, "its setpoint is not known", "which register, in which unit?");
+            }
+        }
+        match &file.reset {
+            Answer::Given(reset) => self.action(Level::Motion, "reset", reset),
+            Answer::None | Answer::Unknown => {
+                self.say("no reset over the bus is known", "reset it at the drive; which word resets it?");
+            }
+        }
+    }
+
+    fn who(&mut self) {
+        let file = self.file;
+        match &file.who.guards {
+            Answer::Given(guards) => {
+                for guard in guards {
+                    self.sound(Level::Motion, "a guard", &guard.get_ref().source);
+                    self.register(Level::Motion, guard.get_ref().register.get_ref());
+                }
+            }
+            Answer::None => {}
+            Answer::Unknown => self.keep(
+                Level::Motion,
+                0,
+                "whether a setting of the drive changes what its words mean is not known",
+                "which parameters choose its protocol, profile or map, and what do they have to hold?",
+            ),
+        }
+        let told = file.who.fingerprints.given().is_some_and(|all| {
+            !all.is_empty() && all.iter().all(|of| grade(file, &of.get_ref().source).is_sound())
+        });
+        let shared = file
+            .actions()
+            .flat_map(|(_, action)| file.writes(action.get_ref()))
+            .any(|written| written.space == Space::HoldingRegister && SHARED.contains(&written.address));
+        if shared && !told && !self.is_tried() {
+            self.keep(
+                Level::Motion,
+                0,
+                "its command stands where other makers have other words, and nothing tells this drive from theirs",
+                "which register only this drive reads so? Or a person tries it on the drive, by name, under [[tried]]",
+            );
+        }
+    }
+
+    /// What keeps from nothing and is told all the same.
+    fn said(&mut self) {
+        let file = self.file;
+        match &file.watchdog {
+            Answer::Given(watchdog) => {
+                let watchdog = watchdog.get_ref();
+                if watchdog.from_factory.is_unknown() {
+                    self.say(
+                        "whether its communication watchdog is on from the factory is not known",
+                        "see its setting",
+                    );
+                } else if watchdog.from_factory == Answer::Given(false) {
+                    self.say("its communication watchdog is off from the factory", "set it at the drive");
+                }
+                if watchdog.fed_by.is_unknown() {
+                    self.say(
+                        "what feeds its communication watchdog is not known",
+                        "any request, or only a write?",
+                    );
+                }
+                if watchdog.actions.is_unknown() {
+                    self.say("what its communication watchdog does is not known", "which value does what?");
+                }
+            }
+            Answer::None => self.say(
+                "it has no communication watchdog: it runs on when the line is lost",
+                "wire an emergency stop",
+            ),
+            Answer::Unknown => self.say(
+                "whether it stops by itself when the line is lost is not known",
+                "does it have a communication watchdog, and how is it set?",
+            ),
+        }
+        let setpoint =
+            file.setpoint.given().and_then(|setpoint| file.named(setpoint.get_ref().register.get_ref()));
+        if let Some(Storage::Unknown) =
+            setpoint.and_then(|register| register.storage.as_ref()).map(|of| *of.get_ref())
+        {
+            self.say("whether each setpoint wears an EEPROM is not known", "where does its register live?");
+        }
+        if file.faults.present.given().is_none() {
+            self.say("the code of its present fault is not known", "which register holds it?");
+        } else if file.faults.codes.given().is_none() {
+            self.say("what its fault codes mean is not known", "the list of its manual");
+        }
+        if let Some(command) = file.command.given()
+            && command.get_ref().acts != crate::format::Acts::Edge
+        {
+            self.say(
+                "a run command that stands may start the motor when its power comes back",
+                "give it a watchdog that ends it, or switch its supply off only when it was stopped",
+            );
+        }
+    }
+
+    fn is_tried(&self) -> bool {
+        self.file.tried.given().is_some_and(|tried| !tried.is_empty())
+    }
+
+    /// An action, and the registers that it writes.
+    fn action(&mut self, level: Level, name: &str, action: &'a Spanned<Action>) {
+        self.sound(level, name, &action.get_ref().source);
+        for to in action.get_ref().steps.iter().filter_map(|step| step.get_ref().write.as_ref()) {
+            self.register(level, to.get_ref());
+        }
+    }
+
+    fn register(&mut self, level: Level, name: &str) {
+        if let Some(register) = self.file.named(name) {
+            let Register { source, .. } = register;
+            self.sound(level, &format!("register {name}"), source);
+        }
+    }
+
+    /// A fact on which a level rests.
+    fn sound(&mut self, level: Level, what: &str, source: &Spanned<String>) {
+        let mark = grade(self.file, source);
+        let settled = mark == crate::format::Mark::X && self.is_tried();
+        if !mark.is_sound() && !settled {
+            self.keep(
+                level,
+                source.span().start,
+                &format!("{what} rests on what is not sure ({})", mark.meaning()),
+                "what does the maker's manual say, on which page?",
+            );
+        }
+    }
+
+    fn keep(&mut self, level: Level, at: usize, what: &str, question: &str) {
+        self.gap(Some(level), at, what, question);
+    }
+
+    fn say(&mut self, what: &str, question: &str) {
+        self.gap(None, 0, what, question);
+    }
+
+    fn gap(&mut self, keeps_from: Option<Level>, at: usize, what: &str, question: &str) {
+        let line = line(self.text, &(at..at));
+        let gap = Gap { keeps_from, line, what: what.to_owned(), question: question.to_owned() };
+        if !self.gaps.contains(&gap) {
+            self.gaps.push(gap);
+        }
+    }
+}

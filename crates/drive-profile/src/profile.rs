@@ -1,0 +1,110 @@
+//! A profile that was checked: [`Profile`].
+
+use crate::{
+    format::{Action, Answer, File, Register, Space, Step},
+    ladder::{Gap, Level},
+};
+
+/// A profile that was checked. What its file holds is whole: each name that it uses is one of its own.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    pub(crate) file: File,
+    pub(crate) level: Level,
+    pub(crate) gaps: Vec<Gap>,
+}
+
+/// One register or coil of a write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Written {
+    pub(crate) space: Space,
+    pub(crate) address: u16,
+    /// The word; 0 or 1 of a coil.
+    pub(crate) value: u16,
+}
+
+impl Profile {
+    /// The name by which configurations choose it.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        self.file.key.get_ref()
+    }
+
+    /// The drive, with its maker.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.file.name.get_ref()
+    }
+
+    /// What the file holds.
+    #[must_use]
+    pub const fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// What the drive can be trusted with by this profile.
+    #[must_use]
+    pub const fn level(&self) -> Level {
+        self.level
+    }
+
+    /// What is not known: first what keeps it from the next level, then what is only said. Each with the question that comes next.
+    #[must_use]
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+}
+
+impl File {
+    /// The space and the wire address of a register.
+    pub(crate) fn place(&self, register: &Register) -> Option<(Space, u16)> {
+        let address = self.link.get_ref().numbering.wire(*register.address.get_ref())?;
+        Some((register.space.unwrap_or(self.link.get_ref().space), address))
+    }
+
+    /// A register by its name.
+    pub(crate) fn named(&self, name: &str) -> Option<&Register> {
+        self.register.get(name).map(toml::Spanned::get_ref)
+    }
+
+    /// What an action writes, in its order, register by register.
+    pub(crate) fn writes(&self, action: &Action) -> Vec<Written> {
+        action.steps.iter().flat_map(|step| self.written(step.get_ref())).collect()
+    }
+
+    /// What a step writes.
+    pub(crate) fn written(&self, step: &Step) -> Vec<Written> {
+        let register = step.write.as_ref().and_then(|name| self.named(name.get_ref()));
+        let Some((space, first)) = register.and_then(|register| self.place(register)) else {
+            return Vec::new();
+        };
+        let words = step.words.iter().flatten().copied();
+        let coils = step.coils.iter().flatten().map(|&on| u16::from(on));
+        let values = words.chain(coils).zip(0_u16..);
+        values.map(|(value, at)| Written { space, address: first.saturating_add(at), value }).collect()
+    }
+
+    /// Every action with its name.
+    pub(crate) fn actions(&self) -> impl Iterator<Item = (&'static str, &toml::Spanned<Action>)> {
+        let all: [(&'static str, &Answer<_>); 8] = [
+            ("stop.ramp", &self.stop.ramp),
+            ("stop.fast", &self.stop.fast),
+            ("stop.freewheel", &self.stop.freewheel),
+            ("stop.dc_injection", &self.stop.dc_injection),
+            ("start.forward", &self.start.forward),
+            ("start.reverse", &self.start.reverse),
+            ("reset", &self.reset),
+            ("setup", &self.setup),
+        ];
+        all.into_iter().filter_map(|(name, action)| Some((name, action.given()?)))
+    }
+
+    /// Whether a word that is written runs the motor.
+    pub(crate) fn runs(&self, written: Written) -> bool {
+        let Some(command) = self.command.given() else { return false };
+        command.get_ref().runs.iter().any(|run| {
+            let run = run.get_ref();
+            let place = self.named(run.register.get_ref()).and_then(|register| self.place(register));
+            place == Some((written.space, written.address)) && run.fit(written.value)
+        })
+    }
+}

@@ -1,0 +1,417 @@
+//! What is refused: good profiles, damaged in one place each. The refusal names the line, the reason and what to write.
+
+use drive_profile::{LONGEST, Level, read, shipped};
+
+/// A profile that is shipped, by its place.
+fn good(name: &str) -> &'static str {
+    shipped::TEXTS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text).expect("it is shipped")
+}
+
+/// The profile with one place of it changed.
+fn damaged(name: &str, place: &str, by: &str) -> String {
+    let text = good(name);
+    assert_eq!(text.matches(place).count(), 1, "{name}: {place}");
+    text.replace(place, by)
+}
+
+/// That a damage is refused for this reason, in the line in which it stands or begins.
+#[track_caller]
+fn refused(name: &str, place: &str, by: &str, reason: &str) {
+    let text = damaged(name, place, by);
+    let refusals = read(&text).map(|profile| profile.level()).expect_err(reason).0;
+    let found = refusals.iter().find(|refusal| refusal.reason.contains(reason));
+    let found = found.unwrap_or_else(|| panic!("{reason:?} is not among {refusals:#?}"));
+    assert!(!found.write.is_empty() && (1..=text.lines().count()).contains(&found.line), "{found}");
+}
+
+const V20: &str = "siemens/v20";
+const GOODRIVE: &str = "invt/goodrive";
+const ALTIVAR: &str = "schneider/altivar";
+const RAMP: &str = "ramp = { steps = [{ write = \"STW\", words = [0x047E] }]";
+
+#[test]
+fn a_stop_that_reads_first() {
+    let by = "ramp = { steps = [{ await = { register = \"ZSW\", mask = 1, value = 1, source = \"oi2012\" }, within_ms = 100 }, { write = \"STW\", words = [0x047E] }]";
+    refused(V20, RAMP, by, "reads or waits before it stops");
+}
+
+#[test]
+fn a_stop_that_unlocks_first() {
+    let by = "ramp = { steps = [{ write = \"HSW\", words = [0] }, { write = \"STW\", words = [0x047E] }]";
+    refused(V20, RAMP, by, "more than one write");
+}
+
+#[test]
+fn a_stop_that_holds_a_run_bit() {
+    refused(V20, RAMP, "ramp = { steps = [{ write = \"STW\", words = [0x047F] }]", "holds a run bit");
+}
+
+#[test]
+fn a_stop_that_nothing_shows() {
+    refused(
+        V20,
+        "words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]",
+        "words = [0x047E] }]",
+        "left in silence",
+    );
+}
+
+#[test]
+fn a_stop_that_is_done_while_the_motor_runs() {
+    let by = "words = [0x047E] }], seen = [\"ready\", \"running\", \"fault\"]";
+    refused(
+        V20,
+        "words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]",
+        by,
+        "while the motor runs",
+    );
+}
+
+#[test]
+fn a_stop_of_a_drive_that_was_not_read_and_that_is_none() {
+    refused(V20, "unread = \"ramp\"", "unread = \"dc_injection\"", "none that is known");
+}
+
+/// Without their run bit in [command] too, by the words alone.
+#[test]
+fn run_words_that_are_equal_to_a_stop() {
+    let text = good(GOODRIVE).replace(
+        "forward = { steps = [{ write = \"CMD\", words = [1] }]",
+        "forward = { steps = [{ write = \"CMD\", words = [5] }]",
+    );
+    let refusals = read(&text).expect_err("5 is a stop");
+    assert!(refusals.to_string().contains("by which a start ends"), "{refusals}");
+}
+
+#[test]
+fn a_start_that_runs_before_its_last_step() {
+    refused(
+        V20,
+        "{ write = \"STW\", words = [0x0C7E] }, { await",
+        "{ write = \"STW\", words = [0x0C7F] }, { await",
+        "before its last step",
+    );
+}
+
+#[test]
+fn a_start_that_runs_nothing() {
+    refused(
+        GOODRIVE,
+        "reverse = { steps = [{ write = \"CMD\", words = [2] }]",
+        "reverse = { steps = [{ write = \"CMD\", words = [9] }]",
+        "does not end with a word that runs",
+    );
+}
+
+#[test]
+fn a_reset_with_a_run_bit() {
+    refused(V20, "words = [0x04FE]", "words = [0x04FF]", "reset writes 04FFh, which holds a run bit");
+}
+
+#[test]
+fn a_reset_that_is_left_standing() {
+    refused(
+        V20,
+        "{ write = \"STW\", words = [0x04FE] }, { write = \"STW\", words = [0x047E] }]",
+        "{ write = \"STW\", words = [0x04FE] }]",
+        "left standing",
+    );
+}
+
+#[test]
+fn a_setpoint_without_limits() {
+    refused(V20, "limits = { low = 0, high = 16384 }\n", "", "`limits` is left in silence");
+    refused(V20, "limits = { low = 0, high = 16384 }", "limits = { low = 0, high = 0 }", "without limits");
+    refused(V20, "limits = { low = 0, high = 16384 }", "limits = { low = 0, high = 40000 }", "cannot hold");
+}
+
+#[test]
+fn a_setpoint_of_which_nobody_says_what_is_all_of_it() {
+    refused(V20, "full_scale = \"owner\"\n", "", "of how much it counts percent");
+}
+
+#[test]
+fn a_setpoint_in_the_eeprom() {
+    let text =
+        good(GOODRIVE).replace("storage = \"unknown\"\nunit = \"Hz\"", "storage = \"eeprom\"\nunit = \"Hz\"");
+    assert!(read(&text).expect_err("it wears").to_string().contains("wears an EEPROM"));
+}
+
+#[test]
+fn a_question_left_in_silence() {
+    for question in [
+        "setup = \"unknown\"\n",
+        "standstill = \"unknown\"\n",
+        "reads_back = \"unknown\"\n",
+        "from_factory = \"unknown\"\n",
+    ] {
+        let name = question.split(' ').next().unwrap_or_default();
+        refused(V20, question, "", &format!("`{name}` is left in silence"));
+    }
+}
+
+#[test]
+fn a_key_that_is_none() {
+    refused(V20, "acts = \"level\"", "acts = \"level\"\nramps = 3", "`ramps` is no key");
+}
+
+#[test]
+fn a_command_among_the_parameters() {
+    refused(
+        V20,
+        "what = \"control word\"",
+        "what = \"control word\"\nparameter = true",
+        "which is a parameter",
+    );
+    refused(
+        V20,
+        "what = \"main setpoint\"",
+        "what = \"main setpoint\"\nparameter = true",
+        "among the parameters",
+    );
+}
+
+#[test]
+fn a_command_among_what_is_never_written() {
+    refused(V20, "{ from = 40004, to = 40007", "{ from = 40004, to = 40107", "which is never written");
+}
+
+#[test]
+fn states_that_overlap() {
+    refused(
+        V20,
+        "state = \"running\", bits = { register = \"ZSW\", mask = 0x0004, value = 0x0004",
+        "state = \"running\", bits = { register = \"ZSW\", mask = 0x000C, value = 0x000C",
+        "is never seen",
+    );
+}
+
+#[test]
+fn a_trip_that_another_state_hides() {
+    let running = "    { state = \"running\", bits = { register = \"ZSW\", mask = 0x0004, value = 0x0004, source = \"oi2012 wb\" } },\n";
+    let fault = "    { state = \"fault\", bits = { register = \"ZSW\", mask = 0x0008, value = 0x0008, source = \"oi2012 wb\" } },\n";
+    let text = good(V20).replace(&format!("{fault}{running}"), &format!("{running}{fault}"));
+    assert!(read(&text).expect_err("it hides").to_string().contains("a trip may be told as Running"));
+}
+
+#[test]
+fn a_state_that_nobody_can_leave() {
+    refused(
+        ALTIVAR,
+        "do = \"write\", register = \"CMD\", word = 0x0006",
+        "do = \"write\"",
+        "nobody can leave",
+    );
+    let text = good(ALTIVAR).replace("do = \"run\"", "do = \"wait\"");
+    assert!(
+        read(&text).expect_err("it waits for ever").to_string().contains("no rung leads to the run command")
+    );
+}
+
+#[test]
+fn a_ladder_that_runs_the_motor() {
+    refused(
+        ALTIVAR,
+        "register = \"CMD\", word = 0x0007",
+        "register = \"CMD\", word = 0x000F",
+        "runs the motor before it is asked to",
+    );
+}
+
+#[test]
+fn a_scale_that_cannot_be_turned_round() {
+    for scale in ["[0, 10]", "[1, 0]", "[-1, 10]"] {
+        let text = good(ALTIVAR).replace(
+            "scale = [1, 10]\nsource = \"invlib\"\n\n[register.HSP]",
+            &format!("scale = {scale}\nsource = \"invlib\"\n\n[register.HSP]"),
+        );
+        assert!(read(&text).expect_err(scale).to_string().contains("cannot be turned round"), "{scale}");
+    }
+}
+
+#[test]
+fn a_mask_without_a_value_and_a_value_that_never_fits() {
+    refused(
+        V20,
+        "warning = { register = \"ZSW\", mask = 0x0080, value = 0x0080",
+        "warning = { register = \"ZSW\", mask = 0x0080",
+        "`value` is left in silence",
+    );
+    refused(
+        V20,
+        "warning = { register = \"ZSW\", mask = 0x0080, value = 0x0080",
+        "warning = { register = \"ZSW\", mask = 0x0080, value = 0x0180",
+        "never fit",
+    );
+}
+
+#[test]
+fn a_framing_that_is_not_modbus_by_its_name() {
+    for (protocol, told) in [
+        ("huanyang", "functions of its own"),
+        ("isaver", "C3h"),
+        ("h2a non-standard", "two bytes"),
+        ("ascii", "no framing"),
+    ] {
+        refused(V20, "protocol = \"modbus_rtu\"", &format!("protocol = \"{protocol}\""), told);
+    }
+}
+
+#[test]
+fn a_function_that_is_no_access_to_a_register() {
+    refused(V20, "functions = [3, 6, 16]", "functions = [3, 6, 8]", "function 8 reads or writes no register");
+    refused(V20, "functions = [3, 6, 16]", "functions = [3]", "no function of the drive writes STW");
+}
+
+#[test]
+fn names_that_nothing_has() {
+    refused(V20, "output = \"FREQ_OUTPUT\"", "output = \"FREQUENCY\"", "there is no register \"FREQUENCY\"");
+    refused(
+        V20,
+        "fed_by = \"command_write\"\nsource = \"oi2012\"",
+        "fed_by = \"command_write\"\nsource = \"oi2013\"",
+        "\"oi2013\" is no source",
+    );
+    refused(
+        V20,
+        "fed_by = \"command_write\"\nsource = \"oi2012\"",
+        "fed_by = \"command_write\"\nsource = \"\"",
+        "without a source",
+    );
+}
+
+#[test]
+fn two_registers_of_one_address_and_addresses_that_are_none() {
+    refused(V20, "address = 40111", "address = 40110", "have one address");
+    refused(V20, "address = 40111", "address = 111", "no address as this file counts them");
+}
+
+#[test]
+fn a_register_of_which_nobody_says_where_it_is_kept() {
+    let text = good(V20).replace(
+        "address = 40100\naccess = \"read_write\"\nstorage = \"ram\"\n",
+        "address = 40100\naccess = \"read_write\"\n",
+    );
+    assert!(read(&text).expect_err("it is silent").to_string().contains("where a value lives"));
+}
+
+#[test]
+fn another_version_and_a_file_that_is_too_long_or_too_deep() {
+    refused(V20, "format = 1\n", "format = 2\n", "format 2 is not read here");
+    let long = format!("{}\n# {}", good(V20), "x".repeat(LONGEST));
+    assert!(read(&long).expect_err("it is long").to_string().contains("longer than"));
+    let deep = format!("texts = {}{}", "[".repeat(100_000), "]".repeat(100_000));
+    assert!(read(&deep).expect_err("it is deep").to_string().contains("too deep"));
+}
+
+/// A fact that is not sure is no refusal: it holds the drive below.
+#[test]
+fn what_is_from_memory_or_contradicted_holds_below_motion_and_a_trial_settles_a_contradiction() {
+    let marked = |mark| {
+        good(V20).replace(
+            "page = \"templates; VFD\", mark = \"R\"",
+            &format!("page = \"templates; VFD\", mark = \"{mark}\""),
+        )
+    };
+    for mark in ["M", "W", "X"] {
+        let profile = read(&marked(mark)).expect("it is right");
+        assert!(profile.level() < Level::Motion, "{mark}");
+        assert!(profile.gaps()[0].to_string().contains("below"), "{}", profile.gaps()[0]);
+    }
+    let tried = marked("X").replace("tried = \"none\"", "tried = [{ person = \"A. Fitter\", drive = \"V20 0.75 kW\", firmware = \"3.92\", day = \"2026-11-24\", seen = \"it stops\" }]");
+    assert_eq!(read(&tried).expect("it is right").level(), Level::Motion);
+}
+
+#[test]
+fn an_address_that_other_makers_use_otherwise_wants_a_fingerprint_or_a_trial() {
+    let profile = shipped::find("ms300").expect("it is shipped");
+    assert_eq!(profile.level(), Level::Stop);
+    let tried = damaged(
+        "delta/ms300",
+        "tried = \"none\"",
+        "tried = [{ person = \"A. Fitter\", drive = \"MS300 1.5 kW\", firmware = \"1.10\", day = \"2026-11-24\", seen = \"it stops\" }]",
+    );
+    assert_eq!(read(&tried).expect("it is right").level(), Level::Motion);
+    let text = good(GOODRIVE);
+    let (head, rest) = text.split_once("fingerprints = [").expect("it has some");
+    let (_, tail) = rest.split_once("\n]\n").expect("they end");
+    let bare = format!("{head}fingerprints = \"none\"\n{tail}");
+    assert_eq!(read(&bare).expect("it is right").level(), Level::Stop);
+}
+
+/// The mistakes of others' published tables, as profiles.
+mod others {
+    use super::*;
+
+    /// A public project has 1 as run, 5 as stop and 3 as emergency stop of a VFD-EL, where 1 is the stop.
+    #[test]
+    fn the_words_of_one_maker_in_the_command_register_of_another() {
+        let text = good("delta/ms300").replace(
+            "forward = { steps = [{ write = \"CMD\", words = [0x0012] }]",
+            "forward = { steps = [{ write = \"CMD\", words = [0x0001] }]",
+        );
+        assert!(read(&text).is_err());
+        let fast =
+            "fast = { steps = [{ write = \"CMD\", words = [0x0003] }], seen = [\"ready\"], source = \"um\" }";
+        refused("delta/ms300", "fast = \"none\"", fast, "holds a run bit");
+    }
+
+    /// 0 as the stop of a Delta is "nothing": the words of [command] do not hold it, and the table is only as sure as its source.
+    #[test]
+    fn a_zero_for_a_stop_from_a_weak_table_stops_nothing() {
+        let weak = damaged("delta/ms300", "ramp = { steps = [{ write = \"CMD\", words = [0x0001] }], seen = [\"ready\", \"stopping\", \"fault\"], source = \"um drivers\" }", "ramp = { steps = [{ write = \"CMD\", words = [0x0000] }], seen = [\"ready\", \"stopping\", \"fault\"], source = \"table\" }")
+            .replace("[sources]\n", "[sources]\ntable = { document = \"a forum\", edition = \"unknown\", page = \"a post\", mark = \"W\" }\n")
+            .replace("{ write = \"CMD2\", words = [0x0000] }, { write = \"CMD\", words = [0x0001] }]", "{ write = \"CMD2\", words = [0x0000] }, { write = \"CMD\", words = [0x0000] }]");
+        assert_eq!(read(&weak).expect("it is right").level(), Level::Watch);
+    }
+
+    /// AC Tech wants its password before each command.
+    #[test]
+    fn an_unlock_before_each_command() {
+        refused(
+            GOODRIVE,
+            "ramp = { steps = [{ write = \"CMD\", words = [5] }]",
+            "ramp = { steps = [{ write = \"FREQ\", words = [0] }, { write = \"CMD\", words = [5] }]",
+            "unlocks first",
+        );
+    }
+
+    /// LinuxCNC's enable that resets and runs in one word.
+    #[test]
+    fn a_reset_that_restarts() {
+        refused("danfoss/danfoss-fc", "words = [0x04BC]", "words = [0x04FC]", "holds a run bit");
+    }
+
+    /// A generated table of an Altivar starts it by writing its register 40001: no document has it.
+    #[test]
+    fn a_run_word_without_a_document() {
+        refused(
+            V20,
+            "forward = { steps = [{ write = \"STW\", words = [0x047E] }, { await = { register = \"ZSW\", mask = 0x0041, value = 0x0001, source = \"oi2012 wb\" }, within_ms = 1000 }, { write = \"STW\", words = [0x047F] }], source = \"wb\" }",
+            "forward = { steps = [{ write = \"STW\", words = [0x047F] }], source = \"\" }",
+            "without a source",
+        );
+    }
+
+    /// Buildbotics divides by a highest frequency of 0; FluidNC by a scale that may be unread.
+    #[test]
+    fn a_highest_of_zero() {
+        refused(
+            GOODRIVE,
+            "limits = { low = 0, high = 65535",
+            "limits = { low = 0, high = 0",
+            "without limits",
+        );
+    }
+
+    /// The W guides of the V20 put ON into another bit.
+    #[test]
+    fn a_run_bit_in_another_place_contradicts_the_command() {
+        refused(
+            V20,
+            "mask = 0x0001, value = 0x0001, source = \"g120c wb\"",
+            "mask = 0x0800, value = 0x0800, source = \"g120c wb\"",
+            "does not end with a word that runs",
+        );
+    }
+}

@@ -1,0 +1,66 @@
+//! The profiles that are shipped: each is one, each at the level that its marks carry, as the table of the README says.
+
+use std::collections::BTreeSet;
+
+use drive_profile::{Level, format::Mark, read, shipped};
+
+#[test]
+fn each_profile_that_is_shipped_is_one_and_has_a_key_of_its_own() {
+    let (mut keys, mut refused) = (BTreeSet::new(), String::new());
+    for (name, text) in shipped::TEXTS {
+        match read(text) {
+            Ok(profile) => assert!(keys.insert(profile.key().to_owned()), "{name}"),
+            Err(refusals) => refused.push_str(&format!("{name}:\n{refusals}\n")),
+        }
+    }
+    assert!(refused.is_empty(), "{refused}");
+    assert_eq!(keys.len(), shipped::all().len());
+}
+
+/// What is not sure is not shipped; what contradicts itself moves nothing.
+#[test]
+fn no_profile_that_is_shipped_rests_on_a_weak_source_or_on_memory() {
+    for profile in shipped::all() {
+        for (name, source) in &profile.file().sources {
+            let mark = source.get_ref().mark;
+            assert!(!matches!(mark, Mark::W | Mark::M), "{}: {name}", profile.key());
+        }
+    }
+}
+
+#[test]
+fn the_readme_has_the_table_of_what_is_shipped() {
+    let mut table = String::from(
+        "| Drive | Key | Level | What keeps it from the next | What else is not known |\n|---|---|---|---|---|\n",
+    );
+    for profile in shipped::all() {
+        let told = |keeps: bool| {
+            let gaps = profile.gaps().iter().filter(|gap| gap.keeps_from.is_some() == keeps);
+            let told: Vec<&str> = gaps.map(|gap| gap.what.as_str()).collect();
+            if told.is_empty() { "—".to_owned() } else { told.join("; ") }
+        };
+        let (name, key, level) = (profile.name(), profile.key(), profile.level());
+        table.push_str(&format!("| {name} | `{key}` | {level} | {} | {} |\n", told(true), told(false)));
+    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
+    let readme = std::fs::read_to_string(path).expect("it is there");
+    let (head, rest) = readme.split_once("<!-- shipped -->\n").expect("it has a place for the table");
+    let (_, tail) = rest.split_once("<!-- /shipped -->").expect("the place has an end");
+    if std::env::var_os("UPDATE_README").is_some() {
+        let written = format!("{head}<!-- shipped -->\n{table}<!-- /shipped -->{tail}");
+        std::fs::write(path, written).expect("it can be written");
+        return;
+    }
+    assert!(
+        readme.contains(&table),
+        "UPDATE_README=1 cargo test -p drive-profile --test shipped writes it:\n{table}"
+    );
+}
+
+#[test]
+fn a_drive_whose_document_carries_all_that_motion_needs_reaches_it() {
+    for key in ["v20", "danfoss-fc", "goodrive"] {
+        let profile = shipped::find(key).unwrap_or_else(|| panic!("{key}"));
+        assert_eq!(profile.level(), Level::Motion, "{key}: {:#?}", profile.gaps());
+    }
+}
