@@ -44,7 +44,10 @@ use drived_http::{
     api::{self, Reload as _},
     metrics, page,
 };
-use drived_plant::{findings, journal, plant::Plant};
+use drived_plant::{
+    findings, journal,
+    plant::{Plant, alarms::KeptAlarms},
+};
 use drived_screen::screen::Screen;
 use drived_words::{
     failure::Failure,
@@ -120,7 +123,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let watchdogs = records::follow(watchdogs, fleet.events(), watchdogs::note);
     let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
-    let plant = Plant::start(fleet.clone(), config.groups.clone(), false);
+    let alarms = KeptAlarms::in_folder(state.folder.as_deref());
+    let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms);
+    let alarms = plant.keep_alarms(alarms);
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
     let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit(), &names);
@@ -176,6 +181,8 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
+    // What became of the motors is in them; that the lines are closed is not.
+    plant.close_alarms();
     let _ = screen.await;
     drop(stopping);
     // It ends with the fleet, and what it says last is not lost.
@@ -183,6 +190,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let _ = watchdogs.await;
     let _ = eeproms.await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, kept).await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, alarms).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
     if read.is_none() {
         report.finish().await;

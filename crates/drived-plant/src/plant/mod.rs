@@ -1,5 +1,6 @@
 //! What every face shares: the fleet, the groups, and what is told of them. No HTTP is in it.
 
+pub mod alarms;
 pub mod commands;
 pub mod history;
 pub mod parameters;
@@ -27,6 +28,7 @@ use self::views::{
     PlannedLineView, SettingsView, StateView,
 };
 use self::{
+    alarms::KeptAlarms,
     commands::{Log, Stopped},
     history::{History, HistoryView},
     parameters::Words,
@@ -63,10 +65,17 @@ struct Inner {
     recent: Recent,
     tally: Tally,
     usage: Usage,
+    alarms: alarms::Desk,
 }
 
 impl Plant {
+    /// A plant whose alarms live as long as the program.
     pub fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
+        Self::start_with(fleet, groups, demo, &KeptAlarms::default())
+    }
+
+    /// A plant that goes on with the alarms that were kept.
+    pub fn start_with(fleet: Fleet, groups: Vec<Group>, demo: bool, kept: &KeptAlarms) -> Self {
         let inner = Arc::new(Inner {
             fleet,
             groups: RwLock::new(groups),
@@ -82,6 +91,7 @@ impl Plant {
             recent: Recent::default(),
             tally: Tally::default(),
             usage: Usage::default(),
+            alarms: alarms::Desk::new(kept),
         });
         watching::start(&inner);
         history::start(&inner);
@@ -112,6 +122,7 @@ impl Plant {
             lines: self.lines(),
             drives: self.drives(),
             groups: self.groups(),
+            alarms: self.alarms().alarms,
         }
     }
 

@@ -118,6 +118,7 @@ impl Inner {
 
     /// Tells what happened to the program itself.
     pub(super) fn tell_notice(&self, notice: NoticeView) {
+        self.note_for_alarms(&notice);
         let revision = self.revisions.push(Subject::Event, &notice);
         self.recent.keep(RecentView { revision, what: Happened::Notice(notice) });
     }

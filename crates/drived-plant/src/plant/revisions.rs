@@ -29,6 +29,7 @@ pub enum Subject {
     Line,
     Command,
     Event,
+    Alarm,
     Tick,
 }
 
@@ -39,6 +40,7 @@ impl Subject {
             Self::Line => "line",
             Self::Command => "command",
             Self::Event => "event",
+            Self::Alarm => "alarm",
             Self::Tick => "tick",
         }
     }

@@ -19,7 +19,7 @@ use drive_sim::{SimLine, SimSlave, Wiring};
 use drive_testing::witness::Witnesses;
 use tokio::time::Instant;
 
-use super::{Plant, views::DriveView};
+use super::{Plant, alarms::KeptAlarms, views::DriveView};
 use drived_config::config::Group;
 
 /// One line, named `north`, with Altivar 312: `pump 1`, `pump 2` … in the group `pumps`.
@@ -39,6 +39,15 @@ impl TestPlant {
 
     /// Drives with these settings, each once it can be started or has been tried for long enough.
     pub async fn with(drives: u8, settings: impl Fn(String) -> DriveSettings) -> Self {
+        Self::start(drives, settings, &KeptAlarms::default()).await
+    }
+
+    /// Drives that may be commanded, of a program that goes on with alarms that were kept.
+    pub async fn keeping(drives: u8, kept: &KeptAlarms) -> Self {
+        Self::start(drives, DriveSettings::controlled, kept).await
+    }
+
+    async fn start(drives: u8, settings: impl Fn(String) -> DriveSettings, kept: &KeptAlarms) -> Self {
         let family = Family::ATV312;
         let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
         let config = LineConfig {
@@ -60,7 +69,8 @@ impl TestPlant {
         }
         let fleet = builder.start().unwrap();
         let witnesses = Witnesses::of_fleet(&fleet, [("north", &line)]);
-        let plant = Plant::start(fleet, vec![Group { name: "pumps".to_owned(), drives: names }], false);
+        let groups = vec![Group { name: "pumps".to_owned(), drives: names }];
+        let plant = Plant::start_with(fleet, groups, false, kept);
         for drive in plant.fleet().drives() {
             let _ = drive.ready(Duration::from_secs(10)).await;
         }

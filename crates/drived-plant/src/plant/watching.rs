@@ -105,6 +105,10 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
         let now = Instant::now();
         let snapshot = Arc::clone(&watch.borrow_and_update());
         let known = Gist::of(&snapshot, now);
+        // Also where nothing is new: what is not seen for long enough becomes an alarm by that alone.
+        let Some(looked_for) = plant.upgrade() else { return };
+        looked_for.look_for_alarms_of(&line, &snapshot);
+        drop(looked_for);
         let is_new = told.as_ref().is_none_or(|(last, at)| {
             *last != known || now.saturating_duration_since(*at) >= ANEW && known.is_live()
         });
@@ -167,6 +171,7 @@ async fn lines(plant: Weak<Inner>) {
         plant.progress.look(&plant.fleet);
         plant.look_at_lines();
         watch(&plant, &mut watched);
+        plant.look_for_alarms();
         if plant.revisions.readers() > 0 {
             let lines = plant.lines();
             for line in lines.iter().filter(|line| !told.contains(line)) {

@@ -13,6 +13,7 @@ mod tests;
 
 use std::borrow::Cow;
 
+use drive_fleet::alarms::AlarmView;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,9 @@ pub struct StateView {
     pub lines: Vec<LineView>,
     pub drives: Vec<DriveView>,
     pub groups: Vec<Group>,
+    /// All alarms that are not over, in the order in which they came first.
+    #[serde(default)]
+    pub alarms: Vec<AlarmView>,
 }
 
 /// The program that answers, and what it lets the asker do.
