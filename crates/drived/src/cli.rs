@@ -10,7 +10,7 @@ use drived_daemon::demo;
 use drived_daemon::run;
 use drived_line_tools::{capture, doctor, explain, families, init, plan, poll, replay, scan, sim};
 use drived_tools::commands::{
-    faults, monitor, param, release, reload, report, reset, setpoint, start, status, stop, watch,
+    alarms, faults, monitor, param, release, reload, report, reset, setpoint, start, status, stop, watch,
 };
 use drived_words::{failure::Failure, output};
 
@@ -20,7 +20,7 @@ To try it:          demo; or sim in one terminal and poll, status, start in anot
 Before wiring:      families, plan
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
-The running daemon: all these without --line and with the names of its drives; watch, monitor, reload
+The running daemon: all these without --line and with the names of its drives; alarms, watch, monitor, reload
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain; replay plays it back
 The service file:   report, of the running daemon or of one line
@@ -71,6 +71,8 @@ pub(crate) enum Command {
     Export(export::Args),
     Completions(completions::Args),
     Watch(watch::Args),
+    #[command(subcommand)]
+    Alarms(alarms::Command),
     Monitor(monitor::Args),
     Reload(reload::Args),
     #[command(subcommand)]
@@ -119,6 +121,7 @@ impl Command {
             Self::Report(args) => report::run(args).await,
             Self::Export(args) => export::run(&args, Cli::command()),
             Self::Completions(args) => completions::run(args, Cli::command()).await,
+            Self::Alarms(command) => alarms::run(command).await,
             Self::Watch(args) => watch::run(args).await,
             Self::Monitor(args) => monitor::run(args).await,
             Self::Reload(args) => reload::run(args).await,

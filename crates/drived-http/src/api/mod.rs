@@ -1,5 +1,6 @@
 //! The HTTP API v1 over the plant: a table of routes, from which both the router and its description are made.
 
+mod alarms;
 mod ask;
 mod capture;
 mod command;

@@ -146,9 +146,13 @@ impl Problem {
 
     /// A drive cannot be asked, or refuses.
     pub(super) fn refused(refused: &drive_fleet::Refused) -> Self {
-        let why = Refused { outcome: OutcomeWord::Refused, reason: refused.word() };
-        let kind = Self::new(StatusCode::CONFLICT, refused.to_string());
-        Self { kind: REFUSED, why: Some(Why::Refused(why)), ..kind }
+        Self::refused_as(refused.word(), refused.to_string())
+    }
+
+    /// Something is not done, though it could be at another time.
+    pub(super) fn refused_as(reason: &'static str, detail: impl Into<String>) -> Self {
+        let why = Some(Why::Refused(Refused { outcome: OutcomeWord::Refused, reason }));
+        Self { kind: REFUSED, why, ..Self::new(StatusCode::CONFLICT, detail) }
     }
 
     /// A command that has ended, and not by a confirmation.

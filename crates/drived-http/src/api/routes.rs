@@ -6,9 +6,11 @@ use axum::{
     routing::{MethodFilter, MethodRouter, on},
 };
 use drive_core::Faults;
+use drive_fleet::alarms::AlarmView;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::{
+    alarms::{self, Acknowledge, Shelve, Unshelve},
     capture, command, demo, health,
     parameter::{self, NewValue},
     read, reload, stream,
@@ -18,6 +20,7 @@ use drived_doors::{
 };
 use drived_plant::plant::{
     Plant,
+    alarms::AlarmsView,
     commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
     history::HistoryView,
     parameters::{ParameterView, WrittenView},
@@ -127,6 +130,19 @@ impl Route {
         let mut route = route.answers::<WrittenView>(200, "it holds the value");
         route.body = Some(SchemaGenerator::subschema_for::<NewValue>);
         route.problems.extend([404, 409, 413, 415, 422, 504]);
+        route
+    }
+
+    /// Something that is done with an alarm, at once.
+    fn of_alarm<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        let mut route = Self::new(Method::POST, path, handler, about)
+            .answers::<AlarmView>(200, "the alarm as it is since; what was done before changes nothing");
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([404, 409, 413, 415, 422]);
         route
     }
 
@@ -243,7 +259,7 @@ pub(super) fn routes() -> Vec<Route> {
 fn reads() -> Vec<Route> {
     let events = Answer {
         status: 200,
-        about: "server-sent events: `drive`, `line`, `command`, `event`, `tick`, and `reset` when the state must be read anew",
+        about: "server-sent events: `drive`, `line`, `command`, `event`, `alarm`, `tick`, and `reset` when the state must be read anew",
         content: "text/event-stream",
         describe: None,
     };
@@ -291,6 +307,12 @@ fn reads() -> Vec<Route> {
             "One line: its plan, what was measured on it, and what was on it lately",
         )
         .answers::<LineDetailView>(200, "the line, its plan, the measured and its last 100 exchanges"),
+        Route::get(
+            "/api/v1/alarms",
+            alarms::alarms,
+            "What troubles the plant, until it is over and acknowledged",
+        )
+        .answers::<AlarmsView>(200, "the alarms, in the order in which they came first"),
         Route::get("/api/v1/commands/{id}", command::command, "What became of a command")
             .with_query(WAIT)
             .answers::<CommandView>(200, "the command, whatever its outcome"),
@@ -364,6 +386,21 @@ fn commands() -> Vec<Route> {
             "/api/v1/drives/{name}/parameters/{register}",
             parameter::write,
             "Writes a register, unless it holds the value, and reads it back",
+        ),
+        Route::of_alarm::<_, _, Acknowledge>(
+            "/api/v1/alarms/{id}/acknowledge",
+            alarms::acknowledge,
+            "Takes note of an alarm",
+        ),
+        Route::of_alarm::<_, _, Shelve>(
+            "/api/v1/alarms/{id}/shelve",
+            alarms::shelve,
+            "Puts an alarm aside for a time; none about a motor that moves or may",
+        ),
+        Route::of_alarm::<_, _, Unshelve>(
+            "/api/v1/alarms/{id}/unshelve",
+            alarms::unshelve,
+            "Takes an alarm back from where it was put aside",
         ),
         Route::command::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
     ]

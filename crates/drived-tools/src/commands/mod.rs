@@ -1,5 +1,6 @@
 //! The subcommands, one module each.
 
+pub mod alarms;
 pub mod faults;
 pub mod monitor;
 pub mod param;

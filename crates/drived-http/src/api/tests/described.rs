@@ -64,6 +64,7 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                 let json = "application/json";
                 let body = match path.rsplit('/').next() {
                     Some("start" | "setpoint") => json!({"setpoint": {"frequency_hz": 20.0}}),
+                    Some("shelve") => json!({"minutes": 5, "why": "a test"}),
                     Some("{register}") => json!({"value": "50"}),
                     _ => json!({}),
                 };
@@ -81,7 +82,7 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                     let told = held(plant, &document, path, odd).await;
                     // A stop is one whatever its body says.
                     assert_eq!(told == 422, !path.ends_with("/stop"), "{asked}: {told}");
-                    if method == Method::POST {
+                    if method == Method::POST && !path.contains("/alarms/") {
                         let waits = request(&format!("{asked}?wait=1h"), json, json!({}));
                         assert_eq!(held(plant, &document, path, waits).await, 400, "{asked}");
                     }

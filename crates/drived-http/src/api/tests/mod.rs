@@ -1,5 +1,6 @@
 //! The API over a simulated plant in virtual time, asked as a client asks it.
 
+mod alarms;
 mod commanding;
 mod described;
 mod doors;
