@@ -12,5 +12,8 @@
 #[allow(dead_code, reason = "a Sparkplug node stands on the rest of it")]
 pub mod broker;
 pub mod desk;
+mod face;
 pub mod mqtt;
 pub mod sparkplug;
+
+pub use self::face::{FACE, OnBroker};

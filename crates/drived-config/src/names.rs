@@ -15,6 +15,9 @@ use crate::{
     kept::{Kept, Readers},
 };
 
+/// How many drives a virtual unit has places for.
+pub const PLACES: usize = 496;
+
 /// The file of the state folder.
 const FILE: &str = "names.json";
 

@@ -2,14 +2,12 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use toml::Spanned;
+use toml::{Spanned, de::DeTable};
 
-use drived_broker::broker::config::MqttEntry;
 use drived_config::config::{
-    DriveEntry, GroupEntries, LineEntries, LineEntry, Parsed, SaidState, of, settings,
+    ConfigError, DriveEntry, GroupEntries, LineEntries, LineEntry, Parsed, SaidState, Source, of, settings,
 };
 use drived_doors::config::{HttpEntry, SocketEntry};
-use drived_gateway::config::GatewayEntry;
 use drived_words::duration::Time;
 
 /// Snapshots come at most so often: each is a line for every drive.
@@ -63,10 +61,6 @@ settings! {
     http as "[http]": HttpEntry = "`127.0.0.1:7580`";
     /// `path` and `mode` of the [control socket](#commands-through-the-daemon)
     socket as "[socket]": SocketEntry = "as there, `\"0660\"`";
-    /// [Modbus TCP gateways](#modbus-tcp-gateway)
-    gateways as "[[gateways]]": Vec<Spanned<GatewayEntry>> = "none";
-    /// the [MQTT broker](#mqtt), and [`[mqtt.sparkplug]`](#sparkplug)
-    mqtt as "[mqtt]": MqttEntry = "none: nothing is told to a broker";
 }
 
 fn snapshots(time: Duration) -> Result<Duration, String> {
@@ -81,4 +75,20 @@ impl File {
     pub(super) fn lines(&self) -> impl Iterator<Item = (&Spanned<String>, &LineEntry)> {
         of(&self.lines).into_iter().flatten()
     }
+}
+
+/// The faces that a program may be built without, each with the feature of `drived` that builds it in.
+const FEATURES: [(&str, &str); 2] = [("gateways", "gateway"), ("mqtt", "mqtt")];
+
+/// Refuses the table of a face that this program was built without, and says how it is built in.
+pub(super) fn not_built_in(source: Source<'_>, left: &DeTable<'_>) -> Result<(), ConfigError> {
+    for (table, feature) in FEATURES {
+        if let Some((key, _)) = left.get_key_value(table) {
+            let problem = format_args!(
+                "this drived was built without it: cargo install drived --features {feature} builds it in"
+            );
+            return Err(source.error(key.span(), problem));
+        }
+    }
+    Ok(())
 }

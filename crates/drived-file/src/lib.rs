@@ -15,26 +15,31 @@ mod checks;
 mod file;
 pub mod ledger;
 
-use std::{path::Path, time::Duration};
+use std::{collections::BTreeMap, path::Path, time::Duration};
+
+use serde::Deserialize as _;
+use toml::de::{DeTable, Deserializer};
 
 use self::file::File;
-use drived_broker::broker::config::{MqttConfig, SparkplugConfig};
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,
 };
 use drived_doors::config::DoorsConfig;
-use drived_gateway::config::{GatewayConfig, GatewayEntry, gateways};
+use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
 
-/// The tables of the file whose keys are declared, each with its head.
-pub fn tables() -> [(&'static str, &'static [Key]); 4] {
-    [
-        ("Top level", File::KEYS),
-        ("`[lines.NAME]`", LineEntry::KEYS),
-        ("`[[drives]]`", DriveEntry::KEYS),
-        ("`[[gateways]]`", GatewayEntry::KEYS),
-    ]
+/// The tables of the file whose keys are declared, each with its head: those of the daemon itself, and those of the faces that the
+/// program knows.
+pub fn tables() -> Vec<(String, Vec<&'static Key>)> {
+    let faces = drived_face::all();
+    let own = [("`[lines.NAME]`", LineEntry::KEYS), ("`[[drives]]`", DriveEntry::KEYS)];
+    let top = File::KEYS.iter().chain(faces.iter().map(|face| face.row()));
+    let mut tables = vec![("Top level".to_owned(), top.collect())];
+    tables.extend(own.map(|(head, keys)| (head.to_owned(), keys.iter().collect())));
+    let declared = faces.iter().filter(|face| !face.keys().is_empty());
+    tables.extend(declared.map(|face| (format!("`{}`", face.row().name), face.keys().iter().collect())));
+    tables
 }
 
 /// A configuration whose fields are right. Whether its lines can work is another question: see [`Self::workable`].
@@ -48,11 +53,8 @@ pub struct Config {
     pub doors: DoorsConfig,
     pub lines: Vec<LinePart>,
     pub groups: Vec<Group>,
-    pub gateways: Vec<GatewayConfig>,
-    /// The broker to which everything is told; `None`: nothing is.
-    pub mqtt: Option<MqttConfig>,
-    /// The edge node that the daemon is on the same brokers.
-    pub sparkplug: Option<SparkplugConfig>,
+    /// The faces that have a table, by its name, in the order in which the program knows them.
+    pub faces: Vec<(&'static str, Box<dyn Configured>)>,
 }
 
 impl Config {
@@ -72,10 +74,19 @@ impl Config {
     /// Reads the text of a file.
     fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let source = Source { file, text };
-        let raw: File = toml::from_str(text).map_err(|error| match error.span() {
+        let wrong = |error: toml::de::Error| match error.span() {
             Some(span) => source.error(span, error.message()),
             None => source.error_of_file(error.message()),
-        })?;
+        };
+        let mut tables = DeTable::parse(text).map_err(wrong)?;
+        // What is a face's is read by it, when the rest is known; what is left is the daemon's own, and has to be known.
+        let mut written = Vec::new();
+        for face in drived_face::all() {
+            let of_face = tables.get_mut().remove(face.table());
+            written.extend(of_face.map(|value| (face, Written::new(source, value))));
+        }
+        file::not_built_in(source, tables.get_ref())?;
+        let raw = File::deserialize(Deserializer::from(tables)).map_err(wrong)?;
         let mut said = file::Draft::default();
         raw.set(source, &mut said)?;
         let file::Draft { snapshots, shutdown, kept } = said;
@@ -95,26 +106,17 @@ impl Config {
         let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups(source, of(&raw.groups), names)?;
-        let broker = of(&raw.mqtt);
-        let mqtt = broker.map(|entry| MqttConfig::read(source, entry));
-        let sparkplug = broker.and_then(|entry| entry.sparkplug.as_ref()).map(|entry| {
-            let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
-            let drives = drives.map(|drive| drive.settings.name.as_str());
-            let lines = lines.iter().map(|line| line.name.as_str());
-            SparkplugConfig::read(source, entry, drives, lines, &state)
-        });
+        let site = Site::new(&lines, &groups, &state);
+        let configured =
+            written.into_iter().map(|(face, written)| Ok((face.table(), face.configure(written, &site)?)));
+        let faces = configured.collect::<Result<_, ConfigError>>()?;
         let doors = DoorsConfig::read(source, of(&raw.http), of(&raw.socket), state)?;
-        let gateways = gateways(source, of(&raw.gateways).map_or(&[], Vec::as_slice), &lines)?;
-        Ok(Self {
-            doors,
-            gateways,
-            snapshots,
-            shutdown,
-            lines,
-            groups,
-            mqtt: mqtt.transpose()?,
-            sparkplug: sparkplug.transpose()?,
-        })
+        Ok(Self { doors, faces, snapshots, shutdown, lines, groups })
+    }
+
+    /// What the file says of the face with this table; `None`: nothing.
+    pub fn face(&self, table: &str) -> Option<&dyn Configured> {
+        self.faces.iter().find(|(name, _)| *name == table).map(|(_, face)| &**face)
     }
 
     /// Names that somebody may take for others.
@@ -127,22 +129,25 @@ impl Config {
 
     /// What is doubtful in another configuration that comes after this one, and would not be without its new names.
     pub fn new_doubt(&self, new: &Self) -> Option<String> {
-        let lived_with = self.names().into_iter().zip(new.names()).flat_map(|((_, mine), (kind, names))| {
-            look_alikes::doubts(kind, names.into_iter().filter(|name| mine.contains(name)))
+        let known = self.names();
+        let of_kind = |kind| known.get(kind).map_or(&[][..], Vec::as_slice);
+        let lived_with = new.names().into_iter().flat_map(|(kind, names)| {
+            look_alikes::doubts(kind, names.into_iter().filter(|name| of_kind(kind).contains(name)))
         });
         let lived_with: Vec<String> = lived_with.collect();
         new.doubts().into_iter().find(|doubt| !lived_with.contains(doubt))
     }
 
     /// The names of each kind: those of drives and groups stand beside each other.
-    fn names(&self) -> [(&'static str, Vec<&str>); 3] {
+    fn names(&self) -> BTreeMap<&'static str, Vec<&str>> {
         let drives =
             self.lines.iter().flat_map(|line| &line.drives).map(|drive| drive.settings.name.as_str());
-        [
+        let groups = self.groups.iter().map(|group| group.name.as_str());
+        let own = [
             ("line", self.lines.iter().map(|line| line.name.as_str()).collect()),
-            ("drive or group", drives.chain(self.groups.iter().map(|group| group.name.as_str())).collect()),
-            ("gateway", self.gateways.iter().map(|gateway| gateway.name.as_str()).collect()),
-        ]
+            ("drive or group", drives.chain(groups).collect()),
+        ];
+        own.into_iter().chain(self.faces.iter().filter_map(|(_, face)| face.names())).collect()
     }
 
     /// The same, if every line can work.

@@ -1,6 +1,6 @@
 //! Files that can work, and what is said of those that cannot.
 
-use std::path::Path;
+use std::{any::Any, path::Path, sync::Once};
 
 use drive_core::{Frequency, Reaction, StopMode};
 use drive_fleet::{Commanders, OnControlTaken, OnExit, OnFault, Periods, WatchdogContract, plan};
@@ -8,13 +8,19 @@ use drive_fleet::{Commanders, OnControlTaken, OnExit, OnFault, Periods, Watchdog
 use drived_config::testing::Folder;
 
 use super::*;
-use drived_broker::broker::config::{Address, Discovery};
+use drived_broker::{
+    OnBroker,
+    broker::config::{Address, Discovery, MqttConfig, SparkplugConfig},
+};
 use drived_config::{
     config::{DrivePart, ROOM_PPM, drive_keys},
     rights::{Rights, Role},
 };
 use drived_doors::Network;
-use drived_gateway::config::Units;
+use drived_gateway::{
+    All,
+    config::{GatewayConfig, Units},
+};
 
 const FULL: &str = r#"
 snapshots = "1s"
@@ -86,8 +92,25 @@ fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
     assert_eq!(read(&serial).unwrap().lines[0].config.far_end_paces, Some(false));
 }
 
+/// The text of a file, for a program with the faces that drived has.
+fn parsed(text: &str) -> Result<Config, ConfigError> {
+    static FACES: Once = Once::new();
+    FACES.call_once(|| {
+        [drived_gateway::FACE, drived_broker::FACE].map(drived_face::add).into_iter().for_each(Result::unwrap)
+    });
+    Config::read(Path::new("drives.toml"), text)
+}
+
+/// What it says of a face.
+fn face<T: Configured>(config: &Config, table: &str) -> Option<T>
+where
+    T: Clone,
+{
+    config.face(table).map(|face| (face as &dyn Any).downcast_ref::<T>().expect("it is of the face").clone())
+}
+
 fn read(text: &str) -> Result<Config, String> {
-    let config = Config::read(Path::new("drives.toml"), text);
+    let config = parsed(text);
     config.and_then(Config::workable).map_err(|error| error.to_string())
 }
 
@@ -322,7 +345,7 @@ fn the_example_is_a_configuration_that_works() {
 #[test]
 fn a_group_names_drives_of_the_file_in_its_own_order() {
     let text = format!("{FULL}\n[groups]\nfans = [\"fan 3\", \"fan 1\"]\n");
-    let config = Config::read(Path::new("drives.toml"), &text).unwrap();
+    let config = parsed(&text).unwrap();
     let [group] = &*config.groups else { panic!("{:?}", config.groups) };
     assert_eq!(
         (group.name.as_str(), &*group.drives),
@@ -336,15 +359,22 @@ fn a_group_names_drives_of_the_file_in_its_own_order() {
         ("\" \" = [\"fan 2\"]", "expected a name"),
     ] {
         let text = format!("{FULL}\n[groups]\n{groups}\n");
-        let error = Config::read(Path::new("drives.toml"), &text).unwrap_err().to_string();
+        let error = parsed(&text).unwrap_err().to_string();
         assert!(error.contains(reason), "{error}");
     }
 }
 
 #[test]
+fn the_tables_of_the_daemon_are_no_faces() {
+    let own: Vec<&str> = File::KEYS.iter().map(|key| key.name.trim_matches(['[', ']'])).collect();
+    let own: Vec<&str> = own.into_iter().map(|key| key.split('.').next().unwrap()).collect();
+    assert_eq!(own, drived_face::OWN);
+}
+
+#[test]
 fn others_than_this_machine_are_let_in_by_tokens_and_by_encryption_alone() {
     let rest = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";
-    let read = |head: &str| Config::read(Path::new("drives.toml"), &format!("{head}\n{rest}"));
+    let read = |head: &str| parsed(&format!("{head}\n{rest}"));
     for (head, problem) in [
         (
             "[http]\nlisten = \"0.0.0.0:7580\"",
@@ -375,10 +405,11 @@ fn others_than_this_machine_are_let_in_by_tokens_and_by_encryption_alone() {
 
 #[test]
 fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
-    assert!(read(FULL).unwrap().gateways.is_empty());
+    assert!(read(FULL).unwrap().faces.is_empty());
     let with = |entry: &str| read(&format!("{FULL}\n[[gateways]]\n{entry}\n"));
     let config = with("line = \"north\"").unwrap();
-    let [gateway] = &*config.gateways else { panic!("{:?}", config.gateways) };
+    let All(gateways) = face(&config, "gateways").unwrap();
+    let [gateway]: [GatewayConfig; 1] = gateways.try_into().unwrap();
     assert_eq!((gateway.name.as_str(), gateway.listen.to_string()), ("gateway", "127.0.0.1:1502".to_owned()));
     assert_eq!(gateway.units, Units::OfLine("north".to_owned()));
     assert_eq!((gateway.share, gateway.clients, gateway.rights.stop), (30, 16, false));
@@ -433,12 +464,13 @@ fn a_network_has_the_addresses_that_begin_as_it_does() {
 const BROKER: &str = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1-2\"\nname = \"pump {}\"\n";
 
 fn with_broker(section: &str) -> Result<MqttConfig, String> {
-    read(&format!("{section}\n{BROKER}")).map(|config| config.mqtt.expect("there is a broker"))
+    read(&format!("{section}\n{BROKER}"))
+        .map(|config| face::<OnBroker>(&config, "mqtt").expect("there is a broker").mqtt)
 }
 
 #[test]
 fn without_a_section_nothing_is_told_to_a_broker_and_nobody_commands_unless_it_is_said() {
-    assert_eq!(read(BROKER).unwrap().mqtt, None);
+    assert!(read(BROKER).unwrap().faces.is_empty());
     let mqtt =
         with_broker("[mqtt]\nservers = [\"mqtts://broker\", \"mqtt://[::1]:1884\"]\nbase = \"plant/north\"")
             .unwrap();
@@ -489,14 +521,19 @@ fn a_slot_is_given_to_one_drive_and_several_of_one_entry_follow_each_other() {
     assert!(told.contains("a default names no line and no drive"), "{told}");
 }
 
+fn edge_node(config: &Config) -> Option<SparkplugConfig> {
+    face::<OnBroker>(config, "mqtt").and_then(|on_broker| on_broker.sparkplug)
+}
+
 fn with_edge_node(section: &str) -> Result<SparkplugConfig, String> {
     let mqtt = "[mqtt]\nservers = [\"mqtts://broker\"]\n[mqtt.sparkplug]\n";
-    read(&format!("{mqtt}{section}\n{BROKER}")).map(|config| config.sparkplug.expect("there is an edge node"))
+    read(&format!("{mqtt}{section}\n{BROKER}"))
+        .map(|config| edge_node(&config).expect("there is an edge node"))
 }
 
 #[test]
 fn without_a_section_the_daemon_is_no_edge_node_and_hosts_command_nothing_unless_it_is_said() {
-    assert_eq!(read(&format!("[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}")).unwrap().sparkplug, None);
+    assert_eq!(edge_node(&read(&format!("[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}")).unwrap()), None);
     let least = with_edge_node("group = \"plant\"\nedge_node = \"hall 1\"\nstate = \"bd-seq\"").unwrap();
     assert_eq!((least.name.group.as_str(), least.name.edge_node.as_str()), ("plant", "hall 1"));
     assert_eq!((least.primary_host, least.commands), (None, None));
@@ -577,7 +614,7 @@ fn what_only_a_drive_under_control_can_do_is_refused_without_it() {
 
 /// The keys that a section takes, by the parser's own words for one that it does not know.
 fn taken(section: &str) -> std::collections::BTreeSet<String> {
-    let told = read(&format!("{section}\nnobody_knows_it = 1\n")).unwrap_err();
+    let told = read(&format!("{section}\nnobody_knows_it = 1\n{BROKER}")).unwrap_err();
     let (_, all) = told.split_once("expected one of ").unwrap_or_else(|| panic!("{section}: {told}"));
     all.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
@@ -607,10 +644,11 @@ fn the_readme_has_every_key_of_the_file_and_no_other() {
 #[test]
 fn the_readme_says_of_each_key_what_its_table_declares() {
     let readme = include_str!("../../drived/README.md");
+    read(FULL).unwrap();
     for (head, keys) in tables() {
         let rows = readme.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
         let rows: Vec<&str> = rows.take_while(|row| row.starts_with('|')).collect();
-        let declared: Vec<String> = keys.iter().map(Key::row).collect();
+        let declared: Vec<String> = keys.iter().map(|key| key.row()).collect();
         assert_eq!(rows, declared, "expected\n{}", declared.join("\n"));
     }
 }
@@ -635,7 +673,7 @@ fn a_key_that_says_its_default_changes_nothing() {
                 default.starts_with('"') || default.parse::<bool>().is_ok() || default.parse::<u8>().is_ok();
             let said = if is_value { default.to_owned() } else { format!("{default:?}") };
             let said = format!("{} = {said}", key.name);
-            let config = match head {
+            let config = match &*head {
                 "Top level" if key.name.starts_with('[') => continue,
                 "Top level" => file([&said, "", "", ""]),
                 "`[lines.NAME]`" => file(["", &format!("lines.a.{said}"), "", ""]),

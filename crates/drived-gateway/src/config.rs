@@ -10,9 +10,9 @@ use std::{
 use drive_core::Class;
 use toml::Spanned;
 
-use super::virtual_unit::MOST_DRIVES;
 use drived_config::{
     config::{ConfigError, Entry as _, LinePart, Parsed, Source, of, settings, within, words},
+    names::PLACES,
     rights::{Rights, Role},
 };
 use drived_doors::Network;
@@ -275,8 +275,8 @@ impl GatewayEntry {
             return Err(source.error(said.span(), problem));
         }
         let drives: usize = lines.iter().map(|line| line.drives.len()).sum();
-        if drives > MOST_DRIVES {
-            let problem = format_args!("{drives} drives: it has room for {MOST_DRIVES}");
+        if drives > PLACES {
+            let problem = format_args!("{drives} drives: it has room for {PLACES}");
             return Err(source.error(said.span(), problem));
         }
         Ok(Some(unit))

@@ -11,7 +11,7 @@ use std::{
 
 use drive_bus::stats::Spread;
 
-use drived_plant::counts::{Id, Samples, Source};
+use drived_plant::counts::{Id, Samples};
 
 /// Why a connection was turned away or ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -172,21 +172,13 @@ impl Counters {
     fn lock(&self) -> std::sync::MutexGuard<'_, Counts> {
         self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-/// The counters of a gateway and its name.
-pub(super) struct Counted {
-    pub(super) name: String,
-    pub(super) counters: Arc<Counters>,
-}
-
-impl Source for Counted {
-    fn collect(&self, samples: &mut Samples) {
-        let (name, counters) = (self.name.as_str(), &self.counters);
-        samples.count(Id::GatewayClients, &[name], counters.clients());
-        samples.count(Id::GatewaySaved, &[name, "joined"], counters.joined());
-        samples.count(Id::GatewaySaved, &[name, "kept"], counters.kept());
-        let Counts { ended, requests, took, refused_writes } = counters.counts();
+    /// Adds what was counted to a scrape, under the gateway's name.
+    pub(super) fn collect(&self, name: &str, samples: &mut Samples) {
+        samples.count(Id::GatewayClients, &[name], self.clients());
+        samples.count(Id::GatewaySaved, &[name, "joined"], self.joined());
+        samples.count(Id::GatewaySaved, &[name, "kept"], self.kept());
+        let Counts { ended, requests, took, refused_writes } = self.counts();
         for ((function, result), count) in requests {
             let function = if function == 0 { "other".to_owned() } else { format!("{function:02X}h") };
             let result = match result {

@@ -13,7 +13,6 @@ use drive_core::{
     Port as _, PortError, Terms,
     tokio_modbus::{ExceptionCode, Response, client::Client as _},
 };
-use drive_families::Options;
 use drive_fleet::{DriveHandle, LineBudget};
 use futures_util::{
     FutureExt as _,
@@ -100,8 +99,6 @@ pub(super) struct Desk {
     pub(super) kept: Kept,
     /// What the virtual unit tells of the last commands.
     pub(super) outcomes: Outcomes,
-    /// What the configuration says of each drive that the bus cannot tell.
-    pub(super) options: HashMap<String, Options>,
     /// By the name of the line.
     turns: Mutex<BTreeMap<Arc<str>, Arc<Turns>>>,
     /// Reads that are not answered yet.
@@ -109,27 +106,9 @@ pub(super) struct Desk {
 }
 
 impl Desk {
-    pub(super) fn new(
-        config: GatewayConfig,
-        plant: Plant,
-        audit: Audit,
-        names: Names,
-        options: HashMap<String, Options>,
-    ) -> Arc<Self> {
+    pub(super) fn new(config: GatewayConfig, plant: Plant, audit: Audit, names: Names) -> Arc<Self> {
         let (counters, clients, kept, outcomes, turns, under_way) = Default::default();
-        Arc::new(Self {
-            config,
-            counters,
-            plant,
-            audit,
-            names,
-            clients,
-            kept,
-            outcomes,
-            options,
-            turns,
-            under_way,
-        })
+        Arc::new(Self { config, counters, plant, audit, names, clients, kept, outcomes, turns, under_way })
     }
 
     /// The PDU that answers a request; `None`: silence.

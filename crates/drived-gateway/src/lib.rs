@@ -16,6 +16,7 @@ mod clients;
 pub mod config;
 pub mod counters;
 mod desk;
+mod face;
 mod framing;
 mod kept;
 mod pdu;
@@ -24,52 +25,42 @@ mod share;
 mod tests;
 pub mod virtual_unit;
 
-use std::{collections::HashMap, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use tokio::{
     net::{TcpListener, TcpStream},
     sync::watch,
+    task::JoinHandle,
     time::{Instant, sleep},
 };
 
-use self::{
-    config::GatewayConfig,
-    counters::{Counted, Ended},
-    desk::Desk,
-};
-use drived_config::{config::LinePart, names::Names};
+pub use self::face::{All, FACE};
+use self::{config::GatewayConfig, counters::Ended, desk::Desk};
 use drived_doors::{
     TRIED_AGAIN,
-    audit::Audit,
     crowd::{Crowd, Limits},
     listen,
 };
-use drived_plant::{counts::Source, plant::Plant};
+use drived_face::Surroundings;
 
-/// The gateways of a daemon. Dropped, they are closed: nobody is let in any more, and every connection ends.
-pub struct Gateways {
-    _end: watch::Sender<()>,
+/// The open gateways of a daemon.
+struct Gateways {
+    /// Becomes true when nobody is let in any more and every connection ends.
+    end: watch::Sender<bool>,
     desks: Vec<Arc<Desk>>,
+    /// One for each desk, which lets its clients in.
+    doors: Vec<JoinHandle<()>>,
 }
 
 impl Gateways {
     /// Opens the gateways of a configuration. An address that is taken, or not there yet, is tried again and again.
-    pub fn open(
-        gateways: &[GatewayConfig],
-        lines: &[LinePart],
-        plant: &Plant,
-        audit: &Audit,
-        names: &Names,
-    ) -> Self {
-        let (end, ended) = watch::channel(());
-        let drives = lines.iter().flat_map(|line| &line.drives);
-        let options: HashMap<_, _> =
-            drives.map(|drive| (drive.settings.name.clone(), drive.options.clone())).collect();
-        let desk = |config: &GatewayConfig| {
-            Desk::new(config.clone(), plant.clone(), audit.clone(), names.clone(), options.clone())
-        };
+    fn open(gateways: &[GatewayConfig], around: &Surroundings) -> Self {
+        let (end, ended) = watch::channel(false);
+        let Surroundings { plant, audit, names, .. } = around;
+        let desk =
+            |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), names.clone());
         let desks: Vec<_> = gateways.iter().map(desk).collect();
-        for desk in desks.iter().cloned() {
+        let open = |desk: Arc<Desk>| {
             let mut ended = ended.clone();
             if desk.config.virtual_unit.is_some() {
                 tokio::spawn(desk.outcomes.clone().follow(plant.fleet().events()));
@@ -81,28 +72,14 @@ impl Gateways {
                 };
                 tracing::info!("gateway {} is at {}", desk.config.name, desk.config.listen);
                 tokio::join!(accept_all(&listener, &desk, ended.clone()), until(desk.watch_silence(), ended));
-            });
-        }
-        Self { _end: end, desks }
-    }
-
-    /// What each counts, for a metrics store.
-    pub fn sources(&self) -> impl Iterator<Item = Arc<dyn Source>> + '_ {
-        self.desks.iter().map(|desk| {
-            let counted = Counted { name: desk.config.name.clone(), counters: Arc::clone(&desk.counters) };
-            Arc::new(counted) as Arc<dyn Source>
-        })
-    }
-
-    /// Says in the log what each has counted.
-    pub fn tell(&self) {
-        for desk in &self.desks {
-            tracing::info!("gateway {}: {}", desk.config.name, desk.counters.in_words());
-        }
+            })
+        };
+        let doors = desks.iter().cloned().map(open).collect();
+        Self { end, desks, doors }
     }
 }
 
-async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<()>) {
+async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<bool>) {
     tokio::select! {
         () = work => {}
         _ = ended.changed() => {}
@@ -111,7 +88,7 @@ async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<()>) {
 
 /// Accepts clients until the end, and serves each on a task of its own. When the system has no room for one more, such as
 /// no file descriptor, it is tried again a little later.
-async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::Receiver<()>) {
+async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::Receiver<bool>) {
     let places = Crowd::new(Limits::of_gateway(desk.config.clients));
     let (name, mut failed) = (&desk.config.name, 0_u64);
     loop {

@@ -11,6 +11,7 @@ use drive_core::{Control, Direction, Setpoint, State, Status};
 use drive_fleet::{
     Became, DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot,
 };
+use drived_config::names::PLACES;
 use tokio::time::Instant;
 
 /// What stands for a value that is not known, or too old to be told as one.
@@ -331,8 +332,8 @@ fn revision(slots: &[Option<Arc<str>>]) -> u16 {
     digest.finalize()
 }
 
-/// How many drives have room.
-pub const MOST_DRIVES: usize = (DETAILS_AT - OVERVIEW_AT) as usize / OVERVIEW.len();
+/// Each number that is given has a place, in the overview and in the details.
+const _: () = assert!(PLACES == (DETAILS_AT - OVERVIEW_AT) as usize / OVERVIEW.len());
 
 /// The map for these drives, each in its place, as CSV.
 pub fn map(slots: &[Option<Arc<str>>]) -> String {

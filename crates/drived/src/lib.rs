@@ -23,15 +23,19 @@
 mod agreement;
 mod cli;
 mod commands;
+mod faces;
 
 use std::process::ExitCode;
 
 use clap::Parser;
-use drived_words::{logging, output};
+use drived_words::{failure::Failure, logging, output};
 
 /// The program: reads the command line of this process, does what it says, and gives the exit code.
 pub fn program() -> ExitCode {
     output::choose_form(std::env::args_os());
+    if let Err(taken) = faces::add() {
+        return cli::end(Err(Failure::Input(taken.to_string())));
+    }
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return cli::refuse(&error),

@@ -143,3 +143,59 @@ fn wait_for(file: &std::path::Path, text: &str) {
     }
     panic!("it does not say {text:?}: {:?}", std::fs::read_to_string(file));
 }
+
+/// The answer to a read of register 3201 (ETA) of unit 1 at this address; `None`: nobody listens there.
+fn asked_by_scada(address: &str) -> Option<[u8; 11]> {
+    use std::io::{Read as _, Write as _};
+    let mut stream = std::net::TcpStream::connect(address).ok()?;
+    stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 3, 0x0C, 0x81, 0, 1]).ok()?;
+    let mut answer = [0; 11];
+    stream.read_exact(&mut answer).ok()?;
+    Some(answer)
+}
+
+#[test]
+fn a_face_is_opened_exchanged_and_closed_by_a_reload_and_no_drive_is_touched_by_it() {
+    let sim = Sim::serve("faces-reload", &["atv312@1"]);
+    let drives = configuration(sim.link(), &[(1, "control = true")]);
+    let [one, other] = [(); 2].map(|()| {
+        let free = std::net::TcpListener::bind("127.0.0.1:0").expect("there is a port");
+        free.local_addr().expect("it is bound").to_string()
+    });
+    let with = |listen: &str| format!("{drives}[[gateways]]\nlisten = \"{listen}\"\n");
+    let file = File::new("faces-reload", &drives);
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for(r#""event":"connected""#);
+    let mut reload = |text: &str, told: &str| {
+        std::fs::write(file.path(), text).expect("it can be written");
+        daemon.signal("-HUP");
+        daemon.wait_for_log(told);
+    };
+    reload(&with(&one), "configuration read again: gateways opened\n");
+    wait_until(|| asked_by_scada(&one).is_some_and(|answer| answer[7] == 3));
+    reload(&with(&other), "configuration read again: gateways closed and opened anew\n");
+    wait_until(|| asked_by_scada(&other).is_some_and(|answer| answer[7] == 3));
+    assert_eq!(asked_by_scada(&one), None, "nobody listens there any more");
+    reload(&with(&other), "nothing has changed");
+    let in_vain =
+        format!("{drives}[mqtt]\nservers = [\"mqtts://127.0.0.1\"]\nauthorities = \"nowhere.pem\"\n");
+    reload(&in_vain, "the old configuration holds on");
+    assert!(asked_by_scada(&other).is_some(), "what cannot be opened closes nothing");
+    reload(&drives, "configuration read again: gateways closed\n");
+    assert_eq!(asked_by_scada(&other), None);
+    let shown = daemon.wait_for(r#""kind":"snapshot""#);
+    assert!(shown.contains(r#""lost":0"#), "{shown}");
+    assert_eq!(daemon.interrupt().0, Some(0));
+}
+
+/// A gateway listens on a task of its own.
+#[expect(clippy::disallowed_methods, reason = "a port tells nobody that it is listened at")]
+fn wait_until(is_so: impl Fn() -> bool) {
+    for _ in 0..600 {
+        if is_so() {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    panic!("it does not become so");
+}

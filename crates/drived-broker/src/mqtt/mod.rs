@@ -4,7 +4,6 @@
 //! nothing of a daemon that is gone looks alive; commands are judged by the [desk](crate::desk) before the plant hears of them.
 
 mod commanding;
-mod counts;
 mod discovery;
 mod gone;
 mod telling;
@@ -28,7 +27,10 @@ use crate::broker::{
 };
 use drived_config::names::{Kind, Names};
 use drived_doors::{audit::Audit, private};
-use drived_plant::{counts::Source, plant::Plant};
+use drived_plant::{
+    counts::{Id, Samples},
+    plant::Plant,
+};
 use drived_words::{failure::Failure, json::unix};
 
 /// The longest silence before the broker is asked for a sign of life; half as much again, and the broker publishes the will.
@@ -117,9 +119,16 @@ impl Mqtt {
         drop(events);
     }
 
-    /// What it counts, for the metrics.
-    pub fn source(&self) -> Arc<dyn Source> {
-        Arc::new(self.face.broker.clone())
+    /// Adds what it counts.
+    pub fn collect(&self, samples: &mut Samples) {
+        let counts = self.face.broker.counts();
+        samples.add(Id::MqttConnected, &[], f64::from(counts.connected));
+        samples.count(Id::MqttWaiting, &[], counts.waiting as u64);
+        samples.count(Id::MqttSent, &[], counts.sent);
+        samples.count(Id::MqttArrived, &[], counts.arrived);
+        for (reason, lost) in counts.lost.by_reason() {
+            samples.count(Id::MqttLost, &[reason], lost);
+        }
     }
 }
 

@@ -32,7 +32,7 @@ use crate::{
 };
 use drived_doors::audit::Audit;
 use drived_plant::{
-    counts::{Id, Samples, Source},
+    counts::{Id, Samples},
     plant::{Plant, views::DriveView},
 };
 use drived_words::{failure::Failure, json::unix};
@@ -47,21 +47,6 @@ const ROOM: Duration = Duration::from_millis(20);
 const OUTCOMES: usize = 256;
 /// How long the goodbye may take.
 const CLOSED_WITHIN: Duration = Duration::from_secs(3);
-
-/// What the connection counts.
-struct Counted(Broker);
-
-impl Source for Counted {
-    fn collect(&self, samples: &mut Samples) {
-        let counts = self.0.counts();
-        samples.add(Id::SparkplugConnected, &[], f64::from(counts.connected));
-        samples.count(Id::SparkplugSent, &[], counts.sent);
-        samples.count(Id::SparkplugArrived, &[], counts.arrived);
-        for (reason, lost) in counts.lost.by_reason() {
-            samples.count(Id::SparkplugLost, &[reason], lost);
-        }
-    }
-}
 
 /// A face that only has to be opened: the files that it needs have been read.
 pub struct Prepared {
@@ -132,16 +117,24 @@ impl Sparkplug {
         drop(events);
     }
 
-    /// What the connection counts, for `/metrics`.
-    pub fn source(&self) -> Arc<dyn Source> {
-        Arc::new(Counted(self.broker.clone()))
+    /// Adds what the connection counts.
+    pub fn collect(&self, samples: &mut Samples) {
+        let counts = self.broker.counts();
+        samples.add(Id::SparkplugConnected, &[], f64::from(counts.connected));
+        samples.count(Id::SparkplugSent, &[], counts.sent);
+        samples.count(Id::SparkplugArrived, &[], counts.arrived);
+        for (reason, lost) in counts.lost.by_reason() {
+            samples.count(Id::SparkplugLost, &[reason], lost);
+        }
     }
 }
 
 impl Prepared {
     /// Connects, and tells and hears from now on. Nothing waits for the broker.
     pub fn open(self, plant: Plant, audit: Audit) -> Sparkplug {
-        let Self { config, options, interval, mut bd_seq, node } = self;
+        let Self { config, options, interval, bd_seq, node } = self;
+        // One that was open until now has counted on.
+        let mut bd_seq = KeptBdSeq::open(&config.state).unwrap_or(bd_seq);
         let number = Arc::new(Mutex::new((0, BdSeq::default())));
         let (name, next) = (config.name.clone(), Arc::clone(&number));
         let (broker, events) = Broker::start(options, move |attempt| {

@@ -29,6 +29,15 @@ pub struct Tells {
 }
 
 impl Key {
+    /// A table of the file: its head as documents write it, what it is for, and what holds without it.
+    pub const fn of_table(
+        name: &'static str,
+        meaning: &'static [&'static str],
+        default: &'static str,
+    ) -> Self {
+        Self { name, meaning, default, acts: false, tells: &[] }
+    }
+
     /// What it means, in one line.
     fn meaning(&self) -> String {
         self.meaning.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")

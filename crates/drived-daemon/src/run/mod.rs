@@ -3,6 +3,7 @@
 mod descriptors;
 mod eeprom;
 mod exit;
+mod faces;
 mod json;
 mod notify;
 mod picture;
@@ -11,24 +12,25 @@ mod report;
 mod runs;
 mod watchdogs;
 
-use std::{io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
+use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
+use drive_families::Options;
 use drive_fleet::{Fleet, FleetBuilder, Left};
 use drived_words::closing;
 use futures_util::future::OptionFuture;
 use tokio::sync::mpsc;
 
 use self::{
+    faces::Faces,
     notify::Notify,
     picture::Picture,
     reload::Reloader,
     report::{Form, Report},
 };
-use drived_broker::{mqtt::Mqtt, sparkplug::Sparkplug};
 use drived_config::{
     config::{Group, LinePart, add},
-    names::{self, Names, Told},
+    names::{self, Names, PLACES, Told},
     records::{self, Records, in_folder},
 };
 use drived_doors::{
@@ -38,13 +40,14 @@ use drived_doors::{
         audit::{Audit, Kind, Record},
     },
 };
+use drived_face::Surroundings;
 use drived_file::{Config, ledger};
-use drived_gateway::{Gateways, virtual_unit::MOST_DRIVES};
 use drived_http::{
     api::{self, Reload as _},
     metrics, page,
 };
 use drived_plant::{
+    counts::Source,
     findings, journal,
     plant::{Plant, alarms::KeptAlarms},
 };
@@ -88,11 +91,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     descriptors::check(config.lines.len())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
-    let sparkplug = match (&config.mqtt, &config.sparkplug) {
-        (Some(mqtt), Some(sparkplug)) => Some(Sparkplug::prepared(mqtt, sparkplug)?),
-        _ => None,
-    };
-    let mqtt = config.mqtt.clone().map(Mqtt::prepare).transpose()?;
+    let faces = faces::prepare(&config, |_| true)?;
     let mut ending = Ending::listen()?;
     let notify = Notify::start();
     let mut wishes = Wishes::listen()?;
@@ -128,16 +127,12 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let alarms = plant.keep_alarms(alarms);
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
-    let gateways = Gateways::open(&config.gateways, &config.lines, &plant, &doors.audit(), &names);
+    plant.set_options(options(&config.lines));
+    let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
-    let reloader = Reloader::new(plant.clone(), notify.clone(), names.clone(), args.config, config);
+    let reloader = Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
-    let mut sources: Vec<Arc<dyn drived_plant::counts::Source>> = vec![Arc::new(reloader.clone())];
-    let mqtt = mqtt.map(|mqtt| mqtt.open(plant.clone(), doors.audit(), names));
-    sources.extend(mqtt.iter().map(Mqtt::source));
-    sources.extend(gateways.sources());
-    let sparkplug = sparkplug.map(|sparkplug| sparkplug.open(plant.clone(), doors.audit()));
-    sources.extend(sparkplug.iter().map(Sparkplug::source));
+    let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
@@ -151,7 +146,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
                 Wish::Reload => drop(tokio::spawn(told(reloader.clone(), doors.audit()))),
                 Wish::State => {
                     tell_state(&fleet);
-                    gateways.tell();
+                    faces.tell();
                 }
                 Wish::End => {
                     tracing::warn!("the terminal is closed: the program ends by each drive's policy");
@@ -171,13 +166,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let screen = OptionFuture::from(screen.map(Screen::close));
     let screen = tokio::spawn(screen);
     let stopping = notify.stopping(fleet.clone());
-    drop(gateways);
-    if let Some(mqtt) = &mqtt {
-        mqtt.closing();
-    }
-    if let Some(sparkplug) = &sparkplug {
-        sparkplug.closing();
-    }
+    faces.closing();
     // No motor waits for a reader of the page.
     let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
@@ -197,8 +186,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     }
     let _ = closed.await;
     // Whoever reads along sees the motors stop first.
-    let told = OptionFuture::from(mqtt.map(Mqtt::close));
-    tokio::join!(told, OptionFuture::from(sparkplug.map(Sparkplug::close)));
+    faces.close().await;
     for (_, line) in fleet.lines() {
         closing::close(&line).await;
     }
@@ -219,9 +207,9 @@ fn tell_names(names: &Names, lines: &[LinePart], groups: &[Group]) {
         Err(why) => tracing::error!("{why}"),
     }
     let places = names.slots().map_or(0, |slots| slots.len());
-    if places > MOST_DRIVES {
+    if places > PLACES {
         tracing::warn!(
-            "{places} numbers are given, and a virtual unit has {MOST_DRIVES} places: drived names forget frees those of drives that are gone"
+            "{places} numbers are given, and a virtual unit has {PLACES} places: drived names forget frees those of drives that are gone"
         );
     }
 }
@@ -254,6 +242,12 @@ fn tell_state(fleet: &Fleet) {
             tracing::info!("{line}: {}: {}", drive.name(), report::text(&drive.snapshot()));
         }
     }
+}
+
+/// What the configuration says of the drives of these lines that the bus cannot tell.
+fn options(lines: &[LinePart]) -> HashMap<String, Options> {
+    let drives = lines.iter().flat_map(|line| &line.drives);
+    drives.map(|drive| (drive.settings.name.clone(), drive.options.clone())).collect()
 }
 
 /// Starts every line. One whose port cannot be opened is tried again; its drives are lost meanwhile, and the others run.

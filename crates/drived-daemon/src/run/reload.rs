@@ -13,7 +13,10 @@ use drived_words::closing;
 use tokio::{sync::Mutex, time::Instant};
 
 use self::changes::{Change, changes};
-use super::notify::Notify;
+use super::{
+    faces::{self, Faces},
+    notify::Notify,
+};
 use drived_config::{
     config::{DrivePart, add},
     names::Names,
@@ -34,6 +37,7 @@ struct Inner {
     plant: Plant,
     notify: Notify,
     names: Names,
+    faces: Faces,
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
@@ -44,12 +48,20 @@ struct Inner {
 }
 
 impl Reloader {
-    pub(super) fn new(plant: Plant, notify: Notify, names: Names, file: PathBuf, config: Config) -> Self {
+    pub(super) fn new(
+        plant: Plant,
+        notify: Notify,
+        names: Names,
+        faces: Faces,
+        file: PathBuf,
+        config: Config,
+    ) -> Self {
         let last = std::sync::Mutex::new((true, unix(Instant::now())));
         Self(Arc::new(Inner {
             plant,
             notify,
             names,
+            faces,
             file,
             config: Mutex::new(config),
             last,
@@ -68,6 +80,8 @@ impl Reloader {
             let line = Line::start(part.config.clone()).map_err(|error| input(&error))?;
             lines.push((part.name.clone(), part.budget, line));
         }
+        let openings =
+            faces::prepare(&new, |table| changes.iter().any(|change| change.opened_face() == Some(table)))?;
         let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
         let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
         let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
@@ -93,11 +107,16 @@ impl Reloader {
         plant.set_groups(config.groups.clone());
         // Who comes has his identity when he is there.
         super::tell_names(&self.0.names, &new.lines, &config.groups);
+        // Nobody asks for a drive that is not there yet.
+        plant.set_options(super::options(&new.lines));
         let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
             .map(|()| settle(&fleet, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
         super::tell_names(&self.0.names, &config.lines, &config.groups);
+        let closed: Vec<&str> = changes.iter().filter_map(Change::closed_face).collect();
+        self.0.faces.exchange(&closed, openings).await;
+        config.faces = std::mem::take(&mut new.faces);
         if !changes.is_empty() {
             plant.revisions().begin_anew();
         }

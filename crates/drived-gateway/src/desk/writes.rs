@@ -136,7 +136,7 @@ impl Desk {
     fn speaker(&self, drive: &DriveHandle) -> Option<Box<dyn Drive>> {
         let family: Family = drive.capabilities().key.parse().ok()?;
         let (_, line) = drive.line();
-        let options = self.options.get(&**drive.name()).cloned().unwrap_or_default();
+        let options = self.plant.options(drive.name());
         Some(family.open_with(line.slave(drive.slave().number()), drive.slave(), &options))
     }
 

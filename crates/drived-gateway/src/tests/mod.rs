@@ -3,12 +3,7 @@
 mod reading;
 mod writing;
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    net::IpAddr,
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::BTreeMap, net::IpAddr, sync::Arc, time::Duration};
 
 use drive_bus::exchange::mbap;
 use drive_core::Class;
@@ -141,6 +136,6 @@ async fn plant(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlan
     let plant = TestPlant::of(drives).await;
     let mut config = config();
     change(&mut config);
-    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), names(&plant), HashMap::new());
+    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), names(&plant));
     (plant, desk)
 }

@@ -190,8 +190,7 @@ async fn a_drive_that_is_only_read_or_another_commanders_is_not_moved() {
     .await;
     let mut config = super::config();
     config.rights = Role::Operate.rights();
-    let desk =
-        Desk::new(config, others.plant.clone(), Default::default(), Default::default(), Default::default());
+    let desk = Desk::new(config, others.plant.clone(), Default::default(), Default::default());
     let mut peer = Peer::of(&desk);
     assert_eq!(peer.ask(1, &write(CMD, 0x0006)).await, [0x86, 0x04]);
     assert_eq!(peer.ask(1, &write(LFR, 300)).await, [0x86, 0x04]);

@@ -14,9 +14,13 @@ mod usage;
 pub mod views;
 mod watching;
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::{
+    collections::HashMap,
+    sync::{Arc, PoisonError, RwLock},
+};
 
 use drive_bus::Line;
+use drive_families::Options;
 use drive_fleet::{DriveHandle, Fleet};
 use tokio::{
     sync::{Mutex, watch},
@@ -51,6 +55,7 @@ pub struct Plant(Arc<Inner>);
 struct Inner {
     fleet: Fleet,
     groups: RwLock<Vec<Group>>,
+    options: RwLock<HashMap<String, Options>>,
     started_unix_ms: u64,
     demo: bool,
     commands: Log,
@@ -79,6 +84,7 @@ impl Plant {
         let inner = Arc::new(Inner {
             fleet,
             groups: RwLock::new(groups),
+            options: RwLock::default(),
             started_unix_ms: unix(Instant::now()),
             demo,
             commands: Log::default(),
@@ -161,6 +167,17 @@ impl Plant {
     /// The groups are these from now on.
     pub fn set_groups(&self, groups: Vec<Group>) {
         *self.0.groups.write().unwrap_or_else(PoisonError::into_inner) = groups;
+    }
+
+    /// What the configuration says of a drive that the bus cannot tell: its words mean nothing for certain without it.
+    pub fn options(&self, drive: &str) -> Options {
+        let options = self.0.options.read().unwrap_or_else(PoisonError::into_inner);
+        options.get(drive).cloned().unwrap_or_default()
+    }
+
+    /// This is what the configuration says of the drives from now on, by their names.
+    pub fn set_options(&self, options: HashMap<String, Options>) {
+        *self.0.options.write().unwrap_or_else(PoisonError::into_inner) = options;
     }
 
     /// What happened lately, the newest last.

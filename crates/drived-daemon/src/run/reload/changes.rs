@@ -23,6 +23,11 @@ pub(super) enum Change {
     /// Its settings are others.
     DriveChanged(Box<DriveSettings>),
     Groups,
+    /// It has a table that it did not have.
+    FaceOpened(&'static str),
+    FaceClosed(&'static str),
+    /// Its table says something else: it is closed and opened anew.
+    FaceChanged(&'static str),
     /// It holds from the next start on.
     Later(&'static str),
 }
@@ -61,6 +66,20 @@ impl Change {
         }
     }
 
+    pub(super) fn opened_face(&self) -> Option<&str> {
+        match self {
+            Self::FaceOpened(table) | Self::FaceChanged(table) => Some(table),
+            _ => None,
+        }
+    }
+
+    pub(super) fn closed_face(&self) -> Option<&str> {
+        match self {
+            Self::FaceClosed(table) | Self::FaceChanged(table) => Some(table),
+            _ => None,
+        }
+    }
+
     /// What has become of it where nothing could be added: lines and drives that had to go are gone.
     pub(super) fn half(&self) -> Option<String> {
         Some(match self {
@@ -71,7 +90,12 @@ impl Change {
                 format!("{name} ended by its policy of the exit and NOT begun anew")
             }
             Self::DriveChanged(settings) => format!("{} goes on with its OLD settings", settings.name),
-            Self::LineRemoved(_) | Self::DriveRemoved(_) | Self::Groups => self.to_string(),
+            Self::LineRemoved(_)
+            | Self::DriveRemoved(_)
+            | Self::Groups
+            | Self::FaceOpened(_)
+            | Self::FaceClosed(_)
+            | Self::FaceChanged(_) => self.to_string(),
             Self::Later(_) => return None,
         })
     }
@@ -100,6 +124,9 @@ impl fmt::Display for Change {
             }
             Self::DriveChanged(settings) => write!(f, "{} has other settings and goes on", settings.name),
             Self::Groups => write!(f, "groups changed"),
+            Self::FaceOpened(table) => write!(f, "{table} opened"),
+            Self::FaceClosed(table) => write!(f, "{table} closed"),
+            Self::FaceChanged(table) => write!(f, "{table} closed and opened anew"),
             Self::Later(what) => write!(f, "{what}: from the next start on"),
         }
     }
@@ -151,6 +178,15 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
     };
     let (planned, kept) = (budgets(new), budgets(old));
     changes.extend((old.groups != new.groups).then_some(Change::Groups));
+    for (table, face) in &old.faces {
+        match new.face(table) {
+            None => changes.push(Change::FaceClosed(table)),
+            Some(other) if !face.is_same(other) => changes.push(Change::FaceChanged(table)),
+            Some(_) => {}
+        }
+    }
+    let opened = new.faces.iter().filter(|(table, _)| old.face(table).is_none());
+    changes.extend(opened.map(|(table, _)| Change::FaceOpened(table)));
     for (is_other, what) in [
         (old.snapshots != new.snapshots, "snapshots"),
         (old.shutdown != new.shutdown, "shutdown"),
@@ -159,8 +195,6 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         (old.doors.state.watchdogs != new.doors.state.watchdogs, "another file of watchdogs"),
         (old.doors.state.tokens != new.doors.state.tokens, "another file of tokens"),
         (old.doors.state.audit != new.doors.state.audit, "another audit log"),
-        (old.gateways != new.gateways, "gateways"),
-        (old.mqtt != new.mqtt || old.sparkplug != new.sparkplug, "mqtt"),
         (
             kept.iter().any(|(name, budget)| planned.get(name).is_some_and(|other| other != budget)),
             "response and segments of lines",

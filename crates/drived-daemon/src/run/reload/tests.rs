@@ -9,7 +9,8 @@ use tower::ServiceExt as _;
 
 use super::*;
 use drived_config::names::Names;
-use drived_doors::{Caller, Rights};
+use drived_doors::{Caller, Rights, audit::Audit};
+use drived_face::Surroundings;
 
 #[path = "../../../../drived-http/src/api/testing.rs"]
 mod described;
@@ -60,7 +61,9 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
     let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
-    let reloader = Reloader::new(plant, Notify::start(), Names::default(), file.clone(), config);
+    let around = Surroundings::new(plant.clone(), Audit::default(), Names::default());
+    let faces = Faces::open(Vec::new(), around);
+    let reloader = Reloader::new(plant, Notify::start(), Names::default(), faces, file.clone(), config);
     // Somebody else in the program has taken a name that the file does not know yet.
     let family = Family::ATV312;
     let stranger = DriveSettings::watched("four".to_owned());

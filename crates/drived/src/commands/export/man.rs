@@ -75,7 +75,7 @@ fn of(command: &mut Command, parent: Option<&str>, pages: &mut Vec<(String, Stri
     if name == "drived-check" {
         for (table, keys) in config_file::tables() {
             let keys = keys.iter().map(|key| (vec![bold(key.name)], plain(&key.sentence())));
-            list(&mut page, &plain(table).to_uppercase(), keys);
+            list(&mut page, &plain(&table).to_uppercase(), keys);
         }
     }
     list(&mut page, "WHAT FOR", map.map(|(what, how)| (vec![bold(what)], how.trim().to_owned())));

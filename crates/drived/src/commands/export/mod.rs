@@ -6,8 +6,11 @@ use std::path::PathBuf;
 
 #[cfg(test)]
 pub(crate) use self::man::ENVIRONMENT;
+#[cfg(feature = "gateway")]
 use super::names::numbered;
+#[cfg(feature = "gateway")]
 use drived_file::Config;
+#[cfg(feature = "gateway")]
 use drived_gateway::virtual_unit;
 use drived_http::metrics;
 use drived_words::{failure::Failure, output};
@@ -34,6 +37,7 @@ enum What {
     /// The board, in JSON, to be imported
     Dashboard,
     /// The registers of the virtual unit, in CSV
+    #[cfg(feature = "gateway")]
     GatewayMap,
     /// A man page for each subcommand
     Man,
@@ -45,6 +49,7 @@ pub(crate) fn run(args: &Args, program: clap::Command) -> Result<(), Failure> {
         (What::Man, None) => Err(Failure::Input("expected --to FOLDER for the man pages".to_owned())),
         (_, Some(_)) => Err(Failure::Input("--to is for the man pages: this is printed".to_owned())),
         (What::Alerts, None) => output::say_as_it_is(metrics::ALERTS.trim_end()),
+        #[cfg(feature = "gateway")]
         (What::GatewayMap, None) => {
             let config = Config::load_workable(&args.config)?;
             output::say_as_it_is(virtual_unit::map(&numbered(&config)?.slots()))
