@@ -19,11 +19,19 @@
 #![forbid(unsafe_code)]
 
 mod check;
+mod drive;
+#[cfg(feature = "families")]
+mod family;
 pub mod format;
 mod ladder;
+#[cfg(feature = "sim")]
+pub mod machine;
 mod profile;
 pub mod shipped;
 
 pub use check::{LONGEST, Refusal, Refusals, read};
+pub use drive::{Owner, ProfileDrive};
+#[cfg(feature = "families")]
+pub use family::definition;
 pub use ladder::{Gap, Level};
 pub use profile::Profile;

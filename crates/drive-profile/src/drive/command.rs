@@ -1,0 +1,397 @@
+//! Start, stop, withdrawal and reset: what is written, step by step, and how it is seen.
+
+use std::borrow::Cow;
+
+use drive_core::{
+    Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Exchange, Frequency, Lease,
+    Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
+    tokio_modbus::{Request, Response},
+};
+use tokio::time::{Duration, Instant, sleep};
+
+use super::{
+    ProfileDrive,
+    reading::{OTHERS, withheld},
+    tables::{mode_name, stop_mode},
+};
+use crate::{
+    format::{Action, Deed, Step},
+    ladder::Level,
+    profile::{Profile, Written},
+};
+
+const NOT_OURS: Refusal = Refusal::Overridden {
+    by: "a run command that this side has not given",
+    remedy: "stop the motor first, and see what else commands it",
+};
+const NOT_ALONE: Refusal = Refusal::Settings(
+    "the drive does not tell who commands it, and a reset may start the motor by another's run command: see that nothing else commands \
+     it, and say so by commands-alone = yes",
+);
+
+/// The most rungs of a ladder that are climbed for one start.
+const RUNGS: usize = 8;
+
+impl<P: Port> ProfileDrive<P> {
+    pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+        let order = Order::Start(direction);
+        self.allow(Level::Motion, "a start")?;
+        let profile = self.profile.clone();
+        let start = &profile.file().start;
+        let action = match direction {
+            Direction::Forward => &start.forward,
+            Direction::Reverse => &start.reverse,
+        };
+        let Some(action) = action.given().map(toml::Spanned::get_ref) else {
+            return Err(Error::Unsupported {
+                what: "a start in this direction",
+                reason: "its profile does not say how",
+            });
+        };
+        let (status, _) = self.read_status(Class::Command).await?;
+        self.guard(order).await?;
+        let local = (status.control == Some(Control::Local)).then_some(OTHERS);
+        let runs = matches!(status.state, State::Running | State::Stopping) && self.comes_down.is_none();
+        let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
+        if let Some(reason) = status.bars_motion().or(local).or(others) {
+            return Err(self.refused(order, reason));
+        }
+        self.climb(order).await?;
+        let Some((last, before)) = action.steps.split_last() else { return Err(self.refused(order, OTHERS)) };
+        for step in before {
+            self.step(step.get_ref(), Class::Command, order).await?;
+        }
+        let word = profile.file().written(last.get_ref()).last().map_or(0, |written| written.value);
+        self.watch.run.give(Lease::new(direction, word));
+        self.comes_down = None;
+        let sent = self.step(last.get_ref(), Class::Command, order).await;
+        self.registers.owe_judgement();
+        match sent {
+            Ok(()) => self.watch.run.was_written(),
+            Err(error) if error.kind() == ErrorKind::NotSent => {
+                self.watch.run.was_not_written();
+                return Err(error);
+            }
+            // An exception is no proof that nothing was done.
+            Err(error) => return Err(error.after_write()),
+        }
+        self.see_start(direction).await.map_err(Error::after_write)
+    }
+
+    /// What has to be written before the run command, from the state in which the drive is.
+    async fn climb(&mut self, order: Order) -> Result<()> {
+        let profile = self.profile.clone();
+        let Some(rungs) = profile.file().start.ladder.given() else { return Ok(()) };
+        let mut confirming = Confirming::begin();
+        let mut written = 0;
+        loop {
+            let (status, words) = self.read_status(Class::Command).await?;
+            let rung = rungs
+                .iter()
+                .map(toml::Spanned::get_ref)
+                .find(|rung| profile.fits(&words, &rung.bits) == Some(true));
+            let Some(rung) = rung else { return Err(self.refused(order, Refusal::State(status.state))) };
+            match (rung.deed, &rung.register, rung.word) {
+                (Deed::Run, ..) => return Ok(()),
+                (Deed::Write, Some(register), Some(word)) if written < RUNGS => {
+                    written += 1;
+                    if let Some((_, address)) =
+                        profile.file().named(register.get_ref()).and_then(|of| profile.file().place(of))
+                    {
+                        self.watch.run.sends(word);
+                        self.registers.at(Class::Command).write_word(address, word).await?;
+                    }
+                }
+                _ => {}
+            }
+            if !confirming.again().await {
+                return Err(self.not_confirmed(order, status, withheld_by(rung.deed)));
+            }
+        }
+    }
+
+    /// Reads until the motor is driven that way. One that turned the other way slows down first: it is on its way.
+    async fn see_start(&mut self, direction: Direction) -> Result<Status> {
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let tells_direction = self.profile.file().see.direction.given().is_some();
+        let mut first: Option<Frequency> = None;
+        loop {
+            let (status, words) = match self.read_status(Class::Command).await {
+                Ok(read) => read,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            let local = (status.control == Some(Control::Local)).then_some(OTHERS);
+            let because = local.or_else(|| withheld(&status));
+            let output = status.output_frequency;
+            let slows = output.is_some() && output < first;
+            if because.is_none() && (status.direction == Some(direction) || !tells_direction || slows) {
+                self.agreed = self.setpoint_seen(&words);
+                let verdict = self.watch.run.verdict(&self.evidence(&status, &words));
+                return Ok(Status { verdict, ..status });
+            }
+            first = first.or(output);
+            let over = because.is_some() && status.is_fault() && Instant::now() >= settled;
+            if over || !confirming.again().await {
+                return Err(self.not_confirmed(Order::Start(direction), status, because));
+            }
+        }
+    }
+
+    /// The stop is written before anything is read, and again while it does not show.
+    pub(super) async fn stop_motor(&mut self, asked: StopMode) -> Result<Stopped> {
+        self.allow(Level::Stop, "a stop")?;
+        if let Some(barred) = self.stop_is_barred() {
+            return Err(barred);
+        }
+        let profile = self.profile.clone();
+        let (mode, instead) = self.substitute(&profile, asked);
+        let Some(action) = profile.file().stop.of(mode_name(mode)).given().map(toml::Spanned::get_ref) else {
+            return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
+        };
+        let order = Order::Stop(asked);
+        // What became of it, the reading tells.
+        self.write_stop(action, order).await?.ok();
+        self.registers.owe_judgement();
+        self.watch.shaft.stops();
+        let mut confirming = Confirming::begin();
+        let mut again = Instant::now() + SETTLED_WITHIN;
+        let mut first: Option<Frequency> = None;
+        loop {
+            let (mut status, _) = match self.read_status(Class::Command).await {
+                Ok(read) => read,
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error.after_write()),
+            };
+            let seen = action
+                .seen
+                .iter()
+                .flat_map(toml::Spanned::get_ref)
+                .any(|state| state.state() == status.state);
+            let falls = comes_down(&status, first);
+            if seen || falls {
+                if falls && status.state == State::Running {
+                    status.state = State::Stopping;
+                    self.comes_down = status.output_frequency.map(Frequency::centihertz);
+                }
+                self.watch.run.end();
+                let stopped = Stopped { instead, ..Stopped::by(mode, Status { verdict: None, ..status }) };
+                return Ok(stopped.held_by(&self.watch.shaft));
+            }
+            first = first.or(status.output_frequency);
+            if Instant::now() >= again {
+                self.write_stop(action, order).await.map_err(Error::after_write)?.ok();
+                again = Instant::now() + SETTLED_WITHIN;
+            }
+            if !confirming.again().await {
+                let because = (status.control == Some(Control::Local)).then_some(OTHERS);
+                return Err(self.not_confirmed(order, status, because));
+            }
+        }
+    }
+
+    /// The mode by which a stop is done, and why where it is not the one that was asked for.
+    fn substitute(&self, profile: &Profile, asked: StopMode) -> (StopMode, Option<&'static str>) {
+        let unread = stop_mode(*profile.file().stop.unread.get_ref());
+        if !self.guarded.have_held {
+            let why = "what tells how the drive is set up was never read: this one is a stop whatever it is";
+            return (unread, (asked != unread).then_some(why));
+        }
+        let has = profile.stop_modes();
+        if has.contains(&asked) {
+            return (asked, None);
+        }
+        let others = [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel];
+        let instead = others.into_iter().find(|mode| has.contains(mode)).unwrap_or(unread);
+        (instead, Some("its profile has no such stop"))
+    }
+
+    /// That the drive refuses it, or that nobody knows whether it arrived, is given back: what the drive shows tells more.
+    async fn write_stop(&mut self, action: &Action, order: Order) -> Result<Result<()>> {
+        let Some(step) = action.steps.first() else { return Ok(Ok(())) };
+        match self.step(step.get_ref(), Class::Stop, order).await {
+            Err(error) if error.kind() == ErrorKind::NotSent => Err(error),
+            sent => Ok(sent),
+        }
+    }
+
+    pub(super) async fn withdraw_run(&mut self) -> Result<Withdrawn> {
+        self.allow(Level::Stop, "a withdrawal")?;
+        let (status, _) = self.read_status(Class::Command).await?;
+        if self.watch.run.lease().is_none() {
+            return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
+        }
+        self.guard(Order::Withdraw).await?;
+        let profile = self.profile.clone();
+        let Some(step) = profile.file().stop.ramp.given().and_then(|stop| stop.get_ref().steps.first())
+        else {
+            return Err(Error::Unsupported {
+                what: "a withdrawal",
+                reason: "its profile has no stop along the ramp",
+            });
+        };
+        self.step(step.get_ref(), Class::Command, Order::Withdraw).await?;
+        self.registers.owe_judgement();
+        let mut confirming = Confirming::begin();
+        let mut first = None;
+        loop {
+            let (status, _) = self.read_status(Class::Command).await.map_err(Error::after_write)?;
+            if status.state != State::Running && status.state != State::Unknown || comes_down(&status, first)
+            {
+                self.watch.run.end();
+                return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
+            }
+            first = first.or(status.output_frequency);
+            if !confirming.again().await {
+                return Err(self.not_confirmed(Order::Withdraw, status, None));
+            }
+        }
+    }
+
+    pub(super) async fn pulse_reset(&mut self) -> Result<Status> {
+        let order = Order::ResetFaults;
+        self.allow(Level::Motion, "a reset")?;
+        let profile = self.profile.clone();
+        let (status, _) = self.read_status(Class::Command).await?;
+        if !status.is_fault() {
+            return Ok(status);
+        }
+        let Some(reset) = profile.file().reset.given().map(toml::Spanned::get_ref) else {
+            return Err(Error::Unsupported {
+                what: "a reset",
+                reason: "its profile does not say how: reset it at the drive",
+            });
+        };
+        self.guard(order).await?;
+        match status.control {
+            Some(Control::Bus) => {}
+            None if self.owner.commands_alone => {}
+            None => return Err(self.refused(order, NOT_ALONE)),
+            Some(_) => return Err(self.refused(order, OTHERS)),
+        }
+        // The run command goes first: none of this side's is to act when the fault is gone.
+        if let Some(stop) = profile.file().stop.ramp.given().and_then(|stop| stop.get_ref().steps.first()) {
+            self.step(stop.get_ref(), Class::Command, order).await?;
+        }
+        let mut edge = Ok(());
+        for step in &reset.steps {
+            match self.step(step.get_ref(), Class::Command, order).await {
+                Err(error) if error.kind() == ErrorKind::NotSent => return Err(error),
+                Err(error) => edge = Err(error),
+                Ok(()) => {}
+            }
+        }
+        self.registers.owe_judgement();
+        let mut confirming = Confirming::begin();
+        loop {
+            let (status, _) = self.read_status(Class::Command).await.map_err(Error::after_write)?;
+            if !status.is_fault() {
+                self.watch.run.end();
+                return Ok(Status { verdict: None, ..status });
+            }
+            if !confirming.again().await {
+                edge.map_err(Error::after_write)?;
+                return Err(self.not_confirmed(order, status, None));
+            }
+        }
+    }
+
+    /// One step of an action.
+    async fn step(&mut self, step: &Step, class: Class, order: Order) -> Result<()> {
+        if let Some(pause) = &step.pause_ms {
+            sleep(Duration::from_millis((*pause.get_ref()).into())).await;
+        }
+        if let (Some(bits), Some(within)) = (&step.awaits, &step.within_ms) {
+            let profile = self.profile.clone();
+            let blocks = profile.blocks(&[bits.register.get_ref().as_str()].into());
+            let mut confirming = Confirming::within(Duration::from_millis((*within.get_ref()).into()));
+            loop {
+                let words = self.read_blocks(class, &blocks).await?;
+                if profile.fits(&words, bits) == Some(true) {
+                    return Ok(());
+                }
+                if !confirming.again().await {
+                    let (status, _) = self.read_status(class).await?;
+                    return Err(self.not_confirmed(order, status, None));
+                }
+            }
+        }
+        let writes = self.profile.file().written(step);
+        self.write(step, &writes, class, order).await
+    }
+
+    async fn write(&mut self, step: &Step, writes: &[Written], class: Class, order: Order) -> Result<()> {
+        let Some(&Written { space, address, value }) = writes.first() else { return Ok(()) };
+        self.watch.run.sends(value);
+        let is_edge = order == Order::ResetFaults;
+        let mut calls = self.registers.at(class);
+        if is_edge {
+            calls = calls.edge();
+        }
+        let several =
+            writes.len() > 1 || step.function.as_ref().is_some_and(|function| *function.get_ref() >= 15);
+        if !space.is_bit() {
+            let words: Vec<u16> = writes.iter().map(|written| written.value).collect();
+            return if several {
+                calls.write_words(address, &words).await
+            } else {
+                calls.write_word(address, value).await
+            };
+        }
+        let coils: Vec<bool> = writes.iter().map(|written| written.value != 0).collect();
+        let has = |function: &u8| calls_have(self.profile.file(), *function);
+        let several = several || !has(&5);
+        let exchange = Exchange { function: if several { 15 } else { 5 }, register: Some(address) };
+        let request = if several {
+            Request::WriteMultipleCoils(address, Cow::Borrowed(&coils))
+        } else {
+            Request::WriteSingleCoil(address, value != 0)
+        };
+        match calls.request(request, exchange).await? {
+            Response::WriteSingleCoil(at, on) if (at, on) == (address, value != 0) => Ok(()),
+            Response::WriteMultipleCoils(at, count) if at == address && usize::from(count) == coils.len() => {
+                Ok(())
+            }
+            _ => Err(calls.answer(exchange, "the confirmation does not echo the write")),
+        }
+    }
+}
+
+fn calls_have(file: &crate::format::File, function: u8) -> bool {
+    file.link.get_ref().functions.iter().any(|has| *has.get_ref() == function)
+}
+
+const fn withheld_by(deed: Deed) -> Option<Refusal> {
+    match deed {
+        Deed::Wait => Some(Refusal::State(State::NotReady)),
+        Deed::Write | Deed::Run => None,
+    }
+}
+
+/// Whether the output goes down below what it is to be, since the first look. One that only follows a lower setpoint ends there.
+fn comes_down(status: &Status, first: Option<Frequency>) -> bool {
+    let Some(output) = status.output_frequency else { return false };
+    let below = status.reference.is_none_or(|reference| output < reference);
+    below && first.is_some_and(|first| output < first) && status.state == State::Running
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_that_only_follows_a_lower_setpoint_is_no_stop() {
+        let hertz = |hertz| Some(Frequency::from_hertz(hertz));
+        let shown = |output, reference| Status {
+            state: State::Running,
+            output_frequency: hertz(output),
+            reference,
+            ..Status::default()
+        };
+        assert!(!comes_down(&shown(35, hertz(20)), hertz(40)), "on its way to 20 Hz");
+        assert!(comes_down(&shown(19, hertz(20)), hertz(40)));
+        assert!(!comes_down(&shown(40, hertz(50)), hertz(40)), "it holds its speed");
+        assert!(!comes_down(&shown(39, hertz(50)), None), "one look tells nothing");
+    }
+}

@@ -1,0 +1,119 @@
+//! The drive as every family is one: [`Drive`] over what the other modules do.
+
+use drive_core::{
+    Class, Command, Direction, Drive, Error, Faults, Lease, Measurements, Port, Recognised, Refusal, Result,
+    Row, Setpoint, Status, StopMode, Stopped, Withdrawn, Written, async_trait, registers::refuse_commands,
+};
+
+use super::ProfileDrive;
+
+#[async_trait]
+impl<P: Port> Drive for ProfileDrive<P> {
+    drive_core::told_by!(registers);
+    drive_core::watched_by!(watch);
+
+    fn run_word_for(&self, direction: Direction) -> Option<u16> {
+        let file = self.profile.file();
+        let start = match direction {
+            Direction::Forward => &file.start.forward,
+            Direction::Reverse => &file.start.reverse,
+        };
+        Some(file.writes(start.given()?.get_ref()).last()?.value)
+    }
+
+    fn adopt(&mut self, lease: Lease) {
+        self.watch.adopt(lease);
+        self.agreed = None;
+    }
+
+    fn forget(&mut self) {
+        self.watch.lose_sight();
+        self.guarded.forget(&self.profile);
+        self.comes_down = None;
+    }
+
+    fn recognise(&self, _: &drive_core::Identity) -> Recognised {
+        match self.guarded.otherwise.filter(|_| !self.guarded.hold) {
+            Some(it_is) => Recognised::NotMine { it_is },
+            None => Recognised::CannotTell,
+        }
+    }
+
+    async fn status(&mut self) -> Result<Status> {
+        if !self.guarded.hold {
+            // Whoever cannot be asked is read all the same; nothing is written before the guards are seen.
+            self.see_guards(Class::Status).await.ok();
+        }
+        let (mut status, words) = self.read_status(Class::Status).await?;
+        self.judge(&mut status, &words);
+        Ok(status)
+    }
+
+    async fn measurements(&mut self) -> Result<Measurements> {
+        self.read_measurements().await
+    }
+
+    async fn faults(&mut self) -> Result<Faults> {
+        self.read_faults().await
+    }
+
+    async fn start(&mut self, direction: Direction) -> Result<Status> {
+        self.registers.begin_order();
+        self.start_motor(direction).await
+    }
+
+    async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.stop_motor(mode).await
+    }
+
+    async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
+        self.withdraw_run().await
+    }
+
+    async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        self.registers.begin_order();
+        self.give_setpoint(setpoint).await
+    }
+
+    async fn reset_faults(&mut self) -> Result<Status> {
+        self.registers.begin_order();
+        self.pulse_reset().await
+    }
+
+    /// A reading: a watchdog that only a write feeds is not fed by it. Nothing here repeats a run word.
+    async fn keep_alive(&mut self) -> Result<()> {
+        let Some(block) = self.fast.first().copied() else { return Ok(()) };
+        self.read_block(Class::KeepAlive, block).await.map(drop)
+    }
+
+    async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {
+        self.registers.at(Class::Background).read_row(row).await
+    }
+
+    async fn write_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
+        let file = self.profile.file();
+        let commands: Vec<u16> = file
+            .actions()
+            .flat_map(|(_, action)| file.writes(action.get_ref()))
+            .map(|written| written.address)
+            .collect();
+        refuse_commands(row, &commands)?;
+        let command = Command::WriteParameter(row.address);
+        if !row.access.is_writable() {
+            let slave = self.registers.slave();
+            return Err(Error::AccessForbidden {
+                slave,
+                register: row.address,
+                code: row.code,
+                access: row.access,
+            });
+        }
+        self.guard(command).await?;
+        let (status, _) = self.read_status(Class::Background).await?;
+        if status.state.is_moving() || !status.is_explained() {
+            return Err(self.refused(command, Refusal::MotorRunning));
+        }
+        self.registers.at(Class::Background).change_row(row, word).await
+    }
+}

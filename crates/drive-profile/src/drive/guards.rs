@@ -1,0 +1,88 @@
+//! Guards and fingerprints: what has to read so before anything but a stop is written.
+
+use drive_core::{Class, Command, Error, Port, Refusal, Result, interned};
+
+use super::{ProfileDrive, Words};
+use crate::{format::Guard, profile::Profile};
+
+/// What the guards of a drive were found to say.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Guarded {
+    /// They were read since the last reconnect, and hold.
+    pub(super) hold: bool,
+    /// They have held since this value was made: the drive is the one of its profile.
+    pub(super) have_held: bool,
+    /// What was found otherwise at the last reading.
+    pub(super) otherwise: Option<&'static str>,
+}
+
+impl Guarded {
+    /// A drive without guards has nothing to show.
+    pub(super) fn of(profile: &Profile) -> Self {
+        let none = all(profile).next().is_none();
+        Self { hold: none, have_held: none, otherwise: None }
+    }
+
+    /// The line was lost: the drive may be another one.
+    pub(super) fn forget(&mut self, profile: &Profile) {
+        self.hold = all(profile).next().is_none();
+    }
+}
+
+fn all(profile: &Profile) -> impl Iterator<Item = &Guard> {
+    let who = &profile.file().who;
+    let lists = [&who.fingerprints, &who.guards].into_iter().filter_map(|list| list.given());
+    lists.flatten().map(toml::Spanned::get_ref)
+}
+
+fn holds(guard: &Guard, word: u16) -> bool {
+    let word = word & guard.mask.unwrap_or(u16::MAX);
+    guard.is.as_ref().is_none_or(|is| is.contains(&word))
+        && guard.is_not.as_ref().is_none_or(|is_not| !is_not.contains(&word))
+}
+
+impl<P: Port> ProfileDrive<P> {
+    /// Reads the guards, unless they were read since the last reconnect.
+    pub(super) async fn see_guards(&mut self, class: Class) -> Result<()> {
+        if self.guarded.hold {
+            return Ok(());
+        }
+        let profile = self.profile.clone();
+        let names = all(&profile).map(|guard| guard.register.get_ref().as_str()).collect();
+        let mut words = Words::default();
+        for block in profile.blocks(&names) {
+            let read = self.read_block(class, block).await?;
+            words.keep(block, read);
+        }
+        let fails = |guard: &&Guard| {
+            profile.word(&words, guard.register.get_ref()).is_none_or(|word| !holds(guard, word))
+        };
+        self.guarded.otherwise = all(&profile).find(fails).map(|guard| {
+            interned::text(&format!(
+                "none of which this holds: {} ({})",
+                guard.what,
+                guard.register.get_ref()
+            ))
+        });
+        if self.guarded.otherwise.is_none() {
+            (self.guarded.hold, self.guarded.have_held) = (true, true);
+        }
+        Ok(())
+    }
+
+    /// Before anything but a stop is written.
+    pub(super) async fn guard(&mut self, command: Command) -> Result<()> {
+        self.see_guards(Class::Command).await?;
+        match self.guarded.otherwise {
+            Some(what) => Err(self.refused(command, Refusal::AnotherDrive(what))),
+            None => Ok(()),
+        }
+    }
+
+    /// A stop does not go to a drive that was found to be another one: its stop word may be that one's run word.
+    pub(super) fn stop_is_barred(&self) -> Option<Error> {
+        let what = self.guarded.otherwise.filter(|_| !self.guarded.hold)?;
+        let command = Command::Stop(drive_core::StopMode::Ramp);
+        Some(self.not_confirmed(command, drive_core::Status::default(), Some(Refusal::AnotherDrive(what))))
+    }
+}

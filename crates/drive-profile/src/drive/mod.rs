@@ -1,0 +1,73 @@
+//! The engine: a drive of a profile is a [`Drive`](drive_core::Drive) as those are whose families are written by hand.
+
+mod command;
+mod driven;
+mod guards;
+mod owner;
+mod plan;
+mod reading;
+mod setpoint;
+mod tables;
+
+use std::sync::Arc;
+
+use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch};
+
+pub use owner::Owner;
+
+use crate::{ladder::Level, profile::Profile};
+use guards::Guarded;
+pub(crate) use plan::{Block, Words, counts, hundredths};
+
+/// A drive of a profile behind a port. See [`Drive`](drive_core::Drive) for what its methods promise; what its profile does not let
+/// them do is `Unsupported`, and says why.
+#[derive(Debug)]
+pub struct ProfileDrive<P> {
+    registers: Registers<P>,
+    profile: Arc<Profile>,
+    fast: Vec<Block>,
+    slow: Vec<Block>,
+    owner: Owner,
+    watch: Watch,
+    guarded: Guarded,
+    /// The setpoint that a run command of this side rests on, as the drive shows it.
+    agreed: Option<i64>,
+    /// A stop of this side was seen, and the motor may still come down by it: its output then.
+    comes_down: Option<u32>,
+}
+
+impl<P: Port> ProfileDrive<P> {
+    /// The drive with this address, of which its owner says this. Nothing is sent.
+    #[must_use]
+    pub fn new(port: P, slave: SlaveAddress, profile: Arc<Profile>, owner: Owner) -> Self {
+        let registers = Registers::new(port, slave, profile.capabilities(), meaning);
+        let (fast, slow) = (profile.fast(), profile.slow());
+        let guarded = Guarded::of(&profile);
+        let (watch, agreed, comes_down) = (Watch::default(), None, None);
+        Self { registers, profile, fast, slow, owner, watch, guarded, agreed, comes_down }
+    }
+
+    /// What the profile does not let be done.
+    fn allow(&self, level: Level, what: &'static str) -> Result<(), Error> {
+        if self.profile.level() < level {
+            return Err(Error::Unsupported {
+                what,
+                reason: "its profile does not reach so far: see its gaps",
+            });
+        }
+        Ok(())
+    }
+
+    const fn refused(&self, command: drive_core::Command, reason: Refusal) -> Error {
+        Error::Refused { slave: self.registers.slave(), command, reason }
+    }
+
+    fn not_confirmed(&self, command: drive_core::Command, status: Status, because: Option<Refusal>) -> Error {
+        Error::NotConfirmed { slave: self.registers.slave(), command, status: Box::new(status), because }
+    }
+}
+
+/// What an exception means where nothing else is known: a number beyond those of Modbus says nothing.
+fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
+    ExceptionMeaning::standard(code)
+}

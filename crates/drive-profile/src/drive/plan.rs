@@ -1,0 +1,187 @@
+//! What a profile comes to once its names are resolved: which registers are read together, and what their words are worth.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use toml::Spanned;
+
+use crate::{
+    format::{Access, Answer, Bits, Byte, Register, Space, UnitName},
+    profile::Profile,
+};
+
+/// Registers that one exchange reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Block {
+    pub(crate) space: Space,
+    pub(crate) first: u16,
+    pub(crate) count: u16,
+}
+
+/// What was read.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Words(BTreeMap<(Space, u16), u16>);
+
+impl Words {
+    /// Keeps what a block was read to hold.
+    pub(crate) fn keep(&mut self, block: Block, words: impl IntoIterator<Item = u16>) {
+        for (word, at) in words.into_iter().zip(0_u16..) {
+            self.0.insert((block.space, block.first.saturating_add(at)), word);
+        }
+    }
+
+    pub(crate) fn at(&self, space: Space, address: u16) -> Option<u16> {
+        self.0.get(&(space, address)).copied()
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (Space, u16, u16)> {
+        self.0.iter().map(|(&(space, address), &word)| (space, address, word))
+    }
+}
+
+impl Profile {
+    /// The words of a register as they stand on the wire.
+    fn place_of(&self, name: &str) -> Option<(&Register, Space, u16)> {
+        let register = self.file.named(name)?;
+        let (space, address) = self.file.place(register)?;
+        Some((register, space, address))
+    }
+
+    /// The word that counts of a register: a byte of it where it is one. Of two words there is none.
+    pub(crate) fn word(&self, words: &Words, name: &str) -> Option<u16> {
+        let (register, space, address) = self.place_of(name)?;
+        if register.words.as_ref().is_some_and(|words| *words.get_ref() != 1) {
+            return None;
+        }
+        let word = words.at(space, address)?;
+        Some(match register.byte {
+            None => word,
+            Some(Byte::High) => word >> 8,
+            Some(Byte::Low) => word & 0xFF,
+        })
+    }
+
+    /// The number of counts that a register holds. What has its decimals elsewhere is not told.
+    pub(crate) fn counts(&self, words: &Words, name: &str) -> Option<i64> {
+        let register = self.file.named(name)?;
+        if register.decimals_in.is_some() {
+            return None;
+        }
+        let word = self.word(words, name)?;
+        Some(if register.signed { i64::from(word.cast_signed()) } else { i64::from(word) })
+    }
+
+    /// The value of a register in hundredths of a unit, rounded; `None` where it has another unit, or was not read.
+    pub(crate) fn hundredths(&self, words: &Words, name: &str, unit: UnitName) -> Option<i64> {
+        let register = self.file.named(name).filter(|register| register.unit == unit)?;
+        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        Some(hundredths(self.counts(words, name)?, numerator, denominator))
+    }
+
+    /// Whether bits fit; `None`: they were not read.
+    pub(crate) fn fits(&self, words: &Words, bits: &Bits) -> Option<bool> {
+        self.word(words, bits.register.get_ref()).map(|word| bits.fit(word))
+    }
+
+    /// What a status reads.
+    pub(crate) fn fast(&self) -> Vec<Block> {
+        let file = &self.file;
+        let mut names: BTreeSet<&str> = BTreeSet::new();
+        names.extend(file.state.is.iter().map(|is| name(&is.get_ref().bits.get_ref().register)));
+        let see = &file.see;
+        names.extend(
+            [&see.output, &see.setpoint, &see.current, &file.faults.present].into_iter().filter_map(given),
+        );
+        names.extend(see.direction.given().map(|direction| name(&direction.get_ref().register)));
+        let told =
+            [&see.at_setpoint, &see.warning, &file.state.standstill].into_iter().filter_map(Answer::given);
+        names.extend(told.map(|bits| name(&bits.get_ref().register)));
+        let owners =
+            [&file.ownership.command, &file.ownership.reference].into_iter().filter_map(Answer::given);
+        names.extend(owners.map(|owner| name(&owner.get_ref().bits.register)));
+        names.extend(file.ownership.reads_back.given().map(|read| name(&read.get_ref().register)));
+        self.blocks(&names)
+    }
+
+    /// What only the measurements read; where there is nothing, what a status does.
+    pub(crate) fn slow(&self) -> Vec<Block> {
+        let see = &self.file.see;
+        let names = [&see.speed, &see.output_voltage, &see.dc_bus_voltage, &see.setpoint]
+            .into_iter()
+            .filter_map(given);
+        let blocks = self.blocks(&names.collect());
+        if blocks.is_empty() { self.fast().into_iter().take(1).collect() } else { blocks }
+    }
+
+    /// The exchanges that read these registers: those that stand in a row in one, where the drive lets them be read so.
+    pub(crate) fn blocks(&self, names: &BTreeSet<&str>) -> Vec<Block> {
+        let link = self.file.link.get_ref();
+        let mut singles: Vec<(Space, u16)> = names
+            .iter()
+            .filter_map(|name| self.place_of(name))
+            .filter(|(register, ..)| register.access != Access::Write)
+            .map(|(_, space, address)| (space, address))
+            .collect();
+        singles.sort_unstable();
+        singles.dedup();
+        let most = |space: Space| {
+            let limit = if space.is_bit() { &link.read_coils } else { &link.read_words };
+            limit.given().copied().unwrap_or(1)
+        };
+        let across = link.reads_across.given() == Some(&true);
+        let mut blocks: Vec<Block> = Vec::new();
+        for (space, first) in singles {
+            match blocks.last_mut() {
+                Some(last)
+                    if across
+                        && last.space == space
+                        && last.count < most(space)
+                        && last.first.checked_add(last.count) == Some(first) =>
+                {
+                    last.count += 1;
+                }
+                _ => blocks.push(Block { space, first, count: 1 }),
+            }
+        }
+        blocks
+    }
+}
+
+fn name(name: &Spanned<String>) -> &str {
+    name.get_ref()
+}
+
+fn given(answer: &Answer<Spanned<String>>) -> Option<&str> {
+    answer.given().map(name)
+}
+
+/// So many counts in hundredths of their unit, rounded to the nearest.
+pub(crate) fn hundredths(counts: i64, numerator: i64, denominator: i64) -> i64 {
+    let (counts, numerator, denominator) =
+        (i128::from(counts), i128::from(numerator), i128::from(denominator));
+    let doubled = 2 * 100 * counts * numerator / denominator;
+    i64::try_from((doubled + doubled.signum()) / 2).unwrap_or(i64::MAX)
+}
+
+/// The counts that stand for so many hundredths: the nearest, and only where they are worth that again.
+pub(crate) fn counts(value: i64, numerator: i64, denominator: i64) -> Option<i64> {
+    let (wide, numerator_wide, denominator_wide) =
+        (i128::from(value), i128::from(numerator), i128::from(denominator));
+    let doubled = 2 * wide * denominator_wide / (100 * numerator_wide);
+    let nearest = i64::try_from((doubled + doubled.signum()) / 2).ok()?;
+    (hundredths(nearest, numerator, denominator) == value).then_some(nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_the_nearest_count_that_is_worth_it_again_and_no_other() {
+        // 4000h counts are 100 %.
+        assert_eq!(counts(6_000, 100, 16_384), Some(9_830));
+        assert_eq!(counts(10_000, 100, 16_384), Some(16_384));
+        // Tenths hold no hundredths.
+        assert_eq!((counts(3_000, 1, 10), counts(3_005, 1, 10)), (Some(300), None));
+        assert_eq!(hundredths(-9_830, 100, 16_384), -6_000);
+    }
+}

@@ -1,0 +1,196 @@
+//! The setpoint.
+
+use drive_core::{
+    Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Port, Refusal, Result,
+    Setpoint, SetpointProblem, Speed,
+};
+
+use super::{ProfileDrive, Words, counts, reading::OTHERS};
+use crate::{
+    format::{Register, Setpoint as Fact, UnitName},
+    ladder::Level,
+};
+
+const NO_FULL_SCALE: Refusal = Refusal::Settings(
+    "the drive counts in percent of a frequency that it does not tell: say it by full-scale, or give a setpoint in percent",
+);
+const NO_HIGHEST: Refusal =
+    Refusal::Settings("the drive does not tell how fast it may turn: say it by highest");
+const UNSEEN: Refusal = Refusal::Overridden {
+    by: "nothing that the drive shows: its profile has no register that holds the setpoint in force; the output",
+    remedy: "start it, and see its output",
+};
+
+impl<P: Port> ProfileDrive<P> {
+    pub(super) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
+        let order = Order::Setpoint(setpoint);
+        self.allow(Level::Motion, "a setpoint")?;
+        let profile = self.profile.clone();
+        let Some(fact) = profile.file().setpoint.given().map(toml::Spanned::get_ref) else {
+            return Err(Error::Unsupported { what: "a setpoint", reason: "its profile has none" });
+        };
+        let Some(register) = profile.file().named(fact.register.get_ref()) else {
+            return Err(Error::Unsupported { what: "a setpoint", reason: "its profile has none" });
+        };
+        self.takes(register, setpoint)?;
+        let (status, _) = self.read_status(Class::Command).await?;
+        self.guard(order).await?;
+        if status.control == Some(Control::Local) {
+            return Err(self.refused(order, OTHERS));
+        }
+        let held = self.limits(fact).await?;
+        let word = self.setpoint_word(fact, register, setpoint, &held)?;
+        let Some((_, address)) = profile.file().place(register) else { return Ok(()) };
+        self.agreed = None;
+        self.registers.at(Class::Command).replacing(address).write_word(address, word).await?;
+        self.registers.owe_judgement();
+        self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
+    }
+
+    fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {
+        let takes = match setpoint {
+            Setpoint::Frequency(_) => matches!(register.unit, UnitName::Hertz | UnitName::Percent),
+            Setpoint::Share(_) => register.unit == UnitName::Percent,
+            Setpoint::Speed(_) => register.unit == UnitName::Rpm,
+        };
+        match setpoint {
+            _ if takes => Ok(()),
+            Setpoint::Share(_) => Err(Error::no_share()),
+            _ => Err(Error::Unsupported {
+                what: "a setpoint in this unit",
+                reason: "the drive counts in another",
+            }),
+        }
+    }
+
+    /// The registers that hold limits and full scale, where the drive has them.
+    async fn limits(&mut self, fact: &Fact) -> Result<Words> {
+        let profile = self.profile.clone();
+        let named = [&fact.limits.get_ref().high_in, &fact.full_scale].into_iter().flatten();
+        let names = named.map(|name| name.get_ref().as_str()).filter(|name| *name != "owner").collect();
+        let blocks = profile.blocks(&names);
+        let mut words = Words::default();
+        for block in blocks {
+            let read = self.read_block(Class::Command, block).await?;
+            words.keep(block, read);
+        }
+        Ok(words)
+    }
+
+    /// The word that stands for a setpoint: exactly, and within what the drive, its profile and its owner allow.
+    fn setpoint_word(
+        &self,
+        fact: &Fact,
+        register: &Register,
+        setpoint: Setpoint,
+        held: &Words,
+    ) -> Result<u16> {
+        let slave = self.registers.slave();
+        let problem = |problem| Error::Setpoint { slave, setpoint, problem };
+        let refused = |reason| self.refused(Order::Setpoint(setpoint), reason);
+        let (value, scale) = match setpoint {
+            Setpoint::Frequency(frequency) => (
+                i64::from(frequency.centihertz()),
+                self.hertz_of(register, held).ok_or_else(|| refused(NO_FULL_SCALE))?,
+            ),
+            Setpoint::Share(share) => (i64::from(share.hundredths()), self.scale(register)?),
+            Setpoint::Speed(speed) => (i64::from(speed.rpm()) * 100, self.scale(register)?),
+        };
+        let step = self.registers.capabilities().frequency_step;
+        let count =
+            counts(value, scale[0], scale[1]).ok_or_else(|| problem(SetpointProblem::Resolution(step)))?;
+        let limits = fact.limits.get_ref();
+        let mut high = i64::from(limits.high);
+        if let Some(name) = &limits.high_in {
+            let allowed = if name.get_ref() == "owner" {
+                let highest = self.owner.highest.ok_or_else(|| refused(NO_HIGHEST))?;
+                self.hertz_of(register, held).map(|[numerator, denominator]| {
+                    i64::from(highest.centihertz()).saturating_mul(denominator)
+                        / numerator.saturating_mul(100)
+                })
+            } else {
+                self.allowed(register, name.get_ref(), held)
+            };
+            high = high.min(allowed.ok_or_else(|| refused(NO_HIGHEST))?);
+        }
+        if !(i64::from(limits.low)..=high).contains(&count) {
+            return Err(problem(self.outside(limits.low.into(), high, scale, setpoint)));
+        }
+        let word = if register.signed {
+            i16::try_from(count).ok().map(i16::cast_unsigned)
+        } else {
+            u16::try_from(count).ok()
+        };
+        word.ok_or_else(|| problem(SetpointProblem::TooLarge))
+    }
+
+    fn scale(&self, register: &Register) -> Result<[i64; 2]> {
+        let none = Error::Unsupported { what: "a setpoint", reason: "its register has no scale" };
+        register.scale.as_ref().map(|scale| *scale.get_ref()).ok_or(none)
+    }
+
+    /// What a register allows, in counts of the setpoint's.
+    fn allowed(&self, register: &Register, name: &str, held: &Words) -> Option<i64> {
+        let highest = self.profile.hundredths(held, name, register.unit)?;
+        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        highest.checked_mul(denominator).map(|counts| counts / numerator.saturating_mul(100))
+    }
+
+    fn outside(
+        &self,
+        low: i64,
+        high: i64,
+        [numerator, denominator]: [i64; 2],
+        setpoint: Setpoint,
+    ) -> SetpointProblem {
+        let worth = |counts: i64| {
+            u32::try_from(super::hundredths(counts, numerator, denominator).max(0)).unwrap_or(u32::MAX)
+        };
+        match setpoint {
+            Setpoint::Frequency(_) => SetpointProblem::OutsideFrequencyLimits {
+                low: Frequency::from_centihertz(worth(low)),
+                high: Frequency::from_centihertz(worth(high)),
+            },
+            Setpoint::Speed(_) => SetpointProblem::OutsideSpeedLimits {
+                low: Speed::from_rpm(worth(low) / 100),
+                high: Speed::from_rpm(worth(high) / 100),
+            },
+            Setpoint::Share(_) => SetpointProblem::TooLarge,
+        }
+    }
+
+    /// It is there where the drive shows it.
+    async fn see_setpoint(&mut self, setpoint: Setpoint, word: u16) -> Result<()> {
+        let order = Order::Setpoint(setpoint);
+        let shows = self.profile.file().see.setpoint.given().is_some();
+        let mut confirming = Confirming::begin();
+        loop {
+            let (status, words) = match self.read_status(Class::Command).await {
+                Ok(read) => read,
+                // A reading that the line has lost is one more reason to read again.
+                Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
+                Err(error) => return Err(error),
+            };
+            let local = (status.control == Some(Control::Local)).then_some(OTHERS);
+            let held = match setpoint {
+                Setpoint::Frequency(frequency) => status.reference == Some(frequency),
+                _ => {
+                    self.profile
+                        .file()
+                        .see
+                        .setpoint
+                        .given()
+                        .and_then(|name| self.profile.word(&words, name.get_ref()))
+                        == Some(word)
+                }
+            };
+            if held && local.is_none() {
+                self.agreed = self.setpoint_seen(&words);
+                return Ok(());
+            }
+            if !shows || !confirming.again().await {
+                return Err(self.not_confirmed(order, status, local.or((!shows).then_some(UNSEEN))));
+            }
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! The tables of a family, from a profile: kept once for the life of the program.
+
+use std::time::Duration;
+
+use drive_core::{
+    Capabilities, FaultEntry, Row, SerialSettings, StopMode, interned,
+    registers::{Access, Confidence, Factory, Form, Range, Storage, Unit},
+    serial::CharacterFormat,
+};
+
+use crate::{
+    format::{self, ModeName, Register, Space, UnitName},
+    profile::Profile,
+};
+
+const MODES: [(ModeName, StopMode); 4] = [
+    (ModeName::Ramp, StopMode::Ramp),
+    (ModeName::Fast, StopMode::Fast),
+    (ModeName::Freewheel, StopMode::Freewheel),
+    (ModeName::DcInjection, StopMode::DcInjection),
+];
+
+pub(crate) fn mode_name(mode: StopMode) -> ModeName {
+    MODES.iter().find(|(_, other)| *other == mode).map_or(ModeName::Ramp, |(name, _)| *name)
+}
+
+pub(crate) fn stop_mode(name: ModeName) -> StopMode {
+    MODES.iter().find(|(other, _)| *other == name).map_or(StopMode::Ramp, |(_, mode)| *mode)
+}
+
+impl Profile {
+    /// What a drive of it can do.
+    #[must_use]
+    pub fn capabilities(&self) -> &'static Capabilities {
+        let link = self.file.link.get_ref();
+        let least = Capabilities::least(interned::text(self.key()), interned::text(self.name()));
+        let functions: Vec<u8> = link.functions.iter().map(|function| *function.get_ref()).collect();
+        let formats: Vec<CharacterFormat> = link
+            .formats
+            .given()
+            .into_iter()
+            .flatten()
+            .filter_map(|format| format.get_ref().parse().ok())
+            .collect();
+        let speeds = link.speeds.given().filter(|speeds| !speeds.is_empty());
+        let (fast, slow) = (self.fast(), self.slow());
+        let unit = self.setpoint_unit();
+        let status_exchanges = u8::try_from(fast.len()).unwrap_or(u8::MAX);
+        interned::one(Capabilities {
+            functions: interned::list(&functions),
+            read_words: link.read_words.given().copied().unwrap_or(1),
+            rows: interned::list(&self.rows()),
+            write_words: link.write_words.given().copied().unwrap_or(1),
+            highest_address: link.highest_address.given().copied().unwrap_or(247),
+            speeds: speeds.map_or(&[9_600, 19_200, 38_400], |speeds| interned::list(speeds)),
+            formats: if formats.is_empty() {
+                &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1, CharacterFormat::F8N2]
+            } else {
+                interned::list(&formats)
+            },
+            factory: self.factory(speeds, &formats),
+            stop_modes: interned::list(&self.stop_modes()),
+            speed_setpoint: unit == Some(UnitName::Rpm),
+            share_setpoint: unit == Some(UnitName::Percent),
+            frequency_step: self.frequency_step(),
+            fault_reset: if self.file.reset.given().is_some() { "by the bus" } else { "not by the bus" },
+            communication_fault: self.file.faults.communication.given().copied(),
+            turnaround: Duration::from_millis(link.pause_ms.given().copied().unwrap_or(0).into()),
+            status_exchanges,
+            status_words: fast.iter().filter(|block| !block.space.is_bit()).map(|block| block.count).sum(),
+            statuses_per_turn: 0,
+            stop_exchanges: status_exchanges.saturating_mul(3).saturating_add(2),
+            measurement_exchanges: u8::try_from(slow.len()).unwrap_or(u8::MAX),
+            ..least
+        })
+    }
+
+    /// What its fault codes mean.
+    #[must_use]
+    pub fn fault_entries(&self) -> &'static [FaultEntry] {
+        let codes = self.file.faults.codes.given().map(|codes| &codes.get_ref().list);
+        let entry = |(code, mnemonic, meaning, remedy): &(u16, String, String, String)| {
+            FaultEntry::new(*code, interned::text(mnemonic), interned::text(meaning), interned::text(remedy))
+        };
+        interned::list(&codes.into_iter().flatten().map(entry).collect::<Vec<_>>())
+    }
+
+    /// The stops that are done as they are asked for.
+    pub(crate) fn stop_modes(&self) -> Vec<StopMode> {
+        let has = |(name, mode): &(ModeName, StopMode)| self.file.stop.of(*name).given().map(|_| *mode);
+        MODES.iter().filter_map(has).collect()
+    }
+
+    fn setpoint_unit(&self) -> Option<UnitName> {
+        let setpoint = self.file.setpoint.given()?;
+        self.file.named(setpoint.get_ref().register.get_ref()).map(|register| register.unit)
+    }
+
+    fn frequency_step(&self) -> &'static str {
+        let register = self
+            .file
+            .setpoint
+            .given()
+            .and_then(|setpoint| self.file.named(setpoint.get_ref().register.get_ref()));
+        match register.and_then(|register| Some((register.unit, *register.scale.as_ref()?.get_ref()))) {
+            Some((UnitName::Hertz, [1, 10])) => "0.1 Hz",
+            Some((UnitName::Hertz, [1, 100])) => "0.01 Hz",
+            _ => "as its full scale gives",
+        }
+    }
+
+    /// The settings with which a line of it is tried first.
+    fn factory(&self, speeds: Option<&Vec<u32>>, formats: &[CharacterFormat]) -> SerialSettings {
+        let said = self.file.link.get_ref().factory.given().and_then(|said| said.get_ref().parse().ok());
+        let speed = speeds.and_then(|speeds| speeds.first().copied()).unwrap_or(19_200);
+        let format = formats.first().copied().unwrap_or(CharacterFormat::F8E1);
+        let usual = SerialSettings::new(speed, format).unwrap_or(SerialSettings::MODBUS_DEFAULT);
+        said.unwrap_or(usual)
+    }
+
+    /// Its holding registers, but for the halves of a word: those that are no parameters are only read.
+    fn rows(&self) -> Vec<Row> {
+        let mut rows: Vec<Row> = Vec::new();
+        for (name, spanned) in &self.file.register {
+            let register = spanned.get_ref();
+            let Some((Space::HoldingRegister, address)) = self.file.place(register) else { continue };
+            if rows.iter().all(|row| row.address != address) {
+                rows.push(self.row(name, register, address));
+            }
+        }
+        rows.sort_by_key(|row| row.address);
+        rows
+    }
+
+    fn row(&self, name: &str, register: &Register, address: u16) -> Row {
+        let sound = crate::check::grade(&self.file, &register.source) == format::Mark::P;
+        Row {
+            address,
+            code: interned::text(name),
+            name: interned::text(&register.what),
+            access: match register.access {
+                format::Access::Write => Access::Write,
+                format::Access::WriteStopped if register.parameter => Access::WriteStopped,
+                format::Access::ReadWrite if register.parameter => Access::ReadWrite,
+                _ => Access::Read,
+            },
+            storage: match register.storage.as_ref().map(|storage| *storage.get_ref()) {
+                None | Some(format::Storage::Ram) => Storage::Volatile,
+                Some(format::Storage::RamUntilSaved) => Storage::RamUntilSaved,
+                Some(format::Storage::Eeprom) => Storage::Eeprom,
+                Some(format::Storage::Unknown) => Storage::Unknown,
+            },
+            unit: unit(register),
+            range: register.range.as_ref().map_or(Range::Any, |range| {
+                let [low, high] = *range.get_ref();
+                Range::Within(low, high)
+            }),
+            factory: register
+                .factory
+                .as_ref()
+                .and_then(|factory| factory.given().copied())
+                .map_or(Factory::None, Factory::Value),
+            confidence: if sound { Confidence::Manual } else { Confidence::Elsewhere },
+            source: interned::text(&self.cited(register)),
+        }
+    }
+
+    /// The documents that a register names.
+    fn cited(&self, register: &Register) -> String {
+        let cited =
+            crate::check::names(register.source.get_ref()).filter_map(|name| self.file.sources.get(name));
+        let cited = cited.map(|source| format!("{}, {}", source.get_ref().document, source.get_ref().page));
+        cited.collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// The unit in which a word is shown, where its scale is one of decimals; else its counts.
+fn unit(register: &Register) -> Unit {
+    let scale = register.scale.as_ref().map(|scale| *scale.get_ref());
+    let decimals = match scale {
+        Some([1, 1]) => Some(0),
+        Some([1, 10]) => Some(1),
+        Some([1, 100]) => Some(2),
+        Some([1, 1_000]) => Some(3),
+        _ => None,
+    };
+    let unit = match (register.unit, decimals) {
+        (UnitName::Bits, _) => Unit::BITS,
+        (UnitName::Code, _) => Unit::CODE,
+        (name, Some(decimals)) => Unit { form: Form::Number, ..Unit::scaled(name.symbol(), decimals) },
+        _ => Unit::COUNT,
+    };
+    if register.signed { unit.signed() } else { unit }
+}

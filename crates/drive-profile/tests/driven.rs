@@ -1,0 +1,342 @@
+//! The drives of profiles, each against its simulated twin: started, reversed, stopped, tripped, reset and lost.
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::{
+    Direction, Drive, Error, ErrorKind, Frequency, Lack, Motion, Percent, Refusal, State, StopMode, Verdict,
+};
+use drive_families::{Definition, Family, Options, SetUp};
+use drive_profile::{Level, Profile, definition, read, shipped};
+use drive_testing::{
+    Contract,
+    rig::Rig,
+    worlds::{Configuration, Event, Share, Surrounded},
+};
+
+/// Those that reach motion and whose registers are all holding registers.
+const DRIVEN: [&str; 5] = ["danfoss-fc", "goodrive", "ig5a", "v20", "danfoss-fc51"];
+
+fn family(key: &str) -> Family {
+    family_of(shipped::find(key).expect("it is shipped").clone())
+}
+
+fn family_of(profile: Profile) -> Family {
+    let definition: &'static Definition = definition(&Arc::new(profile));
+    Family::new(definition)
+}
+
+fn contract(family: Family, options: Options) -> Contract {
+    Contract::new(
+        family.capabilities(),
+        move |port, slave| family.open_with(port, slave, &options),
+        move || family.machine(SetUp::ForTheBus).expect("it has a twin"),
+    )
+}
+
+fn rig(key: &str) -> Rig {
+    let family = family(key);
+    contract(family, family.simulated_options()).rig()
+}
+
+async fn running(key: &str) -> Rig {
+    let mut rig = rig(key);
+    rig.drive.status().await.expect("it answers");
+    rig.drive
+        .set_setpoint(Frequency::from_hertz(30).into())
+        .await
+        .unwrap_or_else(|error| panic!("{key}: {error}"));
+    rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+    rig.until_at(Frequency::from_hertz(30)).await;
+    rig
+}
+
+/// What [`Contract`] asks of every family but for one thing: a drive that does not tell who commands it is told in force by no status.
+#[tokio::test(start_paused = true)]
+async fn each_keeps_the_contract_of_a_family_at_its_level() {
+    for key in DRIVEN {
+        let family = family(key);
+        let contract = contract(family, family.simulated_options());
+        contract.survives_any_words().await;
+        contract.sends_no_request_that_is_too_long().await;
+        contract.does_what_it_claims().await;
+        contract.has_the_watchdog_that_it_claims().await;
+        contract.takes_the_exchanges_that_it_claims().await;
+        contract.lives_the_story().await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn no_disobedient_drive_and_no_lost_answer_makes_one_say_what_is_not_so() {
+    for key in DRIVEN {
+        let family = family(key);
+        let complaints = contract(family, family.simulated_options()).complaints().await;
+        // Told as not known is no lie: it is all that the drive shows.
+        let lies = complaints
+            .iter()
+            .map(ToString::to_string)
+            .filter(|complaint| !complaint.contains("the verdict is Some(NotKnown)"));
+        let lies: Vec<String> = lies.collect();
+        assert!(lies.is_empty(), "{key}:\n{}", lies.join("\n"));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_commands_is_told_only_where_the_drive_tells_it() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        let verdict = rig.drive.status().await.expect("it answers").verdict;
+        assert_eq!(verdict, Some(Verdict::NotKnown), "{key}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_panel_that_takes_control_is_told_where_the_drive_tells_it() {
+    for (key, tells) in [("goodrive", true), ("v20", true), ("danfoss-fc", true), ("ig5a", false)] {
+        let mut rig = running(key).await;
+        rig.machine.panel(drive_sim::Panel::TakeControl);
+        rig.machine.panel(drive_sim::Panel::Run);
+        let status = rig.drive.status().await.expect("it answers");
+        let told = matches!(
+            status.verdict,
+            Some(Verdict::NotInForce { lacks: Lack::Command | Lack::Reference, .. })
+        );
+        assert!(told || !tells, "{key}: {:?}", status.verdict);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn it_trips_and_is_reset_and_nothing_starts_by_itself() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        rig.machine.trip(9);
+        rig.until("the trip", |status| status.state == State::Fault).await;
+        let refused = rig.drive.start(Direction::Forward).await.expect_err("it has tripped");
+        assert!(
+            matches!(refused, Error::Refused { reason: Refusal::Tripped | Refusal::Fault(_), .. }),
+            "{key}: {refused}"
+        );
+        rig.until_machine("the shaft stands", |machine| machine.shaft_frequency == 0).await;
+        let status = rig.drive.reset_faults().await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert!(!status.is_fault() && rig.drive.lease().is_none(), "{key}");
+        rig.poll_for(Duration::from_secs(3)).await;
+        assert!(!rig.machine.observe().running, "{key}: a reset is no start");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_fault_of_a_drive_that_does_not_tell_who_commands_it_is_reset_only_where_its_owner_says_that_nobody_else_does()
+ {
+    for key in ["v20", "danfoss-fc", "ig5a"] {
+        let family = family(key);
+        let mut options = Options::default();
+        options.set("full-scale", "50Hz").ok();
+        let mut rig = contract(family, options).rig();
+        rig.machine.trip(9);
+        rig.until("the trip", |status| status.state == State::Fault).await;
+        let writes = |rig: &Rig| {
+            rig.machine.received().iter().filter(|request| request.pdu.first() == Some(&6)).count()
+        };
+        let refused = rig.drive.reset_faults().await.expect_err("another's run command may stand");
+        assert_eq!((refused.kind(), writes(&rig)), (ErrorKind::Refused, 0), "{key}: {refused}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn neither_a_lost_line_nor_a_power_cycle_makes_it_write_anything() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        rig.machine.power_cycle();
+        let before = rig.machine.received().len();
+        rig.drive.forget();
+        rig.poll_for(Duration::from_secs(5)).await;
+        let written =
+            rig.machine.received().iter().skip(before).any(|request| request.pdu.first() != Some(&3));
+        assert!(!written && !rig.machine.observe().running, "{key}");
+        assert!(
+            rig.drive.lease().is_some(),
+            "{key}: what was given may stand, and nothing has shown that it does not"
+        );
+        rig.drive.withdraw().await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert!(rig.drive.lease().is_none() && !rig.machine.observe().running, "{key}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_another_has_started_is_not_turned_round() {
+    let mut rig = rig("danfoss-fc");
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.machine.written_by_another(49_999, 0x047C).expect("it takes it");
+    rig.until("it runs", |status| status.state == State::Running).await;
+    let refused = rig.drive.start(Direction::Reverse).await.expect_err("it is not ours");
+    assert_eq!(refused.kind(), ErrorKind::Refused, "{refused}");
+    rig.drive.stop(StopMode::Ramp).await.expect("a stop is for everybody");
+    rig.until_machine("it stands", |machine| !machine.running).await;
+}
+
+/// INVT: 1 is "run forward", and Delta's 1 is its stop. A drive that answers otherwise gets neither.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_answers_otherwise_than_its_guards_gets_no_word_not_even_a_stop() {
+    let mut rig = rig("goodrive");
+    let family = family("goodrive");
+    let other = family_of(
+        read(&text("invt/goodrive").replace("is = [1, 2, 3, 4, 5, 6]", "is = [77]")).expect("it is right"),
+    );
+    assert_eq!(other.capabilities().key, family.capabilities().key);
+    let machine = move || family.machine(SetUp::ForTheBus).expect("it has a twin");
+    let options = family.simulated_options();
+    let mut wrong = Contract::new(
+        other.capabilities(),
+        move |port, slave| other.open_with(port, slave, &options),
+        machine,
+    )
+    .rig();
+    wrong.drive.status().await.expect("it is read all the same");
+    for refused in [
+        wrong.drive.start(Direction::Forward).await.map(drop),
+        wrong.drive.set_setpoint(Frequency::from_hertz(20).into()).await,
+        wrong.drive.stop(StopMode::Ramp).await.map(drop),
+    ] {
+        let error = refused.expect_err("it is another drive");
+        assert!(error.to_string().contains("2100h") || error.to_string().contains("STATE"), "{error}");
+    }
+    assert!(
+        wrong.machine.received().iter().all(|request| request.pdu.first() == Some(&3)),
+        "nothing was written"
+    );
+    rig.drive.status().await.expect("it answers");
+    rig.drive.stop(StopMode::Ramp).await.expect("its guards hold");
+}
+
+/// In the I/O profile of an Altivar word 7 starts it: until its guard was read, a stop is word 0, which coasts.
+#[tokio::test(start_paused = true)]
+async fn a_stop_before_the_guards_were_read_is_the_one_that_is_a_stop_whatever_they_say() {
+    let family = family("altivar");
+    let mut rig = contract(family, family.simulated_options()).rig();
+    let _ = rig.drive.stop(StopMode::Ramp).await;
+    let first = rig.machine.received().first().expect("it writes").pdu.clone();
+    assert_eq!(first[..], [0x06, 0x21, 0x35, 0x00, 0x00]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_its_profile_only_lets_stop_is_stopped_and_nothing_else() {
+    let profile = shipped::find("g120").expect("it is shipped");
+    assert_eq!(profile.level(), Level::Stop);
+    let mut rig = rig("g120");
+    for refused in [
+        rig.drive.start(Direction::Forward).await.map(drop),
+        rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await,
+        rig.drive.reset_faults().await.map(drop),
+    ] {
+        assert_eq!(refused.expect_err("its profile does not reach so far").kind(), ErrorKind::Unsupported);
+    }
+    assert_eq!(rig.machine.all_requests(), 0);
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_beyond_what_is_known_is_refused_and_not_sent() {
+    for (key, option) in [("v20", "full-scale"), ("goodrive", "highest")] {
+        let family = family(key);
+        let mut rig = contract(family, Options::default()).rig();
+        let refused =
+            rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("nobody has said");
+        assert!(refused.to_string().contains(option), "{refused}");
+        let mut rig = self::rig(key);
+        let refused = rig
+            .drive
+            .set_setpoint(Frequency::from_centihertz(5_001).into())
+            .await
+            .expect_err("more than 50 Hz");
+        assert!(matches!(refused, Error::Setpoint { .. }), "{refused}");
+        assert!(rig.machine.received().iter().all(|request| request.pdu.first() == Some(&3)), "{key}");
+    }
+    let mut rig = rig("v20");
+    rig.drive.set_setpoint(Percent::from_percent(50).into()).await.expect("it counts so");
+    assert_eq!(rig.machine.peek(100), Some(8_192), "HSW 40101");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_along_the_ramp_ends_at_rest_and_one_that_cuts_the_output_does_not() {
+    for (mode, end) in [(StopMode::Ramp, Motion::AtRest), (StopMode::Freewheel, Motion::Coasting)] {
+        let mut rig = running("v20").await;
+        let stopped = rig.drive.stop(mode).await.expect("it stops");
+        assert_eq!(stopped.mode, mode);
+        assert_eq!(rig.until_standstill().await.motion, end, "{mode}");
+    }
+}
+
+fn text(name: &str) -> String {
+    let found = shipped::TEXTS.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| (*text).to_owned()).expect("it is shipped")
+}
+
+/// The one way in which a profile lets its drive be commanded, with panel, supplies and another master around it.
+struct Around {
+    key: &'static str,
+    masters: Vec<Event>,
+}
+
+impl Surrounded for Around {
+    fn configurations(&self) -> Vec<Configuration> {
+        let of = family(self.key);
+        let options = of.simulated_options();
+        vec![Configuration {
+            name: "by the bus".to_owned(),
+            open: Box::new(move |port, slave| of.open_with(port, slave, &options)),
+            machine: Box::new(move || of.machine(SetUp::ForTheBus).expect("it has a twin")),
+            settings: Vec::new(),
+        }]
+    }
+
+    fn other_masters(&self) -> Vec<Event> {
+        self.masters.clone()
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_three_that_motion_was_proved_for_say_the_truth_in_every_world_around_them() {
+    let masters =
+        |deeds: &[&str]| deeds.iter().map(|deed| Event::lasting(&format!("master {deed}"))).collect();
+    for (key, masters) in [
+        ("goodrive", masters(&["CMD 1", "CMD 2", "CMD 5", "FREQ 1000"])),
+        ("v20", masters(&["STW 1151", "STW 3199", "STW 1150", "HSW 3000"])),
+        ("danfoss-fc", masters(&["CTW 1148", "CTW 33916", "CTW 1084", "REF 3000"])),
+    ] {
+        let of = family(key);
+        let contract = contract(of, of.simulated_options());
+        Contract { around: Some(Box::new(Around { key, masters })), ..contract }
+            .is_true_in_worlds(Share::one_in(17))
+            .await;
+    }
+}
+
+/// The same drive, driven by a profile that has one place otherwise than the machine.
+fn misread(name: &str, key: &str, place: &str, by: &str) -> Rig {
+    let text = text(name);
+    assert_eq!(text.matches(place).count(), 1, "{place}");
+    let (of, other) = (family(key), family_of(read(&text.replace(place, by)).expect("it is right")));
+    let options = of.simulated_options();
+    let open = move |port, slave| other.open_with(port, slave, &options);
+    Contract::new(other.capabilities(), open, move || of.machine(SetUp::ForTheBus).expect("it has a twin"))
+        .rig()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_the_other_way_than_it_was_told_is_not_confirmed() {
+    let mut rig =
+        misread("invt/goodrive", "goodrive", "forward = 1, reverse = 2", "forward = 2, reverse = 1");
+    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    let error = rig.drive.start(Direction::Forward).await.expect_err("it turns in reverse");
+    assert!(matches!(error, Error::NotConfirmed { .. }), "{error}");
+    assert!(rig.drive.lease().is_some(), "it may run by us all the same");
+}
+
+/// A V20 carries out the valid words of a block that it refuses.
+#[tokio::test(start_paused = true)]
+async fn an_exception_to_a_run_command_is_no_proof_that_nothing_was_done() {
+    let mut rig = misread("invt/goodrive", "goodrive", "address = 0x2000", "address = 0x2010");
+    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    let error = rig.drive.start(Direction::Forward).await.expect_err("it is refused");
+    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    assert!(rig.drive.lease().is_some());
+}
