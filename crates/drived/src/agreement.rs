@@ -14,7 +14,7 @@ use axum::{
     routing::get,
 };
 use drive_core::{Direction, Frequency, StopMode};
-use drive_fleet::{ConcernKind, Shows};
+use drive_fleet::{ConcernKind, Shows, alarms::AlarmKind};
 use http_body_util::BodyExt as _;
 use serde_json::json;
 use tokio::{
@@ -66,9 +66,10 @@ fn every_face_tells(state: &StateView) {
 /// The rules for a metrics store say the same words, and wake nobody for what is no trouble.
 fn the_rules_tell(kind: ConcernKind) {
     let rule = format!("summary: \"{{{{ $labels.drive }}}}: {}\"", kind.words());
-    let has_rule = metrics::ALERTS.contains(&format!("drived_drive_concern{{concern=\"{}\"}}", kind.word()));
-    assert_eq!(metrics::ALERTS.contains(&rule), kind.severity().is_trouble(), "{rule}");
-    assert_eq!(has_rule, kind.severity().is_trouble(), "{kind}");
+    let has_rule = metrics::ALERTS.contains(&format!("drived_alarms{{alarm=\"{}\"", kind.word()));
+    let is_alarm = AlarmKind::Drive(kind).severity().is_trouble();
+    assert_eq!(metrics::ALERTS.contains(&rule), is_alarm, "{rule}");
+    assert_eq!(has_rule, is_alarm, "{kind}");
 }
 
 fn state_of(drive: DriveView) -> StateView {

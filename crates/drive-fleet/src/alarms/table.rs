@@ -122,7 +122,7 @@ impl AlarmKind {
         self.row().severity
     }
 
-    /// Whether it is about a motor that moves, or may: somebody is woken for it, and **nobody may shelve it**. Who has taken note of it
+    /// Whether it is about a motor that moves, or may: **nobody may shelve it**. Who has taken note of it
     /// acknowledges it, and it goes on to be shown for as long as the motor may turn.
     #[must_use]
     pub const fn is_of_motion(self) -> bool {
@@ -130,6 +130,12 @@ impl AlarmKind {
             Self::Drive(kind) => kind.wakes(),
             _ => false,
         }
+    }
+
+    /// Whether somebody is woken for it: it is [of motion](Self::is_of_motion), or may stand for alarms that are.
+    #[must_use]
+    pub const fn wakes(self) -> bool {
+        self.is_of_motion() || matches!(self, Self::LineAway | Self::LineSilent)
     }
 
     /// For how long it has to last before it is an alarm.

@@ -4,6 +4,7 @@
 //! already, so that a registry beside it would only have to be cleared of drives and values that are gone. A value that is
 //! not known or too old is absent. No task of a line waits for a scrape.
 
+mod alarms;
 mod dashboard;
 mod drives;
 mod lines;
@@ -83,6 +84,7 @@ impl Metrics {
             }
             lines::collect_commands(&name, &drives, &counts, &mut samples);
         }
+        alarms::collect(&self.plant.alarms(), &mut samples);
         process::collect(&mut samples);
         for source in &self.sources {
             source.collect(&mut samples);

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, fs, path::Path, time::Duration};
 use axum::{Extension, body::Body, http::Request};
 use drive_bus::{Line, LineConfig};
 use drive_families::{Family, SetUp, simulated};
-use drive_fleet::{ConcernKind, DriveSettings, Fleet};
+use drive_fleet::{ConcernKind, DriveSettings, Fleet, alarms::AlarmKind};
 use drive_sim::{SimLine, Wiring};
 use http_body_util::BodyExt as _;
 use tokio::time::sleep;
@@ -346,32 +346,40 @@ async fn three_thousand_drives_are_scraped_and_what_that_costs_is_printed() {
     );
 }
 
-/// The rules of what troubles a drive, as the fleet's table has them.
+/// The rules of the alarms, as the fleet's table has them.
 fn rules_of_the_table() -> String {
     let camel =
         |word: &str| word.split('_').map(|part| part[..1].to_uppercase() + &part[1..]).collect::<String>();
     let mut rules = String::new();
-    for kind in ConcernKind::ALL.iter().filter(|kind| kind.severity().is_trouble()) {
-        let has = format!("drived_drive_concern{{concern=\"{}\"}}", kind.word());
+    for kind in AlarmKind::all() {
+        // One that is shelved, or for which another stands, wakes nobody; one that is acknowledged is so all the same.
+        let has = format!(
+            "max without (state) (drived_alarms{{alarm=\"{}\",state=~\"unacknowledged|acknowledged\"}})",
+            kind.word()
+        );
         let expr = match kind {
-            ConcernKind::Tripped => format!(
+            AlarmKind::Drive(ConcernKind::Tripped) => format!(
                 "|\n          {has} * on (instance, line, drive) group_left (code, mnemonic) drived_drive_fault\n          \
                  or ({has} unless on (instance, line, drive) drived_drive_fault)"
             ),
-            ConcernKind::Lost => format!("{has} and on (instance, line) drived_line_up == 1"),
             _ => has,
         };
         // A line that is busy for a moment wakes nobody.
         let lasts = match kind {
-            ConcernKind::LostRunning => "        for: 10s\n",
-            ConcernKind::Lost => "        for: 30s\n",
-            ConcernKind::Stale => "        for: 1m\n",
+            AlarmKind::Drive(ConcernKind::LostRunning) => "        for: 10s\n",
+            AlarmKind::Drive(ConcernKind::Lost) | AlarmKind::LineAway => "        for: 30s\n",
+            AlarmKind::Drive(ConcernKind::Stale) => "        for: 1m\n",
             _ => "",
+        };
+        let whose = match kind {
+            AlarmKind::Drive(_) => "{{ $labels.drive }}",
+            AlarmKind::LineAway | AlarmKind::LineSilent | AlarmKind::LineFinding => "line {{ $labels.line }}",
+            _ => "{{ $labels.instance }}",
         };
         let severity = if kind.wakes() { "page" } else { "warning" };
         rules += &format!(
             "      - alert: Drived{}\n        expr: {expr}\n{lasts}        labels: {{ severity: {severity} }}\n        \
-             annotations:\n          summary: \"{{{{ $labels.drive }}}}: {}\"\n          description: \"What to do first: {}.\"\n\n",
+             annotations:\n          summary: \"{whose}: {}\"\n          description: \"What to do first: {}.\"\n\n",
             camel(kind.word()),
             kind.words(),
             kind.remedy()
@@ -381,8 +389,28 @@ fn rules_of_the_table() -> String {
 }
 
 #[test]
-fn the_rules_for_a_drive_are_those_of_the_fleets_table() {
+fn the_rules_for_alarms_are_those_of_the_fleets_table() {
     let (_, rest) = ALERTS.split_once("made from the fleet's own table, and kept so by a test.\n\n").unwrap();
-    let (rules, _) = rest.split_once("      # What troubles a line, a broker or the program.\n").unwrap();
+    let (rules, _) =
+        rest.split_once("      # What else troubles a drive, a line, a broker or the program.\n").unwrap();
     assert_eq!(rules, rules_of_the_table());
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_alarm_is_told_by_its_kind_where_it_is_in_its_life() {
+    let plant = TestPlant::of(2).await;
+    plant.machines[0].trip(9);
+    sleep(Duration::from_secs(5)).await;
+    let of = |state: &str| {
+        format!("drived_alarms{{line=\"north\",drive=\"pump 1\",alarm=\"tripped\",state=\"{state}\"}}")
+    };
+    let text = scrape(&plant).await;
+    assert_eq!(series(&text, "drived_alarms").len(), 1, "{text}");
+    assert_eq!(value(&text, &of("unacknowledged")), Some(1.0), "{text}");
+    let id = plant.plant.alarms().alarms[0].alarm.id;
+    let doors = router(&plant, Rights::ALL);
+    assert_eq!(post(&doors, &format!("/api/v1/alarms/{id}/acknowledge"), "{}").await, StatusCode::OK);
+    let text = scrape(&plant).await;
+    assert_eq!((value(&text, &of("unacknowledged")), value(&text, &of("acknowledged"))), (None, Some(1.0)));
+    assert_eq!(value(&text, "drived_alarms_dropped_total"), Some(0.0));
 }

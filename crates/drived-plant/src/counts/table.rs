@@ -103,6 +103,10 @@ metrics! {
         "1 when a stop has not been confirmed for longer than the configuration allows, else 0.";
     DriveConcern: Gauge, "drived_drive_concern", ["line", "drive", "concern"],
         "1 for each thing that troubles the drive, by its word; absent otherwise.";
+    Alarms: Gauge, "drived_alarms", ["line", "drive", "alarm", "state"],
+        "How many alarms of a kind are in a state, by their words; drive is empty for those of a line, line too for those of the program.";
+    AlarmsDropped: Counter, "drived_alarms_dropped_total", [],
+        "Alarms that had returned and were dropped before somebody acknowledged them, because there were too many.";
     DriveWatchdogArmed: Gauge, "drived_drive_watchdog_armed", ["line", "drive"],
         "Whether the drive's communication watchdog is known to be armed: as the configuration says, or as it was found.";
     DriveWatchdogTimeout: Gauge, "drived_drive_watchdog_timeout_seconds", ["line", "drive"],
