@@ -318,7 +318,7 @@ pub struct Watchdog {
 #[non_exhaustive]
 pub enum LineMismatch {
     /// The address.
-    #[error("address {slave}: a {family} has addresses 1 to {highest}")]
+    #[error("address {slave}: {family} has addresses 1 to {highest}")]
     Address {
         /// The family's name.
         family: &'static str,
@@ -328,7 +328,7 @@ pub enum LineMismatch {
         highest: u8,
     },
     /// The speed.
-    #[error("{baud} bit/s: a {family} has {}", speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+    #[error("{baud} bit/s: {family} has {}", speeds.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
     Speed {
         /// The family's name.
         family: &'static str,
@@ -338,7 +338,7 @@ pub enum LineMismatch {
         speeds: &'static [u32],
     },
     /// The character format.
-    #[error("format {format}: a {family} has {}", formats.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+    #[error("format {format}: {family} has {}", formats.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
     Format {
         /// The family's name.
         family: &'static str,

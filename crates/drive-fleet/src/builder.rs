@@ -416,7 +416,7 @@ fn check_watchdog(
     watchdog: Option<WatchdogCapability>,
 ) -> Result<(), String> {
     let Some(watchdog) = watchdog else {
-        return Err(format!("the bus can neither read nor set a communication watchdog of a {name}"));
+        return Err(format!("the bus can neither read nor set a communication watchdog of {name}"));
     };
     let timeout = contract.timeout;
     let in_steps = timeout
@@ -424,14 +424,14 @@ fn check_watchdog(
         .is_some_and(|above| above.as_nanos().checked_rem(watchdog.step.as_nanos()).unwrap_or_default() == 0);
     if timeout > watchdog.max || !in_steps {
         return Err(format!(
-            "a watchdog of {timeout:?}: a {name} has {:?} to {:?} in steps of {:?}",
+            "a watchdog of {timeout:?}: {name} has {:?} to {:?} in steps of {:?}",
             watchdog.min, watchdog.max, watchdog.step
         ));
     }
     if watchdog.settable && !watchdog.reactions.contains(&contract.reaction) {
         let has: Vec<_> = watchdog.reactions.iter().map(ToString::to_string).collect();
         return Err(format!(
-            "the watchdog of a {name} has no {}: it has {}",
+            "the watchdog of {name} has no {}: it has {}",
             contract.reaction,
             has.join(", ")
         ));

@@ -55,10 +55,10 @@ fn a_subcommand_for_one_drive_refuses_several() {
 fn an_impossible_line_is_refused() {
     for (line, reason) in [
         ("/dev/ttyUSB0,0", "0 bit/s is not a serial speed"),
-        ("/dev/ttyUSB0,12345", "atv312@1: 12345 bit/s: a Schneider Altivar 312 has 4800, 9600, 19200"),
+        ("/dev/ttyUSB0,12345", "atv312@1: 12345 bit/s: Schneider Altivar 312 has 4800, 9600, 19200"),
         ("/dev/ttyUSB0,fast", "\"fast\" is not a speed"),
         ("/dev/ttyUSB0,19200,9X9", "\"9X9\" is not a character format"),
-        ("/dev/ttyUSB0,19200,7E1", "atv312@1: format 7E1: a Schneider Altivar 312 has"),
+        ("/dev/ttyUSB0,19200,7E1", "atv312@1: format 7E1: Schneider Altivar 312 has"),
         ("tcp://gateway", "\"gateway\" is not HOST:PORT"),
         ("tcp://gateway:502,19200", "Modbus TCP has no speed"),
         ("http://gateway", "expected PATH"),

@@ -324,7 +324,7 @@ fn an_altivar_58_on_ascii_has_the_watchdog_of_its_card_there_in_plan_check_and_f
         row(file("1s").assert_done(), "watchdog"),
         ["1s, then trip (how the motor stops is not in the manual)"]
     );
-    file("10s").assert_refused(2, "a watchdog of 10s: a Schneider Altivar 58");
+    file("10s").assert_refused(2, "a watchdog of 10s: Schneider Altivar 58");
     let families = run(&["families", "atv58"]);
     assert!(families.assert_done().contains("10s, not settable over the bus; in ASCII 1s"), "{families:?}");
 }
@@ -337,7 +337,7 @@ fn more_stations_than_a_family_allows_on_a_segment_are_refused() {
     };
     plan(&[]).assert_refused(
         2,
-        "19 drives on 1 segment: atv28@1 is a Schneider Altivar 28, which allows 18 stations",
+        "19 drives on 1 segment: atv28@1 is of the family Schneider Altivar 28, which allows 18 stations",
     );
     plan(&["--segments", "2"]).assert_done();
     let wide = run(&["plan", "--line", "/dev/nowhere,19200,8E1", "--drive", "atv312@1-32", "--period", "5s"]);

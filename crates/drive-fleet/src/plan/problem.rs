@@ -56,7 +56,7 @@ impl fmt::Display for PlanProblem {
         match self {
             Self::Stations { drive, family, most, drives, segments } => write!(
                 f,
-                "{drives} drives on {segments} {}: {drive} is a {family}, which allows {most} stations on each; share the \
+                "{drives} drives on {segments} {}: {drive} is of the family {family}, which allows {most} stations on each; share the \
                  drives among lines, or say how many segments the line has behind repeaters",
                 if *segments == 1 { "segment" } else { "segments" },
             ),

@@ -139,7 +139,7 @@ fn more_drives_than_a_family_allows_on_a_segment_are_refused_unless_there_are_re
     let problem = plan(budget(), &every).unwrap_err();
     assert!(
         problem.to_string().starts_with(
-            "19 drives on 1 segment: pump 19 is a Schneider Altivar 28, which allows 18 stations on each"
+            "19 drives on 1 segment: pump 19 is of the family Schneider Altivar 28, which allows 18 stations on each"
         ),
         "{problem}"
     );

@@ -217,7 +217,7 @@ pub(super) fn settings(
     if mode.is_some() {
         let has: Vec<String> = capabilities.stop_modes.iter().map(ToString::to_string).collect();
         let (family, has) = (capabilities.name, has.join(", "));
-        return refuse(mode, format!("a {family} has no {stop_mode} stop: expected one of {has}"));
+        return refuse(mode, format!("{family} has no {stop_mode} stop: expected one of {has}"));
     }
     if let (OnExit::Leave, Some(contract)) = (settings.on_exit, settings.watchdog) {
         let problem = format!(

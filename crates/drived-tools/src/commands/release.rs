@@ -28,7 +28,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let capabilities = name.family.capabilities();
     if !capabilities.release {
         return Err(Failure::Input(format!(
-            "{name}: the bus of a {} cannot give control back: take it at the drive",
+            "{name}: the bus of {} cannot give control back: take it at the drive",
             capabilities.name
         )));
     }

@@ -39,7 +39,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     if matches!(setpoint, Setpoint::Speed(_)) && !name.family.capabilities().speed_setpoint {
         let family = name.family.capabilities().name;
         return Err(Failure::Input(format!(
-            "{name}: a {family} takes no speed in rpm: give a frequency, such as 47.5Hz"
+            "{name}: {family} takes no speed in rpm: give a frequency, such as 47.5Hz"
         )));
     }
     let order = Order::Setpoint { setpoint, until: Until::InForce };

@@ -111,7 +111,7 @@ fn saving(name: DriveName, instead: &str) -> Result<&'static str, Failure> {
     let capabilities = name.family.capabilities();
     capabilities.persist.ok_or_else(|| {
         let family = capabilities.name;
-        Failure::Input(format!("{name}: a {family} has no command that saves its parameters: {instead}"))
+        Failure::Input(format!("{name}: {family} has no command that saves its parameters: {instead}"))
     })
 }
 

@@ -29,7 +29,7 @@ pub(super) fn list(family: Family) -> Table {
 /// The register that a person names, by mnemonic or address.
 pub(super) fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
     Row::find(family.capabilities().rows, text).ok_or_else(|| {
-        Failure::Input(format!("a {family} has no register {text:?}: see drived param list {family}"))
+        Failure::Input(format!("{family} has no register {text:?}: see drived param list {family}"))
     })
 }
 
