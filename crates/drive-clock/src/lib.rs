@@ -10,6 +10,22 @@
 //! A processor that has nothing to do falls asleep and needs 30 to 100 µs to wake up. Where it is known when something
 //! happens, somebody can be awake: [`Timer`] is aimed before its deadline and spins for what is left, and [`Watch`] says
 //! when an answer is worth being awake for. In a process with more than eight precise timers neither happens.
+//!
+//! ```
+//! use drive_clock::Timer;
+//! use std::time::Duration;
+//! use tokio::time::Instant;
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() {
+//! // The silence of 3.5 characters at 19200 bit/s: 11 bits each.
+//! let silence = Duration::from_micros(2_006);
+//! let mut timer = Timer::precise();
+//! let over = Instant::now() + silence;
+//! timer.until(over).await;
+//! assert!(Instant::now() >= over, "late it may be, early never");
+//! # }
+//! ```
 
 #![forbid(unsafe_code)]
 
