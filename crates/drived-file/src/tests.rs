@@ -96,16 +96,16 @@ fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
 fn parsed(text: &str) -> Result<Config, ConfigError> {
     static FACES: Once = Once::new();
     FACES.call_once(|| {
-        [drived_gateway::FACE, drived_broker::FACE].map(drived_face::add).into_iter().for_each(Result::unwrap)
+        [drived_gateway::FACE, drived_broker::FACE]
+            .map(drived_face::add)
+            .into_iter()
+            .for_each(Result::unwrap);
     });
     Config::read(Path::new("drives.toml"), text)
 }
 
 /// What it says of a face.
-fn face<T: Configured>(config: &Config, table: &str) -> Option<T>
-where
-    T: Clone,
-{
+fn face<T: Configured + Clone>(config: &Config, table: &str) -> Option<T> {
     config.face(table).map(|face| (face as &dyn Any).downcast_ref::<T>().expect("it is of the face").clone())
 }
 

@@ -178,8 +178,8 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         // Numbers, times and texts are the person's own.
         (
             _,
-            "ADDRESS" | "ADDRESSES" | "HEAD" | "MNEMONIC" | "N" | "NUMBER" | "SECONDS" | "SETPOINT" | "TEXT"
-            | "TIME" | "WORD",
+            "ADDRESS" | "ADDRESSES" | "HEAD" | "MINUTES" | "MNEMONIC" | "N" | "NUMBER" | "SECONDS"
+            | "SETPOINT" | "TEXT" | "TIME" | "WORD",
         ) => Offers::default(),
         _ => Offers::default(),
     }
