@@ -10,8 +10,8 @@ use std::{
 fn look_ups(source: &str) -> Vec<&str> {
     let code = source.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
     let is_look_up = |line: &&str| {
-        let called = [".get(\"", ".get_mut(\"", ".pointer(\"", ".pointer_mut(\"", "[key]", ".get(key)"];
-        let indexed = line.match_indices("[\"").any(|(at, _)| {
+        let called = [".get(\"", ".get_mut(\"", ".pointer(\"", ".pointer_mut(\"", ".get(key)"];
+        let indexed = ["[\"", "[key]"].iter().flat_map(|opened| line.match_indices(opened)).any(|(at, _)| {
             let of_something =
                 line[..at].ends_with(|last: char| last.is_alphanumeric() || "_)]".contains(last));
             let behind = line[at..].split_once(']').map_or("", |(_, behind)| behind);
@@ -34,7 +34,9 @@ fn no_tool_looks_anything_up_by_its_key_but_reads_it_as_what_it_is() {
     }
     assert_eq!(look_ups("let age = drive[\"status\"][\"age_ms\"].as_u64();").len(), 1);
     assert_eq!(look_ups("told.get(\"reason\")").len(), 1);
+    assert_eq!(look_ups("let age = drive[key].as_u64();").len(), 1);
     assert!(look_ups("body[\"setpoint\"] = json!(setpoint);\ndaemon.read(&[\"state\"])").is_empty());
+    assert!(look_ups("object[key] = meaning;").is_empty());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("crates");
     let mut found =
         vec![folder.join("drived-words/src/values.rs"), folder.join("drived-doors/src/audit/show.rs")];

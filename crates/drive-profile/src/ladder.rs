@@ -5,8 +5,8 @@ use std::fmt;
 use toml::Spanned;
 
 use crate::{
-    check::{grade, line},
     format::{Action, Answer, File, Proves, Register, Space, StateName, Storage},
+    source::{grade, line},
 };
 
 /// Registers of commands that several makers have, each with words of its own: what stops one maker's drive runs another's.

@@ -28,6 +28,7 @@ mod ladder;
 pub mod machine;
 mod profile;
 pub mod shipped;
+mod source;
 
 pub use check::{LONGEST, Refusal, Refusals, read};
 pub use drive::{Owner, ProfileDrive};

@@ -12,9 +12,10 @@ use std::{fmt, ops::Range};
 use toml::Spanned;
 
 use crate::{
-    format::{File, Mark, Register, VERSION},
+    format::{File, Register, VERSION},
     ladder,
     profile::Profile,
+    source::{line, names},
 };
 
 /// The longest text that is read, in bytes: ten times the longest profile that is shipped.
@@ -90,12 +91,6 @@ pub fn read(text: &str) -> Result<Profile, Refusals> {
     refusals.dedup();
     refusals.truncate(TOLD);
     Err(Refusals(refusals))
-}
-
-/// The line in which a place of a text stands, from 1.
-pub(crate) fn line(text: &str, span: &Range<usize>) -> usize {
-    let before = text.get(..span.start.min(text.len())).unwrap_or(text);
-    before.bytes().filter(|byte| *byte == b'\n').count() + 1
 }
 
 /// A file under check.
@@ -262,16 +257,4 @@ impl<'a> Check<'a> {
         }
         found
     }
-}
-
-/// The names in a text of sources.
-pub(crate) fn names(source: &str) -> impl Iterator<Item = &str> {
-    source.split_whitespace()
-}
-
-/// The grade of a fact: that of the weakest source that it names.
-pub(crate) fn grade(file: &File, source: &Spanned<String>) -> Mark {
-    let marks =
-        names(source.get_ref()).map(|name| file.sources.get(name).map_or(Mark::W, |of| of.get_ref().mark));
-    marks.max().unwrap_or(Mark::W)
 }

@@ -1,7 +1,7 @@
 //! The text as such: its length, its form, its keys, and that no question is left out.
 
-use super::{LONGEST, Refusal, line};
-use crate::format::File;
+use super::{LONGEST, Refusal};
+use crate::{format::File, source::line};
 
 /// How deep tables may stand in each other.
 const DEEPEST: usize = 16;

@@ -133,7 +133,7 @@ impl Profile {
     }
 
     fn row(&self, name: &str, register: &Register, address: u16) -> Row {
-        let sound = crate::check::grade(&self.file, &register.source) == format::Mark::P;
+        let sound = crate::source::grade(&self.file, &register.source) == format::Mark::P;
         Row {
             address,
             code: interned::text(name),
@@ -168,7 +168,7 @@ impl Profile {
     /// The documents that a register names.
     fn cited(&self, register: &Register) -> String {
         let cited =
-            crate::check::names(register.source.get_ref()).filter_map(|name| self.file.sources.get(name));
+            crate::source::names(register.source.get_ref()).filter_map(|name| self.file.sources.get(name));
         let cited = cited.map(|source| format!("{}, {}", source.get_ref().document, source.get_ref().page));
         cited.collect::<Vec<_>>().join("; ")
     }

@@ -1,0 +1,25 @@
+//! Where a fact stands in its file, and what its sources are worth.
+
+use std::ops::Range;
+
+use toml::Spanned;
+
+use crate::format::{File, Mark};
+
+/// The line in which a place of a text stands, from 1.
+pub(crate) fn line(text: &str, span: &Range<usize>) -> usize {
+    let before = text.get(..span.start.min(text.len())).unwrap_or(text);
+    before.bytes().filter(|byte| *byte == b'\n').count() + 1
+}
+
+/// The names in a text of sources.
+pub(crate) fn names(source: &str) -> impl Iterator<Item = &str> {
+    source.split_whitespace()
+}
+
+/// The grade of a fact: that of the weakest source that it names.
+pub(crate) fn grade(file: &File, source: &Spanned<String>) -> Mark {
+    let marks =
+        names(source.get_ref()).map(|name| file.sources.get(name).map_or(Mark::W, |of| of.get_ref().mark));
+    marks.max().unwrap_or(Mark::W)
+}
