@@ -17,7 +17,7 @@ use crate::{
     broker::{Arrived, Kept, Message, Qos},
     desk::{self, Answer, Answers, Desk, Refusal},
 };
-use drived_config::names::Kind;
+use drived_config::{kept::sha256, names::Kind};
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::{
     follow::SETTLES_FOR,
@@ -167,10 +167,9 @@ fn setpoint(read: serde_json::Result<Setpoint>, unit: &str) -> Result<Action, St
 
 /// Correlation Data as an id.
 fn id_of(correlation: &[u8]) -> String {
-    use sha2::{Digest as _, Sha256};
     match std::str::from_utf8(correlation) {
         Ok(text) if is_id(text) => text.to_owned(),
-        _ => Sha256::digest(correlation).iter().take(16).map(|byte| format!("{byte:02x}")).collect(),
+        _ => sha256(correlation)[..32].to_owned(),
     }
 }
 

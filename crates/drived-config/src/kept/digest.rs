@@ -1,10 +1,10 @@
 //! What a file or a secret is known by: its SHA-256.
 
-use sha2::{Digest as _, Sha256};
+use ring::digest::{SHA256, digest};
 
 /// The SHA-256 of something, in hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
-    digits(&Sha256::digest(bytes))
+    digits(digest(&SHA256, bytes).as_ref())
 }
 
 /// In hexadecimal digits.

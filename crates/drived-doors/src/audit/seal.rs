@@ -2,22 +2,20 @@
 
 use std::io;
 
-use sha2::{Digest as _, Sha256};
+use ring::hmac;
 use subtle::ConstantTimeEq as _;
 
 use drived_config::kept::{Kept, Readers, digits};
 
 /// What stands behind the name of the log in that of the file of its key.
 const KEY: &str = ".key";
-/// What SHA-256 takes at once.
-const BLOCK: usize = 64;
 /// How a seal stands at the end of a line.
 const BEFORE: &str = ",\"seal\":\"";
 const BEHIND: &str = "\"}";
 
 /// The key of a log.
 #[derive(Clone)]
-pub(super) struct Key([u8; BLOCK]);
+pub(super) struct Key(hmac::Key);
 
 impl Key {
     /// The key of a log, if it has one.
@@ -46,22 +44,11 @@ impl Key {
     }
 
     fn from_text(text: &[u8]) -> Self {
-        let mut key = [0; BLOCK];
-        let hash;
-        let text = if text.len() > BLOCK {
-            hash = Sha256::digest(text);
-            &hash[..]
-        } else {
-            text
-        };
-        key.iter_mut().zip(text).for_each(|(byte, of_text)| *byte = *of_text);
-        Self(key)
+        Self(hmac::Key::new(hmac::HMAC_SHA256, text))
     }
 
     fn hmac(&self, text: &[u8]) -> String {
-        let with = |pad: u8| self.0.map(|byte| byte ^ pad);
-        let inner = Sha256::new().chain_update(with(0x36)).chain_update(text).finalize();
-        digits(&Sha256::new().chain_update(with(0x5C)).chain_update(inner).finalize())
+        digits(hmac::sign(&self.0, text).as_ref())
     }
 
     /// A line with its seal, of an object in JSON.

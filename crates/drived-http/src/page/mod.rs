@@ -26,9 +26,10 @@ use axum::{
 };
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::GzEncoder};
-use sha2::{Digest, Sha256};
+use ring::digest::{SHA256, digest};
 
 use self::files::{File, STOP_SCRIPT, STOP_STYLE, files};
+use drived_config::kept::sha256;
 
 /// The routes of the page: `/` and each of its files.
 ///
@@ -67,9 +68,8 @@ struct Served {
 
 impl Served {
     fn of(file: &File) -> Self {
-        let hash = Sha256::digest(&file.content);
-        let tag: String = hash.iter().take(16).map(|byte| format!("{byte:02x}")).collect();
-        let tag = HeaderValue::try_from(format!("W/\"{tag}\"")).expect("hexadecimal digits are a header");
+        let tag = HeaderValue::try_from(format!("W/\"{}\"", &sha256(&file.content)[..32]))
+            .expect("hexadecimal digits are a header");
         Self {
             content: file.content.clone().into(),
             smaller: compressed(&file.content),
@@ -109,7 +109,7 @@ impl Served {
 
 /// What the document may do: the path of a stop stands in it and is allowed by its hash, and nothing else in line is.
 fn policy() -> HeaderValue {
-    let hash = |text: &str| STANDARD.encode(Sha256::digest(text));
+    let hash = |text: &str| STANDARD.encode(digest(&SHA256, text.as_bytes()));
     let policy = format!(
         "default-src 'self'; script-src 'self' 'sha256-{}'; style-src 'self' 'sha256-{}'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
         hash(STOP_SCRIPT),
