@@ -207,6 +207,7 @@ impl Shaft {
         let was_lost = std::mem::take(&mut self.was_lost);
         let descent = std::mem::take(&mut self.descent);
         let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
+        // A trip cuts the output, also of a motor that nobody saw turning before.
         if shown == Output::Tripped {
             self.stops();
         }

@@ -187,6 +187,7 @@ impl OwnRun {
             self.end();
             return None;
         }
+        // A lost answer leaves open whether the word arrived; that it stands settles it.
         self.arrived |= evidence.word == RunWord::Stands;
         let gone = match evidence.word {
             RunWord::Stands | RunWord::NotTold => None,
@@ -195,6 +196,7 @@ impl OwnRun {
             RunWord::Another => Some(ANOTHER),
         };
         if let Some(because) = gone {
+            // What was never seen to arrive may still come: its lease is kept, so that it is withdrawn then.
             if self.arrived {
                 self.end();
             }

@@ -44,6 +44,7 @@ impl Turns {
 
     /// The thing whose turn had come was not read: it comes again with the next status.
     pub const fn again(&mut self) {
+        // One status before the turn: it comes with the next.
         self.statuses = self.every.saturating_sub(1);
         self.next = self.next.saturating_sub(1);
     }

@@ -192,6 +192,7 @@ pub(crate) fn end(
         let actions = match tokio::time::timeout(limit, all_done()).await {
             Ok(actions) => actions,
             Err(_) => {
+                // Each still says how far it has come.
                 tell(&entries, || Urgent::ExitTimeOver);
                 all_done().await
             }

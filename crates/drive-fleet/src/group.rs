@@ -267,6 +267,7 @@ impl Group {
             return Err(GroupFailure::NotReady(unready));
         }
         let together = spacing.is_zero();
+        // Before the first start, so that a setpoint that one of them refuses starts nobody.
         if let Some(setpoint) = setpoint.filter(|_| together) {
             let order = Order::Setpoint { setpoint, until: Until::InForce };
             self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
@@ -328,6 +329,8 @@ impl Group {
     /// their share since the last.
     async fn on_line<T>(&self, member: &DriveHandle, command: impl AsyncFnOnce() -> T) -> T {
         let line = &member.entry.line;
+        // Held while the command runs: the next waits here and not on the line, where it would expire behind its
+        // siblings.
         let mut free_at = line.commands.lock().await;
         sleep_until(*free_at).await;
         let begun = Instant::now();

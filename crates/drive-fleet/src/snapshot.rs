@@ -371,6 +371,7 @@ impl Snapshot {
 /// Whether a status shows that the output has reached a setpoint; without a setpoint, whether the drive says so itself.
 #[must_use]
 pub fn has_reached(setpoint: Option<Setpoint>, status: &Status) -> bool {
+    // An output that is cut or comes down may pass the setpoint, and is at none.
     if status.motion != Motion::Driven || status.at_reference == Some(false) {
         return false;
     }
