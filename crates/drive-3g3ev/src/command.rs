@@ -31,10 +31,13 @@ impl<P: Port> Drive3g3ev<P> {
             let cut = withheld(&status).filter(|_| is_run(&status));
             return Err(self.refused(order, cut.unwrap_or(Refusal::State(State::NotReady))));
         }
+        // The inputs of n06 to n08 stand in the same word, and are left as they are.
         if self.command.is_none() {
             self.read_command(Class::Command).await?;
         }
         let word = Command::run(direction) | self.inputs();
+        // The lease is there before the word is on its way: a call that is dropped here leaves somebody who withdraws
+        // it.
         self.watch.run.give(Lease::new(direction, word.bits()));
         let sent = self.write_command(word).await;
         self.registers.owe_judgement();

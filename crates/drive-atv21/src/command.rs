@@ -54,6 +54,8 @@ impl<P: Port> Atv21<P> {
         let (status, held) = self.check_start(command).await?;
         let word = self.run_word(direction, held);
         self.take_command(command, status, held, word).await?;
+        // The lease is there before the word is on its way: a call that is dropped here leaves somebody who withdraws
+        // it.
         self.watch.run.give(Lease::new(direction, word.bits()));
         self.watch.run.sends(word.bits());
         let both = block.and_then(|(slots, reference)| command_and_reference(slots, word.bits(), reference));
@@ -143,6 +145,7 @@ impl<P: Port> Atv21<P> {
             }
         };
         if taken {
+            // What acts once has acted: written again it would trip or reset the drive once more.
             let before = CommandWord::from_bits_truncate(held.bits()) - CommandWord::EDGES;
             self.write_command_word(before).await?;
         }
@@ -281,6 +284,7 @@ impl<P: Port> Atv21<P> {
             }
             let comes_down = output == Some(Frequency::ZERO) || is_falling(first, output);
             if because.is_none() && (!runs || comes_down) {
+                // FD01 may show "run" for as long as the motor comes down, and the order is gone.
                 if status.state == State::Running {
                     status.state = State::Stopping;
                 }

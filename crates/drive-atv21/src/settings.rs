@@ -174,6 +174,7 @@ impl<P: Port> Atv21<P> {
         };
         let seconds = if reaction == Reaction::Ignore { 0 } else { self.watchdog_seconds(timeout)? };
         if let Some(word) = reaction_word {
+            // Before the time, so that it never runs with the reaction of before.
             self.change_parameter(map::TIME_OUT_REACTION.row(), word, Command::ArmWatchdog).await?;
         }
         self.change_parameter(map::TIME_OUT.row(), seconds, Command::ArmWatchdog).await?;

@@ -107,6 +107,7 @@ impl<P: Port> Atv312<P> {
             }
         };
         if may_have_changed {
+            // One may change others as well, as LAC (p. 35) and tCC (p. 33) do: all are read again.
             self.known = Known::default();
             self.proof.holds_if(|_| false);
             self.proof.doubt_limits();
@@ -131,6 +132,7 @@ impl<P: Port> Atv312<P> {
         let edge = self.registers.at(Class::Background).edge().write(CMI, save).await;
         match &edge {
             Err(error) if error.kind() != ErrorKind::OutcomeUnknown => return edge.map(|()| self.saves),
+            // Also where the answer was lost: the EEPROM may have been written.
             _ => self.saves = self.saves.saturating_add(1),
         }
         let mut seen = edge.is_ok();
@@ -228,9 +230,12 @@ impl<P: Port> Atv312<P> {
         if current == wanted {
             return Ok(current);
         }
+        // ttO and SLL are written only with the motor stopped (p. 11).
         self.check_standing(Command::ArmWatchdog).await?;
         self.change(TTO, tto).await?;
         self.change(SLL, sll).await?;
+        // The last of the three: from here on the drive watches its line, with the time and the reaction that are
+        // wanted.
         let cmi = self.held_cmi().await?;
         if cmi.contains(ExtendedControl::NO_TIMEOUT) {
             let watched = (cmi - ExtendedControl::NO_TIMEOUT).bits();

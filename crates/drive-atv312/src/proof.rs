@@ -135,6 +135,8 @@ impl<P: Port> Atv312<P> {
         let turns = words.state_words().is_turning()
             && !words.state_words().eti.contains(ExtendedStatus::DECELERATING);
         // Slip is compensated by a few percent of the nominal frequency.
+        // With the other resolution the same word is 5.5 times as much, or as little: a quarter and 5 Hz lie between
+        // the two.
         let too_fast = output > high + high / 4 + 500;
         let too_slow = turns && reached && asked > output + output / 4 + 500;
         !(too_fast || too_slow)

@@ -29,6 +29,15 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const JUDGED_WITHIN: Duration = CONFIRMED_WITHIN.saturating_mul(2);
 
 /// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
+///
+/// ```
+/// use std::time::Duration;
+/// use drive_core::{Class, Lifetimes};
+///
+/// let lifetimes = Lifetimes { status: Some(Duration::from_millis(500)), ..Lifetimes::default() };
+/// assert_eq!(lifetimes.of(Class::Command), Some(Duration::from_secs(1)), "never carried out late");
+/// assert_eq!(lifetimes.of(Class::Stop), None, "a stop does not expire");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lifetimes {
     /// Stops. They do not expire by default.
@@ -99,6 +108,7 @@ impl<P: Port> Registers<P> {
         meaning: fn(function: u8, code: u8) -> ExceptionMeaning,
     ) -> Self {
         let elsewhere = port.made_for().filter(|made_for| *made_for != slave);
+        // A port that was made for another slave keeps it, so that nothing goes to a drive that is not meant.
         if elsewhere.is_none() {
             port.set_slave(Slave(slave.number()));
         }
@@ -274,6 +284,7 @@ impl<P: Port> Calls<'_, P> {
         let Response::ReadHoldingRegisters(words) = response else {
             return Err(self.answer(exchange, "the answer is of another function"));
         };
+        // tokio-modbus's own clients check neither this nor what a confirmation names in a release build.
         if words.len() != usize::from(count) {
             return Err(self.answer(exchange, "the answer holds another number of words"));
         }
@@ -384,6 +395,7 @@ impl<P: Port> Calls<'_, P> {
     /// [`Error::NotConfirmed`] when it reads back otherwise; the status of that error holds the word and nothing else.
     pub async fn change_row(&mut self, row: &Row, word: u16) -> Result<Written> {
         self.check_row(row, word)?;
+        // To write what stands there wears the EEPROM for nothing (rule 10).
         if row.access.is_readable() && self.read_row(row).await? == word {
             return Ok(Written { changed: false, storage: row.storage });
         }
@@ -424,6 +436,7 @@ impl<P: Port> Calls<'_, P> {
 
     /// Asks what the device is, by function 43/14 from object 00 on.
     pub async fn identification(&mut self, code: ReadCode) -> Result<Identity> {
+        // Some gateways do not pass function 43 on and take their whole wait to say so: what was told once is kept.
         let exchange = Exchange { function: 0x2B, register: None };
         let is_kept = self.terms.class == Class::Background;
         if is_kept && let Some((told, at)) = self.registers.kept.named(Instant::now()) {
@@ -478,6 +491,7 @@ impl<P: Port> Calls<'_, P> {
             if !busy || terms.effect == Effect::Edge || !asking.again().await {
                 return outcome;
             }
+            // The lifetime counts from the first try, or a busy drive would make a command late (rule 2).
             terms.lifetime = terms.lifetime.map(|_| until.saturating_duration_since(Instant::now()));
         }
     }

@@ -12,7 +12,8 @@ use tokio_modbus::{
 
 use crate::port::{Class, Port, PortError, Terms};
 
-/// How long an answer that nobody waits for any more may still come, at the least.
+/// How long an answer that nobody waits for any more may still come, at the least: one and a half times the response timeout
+/// that most masters have, as the late window of a line (drive-bus).
 const LATE: Duration = Duration::from_millis(750);
 
 /// How long a connection may take, at the least.
@@ -73,6 +74,7 @@ where
         let is_write = is_write(&request);
         let mut doubtful = false;
         if let Some(until) = self.owed_until {
+            // With the connection goes whatever may still come over it.
             self.context = None;
             doubtful = is_write && self.terms.class == Class::Stop && until > asked;
             if !doubtful {
@@ -83,11 +85,13 @@ where
             Some(context) => context,
             none => none.insert(connected(&mut self.connect, self.response_timeout).await?),
         };
+        // The wait and the connection may have taken longer than a command may wait (rule 2).
         if self.terms.lifetime.is_some_and(|lifetime| asked.elapsed() > lifetime) {
             return Err(PortError::Expired);
         }
         context.set_slave(self.slave);
         let sent = Instant::now();
+        // Before the call, and taken back by its answer: a call that is dropped in between leaves it owed.
         self.owed_until = Some(sent + LATE.max(self.response_timeout * 3 / 2));
         let problem = match timeout(self.response_timeout, context.call(request)).await {
             Ok(Ok(_)) if doubtful => PortError::Mismatch("an earlier answer may have come".to_owned()),

@@ -5,6 +5,15 @@
 pub const STATUSES_PER_TURN: u16 = 20;
 
 /// Whose turn it is. Each of `n` things is read within `n` times so many statuses as there are from turn to turn.
+///
+/// ```
+/// use drive_core::Turns;
+///
+/// // Two things, one of them behind every third status.
+/// let mut turns = Turns::every(3);
+/// let read: Vec<_> = (0..6).map(|_| turns.pass(2)).collect();
+/// assert_eq!(read, [None, None, Some(0), None, None, Some(1)]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turns {
     every: u16,
@@ -44,6 +53,7 @@ impl Turns {
 
     /// The thing whose turn had come was not read: it comes again with the next status.
     pub const fn again(&mut self) {
+        // One status before the turn: it comes with the next.
         self.statuses = self.every.saturating_sub(1);
         self.next = self.next.saturating_sub(1);
     }

@@ -167,6 +167,8 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                 given |= run;
                 let step = if run { word } else { step };
                 if run {
+                    // The lease is there before the word is on its way: a call that is dropped here leaves somebody
+                    // who withdraws it.
                     let word = drive.as_written(word);
                     drive.own_run().give(Lease::new(direction, word));
                 }
@@ -285,6 +287,7 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
         }
         let defies = drive.defies_stop(&status);
         if defies.is_some() || !confirming.again().await {
+            // What the last write ended in says more than that nothing shows.
             written?;
             let somebody = status.control.filter(|&control| control != Control::Bus);
             let because = defies.or(somebody.map(Refusal::NotInControl));

@@ -255,6 +255,7 @@ impl FleetBuilder {
             return Err(FleetError::AddressTaken { drive: drive(), line: line_name.to_owned(), slave });
         }
         let opened = open(wire.line.slave(address), slave);
+        // A drive that was made for another address would be commanded where nobody looks for it.
         let made_for = opened.slave();
         if made_for != slave {
             return Err(FleetError::OtherAddress { drive: drive(), slave, made_for });
@@ -301,6 +302,7 @@ impl FleetBuilder {
         let mut all = Members { lines, entries: standing.entries.clone() };
         for member in added {
             if let Some(line) = all.lines.get(member.line) {
+                // Before its task asks anything.
                 member.keep_pause(&line.line);
                 all.entries.push(spawn(member, events, Arc::clone(line)));
             }

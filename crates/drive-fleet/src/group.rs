@@ -119,6 +119,45 @@ impl fmt::Display for GroupFailure {
 impl std::error::Error for GroupFailure {}
 
 /// Several drives of a fleet, commanded together: as of each drive, a command is given when its method returns. A drive that has left the fleet since refuses every command.
+///
+/// ```
+/// use drive_atv312::Atv312;
+/// use drive_core::{Direction, Frequency, StopMode};
+/// use drive_fleet::{DriveSettings, Fleet, GroupStart, Until};
+/// use std::time::Duration;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # for address in 1..=2 {
+/// #     plant.add(address, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # }
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// let pump = |name| DriveSettings::controlled(name);
+/// let fleet = Fleet::builder()
+///     .line("north", line)
+///     .drive("north", 1, pump("pump 1"), |port, slave| Box::new(Atv312::new(port, slave)))
+///     .drive("north", 2, pump("pump 2"), |port, slave| Box::new(Atv312::new(port, slave)))
+///     .start()?;
+/// # for drive in fleet.drives() {
+/// #     drive.ready(Duration::from_secs(10)).await?;
+/// # }
+/// let pumps = fleet.group(["pump 1", "pump 2"])?;
+/// let start = GroupStart {
+///     direction: Direction::Forward,
+///     setpoint: Some(Frequency::from_hertz(20).into()),
+///     spacing: Duration::from_secs(2),
+///     until: Until::InForce,
+/// };
+/// // All of them, or none.
+/// for (drive, outcome) in pumps.start(start).await? {
+///     println!("{drive}: {outcome}");
+/// }
+/// assert!(pumps.stop(StopMode::Ramp).await.is_confirmed());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Group {
     fleet: Fleet,
@@ -267,6 +306,7 @@ impl Group {
             return Err(GroupFailure::NotReady(unready));
         }
         let together = spacing.is_zero();
+        // Before the first start, so that a setpoint that one of them refuses starts nobody.
         if let Some(setpoint) = setpoint.filter(|_| together) {
             let order = Order::Setpoint { setpoint, until: Until::InForce };
             self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
@@ -328,6 +368,8 @@ impl Group {
     /// their share since the last.
     async fn on_line<T>(&self, member: &DriveHandle, command: impl AsyncFnOnce() -> T) -> T {
         let line = &member.entry.line;
+        // Held while the command runs: the next waits here and not on the line, where it would expire behind its
+        // siblings.
         let mut free_at = line.commands.lock().await;
         sleep_until(*free_at).await;
         let begun = Instant::now();

@@ -56,6 +56,7 @@ impl Fleet {
         let members = self.members();
         let entry = members.entries.iter().find(|entry| *entry.name == *settings.name);
         let Some(entry) = entry else { return Err(FleetError::NoSuchDrive(settings.name)) };
+        // What is only read is stopped by nobody: a motor that was started here would be left to itself.
         let released = (entry.settings().control && !settings.control).then(|| SettingProblem {
             setting: "control",
             reason: "a drive under control is removed, by its policy, before it is only read".to_owned(),
@@ -90,6 +91,7 @@ impl Fleet {
         let (ended, fleet) = (end(leaving.clone(), Policy::Removal, limit), self.clone());
         async move {
             let actions = ended.await;
+            // Not before: nobody waits for a policy with the lock in hand.
             let _changing = fleet.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
             let mut members = Members::clone(&fleet.members());
             members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));

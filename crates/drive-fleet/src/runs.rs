@@ -10,7 +10,8 @@ use tokio::{
 
 use crate::settings::RunRecord;
 
-/// How long a start waits at the most until its record is kept: a disk that hangs holds up no pump for ever.
+/// How long a start waits at the most until its record is kept: a disk that hangs holds up no pump for ever. Less than half of
+/// the second that a command may wait, and that goes on meanwhile.
 const KEPT_WITHIN: Duration = Duration::from_millis(400);
 
 /// What is to be kept of a drive's run command from now on, in the order in which it is told. **A start waits until its record is

@@ -60,6 +60,7 @@ impl Task {
             // Also what a call that was dropped has left.
             let lease = drive.lease();
             desk.supervisor.handle_lease(lease);
+            // The record of an earlier run stays kept until the drive has said whether it is ours.
             if lease.is_some() || !desk.supervisor.is_adopting() {
                 keeper.follow(lease, || desk.supervisor.says_what_it_is());
             }
@@ -303,6 +304,7 @@ async fn carry_out(
     {
         let began = Instant::now();
         keeper.before(RunRecord { identity, lease: Lease::new(direction, word) }).await;
+        // The disk's time is the order's: a start is not sent late for it (rule 2).
         lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
     }
     let reply = call(drive, job, lifetime).await;

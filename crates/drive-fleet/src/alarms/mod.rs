@@ -48,6 +48,34 @@ pub const LONGEST_SHELF: Duration = Duration::from_secs(24 * 3_600);
 const GONE_AFTER: u64 = 10_000;
 
 /// All alarms of a plant.
+///
+/// ```
+/// use drive_fleet::{
+///     ConcernKind,
+///     alarms::{AlarmKind, Alarms, Condition, Look},
+/// };
+///
+/// let kind = AlarmKind::Drive(ConcernKind::Tripped);
+/// let look = |there: &[AlarmKind]| Look {
+///     drive: Some("pump 1".to_owned()),
+///     line: Some("north".to_owned()),
+///     there: there
+///         .iter()
+///         .map(|kind| Condition { kind: *kind, mark: None, since_unix_ms: None, detail: None, remedy: None })
+///         .collect(),
+///     seen: vec![kind],
+/// };
+/// let mut alarms = Alarms::default();
+/// alarms.look(&[look(&[kind])], 1_000);
+/// let id = alarms.all()[0].id;
+///
+/// // It is over when it is so no more, and somebody has taken note of it: in either order.
+/// alarms.acknowledge(id, "Anna", Some("belt changed"), 2_000)?;
+/// assert!(alarms.all()[0].is_active());
+/// alarms.look(&[look(&[])], 3_000);
+/// assert!(alarms.all().is_empty());
+/// # Ok::<(), drive_fleet::alarms::AlarmRefused>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Alarms {

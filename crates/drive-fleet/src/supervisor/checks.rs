@@ -352,6 +352,7 @@ impl Checks {
     ) -> Option<EventKind> {
         let found = match result {
             Ok((identity, Recognised::NotMine { it_is })) => {
+                // What was found was another drive's: nothing of it is put back here.
                 (self.found, self.written, self.inherited) = (None, false, None);
                 let found = Arc::new(identity);
                 let it_is = Cow::Borrowed(it_is);

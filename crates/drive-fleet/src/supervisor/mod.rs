@@ -259,6 +259,7 @@ impl Supervisor {
 
     /// What to do now. A job that it gives is in flight until its reply or [`handle_dropped`](Self::handle_dropped).
     pub(crate) fn next(&mut self, now: Instant) -> Step {
+        // What the time has ended ends before anything is chosen: nothing that has expired is sent.
         self.handle_time(now);
         if let Exit::Done(_) = self.exit {
             return Step::Finished;
@@ -286,6 +287,7 @@ impl Supervisor {
         if let Some(job) = self.stop_job(now) {
             return Some((job, None));
         }
+        // A run command that is not in force may act at any moment (rule 5): before every order.
         if let Some(job) = self.withdraw_job(now).or_else(|| self.restore_job()) {
             return Some((job, None));
         }
@@ -299,6 +301,7 @@ impl Supervisor {
         if let Some(order) = self.order_job(now) {
             return Some(order);
         }
+        // Behind the orders, whose own frames feed the drive as well.
         if hungry {
             return Some((Job::KeepAlive, None));
         }
@@ -395,6 +398,7 @@ impl Supervisor {
         if let Some(error) = reply.error() {
             self.last_error = Some(error.clone());
             self.counters.failures += 1;
+            // The line has asked it often enough: nobody waits until its status is too old.
             if is_gone(error) && self.link == Link::Connected {
                 self.lose(now);
             }

@@ -93,6 +93,7 @@ impl Supervisor {
                 (Some(code), Some(shown)) => code == shown,
                 // Its explanation will tell.
                 (Some(_), None) => false,
+                // The manual of an Altivar 58 names no code for it: how long it was not spoken to is all there is.
                 (None, _) => unheard.is_some(),
             };
             let watchdog_after = unheard.filter(|_| by_watchdog || status.value.fault_code.is_none());

@@ -122,6 +122,7 @@ impl Supervisor {
                 false
             }
             Phase::Sending(Job::SetSetpoint(_)) => {
+                // It may stand in the drive or not: a later start must not count on it.
                 self.given = None;
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
                 true

@@ -60,6 +60,7 @@ impl Pace {
 
     /// The status that was due has ended; whether before the next tick.
     pub(crate) fn status_ended(&mut self, now: Instant, busy: bool) -> bool {
+        // A period of nothing would divide by zero.
         let period = self.period(busy).max(Duration::from_millis(1));
         let next = self.status_due + period;
         let in_time = now <= next;

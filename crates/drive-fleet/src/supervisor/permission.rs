@@ -119,12 +119,14 @@ impl Supervisor {
         let status = self.status.as_ref().map(|status| &*status.value).ok_or(Refused::NotConnected)?;
         Ok(match order {
             Order::AcceptIdentity => None,
+            // The words by which some families reset take the voltage from a motor that runs: without a fault none is written.
             Order::ResetFaults if !status.is_fault() => None,
             Order::ResetFaults => Some(Job::ResetFaults),
             Order::Release => Some(Job::Release),
             Order::Persist => Some(Job::Persist),
             Order::Setpoint { setpoint, until } => {
                 if status.is_undriven() {
+                    // A motor that stands never comes to it.
                     if until == Until::AtReference {
                         return Err(Refusal::State(status.state).into());
                     }
@@ -141,6 +143,7 @@ impl Supervisor {
                         self.allow_setpoint(now, setpoint)?;
                         Some(Job::SetSetpoint(setpoint))
                     }
+                    // What the drive holds was given by nobody here, and may lie outside of the limits.
                     None if !self.settings.limits.is_empty() && self.given.is_none() => {
                         return Err(Refused::Limit(LimitProblem::UnknownSetpoint).into());
                     }

@@ -167,8 +167,10 @@ impl Supervisor {
 
     pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, order: StopOrder, patience: Duration) {
         let (mode, injection) = (order.mode, order.injects_for());
+        // What waits would move the motor behind its stop.
         self.end_orders_by_stop();
         self.stops += 1;
+        // Who gave the start has nothing to take back any more.
         self.started_by = None;
         self.changed = true;
         // A stop takes the run command back as well.
@@ -307,6 +309,7 @@ impl Supervisor {
                 stopping.go_on_by_ramp(now);
             }
             _ if !stopping.taken => {}
+            // A run command has come behind the stop, kept back on its way or from somebody else.
             Motion::Driven => {
                 stopping.taken = false;
                 stopping.next_try = Some(now);

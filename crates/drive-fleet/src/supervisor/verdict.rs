@@ -220,6 +220,7 @@ impl Supervisor {
                 let unconfirmed = Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()));
                 self.end_order(denied(&error).unwrap_or(unconfirmed));
             }
+            // A family that tells no reference leaves the question open.
             Ok(_) => self.end_order(self.unknown(now, Some(error))),
         }
         result
