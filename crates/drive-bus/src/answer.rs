@@ -206,10 +206,12 @@ fn check_response(request: &Request<'_>, mut response: Response) -> Result<Respo
         if got == asked { Ok(()) } else { Err(format!("{got} values instead of {asked}")) }
     };
     let address = |got: u16, asked: u16| {
-        if got == asked { Ok(()) } else { Err(format!("address {got} instead of {asked}")) }
+        let is_it = crate::mutant!("confirmed-address-unchecked", got == asked, true);
+        if is_it { Ok(()) } else { Err(format!("address {got} instead of {asked}")) }
     };
     let value = |got: u16, sent: u16| {
-        if got == sent { Ok(()) } else { Err(format!("value {got} instead of {sent}")) }
+        let is_it = crate::mutant!("confirmed-value-unchecked", got == sent, true);
+        if is_it { Ok(()) } else { Err(format!("value {got} instead of {sent}")) }
     };
     match (request, &mut response) {
         (Request::ReadCoils(_, asked), Response::ReadCoils(coils))

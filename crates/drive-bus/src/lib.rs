@@ -78,6 +78,8 @@ pub mod listen;
 #[doc(hidden)]
 pub mod master;
 #[doc(hidden)]
+pub mod mutants;
+#[doc(hidden)]
 pub mod pdu;
 pub mod protocol;
 pub mod record;

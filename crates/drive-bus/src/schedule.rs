@@ -283,7 +283,7 @@ impl<T> Schedule<T> {
                 .min_by_key(|(_, (entry, _))| entry.rank)
                 .map(|(index, _)| Best::Now(index))
         };
-        if let Some(stop) = first(Class::Stop) {
+        if let Some(stop) = crate::mutant!("stop-waits-its-turn", first(Class::Stop), None) {
             return Some(stop);
         }
         let held = self.readiness.iter().filter(|readiness| readiness.holds_line).map(|held| held.at);
@@ -304,9 +304,14 @@ impl<T> Schedule<T> {
         {
             return Some(background);
         }
-        let best = all()
-            .filter(|(_, (_, readiness))| readiness.at <= now)
-            .min_by_key(|(_, (entry, _))| (Reverse(entry.terms.class), entry.rank));
+        let best = all().filter(|(_, (_, readiness))| readiness.at <= now).min_by_key(|(_, (entry, _))| {
+            let class = crate::mutant!(
+                "stop-waits-its-turn",
+                entry.terms.class,
+                entry.terms.class.min(Class::Command)
+            );
+            (Reverse(class), entry.rank)
+        });
         let Some((index, (entry, readiness))) = best else {
             return self.readiness.iter().map(|readiness| readiness.at).min().map(Best::At);
         };

@@ -107,7 +107,8 @@ impl Mbap {
         if let Stray::Frame { number, .. } = &mut stray {
             *number = transaction;
         }
-        let Some(current) = self.current.as_mut().filter(|_| transaction == Some(self.transaction)) else {
+        let is_it = crate::mutant!("transaction-unchecked", transaction == Some(self.transaction), true);
+        let Some(current) = self.current.as_mut().filter(|_| is_it) else {
             self.strays.push(stray);
             return None;
         };

@@ -136,7 +136,7 @@ impl FarEnd {
 
     /// A question was given up.
     pub(super) fn owe(&mut self, asked: Asked) {
-        if self.gateway.is_none() || asked.slave == 0 {
+        if crate::mutant!("far-end-owes-nothing", self.gateway.is_none(), true) || asked.slave == 0 {
             return;
         }
         let begins = self.owed.iter().map(|owed| owed.until).max().filter(|_| self.serves < 2);
@@ -255,7 +255,8 @@ impl FarEnd {
     /// What can no longer come, as far as is known: the slaves that were asked, where it is known how long is waited for
     /// them.
     pub(super) fn expired(&mut self, now: Instant) -> Vec<u8> {
-        if self.owed.iter().all(|owed| owed.until > now) {
+        let none_is_over = self.owed.iter().all(|owed| owed.until > now);
+        if crate::mutant!("far-end-owes-for-ever", none_is_over, true) {
             return Vec::new();
         }
         self.unproven = self.unproven.saturating_add(1);

@@ -25,7 +25,7 @@ impl<C> Master<C> {
         let Some(flight) = self.flight.take() else { return };
         self.to_send = None;
         self.exchange_end = now;
-        self.asked_at = flight.asked_at;
+        self.asked_at = crate::mutant!("age-of-the-telling", flight.asked_at, now);
         let slave = flight.slave;
         if flight.purpose.is_thrown_away() {
             return self.throw_away(now, &flight, &result);
@@ -64,6 +64,7 @@ impl<C> Master<C> {
                 Ok(answer) => {
                     // An earlier attempt may have been carried out: its repetition can be refused for that very reason.
                     let doubtful = answer.is_err() && entry.work.is_write && entry.work.last.is_some();
+                    let doubtful = crate::mutant!("refused-repetition-believed", doubtful, false);
                     let refused = "not answered, and refused when it was repeated";
                     let outcome = if doubtful { Err(PortError::OutcomeUnknown(refused)) } else { Ok(answer) };
                     self.outcomes.push_back((entry.work.caller, outcome));
@@ -119,7 +120,8 @@ impl<C> Master<C> {
     ) -> Result<Answer, Failure> {
         let answer = result?;
         let owes_refusal = self.station(flight.slave).doubt.owes_refusal(now, flight.shape);
-        if flight.suspect || answer.is_err() && owes_refusal {
+        let doubtful = flight.suspect || answer.is_err() && owes_refusal;
+        if crate::mutant!("doubtful-answer-believed", doubtful, false) {
             self.fear_late_answer(now, flight);
             return Err(Failure::Doubted("the answer may be that to an earlier request"));
         }
@@ -275,7 +277,8 @@ impl<C> Master<C> {
     /// The exchange has ended without its answer, which may still come: also over the next connection, from a serial
     /// server that has kept it.
     pub(super) fn fear_late_answer(&mut self, now: Instant, flight: &Flight<C>) {
-        if flight.slave == 0 || !self.exchange.confuses_late_answers() {
+        let confuses = crate::mutant!("late-answer-unfeared", self.exchange.confuses_late_answers(), false);
+        if flight.slave == 0 || !confuses {
             return;
         }
         let station = self.station(flight.slave);
@@ -309,8 +312,10 @@ impl<C> Master<C> {
         tracing::debug!(slave, "slave off-line");
         let at = self.probe_at(slave).unwrap_or(now);
         let retry_in = self.probe_in(now, at);
-        let waiting =
-            self.schedule.withdraw_all(|entry| entry.slave == slave && entry.terms.class != Class::Stop);
+        let waiting = self.schedule.withdraw_all(|entry| {
+            entry.slave == slave
+                && crate::mutant!("stop-dropped-offline", entry.terms.class != Class::Stop, true)
+        });
         for entry in waiting {
             self.drop_unsent(entry, PortError::Offline { retry_in });
         }
@@ -333,7 +338,13 @@ impl<C> Master<C> {
             },
             Failure::Doubted(why) if write => PortError::OutcomeUnknown(why),
             Failure::Doubted(why) => PortError::Mismatch(why.to_owned()),
-            Failure::Timeout | Failure::Nobody if write => PortError::OutcomeUnknown("no answer"),
+            Failure::Timeout | Failure::Nobody if write => {
+                crate::mutant!(
+                    "lost-write-told-as-expired",
+                    PortError::OutcomeUnknown("no answer"),
+                    PortError::Expired
+                )
+            }
             Failure::Damaged(_) if write => PortError::OutcomeUnknown("the answer was damaged"),
             Failure::Mismatch(_) if write => PortError::OutcomeUnknown("the confirmation does not fit"),
             Failure::Timeout | Failure::Nobody => PortError::Timeout { after: waited },
@@ -351,18 +362,21 @@ impl<C> Master<C> {
 
     fn may_retry(&self, now: Instant, entry: &Entry<Asked<C>>) -> bool {
         let offline = self.offline.contains(entry.slave);
-        let edge = entry.work.is_write && entry.terms.effect == Effect::Edge;
+        let edge =
+            crate::mutant!("edge-repeated", entry.work.is_write && entry.terms.effect == Effect::Edge, false);
         // A command sent again behind a stop would undo it.
         let stopped = entry.work.is_write
             && entry.terms.class != Class::Stop
             && self.schedule.any(|other| {
                 other.terms.class == Class::Stop && (other.slave == 0 || other.slave == entry.slave)
             });
+        let stopped = crate::mutant!("command-repeated-behind-stop", stopped, false);
         // A later request with the same key says that this value is not wanted any more.
         let replaced = entry.terms.replaces.is_some()
             && self
                 .schedule
                 .any(|other| other.slave == entry.slave && other.terms.replaces == entry.terms.replaces);
+        let replaced = crate::mutant!("old-setpoint-repeated", replaced, false);
         // The gateway has not given it up yet, and asks as often as it does. One that answers as a rule is late, and soon heard.
         let was_heard = self.stations.get(&entry.slave).is_some_and(|station| station.timeout.is_learned());
         let is_asked_still =
@@ -436,7 +450,7 @@ impl<C> Master<C> {
             PortError::Superseded => outcomes.superseded += 1,
             _ => outcomes.refused += 1,
         }
-        let error = entry.work.last.unwrap_or(error);
+        let error = crate::mutant!("sent-told-as-unsent", entry.work.last.unwrap_or(error), error);
         self.outcomes.push_back((entry.work.caller, Err(error)));
     }
 }

@@ -341,7 +341,9 @@ impl<C> Master<C> {
     /// A stop arrives: commands that wait for the same slave would undo it, and no probe is worth its wait.
     fn clear_the_way(&mut self, now: Instant, slave: u8) {
         let overtaken = self.schedule.withdraw_all(|entry| {
-            entry.terms.class == Class::Command && entry.work.is_write && (slave == 0 || entry.slave == slave)
+            let is_command =
+                crate::mutant!("stop-spares-commands", entry.terms.class == Class::Command, false);
+            is_command && entry.work.is_write && (slave == 0 || entry.slave == slave)
         });
         for entry in overtaken {
             self.drop_unsent(entry, PortError::Superseded);
@@ -399,7 +401,10 @@ impl<C> Master<C> {
 
     /// The caller of a request is gone: what is unsent never is, but the write of a stop is sent, and sent again, all the same.
     pub fn withdraw(&mut self, ticket: Ticket) {
-        let is_stop = |entry: &Entry<Asked<C>>| entry.terms.class == Class::Stop && entry.work.is_write;
+        let is_stop = |entry: &Entry<Asked<C>>| {
+            let is_stop = entry.terms.class == Class::Stop && entry.work.is_write;
+            crate::mutant!("stop-dropped-with-its-caller", is_stop, false)
+        };
         if self.schedule.any(|entry| entry.ticket == ticket && is_stop(entry)) {
             return;
         }
@@ -452,7 +457,7 @@ impl<C> Master<C> {
 
     /// [`deadline`](Self::deadline) has passed.
     pub fn handle_timeout(&mut self, now: Instant) {
-        for entry in self.schedule.expired(now) {
+        for entry in crate::mutant!("command-sent-late", self.schedule.expired(now), Vec::new()) {
             self.drop_unsent(entry, PortError::Expired);
         }
         let given_up = self.far_end.expired(now);

@@ -64,7 +64,7 @@ impl<C> Master<C> {
             return None;
         }
         if stop_at.is_none() && !self.closing {
-            match self.first(now) {
+            match crate::mutant!("first-answer-believed", self.first(now), First::Nothing) {
                 First::Nothing => {}
                 First::Listen(until) => {
                     let waits = !self.schedule.is_empty() || probe.is_some();
@@ -126,7 +126,7 @@ impl<C> Master<C> {
 
     /// When the silence before any request is over.
     fn free_at(&self) -> Instant {
-        self.quiet_from + self.config.silence()
+        self.quiet_from + crate::mutant!("silence-unkept", self.config.silence(), std::time::Duration::ZERO)
     }
 
     /// When a Stop that waits since `arrived` is sent at the latest, whatever is heard on the line: bytes that belong to
@@ -224,7 +224,7 @@ impl<C> Master<C> {
             self.exchange.start(slave, Arc::clone(&request), pdu)
         };
         let is_write = self.exchange.is_write(&request);
-        let first = self.fresh.is_first();
+        let first = crate::mutant!("first-answer-believed", self.fresh.is_first(), false);
         let doubt = &mut self.station(slave).doubt;
         let suspect = first || doubt.owes(now, shape);
         if is_write {

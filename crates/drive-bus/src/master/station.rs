@@ -83,7 +83,7 @@ impl Station {
     pub(super) fn answered(&mut self, now: Instant) {
         self.failures = 0;
         self.slow = false;
-        self.ready_at = Some(now + self.settings.turnaround);
+        self.ready_at = Some(now + crate::mutant!("pause-unkept", self.settings.turnaround, Duration::ZERO));
     }
 
     /// With how many words more a read is asked, so that its answer differs from what may come, and until when it waits

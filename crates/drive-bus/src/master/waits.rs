@@ -41,7 +41,8 @@ impl<C> Waits<'_, C> {
     /// Until when it waits. `None`: for nothing.
     pub(super) fn until(&self, now: Instant, entry: &Entry<Asked<C>>) -> Option<Instant> {
         let is_stop = entry.terms.class == Class::Stop;
-        let goes_at_once = is_stop && entry.work.is_write;
+        let goes_at_once =
+            crate::mutant!("stop-waits-for-the-gateway", is_stop && entry.work.is_write, false);
         let aside = self.aside.get(&entry.slave).filter(|aside| !goes_at_once || aside.is_stop());
         let aside = aside.map(|aside| aside.at.max(now + LOOK));
         let station = self.stations.get(&entry.slave);

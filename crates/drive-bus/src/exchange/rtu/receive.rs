@@ -54,7 +54,7 @@ impl Rtu {
 
     /// What was received begins with a frame of this length that has the form of the answer.
     fn accept(&mut self, now: Instant, len: usize) -> Option<Step> {
-        let is_early = self.pace.is_early(now, len);
+        let is_early = crate::mutant!("early-answer-believed", self.pace.is_early(now, len), false);
         let current = self.current.as_mut()?;
         // An echo would have come first. Where something came first and was not understood, that may have been it.
         let came_first = current.received == self.received.len();
@@ -78,7 +78,7 @@ impl Rtu {
         match answer::check(&current.request, pdu.clone()) {
             Ok(answer) => {
                 self.taken = Some(Frame::of(&pdu));
-                if self.another_follows(&pdu) {
+                if crate::mutant!("two-answers-believed", self.another_follows(&pdu), false) {
                     self.judge(self.received.len());
                     self.current = None;
                     return Some(Step::Done(Err(Failure::Mismatch("two answers that differ".to_owned()))));
@@ -247,10 +247,12 @@ fn is_like(sent: &[u8], bytes: &[u8]) -> bool {
 /// What stands at the beginning of `bytes`.
 fn look(current: &mut Current, bytes: &[u8]) -> Found {
     let Some((&slave, pdu)) = bytes.split_first() else { return Found::Nothing };
-    if slave != current.slave {
+    if crate::mutant!("another-slaves-answer", slave != current.slave, false) {
         return Found::Nothing;
     }
-    let whole = |len: usize| bytes.get(..len + OVERHEAD).map(crc_fits);
+    let whole = |len: usize| {
+        bytes.get(..len + OVERHEAD).map(|frame| crate::mutant!("crc-unchecked", crc_fits(frame), true))
+    };
     match answer::extent(&current.request, pdu) {
         Extent::AtLeast(_) => Found::Beginning,
         Extent::Exactly(len) => match whole(len) {

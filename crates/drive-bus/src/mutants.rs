@@ -1,0 +1,165 @@
+//! Mutants that are chosen at run time: at a decisive line stands, beside what is right, what would be wrong. One build has them
+//! all, one name chooses among them, and an attack that lets its mutant live is no attack.
+//!
+//! Without the feature `mutants`, which no build has that anybody is given, [`mutant!`](crate::mutant) is its first expression and
+//! nothing else.
+
+// Packages are built without debug assertions: none can have the feature, whoever asks for all of them at once.
+#[cfg(all(feature = "mutants", not(debug_assertions)))]
+compile_error!("the feature `mutants` of drive-bus is for attacks on a build of development alone");
+
+/// `mutant!("its-name", right, wrong)`: what is right, unless this mutant is chosen.
+#[cfg(not(feature = "mutants"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! mutant {
+    ($name:literal, $right:expr, $wrong:expr) => {
+        $right
+    };
+}
+
+/// `mutant!("its-name", right, wrong)`: what is right, unless this mutant is chosen.
+#[cfg(feature = "mutants")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! mutant {
+    ($name:literal, $right:expr, $wrong:expr) => {
+        if $crate::mutants::is($name) { $wrong } else { $right }
+    };
+}
+
+#[cfg(feature = "mutants")]
+pub use chosen::{Chosen, choose, is, was_reached};
+
+/// A mutant: its name, and the promise that it breaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mutant {
+    /// Its name, which stands at its line.
+    pub name: &'static str,
+    /// What no longer holds, in the words of the README.
+    pub breaks: &'static str,
+}
+
+const fn mutant(name: &'static str, breaks: &'static str) -> Mutant {
+    Mutant { name, breaks }
+}
+
+/// All of this crate.
+pub const ALL: &[Mutant] = &[
+    mutant("another-slaves-answer", "an answer is that of the slave that was asked"),
+    mutant("crc-unchecked", "a damaged frame is no answer"),
+    mutant("lrc-unchecked", "a damaged frame is no answer"),
+    mutant("transaction-unchecked", "an answer has the number of its request"),
+    mutant("confirmed-value-unchecked", "a confirmation names what was written"),
+    mutant("confirmed-address-unchecked", "a confirmation names where it was written"),
+    mutant("early-answer-believed", "no answer ends before its request can have left the wire"),
+    mutant("two-answers-believed", "of two answers that differ none is believed"),
+    mutant("late-answer-unfeared", "a late answer is not that to the next request"),
+    mutant("doubtful-answer-believed", "an answer that may be that to an earlier request proves nothing"),
+    mutant("silence-unkept", "3.5 characters of silence stand before each request"),
+    mutant("pause-unkept", "each slave has its pause"),
+    mutant("edge-repeated", "an edge is written once"),
+    mutant("command-repeated-behind-stop", "a command is not sent again behind a stop"),
+    mutant("old-setpoint-repeated", "the latest setpoint counts"),
+    mutant("command-sent-late", "a command expires and is never sent late"),
+    mutant("sent-told-as-unsent", "what was told as not sent was never on the wire"),
+    mutant("lost-write-told-as-expired", "a write whose answer was lost has an unknown outcome"),
+    mutant(
+        "refused-repetition-believed",
+        "a write that was refused when it was repeated has an unknown outcome",
+    ),
+    mutant("stop-waits-its-turn", "a stop goes before everything"),
+    mutant("stop-spares-commands", "a stop takes waiting commands with it"),
+    mutant("stop-dropped-with-its-caller", "a stop is sent whether its caller waits or not"),
+    mutant("stop-dropped-offline", "a stop is sent to a slave that is off-line"),
+    mutant("stop-waits-for-the-gateway", "a stop is sent whatever the far end owes"),
+    mutant("far-end-owes-nothing", "no more is owed than the bound of a stop allows"),
+    mutant("far-end-owes-for-ever", "what is owed is over at its time"),
+    mutant("age-of-the-telling", "a value is as old as its question"),
+    mutant("first-answer-believed", "what the last port left behind is nobody's answer"),
+];
+
+#[cfg(feature = "mutants")]
+mod chosen {
+    use std::{
+        cell::{Cell, RefCell},
+        collections::BTreeSet,
+        env,
+    };
+
+    thread_local! {
+        /// Of this thread alone, so that one test attacks without its neighbour.
+        static CHOSEN: Cell<Option<&'static str>> = Cell::new(by_environment());
+        static REACHED: RefCell<BTreeSet<&'static str>> = const { RefCell::new(BTreeSet::new()) };
+    }
+
+    /// What `DRIVED_MUTANT` names.
+    fn by_environment() -> Option<&'static str> {
+        let name = env::var("DRIVED_MUTANT").ok()?;
+        super::ALL.iter().find(|mutant| mutant.name == name).map(|mutant| mutant.name)
+    }
+
+    /// Whether this mutant is chosen, asked at its line.
+    #[must_use]
+    pub fn is(name: &'static str) -> bool {
+        let chosen = CHOSEN.get() == Some(name);
+        if chosen {
+            REACHED.with_borrow_mut(|reached| reached.insert(name));
+        }
+        chosen
+    }
+
+    /// Whether its line was reached on this thread while it was chosen: one whose line is never reached has survived nothing.
+    #[must_use]
+    pub fn was_reached(name: &str) -> bool {
+        REACHED.with_borrow(|reached| reached.contains(name))
+    }
+
+    /// A mutant is chosen on this thread for as long as this lives.
+    #[derive(Debug)]
+    pub struct Chosen(Option<&'static str>);
+
+    /// Chooses a mutant on this thread.
+    #[must_use]
+    pub fn choose(name: &'static str) -> Chosen {
+        REACHED.with_borrow_mut(|reached| reached.remove(name));
+        Chosen(CHOSEN.replace(Some(name)))
+    }
+
+    impl Drop for Chosen {
+        fn drop(&mut self) {
+            CHOSEN.set(self.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, fs, path::Path};
+
+    use super::ALL;
+
+    /// The names that stand at a line of a source.
+    fn at_lines(folder: &Path, found: &mut BTreeSet<String>) {
+        for path in
+            fs::read_dir(folder).expect("it is a folder").map(|entry| entry.expect("it is there").path())
+        {
+            if path.is_dir() {
+                at_lines(&path, found);
+            } else if !path.ends_with("mutants.rs") {
+                let text = fs::read_to_string(&path).expect("it is a source");
+                let named = text.split("mutant!(").skip(1).filter_map(|behind| behind.split('"').nth(1));
+                found.extend(named.map(str::to_owned));
+            }
+        }
+    }
+
+    #[test]
+    fn each_mutant_of_the_list_stands_at_a_line_and_each_at_a_line_is_in_the_list() {
+        let mut found = BTreeSet::new();
+        at_lines(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut found);
+        let listed: BTreeSet<String> = ALL.iter().map(|mutant| mutant.name.to_owned()).collect();
+        assert_eq!(found, listed);
+        assert_eq!(listed.len(), ALL.len(), "each name once");
+    }
+}

@@ -1,0 +1,71 @@
+//! `drive-fire`: the attacks, one part or all of them.
+
+#![forbid(unsafe_code)]
+
+use std::{
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::{Parser, Subcommand};
+use drive_fire::{matrix, report::Told};
+
+/// Attacks everything that stands, and says what was tried and what was found.
+#[derive(Debug, Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    part: Part,
+    /// Where the random numbers begin: the same seed, the same attack.
+    #[arg(long, global = true, default_value_t = 1)]
+    seed: u64,
+    /// It ends after so many minutes, wherever it is.
+    #[arg(long, global = true)]
+    minutes: Option<u64>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// The fault matrix.
+    Matrix {
+        /// So many cells of each of its four planes.
+        #[arg(long, default_value_t = 500)]
+        of_each: u64,
+        /// One cell alone, as a find names it.
+        #[arg(long)]
+        cell: Option<String>,
+        /// How many cells there are, and which cannot exist.
+        #[arg(long)]
+        census: bool,
+        /// Against its planted defects; those in the line need `--features plants`.
+        #[arg(long)]
+        plants: bool,
+    },
+}
+
+fn main() -> ExitCode {
+    let Arguments { part, seed, minutes } = Arguments::parse();
+    let end = minutes.map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
+    let go_on = move || end.is_none_or(|end| Instant::now() < end);
+    let told: Vec<Told> = match part {
+        Part::Matrix { cell: Some(name), .. } => {
+            let Some(cell) = matrix::Cell::named(&name) else {
+                eprintln!("{name} is no cell: a letter of W, F, E, A, a colon and a number");
+                return ExitCode::FAILURE;
+            };
+            println!("{cell}");
+            if let Some(why) = cell.cannot_exist() {
+                println!("it cannot exist: {why}");
+            }
+            println!("{:#?}", matrix::live(&cell, &*matrix::open(&cell)));
+            return ExitCode::SUCCESS;
+        }
+        Part::Matrix { census: true, .. } => {
+            matrix::census(3_000_000).iter().for_each(|line| println!("{line}"));
+            return ExitCode::SUCCESS;
+        }
+        Part::Matrix { plants: true, of_each, .. } => vec![matrix::find_plants(seed, of_each as usize)],
+        Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
+    };
+    told.iter().for_each(|told| print!("{told}"));
+    if told.iter().all(|told| told.finds.is_empty()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}

@@ -1,0 +1,309 @@
+//! One cell, lived through in virtual time and judged.
+
+use std::{cell::RefCell, panic, sync::Once, time::Duration};
+
+use drive_core::{Direction, Error, ErrorKind, Frequency, Reaction, Result, Status, StopMode, Withdrawn};
+use drive_sim::Breach;
+use drive_testing::{contract::Open, truth::TOLERANCE};
+use tokio::time::{Instant, sleep, timeout};
+
+use super::{
+    Cell, Event, FarEnd, Fault, Operation, Way,
+    axes::parameter,
+    stage::{Around, Stage},
+};
+
+/// Longer than any operation may take: every retry of every exchange behind the slowest gateway, and the repetitions of a stop.
+const PATIENCE: Duration = Duration::from_secs(240);
+/// How often a plant asks.
+const POLL: Duration = Duration::from_millis(300);
+/// The speed at which the motor runs.
+const SETPOINT: Frequency = Frequency::from_hertz(30);
+
+/// How a cell ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Lived {
+    /// The operation said this.
+    Told(&'static str),
+    /// The drive could not be brought to where the operation begins, for what stands between.
+    NotBegun,
+    /// The operation has fewer exchanges than the fault wants.
+    NotReached,
+    /// It was told what is wrong, and nobody at this end of the way can tell; why.
+    BeyondTelling(&'static str),
+    /// What contradicted itself.
+    Against(Vec<String>),
+}
+
+thread_local! {
+    static PANICS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+    static LISTENS: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+/// Panics of this thread are written down instead of printed while a cell lives.
+fn write_panics_down() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if LISTENS.get() {
+                PANICS.with_borrow_mut(|panics| panics.push(info.to_string()));
+            } else {
+                before(info);
+            }
+        }));
+    });
+}
+
+/// Lives through a cell with the drive that `open` makes.
+///
+/// # Panics
+/// When the stage itself is wrong.
+#[must_use]
+pub fn live(cell: &Cell, open: &Open) -> Lived {
+    write_panics_down();
+    LISTENS.set(true);
+    PANICS.with_borrow_mut(Vec::clear);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
+    let runtime = runtime.expect("a runtime of one thread");
+    let lived = panic::catch_unwind(panic::AssertUnwindSafe(|| runtime.block_on(play(cell, open))));
+    drop(runtime);
+    LISTENS.set(false);
+    let panics = PANICS.take();
+    if panics.is_empty() {
+        return lived.unwrap_or_else(|_| Lived::Against(vec!["a panic that said nothing".to_owned()]));
+    }
+    Lived::Against(panics.into_iter().map(|panic| format!("a panic: {panic}")).collect())
+}
+
+async fn play(cell: &Cell, open: &Open) -> Lived {
+    let mut stage = Stage::new(cell, open);
+    if !prepare(cell, &mut stage).await {
+        return Lived::NotBegun;
+    }
+    let (deeds, later) = cell.event.deeds(cell.subject);
+    let around = Around::of(&stage);
+    if !cell.amid {
+        deeds.iter().for_each(|deed| around.happens(deed));
+        sleep(Duration::from_millis(200)).await;
+    }
+    let before = Before::of(&stage);
+    stage.bench.tap.strike(cell.fault, cell.place);
+    let asked = Instant::now();
+    let event = async {
+        if cell.amid {
+            sleep(Duration::from_millis(60)).await;
+            deeds.iter().for_each(|deed| around.happens(deed));
+        }
+        if let Some((time, deed)) = later {
+            sleep(time).await;
+            around.happens(&deed);
+        }
+    };
+    let (told, ()) = tokio::join!(timeout(PATIENCE, operate(cell, &mut stage)), event);
+    let Ok(told) = told else {
+        return Lived::Against(vec![format!("{} does not end in {PATIENCE:?}", cell.operation)]);
+    };
+    let fresh = cell.operation == Operation::Status;
+    match &told {
+        Ok(Some(status)) => stage.bench.judge_status(status, asked, fresh),
+        Err(Error::NotConfirmed { status, .. }) => stage.bench.judge_status(status, asked, false),
+        _ => {}
+    }
+    let at_once = stage.bench.machine.observe();
+    let struck = stage.bench.tap.calm();
+    sleep(cell.fault.lasts()).await;
+    settle(&mut stage).await;
+    judge(cell, &stage, &told, &before, &at_once);
+    let mut against = stage.bench.notes.against();
+    against.truncate(4);
+    if !against.is_empty() {
+        let beyond = cell.is_beyond_telling().filter(|_| !stage.bench.notes.breaks_a_rule());
+        return beyond.map_or(Lived::Against(against), Lived::BeyondTelling);
+    }
+    if cell.fault != Fault::None && !struck {
+        return Lived::NotReached;
+    }
+    Lived::Told(match told {
+        Ok(_) => "confirmed",
+        Err(error) => word(&error),
+    })
+}
+
+/// What an error is in one word.
+fn word(error: &Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::NoAnswer => "no answer",
+        ErrorKind::OutcomeUnknown => "outcome unknown",
+        ErrorKind::NotSent => "not sent",
+        ErrorKind::Exception => "exception",
+        ErrorKind::Answer => "answer against the manual",
+        ErrorKind::Refused => "refused",
+        ErrorKind::NotConfirmed => "not confirmed",
+        ErrorKind::Unsupported => "unsupported",
+        _ => "another error",
+    }
+}
+
+/// The drive is known, has its setpoint, runs where it is to run, has tripped where it is to be reset.
+async fn prepare(cell: &Cell, stage: &mut Stage) -> bool {
+    let begins = async {
+        stage.drive.status().await.ok()?;
+        stage.drive.set_setpoint(SETPOINT.into()).await.ok()?;
+        if cell.runs {
+            stage.drive.start(Direction::Forward).await.ok()?;
+            while stage.bench.machine.observe().output_frequency < 2_500 {
+                stage.drive.status().await.ok()?;
+                sleep(POLL).await;
+            }
+        }
+        if cell.operation == Operation::Reset {
+            let trip = cell.subject.family().simulated_trip()?;
+            stage.happens(&format!("trip {trip}"));
+            stage.drive.status().await.ok()?;
+        }
+        Some(())
+    };
+    matches!(timeout(Duration::from_secs(60), begins).await, Ok(Some(())))
+}
+
+/// Everything is well again, and the drive is asked as a plant asks it.
+async fn settle(stage: &mut Stage) {
+    let end = Instant::now() + Duration::from_secs(6);
+    while Instant::now() < end {
+        let asked = Instant::now();
+        if let Ok(Ok(status)) = timeout(PATIENCE, stage.drive.status()).await {
+            stage.bench.judge_status(&status, asked, true);
+        }
+        sleep(POLL).await;
+    }
+}
+
+/// What there was before the operation.
+struct Before {
+    saved: u32,
+    ran: bool,
+    had_lease: bool,
+}
+
+impl Before {
+    fn of(stage: &Stage) -> Self {
+        let seen = stage.bench.machine.observe();
+        Self { saved: seen.eeprom_writes, ran: seen.running, had_lease: stage.drive.lease().is_some() }
+    }
+}
+
+async fn operate(cell: &Cell, stage: &mut Stage) -> Result<Option<Status>> {
+    let drive = &mut stage.drive;
+    let parameter = parameter(cell.subject);
+    Ok(match (cell.operation, parameter) {
+        (Operation::Status, _) => Some(drive.status().await?),
+        (Operation::Measurements, _) => drive.measurements().await.map(|_| None)?,
+        (Operation::Faults, _) => drive.faults().await.map(|_| None)?,
+        (Operation::Identify, _) => drive.identify().await.map(|_| None)?,
+        (Operation::KeepAlive, _) => drive.keep_alive().await.map(|()| None)?,
+        (Operation::Start(direction), _) => Some(drive.start(direction).await?),
+        (Operation::Setpoint, _) => {
+            drive.set_setpoint(Frequency::from_hertz(20).into()).await.map(|()| None)?
+        }
+        (Operation::Stop(mode), _) => Some(drive.stop(mode).await?.status),
+        (Operation::Reset, _) => Some(drive.reset_faults().await?),
+        (Operation::Release, _) => Some(drive.release().await?),
+        (Operation::Withdraw, _) => Some(drive.withdraw().await.map(Withdrawn::into_status)?),
+        (Operation::ReadParameter, Some(row)) => {
+            let held = stage.bench.machine.peek(row.address);
+            let read = drive.read_parameter(row).await?;
+            let touched = cell.event != Event::Nothing;
+            if Some(read) != held && !touched {
+                stage.bench.notes.object(format!("{} reads {read}, the machine has {held:?}", row.code));
+            }
+            None
+        }
+        (Operation::WriteParameter, Some(row)) => {
+            drive.write_parameter(row, 42).await?;
+            let held = stage.bench.machine.peek(row.address);
+            let touched = cell.event != Event::Nothing;
+            if held != Some(42) && !touched {
+                stage
+                    .bench
+                    .notes
+                    .object(format!("{} is told as written, the machine has {held:?}", row.code));
+            }
+            None
+        }
+        (Operation::Persist, _) => drive.persist().await.map(|_| None)?,
+        (Operation::Watchdog, _) => drive.watchdog().await.map(|_| None)?,
+        (Operation::ArmWatchdog, _) => {
+            let claims = drive.capabilities().watchdog.ok_or(Error::no_share())?;
+            let reaction = claims.reactions.iter().copied().find(|reaction| *reaction != Reaction::Ignore);
+            let time = claims.min.max(Duration::from_secs(2));
+            drive.arm_watchdog(time, reaction.unwrap_or(Reaction::Ramp)).await.map(|_| None)?
+        }
+        (Operation::ReadParameter | Operation::WriteParameter, None) => None,
+    })
+}
+
+/// What is said of the operation, against what the machine does at the end.
+fn judge(
+    cell: &Cell,
+    stage: &Stage,
+    told: &Result<Option<Status>>,
+    before: &Before,
+    at_once: &drive_sim::Observation,
+) {
+    let notes = &stage.bench.notes;
+    let (seen, twin) = (stage.bench.machine.observe(), stage.twin.observe());
+    for why in notes.doubled_edges(&stage.bench.machine) {
+        notes.breach(why);
+    }
+    if seen.eeprom_writes > before.saved + 1 && cell.operation == Operation::Persist {
+        notes.breach(format!("saved {} times", seen.eeprom_writes - before.saved));
+    }
+    silences(cell, stage);
+    // One that comes down on its ramp steers for nothing.
+    let steers = seen.setpoint.abs() > TOLERANCE;
+    let moves = seen.running && steers && seen.output_frequency.abs() > TOLERANCE;
+    let lease = stage.drive.lease();
+    if moves && !twin.running && lease.is_none() && !cell.event.silences() {
+        notes.object(format!("it moves and no lease stands: {seen:?}"));
+    }
+    let starts = matches!(cell.operation, Operation::Start(_));
+    if moves && !twin.running && !before.ran && !before.had_lease && !starts && !cell.runs {
+        notes.object(format!("{} started it: {seen:?}", cell.operation));
+    }
+    match (cell.operation, told) {
+        // An injection is held for as long as it is told to.
+        (Operation::Stop(mode), Ok(_)) if moves && !twin.running && mode != StopMode::DcInjection => {
+            notes.object(format!("a stop was confirmed: {seen:?}"));
+        }
+        (Operation::Start(_), Ok(_)) if !at_once.running && cell.event == Event::Nothing => {
+            notes.object(format!("a start was confirmed: {at_once:?}"));
+        }
+        (Operation::Start(_), Err(error))
+            if error.kind() == ErrorKind::Refused && moves && !before.ran && !twin.running =>
+        {
+            notes.object(format!("a start was refused ({error}): {seen:?}"));
+        }
+        (Operation::Reset, Ok(_)) if at_once.trip.is_some() && cell.event == Event::Nothing => {
+            notes.object(format!("a reset was confirmed: {at_once:?}"));
+        }
+        _ => {}
+    }
+}
+
+/// The rules of the line were kept, where the line that the simulator sees is the line that the master sees.
+fn silences(cell: &Cell, stage: &Stage) {
+    let sees_the_same = matches!(cell.way, Way::Rtu | Way::Ascii)
+        && matches!(cell.far_end, FarEnd::Plain)
+        && cell.fault != Fault::RequestTruncated
+        && cell.fault != Fault::PortLost;
+    if !sees_the_same {
+        return;
+    }
+    for violation in stage.simulated.violations() {
+        // A request that was cut or changed on the way has another length for whoever listens.
+        if !matches!(violation.breach, Breach::Collision { late: true, .. }) {
+            stage.bench.notes.breach(format!("a rule of the line was broken: {:?}", violation.breach));
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The fault matrix: what goes wrong on the wire × what stands between × what happens to the drive × what is asked of it, for every
+//! family and shipped profile with a simulated twin, on every protocol, in virtual time.
+//!
+//! Each cell ends in a right value with a true age, a typed error, or "not known". Never in a wrong value, a hang, a panic, a command
+//! done twice, a silence broken, a motor that moves and that neither a lease nor that world's own commander explains.
+
+mod axes;
+mod cell;
+mod fault;
+mod frames;
+mod judge;
+mod live;
+mod plants;
+mod stage;
+mod tap;
+
+use std::{collections::BTreeMap, time::Instant};
+
+pub use axes::{Event, FarEnd, Operation, Subject, Way};
+pub use cell::{Cell, Plane};
+pub use fault::Fault;
+pub use live::{Lived, live};
+pub use plants::find_plants;
+
+use crate::report::{Find, Told};
+
+/// The drive of a cell as its family makes it.
+#[must_use]
+pub fn open(cell: &Cell) -> Box<drive_testing::contract::Open> {
+    let family = cell.subject.family();
+    Box::new(move |port, slave| family.open_with(port, slave, &family.simulated_options()))
+}
+
+/// The cells of a plane in an order in which neighbours have nothing in common, each once; the same seed, the same order.
+pub fn shuffled(plane: Plane, seed: u64) -> impl Iterator<Item = Cell> {
+    let len = plane.len();
+    // A permutation of as many numbers as the next power of four holds, in four rounds; what is beyond the plane is passed over.
+    let half = (64 - (len.max(2) - 1).leading_zeros()).div_ceil(2);
+    let mask = (1_u64 << half) - 1;
+    let round = move |value: u64, round: u64| {
+        let mixed = (value ^ seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ round << 56)
+            .wrapping_mul(0xD6E8_FEB8_6659_FD93);
+        (mixed ^ mixed >> 32).wrapping_mul(0xD6E8_FEB8_6659_FD93) >> 32 & mask
+    };
+    (0..1_u64 << (2 * half)).filter_map(move |turn| {
+        let (mut left, mut right) = (turn >> half, turn & mask);
+        for number in 0..4 {
+            (left, right) = (right, left ^ round(right, number));
+        }
+        Cell::of(plane, left << half | right)
+    })
+}
+
+/// So many cells of each plane that can exist, or as many as time allows; `go_on` is asked before each.
+pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
+    let begun = Instant::now();
+    let mut told = Told::new("fault matrix", "cells");
+    let mut outcomes = BTreeMap::<String, u64>::new();
+    for plane in Plane::ALL {
+        let mut lived = 0;
+        for cell in shuffled(plane, seed) {
+            if lived >= of_each || !go_on() {
+                break;
+            }
+            if cell.cannot_exist().is_some() {
+                continue;
+            }
+            lived += 1;
+            match live(&cell, &*open(&cell)) {
+                Lived::Told(word) => {
+                    told.count += 1;
+                    *outcomes.entry(word.to_owned()).or_default() += 1;
+                }
+                Lived::BeyondTelling(why) => {
+                    told.count += 1;
+                    *outcomes.entry(format!("wrong, and nobody can tell: {why}")).or_default() += 1;
+                }
+                Lived::NotBegun => {
+                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1
+                }
+                Lived::NotReached => {
+                    *outcomes.entry("the operation has fewer exchanges".to_owned()).or_default() += 1;
+                }
+                Lived::Against(why) => {
+                    told.count += 1;
+                    let replay = format!("drive-fire matrix --cell {}", cell.name());
+                    told.finds.push(Find { what: format!("{cell}\n    {}", why.join("\n    ")), replay });
+                }
+            }
+        }
+    }
+    told.details = outcomes.into_iter().map(|(what, count)| format!("{count:>8} {what}")).collect();
+    told.took = begun.elapsed();
+    told
+}
+
+/// How many cells there are in each plane, how many of them cannot exist, and why; of the largest plane by a sample of this many.
+#[must_use]
+pub fn census(sample: u64) -> Vec<String> {
+    let mut lines = Vec::new();
+    for plane in Plane::ALL {
+        let looked = plane.len().min(sample);
+        let mut why = BTreeMap::<&str, u64>::new();
+        for cell in shuffled(plane, 1).take(looked as usize) {
+            *why.entry(cell.cannot_exist().unwrap_or("can exist")).or_default() += 1;
+        }
+        let share =
+            |count: u64| (u128::from(count) * u128::from(plane.len()) / u128::from(looked.max(1))) as u64;
+        let counted = if looked < plane.len() { "about " } else { "" };
+        lines.push(format!("{plane:?}: {} cells", plane.len()));
+        lines.extend(
+            why.into_iter().map(|(why, count)| format!("{:>12} {why}", format!("{counted}{}", share(count)))),
+        );
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn a_plane_is_shuffled_without_losing_or_doubling_a_cell() {
+        let numbers: BTreeSet<u64> = shuffled(Plane::Events, 3).map(|cell| cell.number).collect();
+        assert_eq!(numbers.len() as u64, Plane::Events.len());
+        let first = |seed| shuffled(Plane::All, seed).next().map(|cell| cell.number);
+        assert_eq!(first(1), first(1));
+        assert_ne!(first(1), first(2));
+    }
+
+    #[test]
+    fn the_name_of_a_cell_is_that_cell() {
+        let cell = Cell::of(Plane::All, 123_456_789).expect("it is one");
+        assert_eq!(Cell::named(&cell.name()), Some(cell));
+        assert_eq!(Cell::named("W:99999999999"), None);
+    }
+}

@@ -1,0 +1,89 @@
+//! What a part tells: how much it tried, what it found, which of its planted defects it found, and how long it took.
+
+use std::{fmt, time::Duration};
+
+/// What was found, and how it is found again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Find {
+    /// What contradicts what.
+    pub what: String,
+    /// The command that replays it.
+    pub replay: String,
+}
+
+/// A defect that was planted, and whether the part found it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Plant {
+    /// Its name.
+    pub name: String,
+    /// What found it first; `None`: it lived.
+    pub found_by: Option<String>,
+}
+
+/// What a part tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Told {
+    /// Which part.
+    pub part: &'static str,
+    /// What it counts.
+    pub unit: &'static str,
+    /// How many of them were tried.
+    pub count: u64,
+    /// What was found.
+    pub finds: Vec<Find>,
+    /// What was planted.
+    pub plants: Vec<Plant>,
+    /// More, line by line.
+    pub details: Vec<String>,
+    /// How long it took.
+    pub took: Duration,
+}
+
+impl Told {
+    /// A part that has tried nothing yet.
+    #[must_use]
+    pub const fn new(part: &'static str, unit: &'static str) -> Self {
+        Self {
+            part,
+            unit,
+            count: 0,
+            finds: Vec::new(),
+            plants: Vec::new(),
+            details: Vec::new(),
+            took: Duration::ZERO,
+        }
+    }
+
+    /// How many of the planted defects were found.
+    #[must_use]
+    pub fn plants_found(&self) -> usize {
+        self.plants.iter().filter(|plant| plant.found_by.is_some()).count()
+    }
+}
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { part, unit, count, finds, plants, details, took } = self;
+        writeln!(f, "{part}: {count} {unit} in {:.1} s, {} found", took.as_secs_f64(), finds.len())?;
+        for line in details {
+            writeln!(f, "  {line}")?;
+        }
+        if !plants.is_empty() {
+            writeln!(f, "  planted defects: {} of {} found", self.plants_found(), plants.len())?;
+            for Plant { name, found_by } in plants {
+                match found_by {
+                    Some(by) => writeln!(f, "    found  {name}, by {by}")?,
+                    None => writeln!(f, "    LIVED  {name}")?,
+                }
+            }
+        }
+        for Find { what, replay } in finds {
+            writeln!(
+                f,
+                "  FOUND {what}\n    again by: cargo run -p drive-fire -- {}",
+                replay.trim_start_matches("drive-fire ")
+            )?;
+        }
+        Ok(())
+    }
+}
