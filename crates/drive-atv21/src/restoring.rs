@@ -36,4 +36,6 @@ pub(crate) const RESTORING: Restoring = Restoring {
         ),
     ],
     left: &[],
+    relations: &[],
+    control: &[REFERENCE_MODE, COMMAND_MODE],
 };

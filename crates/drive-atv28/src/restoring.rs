@@ -1,7 +1,7 @@
 //! What a backup keeps of an Altivar 28 and in which order a restore writes it: the rules of the twins on the Altivar 312
 //! (BBV51701), as far as the Altivar 28 has the registers.
 
-use drive_core::registers::{Restoring, Step};
+use drive_core::registers::{Holds, Relation, Restoring, Step};
 
 use crate::registers::address::*;
 
@@ -26,5 +26,10 @@ pub(crate) const RESTORING: Restoring = Restoring {
     unkept: &[
         SMIL_LOW, SMIL_HIGH, SMAL_LOW, SMAL_HIGH, SPAL_LOW, SPAL_HIGH, SPAT, SPDL_LOW, SPDL_HIGH, SPDT, COD,
     ],
+    relations: &[Relation {
+        holds: Holds::NotAbove,
+        registers: &[LSP, HSP, TFR],
+        why: "LSP ≤ HSP ≤ tFr on the twin (BBV51701 p. 27)",
+    }],
     ..Restoring::NONE
 };

@@ -1,7 +1,7 @@
 //! What a backup keeps of an Altivar 312 and in which order a restore writes it: the interlocks and side effects that
 //! BBV51701 prints beside its variables.
 
-use drive_core::registers::{Restoring, Scaled, Step, Unit};
+use drive_core::registers::{Holds, Relation, Restoring, Scaled, Step, Unit};
 
 use crate::registers::address::*;
 
@@ -23,7 +23,10 @@ pub(crate) const RESTORING: Restoring = Restoring {
         Step { registers: &[UFT2], why: "it puts UFr2 back (BBV51701 p. 50)" },
         Step { registers: &[RSC], why: "a cold-state resistance forces tnL (BBV51701 p. 53)" },
         Step { registers: &[INR], why: "it is the unit of ACC, dEC, AC2 and dE2 (BBV51701 p. 38)" },
-        Step { registers: &[LSP, HSP, TFR], why: "LSP ≤ HSP ≤ tFr at every moment (BBV51701 p. 27)" },
+        Step {
+            registers: &[BEN, LSP, HSP, TFR],
+            why: "bEn ≤ LSP ≤ HSP ≤ tFr at every moment (BBV51701 p. 27, 47)",
+        },
         Step { registers: &[TA1, TA2], why: "tA1 + tA2 at most 100 (BBV51701 p. 38)" },
         Step { registers: &[TA3, TA4], why: "tA3 + tA4 at most 100 (BBV51701 p. 38)" },
         Step { registers: &[CRL3, CRH3], why: "LFL depends on them (BBV51701 p. 54)" },
@@ -64,6 +67,35 @@ pub(crate) const RESTORING: Restoring = Restoring {
         "the manual does not say when it acts: switch the drive off and on to be sure (BBV51701 p. 55)",
     )],
     left: &[(&[TUN], "auto-tuning belongs to the motor on its cable: tune at the drive (BBV51701 p. 30)")],
+    relations: &[
+        Relation {
+            holds: Holds::NotAbove,
+            registers: &[LSP, HSP, TFR],
+            why: "LSP ≤ HSP ≤ tFr (BBV51701 p. 27)",
+        },
+        Relation { holds: Holds::NotAbove, registers: &[BEN, LSP], why: "bEn ≤ LSP (BBV51701 p. 47)" },
+        Relation {
+            holds: Holds::SumAtMost(100),
+            registers: &[TA1, TA2],
+            why: "tA1 + tA2 ≤ 100 % (BBV51701 p. 38)",
+        },
+        Relation {
+            holds: Holds::SumAtMost(100),
+            registers: &[TA3, TA4],
+            why: "tA3 + tA4 ≤ 100 % (BBV51701 p. 38)",
+        },
+        Relation {
+            holds: Holds::NotWithoutNext,
+            registers: &[PS16, PS8, PS4, PS2],
+            why: "PS4 needs PS2, PS8 needs PS4, PS16 needs PS8 (BBV51701 p. 43)",
+        },
+        Relation {
+            holds: Holds::NotWithoutNext,
+            registers: &[PR4, PR2],
+            why: "Pr4 needs Pr2 (BBV51701 p. 46)",
+        },
+    ],
+    control: &[CHCF, CD2, CD1, CCS, COP],
 };
 
 /// The ramps, whose unit `Inr` chooses (p. 38, 39).

@@ -284,7 +284,7 @@ pub enum Error {
     },
     /// The command was sent and the drive's own words do not show it. What was written stands in the drive and may take
     /// effect later: a start that is not confirmed is taken back by a stop, and by nothing else.
-    #[error("slave {slave}: {command} not confirmed: the drive says {status}{}", because.map_or_else(String::new, |because| format!("; {because}")))]
+    #[error("slave {slave}: {command} not confirmed: {}{}", shown(command, status), because.map_or_else(String::new, |because| format!("; {because}")))]
     NotConfirmed {
         /// The slave.
         slave: SlaveAddress,
@@ -295,6 +295,16 @@ pub enum Error {
         /// What keeps the command from being in force, where the drive tells it.
         because: Option<Refusal>,
     },
+}
+
+/// What the drive showed instead: of a parameter the word that was read back, else its status.
+fn shown(command: &Command, status: &Status) -> String {
+    match (command, &*status.raw) {
+        (Command::WriteParameter(_), [read]) => {
+            format!("{} reads back as {} ({:04X}h)", read.code, read.value, read.value)
+        }
+        _ => format!("the drive says {status}"),
+    }
 }
 
 /// The kind of an [`Error`], for a program that decides by it.

@@ -1,6 +1,7 @@
 //! What of a drive's registers a backup keeps, and the order in which a restore writes it: as data, from the manuals.
 
 use super::{
+    relations::Relation,
     row::{Row, Storage},
     unit::Unit,
 };
@@ -46,6 +47,11 @@ pub struct Restoring {
     pub acts_later: &'static [(&'static [u16], &'static str)],
     /// Registers that keep a value and are not restored, with the reason.
     pub left: &'static [(&'static [u16], &'static str)],
+    /// What has to hold among values at every moment of the way.
+    pub relations: &'static [Relation],
+    /// Registers that say who commands: written last, and not at all behind a setting that was refused, for that one may be what
+    /// keeps the motor of whoever commands then within its limits.
+    pub control: &'static [u16],
 }
 
 /// Registers that are written together.
@@ -80,6 +86,8 @@ impl Restoring {
         by_hand: &[],
         acts_later: &[],
         left: &[],
+        relations: &[],
+        control: &[],
     };
 
     /// What a register needs before a written value acts; `None` where the manual asks for nothing.

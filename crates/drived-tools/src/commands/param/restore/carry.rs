@@ -1,8 +1,15 @@
-//! Carrying a restore out: one register after the other, each at standstill and read back, up to the first that cannot be.
+//! Carrying a restore out: one register after the other, each at standstill and read back. One that is refused is passed over, and
+//! told; a drive that does not answer, or that runs, ends it.
 
-use drive_core::{Row, registers::Change};
+use drive_core::{
+    Row,
+    registers::{Change, Part},
+};
 
-use super::plan::{Plan, ordered};
+use super::{
+    plan::{Plan, Wanted, ordered},
+    way::Way,
+};
 use crate::commands::param::source::{Source, Unread, Unwritten};
 use drived_words::{output::Progress, signals::Ending};
 
@@ -11,6 +18,10 @@ use drived_words::{output::Progress, signals::Ending};
 pub(super) struct Carried {
     /// What was written and read back.
     pub(super) written: Vec<Change>,
+    /// What could not be written, or is not held though it was, with the reason.
+    pub(super) refused: Vec<(&'static Row, String)>,
+    /// What was not written because something before it was refused.
+    pub(super) held_back: Vec<&'static Row>,
     /// Why it ended before all was done.
     pub(super) stopped: Option<Stopped>,
     /// What differed at the beginning and has not been written.
@@ -32,63 +43,127 @@ impl Carried {
     pub(super) fn eeprom_writes(&self) -> usize {
         self.written.iter().filter(|change| change.row.storage.may_wear()).count()
     }
+
+    fn has_done(&self, row: &Row) -> bool {
+        let mut done = self.written.iter().map(|change| change.row).chain(self.held_back.iter().copied());
+        let mut refused = self.refused.iter();
+        done.any(|done| done.address == row.address)
+            || refused.any(|(refused, _)| refused.address == row.address)
+    }
 }
 
 /// Writes what differs. What an earlier write has changed is seen, because each step is read before it is written.
 pub(super) async fn carry(plan: &Plan, source: &mut Source, ending: &mut Ending) -> Carried {
-    let mut carried = Carried::default();
     let rows: usize = plan.steps.iter().map(Vec::len).sum();
-    let mut progress = Progress::of(format_args!("{}: restoring", source.name()), rows);
+    let progress = Progress::of(format_args!("{}: restoring", source.name()), rows);
+    let mut carrying =
+        Carrying { source, ending, progress, way: plan.way.clone(), carried: Carried::default() };
     for step in &plan.steps {
-        if let Err(stopped) = carry_step(step, source, ending, &mut progress, &mut carried.written).await {
-            carried.stopped = Some(stopped);
+        if let Err(stopped) = carrying.step(step).await {
+            carrying.carried.stopped = Some(stopped);
             break;
         }
     }
+    let mut carried = carrying.carried;
     if let Some(stopped) = &carried.stopped {
-        let is_done = |row: &Row| carried.written.iter().any(|done| done.row.address == row.address);
         let unknown = stopped.is_unknown.then_some(stopped.at.address);
         let rows = plan.changes.iter().map(|change| change.row);
-        carried.left = rows.filter(|row| !is_done(row) && Some(row.address) != unknown).collect();
+        let left = rows.filter(|row| !carried.has_done(row) && Some(row.address) != unknown);
+        carried.left = left.collect();
     }
     carried
 }
 
-async fn carry_step(
-    step: &[super::plan::Wanted],
-    source: &mut Source,
-    ending: &mut Ending,
-    progress: &mut Progress,
-    written: &mut Vec<Change>,
-) -> Result<(), Stopped> {
-    let mut held = Vec::new();
-    for wanted in step {
-        progress.note(wanted.row.code);
-        progress.step();
-        let word = source.read(wanted.row).await.map_err(|unread| {
-            let (Unread::Refused(why) | Unread::Silent(why)) = unread;
-            Stopped { at: wanted.row, why, is_unknown: false }
-        })?;
-        held.push((wanted.row.address, word));
+struct Carrying<'a> {
+    source: &'a mut Source,
+    ending: &'a mut Ending,
+    progress: Progress,
+    /// What the drive holds, as far as it is known.
+    way: Way,
+    carried: Carried,
+}
+
+impl Carrying<'_> {
+    async fn step(&mut self, step: &[Wanted]) -> Result<(), Stopped> {
+        let mut readable = Vec::new();
+        for wanted in step {
+            self.progress.note(wanted.row.code);
+            self.progress.step();
+            match self.source.read(wanted.row).await {
+                Ok(word) => {
+                    self.way.hold(wanted.row.address, word);
+                    readable.push(*wanted);
+                }
+                Err(Unread::Refused(why)) => self.carried.refused.push((wanted.row, why)),
+                Err(Unread::Silent(why)) => return Err(Stopped { at: wanted.row, why, is_unknown: false }),
+            }
+        }
+        let mut pending = ordered(&readable, &|row| self.way.word(row.address));
+        if pending.iter().any(|change| !self.goes_on_behind_a_refusal(change.row)) {
+            self.carried.held_back.extend(pending.drain(..).map(|change| change.row));
+        }
+        self.read_related(&pending).await?;
+        while let Some(change) = self.way.take(&mut pending) {
+            self.write(change).await?;
+        }
+        for change in pending {
+            let why = self.way.would_break(&change).unwrap_or_default();
+            self.carried.refused.push((change.row, format!("not written, it would be {why}")));
+        }
+        Ok(())
     }
-    let held = |row: &Row| held.iter().find(|(address, _)| *address == row.address).map(|(_, word)| *word);
-    for change in ordered(step, &held) {
+
+    /// Whether a register is written whatever was refused before it. Who commands, and where the drive is found, stays as it is.
+    fn goes_on_behind_a_refusal(&self, row: &Row) -> bool {
+        let restoring = self.way.restoring();
+        let is_line = restoring.part(row) == Part::Communication;
+        self.carried.refused.is_empty() || !(is_line || restoring.control.contains(&row.address))
+    }
+
+    /// What else has to do with these changes, which the file does not have, or an earlier write may have changed.
+    async fn read_related(&mut self, pending: &[Change]) -> Result<(), Stopped> {
+        let addresses: Vec<u16> = pending.iter().map(|change| change.row.address).collect();
+        for row in self.way.related(&addresses) {
+            match self.source.read(row).await {
+                Ok(word) => self.way.hold(row.address, word),
+                // What the drive does not tell is compared with nothing.
+                Err(Unread::Refused(_)) => self.way.forget(row.address),
+                Err(Unread::Silent(why)) => return Err(Stopped { at: row, why, is_unknown: false }),
+            }
+        }
+        Ok(())
+    }
+
+    async fn write(&mut self, change: Change) -> Result<(), Stopped> {
         let stopped = |why, is_unknown| Stopped { at: change.row, why, is_unknown };
-        let mut writing = std::pin::pin!(source.write(change.row, change.wanted));
+        let mut writing = std::pin::pin!(self.source.write(change.row, change.wanted));
         let (outcome, is_asked) = tokio::select! {
             biased;
             outcome = &mut writing => (outcome, false),
             // What is on the wire is waited for: whoever ends the program knows then what was written.
-            () = ending.asked() => (writing.await, true),
+            () = self.ending.asked() => (writing.await, true),
         };
         match outcome {
-            Ok(()) => written.push(change),
-            Err(Unwritten::Refused(why)) => return Err(stopped(why, false)),
+            Ok(()) => {
+                self.way.hold(change.row.address, change.wanted);
+                self.carried.written.push(change);
+            }
+            Err(Unwritten::Refused(why)) => self.carried.refused.push((change.row, why)),
+            Err(Unwritten::ReadsBack(word)) => {
+                self.way.hold(change.row.address, word);
+                let why = format!(
+                    "it was written and reads back as {}: the drive has not taken {}",
+                    self.way.text(change.row, word),
+                    self.way.text(change.row, change.wanted)
+                );
+                self.carried.refused.push((change.row, why));
+            }
+            Err(Unwritten::NotNow(why)) => return Err(stopped(why, false)),
             Err(Unwritten::Unknown(why)) => return Err(stopped(why, true)),
         }
-        if is_asked {
-            return Err(stopped("asked to end; this one is written".to_owned(), false));
+        match is_asked {
+            true => Err(stopped("asked to end; this one is written".to_owned(), false)),
+            false => Ok(()),
         }
     }
-    Ok(())
 }

@@ -2,6 +2,7 @@
 
 mod carry;
 mod plan;
+mod way;
 
 use std::path::{Path, PathBuf};
 
@@ -23,8 +24,11 @@ use drived_words::{failure::Failure, output, signals::Ending};
 /// Put parameters from a file back into a drive, in the order that its manual wants; without --write it is only said what would
 /// be written
 ///
-/// Only what differs is written, each at standstill and read back, up to the first that is refused; running it again goes on
-/// from there. Through the daemon it needs the right to change parameters.
+/// Only what differs is written, each at standstill and read back. One that the drive refuses is passed over, and told with its
+/// reason at the end (exit code 1); who commands the drive, and the line's own settings, stay as they are then. A drive that does
+/// not answer, or that runs, ends it; running it again goes on from there. Limits that belong together (low speed, high speed,
+/// highest frequency) are kept in their order at every moment of the way. Through the daemon it needs the right to change
+/// parameters.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Files that drived param backup has kept, or a folder of them
@@ -59,7 +63,8 @@ pub struct Args {
 struct Told {
     text: Vec<String>,
     json: Map<String, Value>,
-    failure: Option<Failure>,
+    /// Why it is not done, and whether the next file may be taken all the same.
+    failure: Option<(Failure, bool)>,
 }
 
 pub(super) async fn run(args: Args) -> Result<(), Failure> {
@@ -94,8 +99,15 @@ pub(super) async fn run(args: Args) -> Result<(), Failure> {
             text.iter().try_for_each(output::say)?;
         }
         told.push(Value::Object(json));
-        if let Some(failure) = failure {
-            result = Err(failure);
+        // What one drive refuses keeps nobody from the next one.
+        let goes_on = failure.as_ref().is_none_or(|(_, goes_on)| *goes_on);
+        result = match (result, failure) {
+            (Err(Failure::Drive(before)), Some((Failure::Drive(why), _))) => {
+                Err(Failure::Drive(format!("{before}; {why}")))
+            }
+            (before, failure) => before.and(failure.map_or(Ok(()), |(failure, _)| Err(failure))),
+        };
+        if !goes_on {
             break;
         }
     }
@@ -150,6 +162,7 @@ async fn restore(
     }
     let now = source.keep().await?;
     let other = other_model(file, &now);
+    let firmware = other_firmware(file, &now);
     if let Some(why) = other.as_ref().filter(|_| !args.other_model) {
         return Err(Failure::Input(format!(
             "{name} is another model than that of {}: {why}; --other-model writes all the same",
@@ -175,7 +188,12 @@ async fn restore(
         text.push(format!("{name}: {differ} from {}", path.display()));
         text.push(plan.table(file, &now).on_terminal().to_string());
     }
+    json.insert("other_model".to_owned(), json!(other));
+    json.insert("other_firmware".to_owned(), json!(firmware));
     text.extend(other.map(|why| format!("another model: {why}")));
+    text.extend(
+        firmware.map(|why| format!("another firmware: {why}: what this one does not know it refuses")),
+    );
     text.extend(plan.skipped.iter().map(|(row, why)| format!("not written: {}: {why}", row.code)));
     text.extend(by_hand.map(|why| format!("before anything is written: {why}")));
     if !args.write {
@@ -189,13 +207,17 @@ async fn restore(
     }
     source.ready_for_writing(&args.ledger).await?;
     let mut carried = carry(&plan, source, ending).await;
-    let mut failure =
-        carried.stopped.as_ref().map(|stopped| Failure::Drive(stopped.in_words(&name, &carried)));
+    let stopped = carried.stopped.as_ref().map(|stopped| stopped.in_words(&name, &carried));
+    let mut failure = stopped.map(|why| (Failure::Drive(why), false));
     // The line itself may be another one then, and nobody answers where the drive was.
     let cuts = |change: &Change| of.capabilities().restoring.part(change.row) == Part::Communication;
     let is_cut = carried.written.iter().any(cuts);
     if failure.is_none() && !is_cut {
-        failure = verify(file, source, args.with_communication, &plan, &mut carried).await;
+        let put_back = verify(file, source, args.with_communication, &plan, &mut carried).await;
+        failure = put_back.map(|failure| (failure, false));
+    }
+    if failure.is_none() && !carried.refused.is_empty() {
+        failure = Some((Failure::Drive(carried.refusals_in_words(&name)), true));
     }
     let mut saved = false;
     if failure.is_none() {
@@ -204,28 +226,52 @@ async fn restore(
                 saved = is_saved;
                 text.extend(how);
             }
-            Err(why) => failure = Some(Failure::Drive(format!("all is written, and not saved: {why}"))),
+            Err(why) => {
+                failure = Some((Failure::Drive(format!("all is written, and not saved: {why}")), false))
+            }
         }
+    } else if args.save {
+        text.push(NOT_SAVED.to_owned());
     }
     if !carried.written.is_empty() {
         let written = output::counted(carried.written.len(), "parameter was", "parameters were");
-        let by_itself = plan.changes.len().saturating_sub(carried.written.len());
-        let more = match by_itself {
-            1.. if failure.is_none() => format!("; {by_itself} more came right by these"),
+        let others = carried.written.len() + carried.refused.len() + carried.held_back.len();
+        let more = match plan.changes.len().saturating_sub(others) {
+            by_itself @ 1.. if carried.stopped.is_none() => format!("; {by_itself} more came right by these"),
             _ => String::new(),
         };
         text.insert(0, format!("{name}: {written} written and read back{more}"));
     }
+    let slave = source.slave();
+    for (row, why) in &carried.refused {
+        text.push(format!("refused: {name}, slave {slave}, {} ({}): {why}", row.code, row.address));
+    }
+    if !carried.held_back.is_empty() {
+        let codes: Vec<_> = carried.held_back.iter().map(|row| row.code).collect();
+        text.push(format!("left as it was because of that: {}: {HELD_BACK}", codes.join(", ")));
+    }
     text.extend(later(&of.capabilities().restoring, &carried));
     json.extend([
         ("written".to_owned(), carried.written.iter().map(|change| change.row.code).collect()),
+        ("refused".to_owned(), carried.refused.iter().map(|refusal| refusal_json(slave, refusal)).collect()),
+        ("held_back".to_owned(), carried.held_back.iter().map(|row| row.code).collect()),
         ("not_written".to_owned(), carried.left.iter().map(|row| row.code).collect()),
         ("unknown".to_owned(), json!(carried.unknown())),
         ("eeprom_writes".to_owned(), json!(carried.eeprom_writes())),
         ("saved".to_owned(), json!(saved)),
-        ("error".to_owned(), json!(failure.as_ref().map(ToString::to_string))),
+        ("error".to_owned(), json!(failure.as_ref().map(|(failure, _)| failure.to_string()))),
     ]);
     Ok(Told { text, json, failure })
+}
+
+const NOT_SAVED: &str =
+    "nothing was saved to EEPROM: see what is missing, then drived param save keeps what was written";
+
+const HELD_BACK: &str = "who commands, and where the drive is found, is only changed when everything else is as in the file; set \
+    what was refused, or take its line out of the file, and run it again";
+
+fn refusal_json(slave: u8, (row, why): &(&'static drive_core::Row, String)) -> Value {
+    json!({ "slave": slave, "mnemonic": row.code, "address": row.address, "why": why })
 }
 
 /// What has been written and does not act yet, by what it needs.
@@ -258,6 +304,12 @@ fn other_model(file: &Backup, now: &Backup) -> Option<String> {
     })
 }
 
+/// Which other firmware the drive has than that of the file, where both say it.
+fn other_firmware(file: &Backup, now: &Backup) -> Option<String> {
+    let (was, is) = (file.head.firmware.as_ref()?, now.head.firmware.as_ref()?);
+    (was != is).then(|| format!("the drive has {is}, and the file is of {was}"))
+}
+
 /// Reads everything again: what a later write has put back is no success.
 async fn verify(
     file: &Backup,
@@ -277,7 +329,11 @@ async fn verify(
         |row: &drive_core::Row| plan.skipped.iter().any(|(skipped, _)| skipped.address == row.address);
     let has = |row: &drive_core::Row| file.word(row.address).is_some();
     let rows = differences.iter().map(|difference| difference.row);
-    carried.left = rows.filter(|row| has(row) && !is_skipped(row)).collect();
+    let is_told = |row: &drive_core::Row| {
+        let refused = carried.refused.iter().map(|(row, _)| *row);
+        refused.chain(carried.held_back.iter().copied()).any(|told| told.address == row.address)
+    };
+    carried.left = rows.filter(|row| has(row) && !is_skipped(row) && !is_told(row)).collect();
     if carried.left.is_empty() {
         return None;
     }
@@ -311,6 +367,19 @@ async fn keep(args: &Args, source: &mut Source, carried: &Carried) -> Result<(bo
 }
 
 impl Carried {
+    /// What was refused, in a line; why stands with each.
+    fn refusals_in_words(&self, name: &str) -> String {
+        let refused = output::counted(self.refused.len(), "parameter was", "parameters were");
+        let codes: Vec<_> = self.refused.iter().map(|(row, _)| row.code).collect();
+        let codes = codes.join(", ");
+        if self.held_back.is_empty() {
+            return format!("{name}: {refused} refused: {codes}; the rest is as in the file");
+        }
+        let held_back: Vec<_> = self.held_back.iter().map(|row| row.code).collect();
+        let held_back = held_back.join(", ");
+        format!("{name}: {refused} refused: {codes}; left as it was because of that: {held_back}")
+    }
+
     fn unknown(&self) -> Option<&'static str> {
         self.stopped.as_ref().filter(|stopped| stopped.is_unknown).map(|stopped| stopped.at.code)
     }
@@ -325,12 +394,16 @@ impl carry::Stopped {
         };
         let written = listed(&mut carried.written.iter().map(|change| change.row.code));
         let left = listed(&mut carried.left.iter().map(|row| row.code));
+        let refused = match carried.refused.is_empty() {
+            true => String::new(),
+            false => format!("; refused: {}", listed(&mut carried.refused.iter().map(|(row, _)| row.code))),
+        };
         let unknown = match self.is_unknown {
             true => format!("; unknown whether written: {}", self.at.code),
             false => String::new(),
         };
         format!(
-            "{name}: stopped at {}: {}; written: {written}{unknown}; not written: {left}; the same command goes on from here",
+            "{name}: stopped at {}: {}; written: {written}{refused}{unknown}; not written: {left}; the same command goes on from here",
             self.at.code, self.why
         )
     }

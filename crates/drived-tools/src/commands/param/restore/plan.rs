@@ -6,11 +6,12 @@ use drive_core::{
 };
 use serde_json::{Value, json};
 
+use super::way::Way;
 use crate::commands::param::file::{Backup, Entry};
 use drived_words::{failure::Failure, output::Table, registers::range};
 
 /// What is to be done to one drive.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub(super) struct Plan {
     /// Settings that the file has, in the order in which they are written, those of one step together.
     pub(super) steps: Vec<Vec<Wanted>>,
@@ -18,6 +19,8 @@ pub(super) struct Plan {
     pub(super) changes: Vec<Change>,
     /// What differs, or may, and is not written, with the reason.
     pub(super) skipped: Vec<(&'static Row, String)>,
+    /// What the drive holds now.
+    pub(super) way: Way,
 }
 
 /// A word that the file has for a register.
@@ -58,8 +61,10 @@ impl Plan {
             rows.filter_map(wanted).collect::<Vec<_>>()
         });
         let steps: Vec<Vec<Wanted>> = steps.filter(|step| !step.is_empty()).collect();
-        let changes: Vec<Change> =
-            steps.iter().flat_map(|step| ordered(step, &|row| now.word(row.address))).collect();
+        let words =
+            now.entries.iter().filter_map(|entry| Some((entry.row.address, *entry.held.as_ref().ok()?)));
+        let way = Way::of(capabilities, words);
+        let changes = in_steps(&steps, way.clone())?;
         for Change { row, wanted, .. } in &changes {
             if !row.range.allows(row.unit.number(*wanted)) {
                 let shown = file.row(row);
@@ -72,7 +77,7 @@ impl Plan {
                 )));
             }
         }
-        Ok(Self { steps, changes, skipped })
+        Ok(Self { steps, changes, skipped, way })
     }
 
     /// What has to be set at the drive before anything is written: it would load other values over them.
@@ -120,7 +125,36 @@ impl Plan {
     }
 }
 
-/// The changes of one step, in the order in which they are written.
+/// What is written, one after the other, so that what the manual wants to hold among values holds at every moment.
+fn in_steps(steps: &[Vec<Wanted>], mut way: Way) -> Result<Vec<Change>, Failure> {
+    let of_step = |step: &Vec<Wanted>, way: &Way| ordered(step, &|row| way.word(row.address));
+    let mut end = way.clone();
+    let all: Vec<Change> = steps.iter().flat_map(|step| of_step(step, &way)).collect();
+    all.iter().for_each(|change| end.hold(change.row.address, change.wanted));
+    let changed: Vec<u16> = all.iter().map(|change| change.row.address).collect();
+    if let Some(why) = end.breaks(&changed) {
+        let why = format!("the drive would be left with {why}: mend the file; nothing was written");
+        return Err(Failure::Input(why));
+    }
+    let mut changes = Vec::new();
+    for step in steps {
+        let mut pending = of_step(step, &way);
+        while let Some(change) = way.take(&mut pending) {
+            way.hold(change.row.address, change.wanted);
+            changes.push(change);
+        }
+        if let Some(why) = pending.first().and_then(|change| way.would_break(change)) {
+            let codes: Vec<&str> = pending.iter().map(|change| change.row.code).collect();
+            return Err(Failure::Input(format!(
+                "no order of {} keeps the drive from {why} on the way: set one of them to another value at the drive first; nothing was written",
+                codes.join(", ")
+            )));
+        }
+    }
+    Ok(changes)
+}
+
+/// The changes of one step, in the order in which they are written where nothing else forbids it.
 pub(super) fn ordered(step: &[Wanted], held: &dyn Fn(&Row) -> Option<u16>) -> Vec<Change> {
     let change = |Wanted { row, word }: &Wanted| Some(Change { row, held: held(row)?, wanted: *word });
     in_order(&step.iter().filter_map(change).collect::<Vec<_>>())

@@ -252,25 +252,154 @@ async fn functions_that_exclude_each_other_are_taken_away_before_others_are_give
     }
 }
 
-#[tokio::test(start_paused = true)]
-async fn what_the_drive_or_its_family_refuses_ends_it_before_anything_else_is_written() {
-    let file = Bench::kept(Family::ATV312).await;
-    // BBV51701 p. 35: from L3 back to L1 only by a factory setting.
-    for (code, word, set_up) in [("LAC", 0, SetUp::ForTheBus)] {
-        let mut file = file.clone();
-        file.entries.iter_mut().find(|entry| entry.row.code == code).unwrap().held = Ok(word);
-        let mut new = Bench::of(Family::ATV312, set_up);
-        let plan = new.plan(&file).await;
-        let carried = new.carry(&plan).await;
-        let stopped = carried.stopped.as_ref().unwrap_or_else(|| panic!("{code} was written"));
-        assert_eq!((stopped.at.code, stopped.is_unknown), (code, false), "{}", stopped.why);
-        assert_eq!((carried.written.len(), carried.left.len()), (0, plan.changes.len()));
-        let told = stopped.in_words("pump 1", &carried);
-        assert!(
-            told.contains("written: none; not written: ") && told.contains("goes on from here"),
-            "{told}"
-        );
+/// A file in which these stand otherwise.
+fn edited(mut file: Backup, words: &[(&str, u16)]) -> Backup {
+    for (code, word) in words {
+        file.entries.iter_mut().find(|entry| entry.row.code == *code).unwrap().held = Ok(*word);
     }
+    file
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_backup_of_one_drive_goes_into_another_that_refuses_three_and_each_is_told() {
+    let kept = Bench::kept(Family::ATV312).await;
+    let mut other = Bench::of(Family::ATV312, SetUp::ForTheBus);
+    // The firmware is what function 43/14 says of the drive (BBV52816, "Identification").
+    let mut file = kept.clone();
+    file.head.firmware = Some("0000".to_owned());
+    // From L3 back to L1 only by a factory setting (BBV51701 p. 35); at most 500 V on an N4 (p. 28); nCr at most 1.5 In (p. 29);
+    // Cd1 = tEr, the terminals (p. 36).
+    let file = edited(file, &[("LAC", 0), ("UnS", 600), ("nCr", 60_000), ("Cd1", 1)]);
+    let command = other.machine.peek(8_423);
+    assert_ne!(command, Some(1));
+    let told = say(&mut other, &file, &["--write", "--save"]).await.unwrap();
+    let refused: Vec<_> = told.json["refused"].as_array().unwrap().iter().collect();
+    let codes: Vec<_> = refused.iter().map(|one| one["mnemonic"].as_str().unwrap()).collect();
+    assert_eq!(codes, ["LAC", "UnS", "nCr"]);
+    for one in refused {
+        assert!(one["slave"] == 1 && one["address"].is_u64(), "{one}");
+        assert!(one["why"].as_str().unwrap().contains("exception 03h"), "{one}");
+    }
+    for line in ["refused: atv312@1, slave 1, LAC (3006): ", "refused: atv312@1, slave 1, nCr (9603): "] {
+        assert!(told.text.iter().any(|text| text.starts_with(line)), "{line} in {:?}", told.text);
+    }
+    assert!(told.text.iter().any(|text| text.starts_with("another firmware: ")), "{:?}", told.text);
+    let Some((Failure::Drive(why), true)) = &told.failure else { panic!("{:?}", told.failure) };
+    assert!(why.contains("3 parameters were refused: LAC, UnS, nCr") && why.contains("Cd1"), "{why}");
+    // Everything else is as in the file; who commands is not, and nothing is in the EEPROM.
+    assert_eq!(other.differences(&file).await, ["UnS", "nCr", "LAC", "Cd1"]);
+    assert_eq!((other.machine.peek(8_423), &told.json["saved"]), (command, &json!(false)));
+    assert!(other.machine.peek(9_001) == Some(1_234) && other.machine.peek(9_604) == Some(1_745));
+}
+
+#[tokio::test(start_paused = true)]
+async fn whichever_request_is_refused_the_rest_goes_on_and_no_limit_passes_its_neighbour_at_any_moment() {
+    // BBV51701 p. 27: LSP ≤ HSP ≤ tFr.
+    const LIMITS: [u16; 3] = [3_105, 3_104, 3_103];
+    let held_by = |machine: &SimSlave| LIMITS.map(|address| machine.peek(address).unwrap());
+    let set = |bench: &Bench, words: [u16; 3]| {
+        LIMITS.iter().zip(words).for_each(|(address, word)| assert!(bench.machine.poke(*address, word)));
+    };
+    let mut passed_over = 0;
+    for (held, wanted) in [([100, 400, 700], [550, 650, 1_000]), ([550, 650, 1_000], [100, 400, 600])] {
+        let mut other = Bench::of(Family::ATV312, SetUp::Factory);
+        set(&other, wanted);
+        let mut file = other.source.keep().await.unwrap();
+        file.entries.retain(|entry| LIMITS.contains(&entry.row.address));
+        let mut whole = Bench::of(Family::ATV312, SetUp::Factory);
+        set(&whole, held);
+        let plan = whole.plan(&file).await;
+        let begun = whole.machine.all_requests();
+        whole.carry(&plan).await;
+        assert_eq!(held_by(&whole.machine), wanted);
+        for refused in begun..whole.machine.all_requests() {
+            let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
+            set(&bench, held);
+            bench.plan(&file).await;
+            let machine = bench.machine.clone();
+            let watching = tokio::spawn(async move {
+                for requests in begun.. {
+                    machine.wait_for_requests(requests).await;
+                    assert!(held_by(&machine).is_sorted(), "{:?} at request {requests}", held_by(&machine));
+                    if requests == refused {
+                        machine.refuse_next(drive_sim::Exception::ILLEGAL_VALUE);
+                    }
+                }
+            });
+            let carried = bench.carry(&plan).await;
+            watching.abort();
+            assert!(watching.await.is_err_and(|ended| ended.is_cancelled()), "a limit was passed");
+            assert!(held_by(&bench.machine).is_sorted());
+            let done = carried.written.len() + carried.refused.len();
+            assert!(carried.stopped.is_some() || done == LIMITS.len(), "{refused}: {carried:?}");
+            passed_over += usize::from(carried.stopped.is_none() && !carried.refused.is_empty());
+        }
+    }
+    assert!(passed_over >= 6, "{passed_over}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn values_that_cannot_stand_together_are_refused_before_anything_is_written() {
+    // BBV51701 p. 27, 38, 43; 3G3EV §5.3: OP4, OP5.
+    let of_312: [(&[(&str, u16)], &str); 3] = [
+        (
+            &[("LSP", 600), ("HSP", 500)],
+            "LSP 60.0 Hz and HSP 50.0 Hz against LSP ≤ HSP ≤ tFr (BBV51701 p. 27)",
+        ),
+        (&[("tA1", 60), ("tA2", 41)], "tA1 60 % and tA2 41 % against tA1 + tA2 ≤ 100 %"),
+        (&[("PS2", 0), ("PS4", 132)], "PS4 LI4 and PS2 nO against PS4 needs PS2"),
+    ];
+    let of_3g3ev: [(&[(&str, u16)], &str); 2] = [
+        (&[("n42", 700), ("n41", 600)], "n42 700 and n41 600 against n42 ≤ n41 (§5.3 OP4)"),
+        (&[("n58", 300), ("n57", 200), ("n56", 400)], "n58 300 and n57 200 against n58 ≤ n57 ≤ n56"),
+    ];
+    for (family, cases) in [(Family::ATV312, &of_312[..]), (Family::OMRON_3G3EV, &of_3g3ev[..])] {
+        let mut new = Bench::of(family, SetUp::Factory);
+        let now = new.source.keep().await.unwrap();
+        for (words, reason) in cases {
+            let file = edited(now.clone(), words);
+            let Err(Failure::Input(why)) = say(&mut new, &file, &["--write"]).await else {
+                panic!("{words:?}")
+            };
+            assert!(why.contains(reason) && why.contains("nothing was written"), "{why}");
+        }
+        assert_eq!(seen(&new.machine), [0_u16; 0]);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn functions_of_inputs_are_never_equal_on_the_way_and_change_places_by_nobody() {
+    // 3G3EV §5.3, OP1.
+    let mut bench = Bench::of(Family::OMRON_3G3EV, SetUp::Factory);
+    let now = bench.source.keep().await.unwrap();
+    let held = ["n06", "n07", "n08"].map(|code| {
+        let address = now.entries.iter().find(|entry| entry.row.code == code).unwrap().row.address;
+        now.word(address).unwrap()
+    });
+    let [one, two, three] = held;
+    let turned = edited(now.clone(), &[("n06", two), ("n07", three), ("n08", 9)]);
+    assert_eq!(codes(&Plan::of(&turned, &now, false).unwrap().changes), ["n08", "n07", "n06"]);
+    let swapped = edited(now.clone(), &[("n06", two), ("n07", one)]);
+    let Err(Failure::Input(why)) = Plan::of(&swapped, &now, false) else { panic!("taken") };
+    assert!(why.contains("no order of n07, n06 keeps the drive from"), "{why}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_that_the_drive_ignores_is_told_with_what_was_read_back() {
+    let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
+    let now = bench.source.keep().await.unwrap();
+    // ACC, 3.0 s from the factory (BBV52816 p. 12).
+    let file = edited(now, &[("ACC", 45)]);
+    let machine = bench.machine.clone();
+    let forgetting = tokio::spawn(async move {
+        machine.wait_until(|_| machine.requests(0x06) > 0).await;
+        assert!(machine.poke(9_001, 30));
+    });
+    let told = say(&mut bench, &file, &["--write"]).await.unwrap();
+    forgetting.await.unwrap();
+    let [one] = &**told.json["refused"].as_array().unwrap() else { panic!("{:?}", told.json) };
+    assert_eq!(one["why"], "it was written and reads back as 3.0 s: the drive has not taken 4.5 s");
+    assert_eq!(told.failure.unwrap().0.code(), 1);
 }
 
 #[tokio::test(start_paused = true)]

@@ -1,6 +1,7 @@
 //! One register of a drive, read or written, and the save to its EEPROM.
 
-use drive_core::{ErrorKind, Row};
+use axum::http::StatusCode;
+use drive_core::{Error, ErrorKind, Refusal, Row};
 use serde_json::json;
 
 use super::{Source, Unread, Unwritten};
@@ -45,17 +46,13 @@ impl Source {
                     Ok(status) => {
                         let why =
                             format!("parameters are restored at standstill, and the drive shows {status}");
-                        return Err(Unwritten::Refused(why));
+                        return Err(Unwritten::NotNow(why));
                     }
-                    Err(error) => return Err(Unwritten::Refused(error.to_string())),
+                    Err(error) => return Err(Unwritten::NotNow(error.to_string())),
                 }
                 let written = one.drive.write_parameter(row, word).await;
                 one.count_of(row, &written);
-                match written {
-                    Ok(_) => Ok(()),
-                    Err(error) if may_have_written(&error) => Err(Unwritten::Unknown(error.to_string())),
-                    Err(error) => Err(Unwritten::Refused(error.to_string())),
-                }
+                written.map(drop).map_err(|error| unwritten(row, &error))
             }
             Self::OfDaemon { daemon, view } => {
                 let name = view.name();
@@ -63,12 +60,20 @@ impl Source {
                 let body = json!({ "value": format!("0x{word:04X}"), "only_at_standstill": true });
                 let answer = daemon.put(&path, &body).await;
                 let answer = answer.map_err(|failure| Unwritten::Unknown(failure.to_string()))?;
+                let why = answer.failure().to_string();
                 match answer.status {
                     status if status.is_success() => Ok(()),
-                    status if status.is_client_error() => {
-                        Err(Unwritten::Refused(answer.failure().to_string()))
+                    StatusCode::UNPROCESSABLE_ENTITY => Err(Unwritten::Refused(why)),
+                    StatusCode::CONFLICT if !answer.reason().is_some_and(|word| is_of_the_moment(&word)) => {
+                        Err(Unwritten::Refused(why))
                     }
-                    _ => Err(Unwritten::Unknown(answer.failure().to_string())),
+                    status if status.is_client_error() => Err(Unwritten::NotNow(why)),
+                    // Sent, and not confirmed: what it holds says what became of it.
+                    _ => match self.read(row).await {
+                        Ok(held) if held == word => Ok(()),
+                        Ok(held) => Err(Unwritten::ReadsBack(held)),
+                        Err(_) => Err(Unwritten::Unknown(why)),
+                    },
                 }
             }
         }
@@ -95,4 +100,40 @@ impl Source {
             }
         }
     }
+}
+
+/// What became of a register that could not be written.
+fn unwritten(row: &Row, error: &Error) -> Unwritten {
+    match error {
+        Error::NotConfirmed { status, .. } => {
+            let mut read = status.raw.iter().filter(|read| read.address == row.address);
+            read.next().map_or_else(
+                || Unwritten::Unknown(error.to_string()),
+                |read| Unwritten::ReadsBack(read.value),
+            )
+        }
+        _ if may_have_written(error) => Unwritten::Unknown(error.to_string()),
+        Error::Refused { reason: Refusal::MotorRunning, .. } | Error::Port { .. } => {
+            Unwritten::NotNow(error.to_string())
+        }
+        _ => Unwritten::Refused(error.to_string()),
+    }
+}
+
+/// Whether the daemon refuses whatever is asked of this drive, now or of this caller, and not this register: its words for that.
+fn is_of_the_moment(reason: &str) -> bool {
+    const WHATEVER: [&str; 11] = [
+        "read_only",
+        "no_right",
+        "offline",
+        "stale",
+        "identity",
+        "watchdog",
+        "stop_pending",
+        "stop",
+        "later_command",
+        "queue_full",
+        "shut_down",
+    ];
+    reason == Refusal::MotorRunning.word() || WHATEVER.contains(&reason)
 }

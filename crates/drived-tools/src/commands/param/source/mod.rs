@@ -53,8 +53,12 @@ pub(super) enum Unread {
 
 /// Why a register was not written.
 pub(super) enum Unwritten {
-    /// It holds what it held.
+    /// The drive, or what is known of it, refuses this one: it holds what it held, and another one may be taken.
     Refused(String),
+    /// It was written, and this is what it holds.
+    ReadsBack(u16),
+    /// Nothing can be written now: it runs, it does not answer, or somebody may not write. It holds what it held.
+    NotNow(String),
     /// Nobody knows what it holds.
     Unknown(String),
 }
@@ -157,6 +161,13 @@ impl Source {
         match self {
             Self::OnLine(one) => one.name.to_string(),
             Self::OfDaemon { view, .. } => view.name().to_owned(),
+        }
+    }
+
+    pub(super) fn slave(&self) -> u8 {
+        match self {
+            Self::OnLine(one) => one.name.slave.number(),
+            Self::OfDaemon { view, .. } => view.slave,
         }
     }
 
