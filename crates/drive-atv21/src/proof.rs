@@ -140,9 +140,9 @@ impl Approach {
 fn output(word: StatusWord, frequency: Option<Frequency>, was_braked: bool) -> Output {
     let cut = StatusWord::FREEWHEEL | StatusWord::UNDERVOLTAGE | StatusWord::EMERGENCY_STOP;
     let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
-    // A trip may stop along a ramp (F603 = 1).
+    // A trip may stop along a ramp (F603 = 1), or cut the output of a motor that was coming down.
     if word.contains(StatusWord::TRIPPED) {
-        return if was_braked { Output::None } else { Output::Tripped };
+        return if was_braked { Output::Gone } else { Output::Tripped };
     }
     if word.intersects(cut) || !word.contains(StatusWord::STANDBY) {
         return Output::Cut;

@@ -8,7 +8,7 @@ mod support;
 use std::time::Duration;
 
 use drive_bus::{
-    Echo, LineConfig,
+    Echo, LineConfig, SlaveSettings,
     exchange::{Machine, Step, mbap::Mbap, rtu},
 };
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
@@ -127,6 +127,21 @@ fn after_a_timeout_the_next_read_asks_another_length_so_that_the_late_answer_is_
     line.hears(RESPONSE, &rtu::frame(1, &words(&[2, 2, 0xFFFF])));
     assert_eq!(line.ended(), Some((1, read(&[2, 2]))));
     assert_eq!(line.master.stats(line.now).slaves[&1].late, 1);
+}
+
+#[test]
+fn a_slave_has_its_pause_behind_an_answer_that_came_late() {
+    let pause = SlaveSettings { turnaround: 40 * MS, ..SlaveSettings::default() };
+    let mut line = ByHand::new(LineConfig { retries: 0, ..config() }.slave(1, pause));
+    line.ask(1, 1, READ, Terms::default().sparing(3));
+    let request = line.sent();
+    nothing_is_sent_for(&mut line, 600 * MS);
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    line.hears(RESPONSE, &rtu::frame(1, &words(&[1, 1])));
+    let late = line.now;
+    line.ask(2, 1, STOP, Terms::of(Class::Stop));
+    line.sent();
+    assert!(line.now >= late + 40 * MS, "{request:02X?}: {:?}", line.now - late);
 }
 
 #[test]

@@ -6,4 +6,6 @@
 #![forbid(unsafe_code)]
 
 pub mod matrix;
+pub mod model;
 pub mod report;
+pub mod story;

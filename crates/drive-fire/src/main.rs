@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use drive_fire::{matrix, report::Told};
+use drive_fire::{matrix, model, report::Told, story};
 
 /// Attacks everything that stands, and says what was tried and what was found.
 #[derive(Debug, Parser)]
@@ -40,6 +40,31 @@ enum Part {
         #[arg(long)]
         plants: bool,
     },
+    /// Random worlds, judged and shrunk.
+    Worlds {
+        /// So many stories.
+        #[arg(long, default_value_t = 500)]
+        stories: u64,
+        /// One story alone, as a find names it.
+        #[arg(long)]
+        story: Option<String>,
+    },
+    /// The master of a line, explored to the end.
+    Model {
+        /// Every sequence of so many steps.
+        #[arg(long, default_value_t = 4)]
+        depth: usize,
+        /// One sequence alone, as a find names it.
+        #[arg(long)]
+        steps: Option<String>,
+        /// On which line: `Wire` or `Gateway`.
+        #[arg(long, default_value = "Wire")]
+        setting: String,
+        /// Against its planted defects, with `--features plants`.
+        #[cfg(feature = "plants")]
+        #[arg(long)]
+        plants: bool,
+    },
 }
 
 fn main() -> ExitCode {
@@ -65,6 +90,29 @@ fn main() -> ExitCode {
         }
         Part::Matrix { plants: true, of_each, .. } => vec![matrix::find_plants(seed, of_each as usize)],
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
+        Part::Worlds { story: Some(line), .. } => {
+            let Some(story) = story::Story::read(&line) else {
+                eprintln!("{line} is no story");
+                return ExitCode::FAILURE;
+            };
+            println!("{}", story.in_words());
+            println!("{:#?}", matrix::tell(&story, &*matrix::drive_of(story.subject)));
+            return ExitCode::SUCCESS;
+        }
+        Part::Worlds { stories, .. } => vec![story::run(seed, stories, go_on)],
+        Part::Model { steps: Some(code), setting, .. } => {
+            let known = model::master::Setting::ALL.into_iter().find(|known| format!("{known:?}") == setting);
+            let (Some(steps), Some(setting)) = (model::steps(&code), known) else {
+                eprintln!("{code} are no steps, or {setting} is no line");
+                return ExitCode::FAILURE;
+            };
+            println!("{setting:?}: {steps:?}");
+            println!("{:?}", model::master::lives(setting, &steps));
+            return ExitCode::SUCCESS;
+        }
+        #[cfg(feature = "plants")]
+        Part::Model { plants: true, depth, .. } => vec![model::find_plants(depth)],
+        Part::Model { depth, .. } => vec![model::run(depth, go_on)],
     };
     told.iter().for_each(|told| print!("{told}"));
     if told.iter().all(|told| told.finds.is_empty()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }

@@ -592,7 +592,7 @@ impl<C> Master<C> {
             return;
         }
         if late {
-            station.heard_late();
+            station.heard_late(now);
             self.offline.hope(now, slave);
         }
         match asked {

@@ -120,9 +120,10 @@ impl Station {
         self.failures == 0 && self.timeout.is_learned()
     }
 
-    /// An answer came when its time was over: it is there, and slow.
-    pub(super) const fn heard_late(&mut self) {
+    /// An answer came when its time was over: it is there, and slow, and needs its pause.
+    pub(super) fn heard_late(&mut self, now: Instant) {
         self.slow = true;
+        self.ready_at = self.ready_at.max(Some(now + self.settings.turnaround));
     }
 
     /// Whether only a long question is worth asking, because its own time was set or because it was heard late.

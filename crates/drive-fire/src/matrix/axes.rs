@@ -157,6 +157,22 @@ impl FarEnd {
         Self::GoesMute,
     ];
 
+    /// Why what is wrong behind it cannot be told from what is right, where a fault has `struck` besides, if it cannot.
+    #[must_use]
+    pub fn is_beyond_telling(self, way: Way, struck: bool) -> Option<&'static str> {
+        match self {
+            Self::Caching => Some("a gateway that answers from what it has kept tells no age"),
+            Self::Twins => Some("two that answer as one"),
+            Self::Doubling if way == Way::RtuOverTcp => {
+                Some("the first answer that comes twice, to a read that cannot differ")
+            }
+            Self::SecondMaster if struck => {
+                Some("the answer to a second master is struck, of which nobody knows any more whose it is")
+            }
+            _ => None,
+        }
+    }
+
     /// Why it is not on this way.
     #[must_use]
     pub fn impossible_on(self, way: Way) -> Option<&'static str> {
@@ -254,7 +270,9 @@ impl Operation {
         Self::ArmWatchdog,
     ];
 
-    pub(super) fn impossible_for(self, subject: Subject, runs: bool) -> Option<&'static str> {
+    /// Why it cannot be asked of this drive, or cannot happen to it, if it cannot.
+    #[must_use]
+    pub fn impossible_for(self, subject: Subject, runs: bool) -> Option<&'static str> {
         let family = subject.family();
         let claims = family.capabilities();
         match self {
@@ -371,7 +389,9 @@ impl Event {
         Self::ParameterChanged,
     ];
 
-    pub(super) fn impossible_for(self, subject: Subject) -> Option<&'static str> {
+    /// Why it cannot be asked of this drive, or cannot happen to it, if it cannot.
+    #[must_use]
+    pub fn impossible_for(self, subject: Subject) -> Option<&'static str> {
         let around = subject.around();
         match self {
             Self::InputCloses(number) | Self::InputPulses(number)

@@ -137,11 +137,7 @@ impl Cell {
     /// README of drive-bus lists them.
     #[must_use]
     pub fn is_beyond_telling(&self) -> Option<&'static str> {
-        let of_far_end = match self.far_end {
-            FarEnd::Caching => Some("a gateway that answers from what it has kept tells no age"),
-            FarEnd::Twins => Some("two that answer as one"),
-            _ => None,
-        };
+        let of_far_end = self.far_end.is_beyond_telling(self.way, self.fault != Fault::None);
         of_far_end.or_else(|| self.fault.is_beyond_telling(self.way, self.far_end == FarEnd::Fast))
     }
 

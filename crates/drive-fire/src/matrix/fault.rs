@@ -198,19 +198,20 @@ impl Fault {
     #[must_use]
     pub fn is_beyond_telling(self, way: Way, fast: bool) -> Option<&'static str> {
         match (self, way) {
-            (Self::ReplayInstead | Self::ReplayBefore, Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
-                Some("an earlier answer of the same shape, in time: RTU and ASCII number nothing")
-            }
+            (
+                Self::ReplayInstead | Self::ReplayBefore,
+                Way::Rtu | Way::Ascii | Way::RtuOverTcp | Way::UniTelway,
+            ) => Some("an earlier answer of the same shape, in time, where nothing is numbered"),
             (Self::Exception(1 | 6), _) => Some(
                 "a drive that says that it has done nothing, and has (Modbus Application Protocol, section 7)",
             ),
-            (Self::Double(_), Way::RtuOverTcp) => Some(
-                "the first answer that comes twice, to a read that cannot differ, where time proves nothing",
-            ),
-            (Self::Late(741..), Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
+            (Self::Double(_), Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
+                Some("the first answer that comes twice, to a read that cannot differ")
+            }
+            (Self::Late(700..), Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
                 Some("an answer later than the late window, to a read that cannot differ")
             }
-            (Self::EchoAlone, _) if fast => {
+            (Self::EchoAlone, way) if fast || way == Way::Ascii => {
                 Some("the first echo of an adapter that had never echoed, where time proves nothing")
             }
             (Self::Flipped(2..) | Self::RequestFlipped, Way::Ascii) => {

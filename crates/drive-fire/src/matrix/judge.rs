@@ -7,7 +7,7 @@ use std::{
 };
 
 use async_trait::async_trait;
-use drive_core::{Class, Effect, Port, PortError, SlaveAddress, Status, Terms};
+use drive_core::{Class, Effect, Motion, Port, PortError, SlaveAddress, Status, Terms};
 use drive_sim::SimSlave;
 use drive_testing::truth::contradiction;
 use tokio::time::Instant;
@@ -18,6 +18,12 @@ use super::{Way, tap::Tap};
 /// How much later than its lifetime a request may be heard whole: its characters on the wire, and a turn of the clock.
 const ON_THE_WIRE: Duration = Duration::from_millis(250);
 
+/// In this time a motor can be run and cut by others, or trip and coast.
+const UNSEEN: Duration = Duration::from_millis(500);
+
+/// A ramp of these drives passes less than the tolerance of a look in this time.
+const WHILE_IT_RAMPS: Duration = Duration::from_millis(60);
+
 /// What was found against a cell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes(Arc<Mutex<Noted>>);
@@ -25,6 +31,10 @@ pub(super) struct Notes(Arc<Mutex<Noted>>);
 #[derive(Debug, Default)]
 struct Noted {
     against: Vec<String>,
+    /// When the drive told a status last.
+    looked: Option<Instant>,
+    /// Since then it was looked at again, behind a time in which it was not.
+    unseen_until: Option<Instant>,
     /// A rule was broken that holds whatever the drive is told.
     breaks_a_rule: bool,
     /// Edges that were given, with when.
@@ -47,6 +57,22 @@ impl Notes {
         let mut noted = self.noted();
         noted.breaks_a_rule = true;
         noted.against.push(why);
+    }
+
+    /// Whether the drive was not looked at for so long that its motor may have been run and cut unseen, and has not stood since.
+    fn lost_sight_of(&self, at: Option<Instant>) -> bool {
+        self.noted().unseen_until.is_some_and(|until| at.is_none_or(|at| at >= until))
+    }
+
+    /// A status was told, of a motor that turns or stands.
+    pub(super) fn looked(&self, at: Instant, turns: bool) {
+        let mut noted = self.noted();
+        let gap = noted.looked.replace(at).is_some_and(|before| before + UNSEEN < at);
+        if !turns {
+            noted.unseen_until = None;
+        } else if gap {
+            noted.unseen_until = Some(at);
+        }
     }
 
     pub(super) fn breaks_a_rule(&self) -> bool {
@@ -231,6 +257,7 @@ impl Bench {
     /// What the machine has against a status that was asked for at `asked`.
     pub(super) fn judge_status(&self, status: &Status, asked: Instant, fresh: bool) {
         if let Some(at) = status.at {
+            self.notes.looked(at, self.machine.observe().shaft_frequency != 0);
             let now = Instant::now();
             if at > now {
                 self.notes.object(format!("a status from {:?} ahead", at - now));
@@ -244,7 +271,18 @@ impl Bench {
                 return;
             }
         }
-        if let Some(why) = contradiction(status, &self.machine.observe()) {
+        // Of a motor on its ramp a status that is told late says what was so: one that stood and was not touched stands.
+        let is_late = status.at.is_some_and(|at| at + WHILE_IT_RAMPS < Instant::now());
+        if is_late && status.motion != Motion::AtRest {
+            return;
+        }
+        let seen = self.machine.observe();
+        if seen.shaft_frequency != 0 && self.notes.lost_sight_of(status.at) && status.motion == Motion::AtRest
+        {
+            // What it did between two looks nobody saw: see `Motion::AtRest`.
+            return;
+        }
+        if let Some(why) = contradiction(status, &seen) {
             self.notes.object(why);
         }
     }

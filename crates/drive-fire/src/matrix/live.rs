@@ -7,18 +7,21 @@ use drive_sim::Breach;
 use drive_testing::{contract::Open, truth::TOLERANCE};
 use tokio::time::{Instant, sleep, timeout};
 
+use crate::story::Story;
+
 use super::{
-    Cell, Event, FarEnd, Fault, Operation, Way,
+    Cell, Event, FarEnd, Fault, Operation, Subject, Way,
     axes::parameter,
     stage::{Around, Stage},
+    telling,
 };
 
 /// Longer than any operation may take: every retry of every exchange behind the slowest gateway, and the repetitions of a stop.
-const PATIENCE: Duration = Duration::from_secs(240);
+pub(super) const PATIENCE: Duration = Duration::from_secs(240);
 /// How often a plant asks.
-const POLL: Duration = Duration::from_millis(300);
+pub(super) const POLL: Duration = Duration::from_millis(300);
 /// The speed at which the motor runs.
-const SETPOINT: Frequency = Frequency::from_hertz(30);
+pub(super) const SETPOINT: Frequency = Frequency::from_hertz(30);
 
 /// How a cell ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,12 +64,26 @@ fn write_panics_down() {
 /// When the stage itself is wrong.
 #[must_use]
 pub fn live(cell: &Cell, open: &Open) -> Lived {
+    watched(play(cell, open))
+}
+
+/// Tells a story of the drive that `open` makes.
+///
+/// # Panics
+/// When the stage itself is wrong.
+#[must_use]
+pub fn tell(story: &Story, open: &Open) -> Lived {
+    watched(telling::tell(story, open))
+}
+
+/// In a virtual time of its own; whatever panics there is found.
+fn watched(lives: impl Future<Output = Lived>) -> Lived {
     write_panics_down();
     LISTENS.set(true);
     PANICS.with_borrow_mut(Vec::clear);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
     let runtime = runtime.expect("a runtime of one thread");
-    let lived = panic::catch_unwind(panic::AssertUnwindSafe(|| runtime.block_on(play(cell, open))));
+    let lived = panic::catch_unwind(panic::AssertUnwindSafe(|| runtime.block_on(lives)));
     drop(runtime);
     LISTENS.set(false);
     let panics = PANICS.take();
@@ -77,7 +94,7 @@ pub fn live(cell: &Cell, open: &Open) -> Lived {
 }
 
 async fn play(cell: &Cell, open: &Open) -> Lived {
-    let mut stage = Stage::new(cell, open);
+    let mut stage = Stage::new(&cell.into(), open);
     if !prepare(cell, &mut stage).await {
         return Lived::NotBegun;
     }
@@ -100,7 +117,7 @@ async fn play(cell: &Cell, open: &Open) -> Lived {
             around.happens(&deed);
         }
     };
-    let (told, ()) = tokio::join!(timeout(PATIENCE, operate(cell, &mut stage)), event);
+    let (told, ()) = tokio::join!(timeout(PATIENCE, operate(Asks::of(cell), &mut stage)), event);
     let Ok(told) = told else {
         return Lived::Against(vec![format!("{} does not end in {PATIENCE:?}", cell.operation)]);
     };
@@ -169,11 +186,18 @@ async fn prepare(cell: &Cell, stage: &mut Stage) -> bool {
 
 /// Everything is well again, and the drive is asked as a plant asks it.
 async fn settle(stage: &mut Stage) {
-    let end = Instant::now() + Duration::from_secs(6);
+    poll_for(stage, Duration::from_secs(6)).await;
+}
+
+pub(super) async fn poll_for(stage: &mut Stage, time: Duration) {
+    let end = Instant::now() + time;
     while Instant::now() < end {
         let asked = Instant::now();
-        if let Ok(Ok(status)) = timeout(PATIENCE, stage.drive.status()).await {
-            stage.bench.judge_status(&status, asked, true);
+        match timeout(PATIENCE, stage.drive.status()).await {
+            Ok(Ok(status)) => stage.bench.judge_status(&status, asked, true),
+            // What was read once is true only as long as the drive was not switched off.
+            Ok(Err(_)) => stage.drive.forget(),
+            Err(_) => stage.bench.notes.breach(format!("status does not end in {PATIENCE:?}")),
         }
         sleep(POLL).await;
     }
@@ -193,7 +217,21 @@ impl Before {
     }
 }
 
-async fn operate(cell: &Cell, stage: &mut Stage) -> Result<Option<Status>> {
+/// What is asked, of which drive, and whether anything else may have changed what it holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asks {
+    pub(super) operation: Operation,
+    pub(super) subject: Subject,
+    pub(super) touched: bool,
+}
+
+impl Asks {
+    fn of(cell: &Cell) -> Self {
+        Self { operation: cell.operation, subject: cell.subject, touched: cell.event != Event::Nothing }
+    }
+}
+
+pub(super) async fn operate(cell: Asks, stage: &mut Stage) -> Result<Option<Status>> {
     let drive = &mut stage.drive;
     let parameter = parameter(cell.subject);
     Ok(match (cell.operation, parameter) {
@@ -213,7 +251,7 @@ async fn operate(cell: &Cell, stage: &mut Stage) -> Result<Option<Status>> {
         (Operation::ReadParameter, Some(row)) => {
             let held = stage.bench.machine.peek(row.address);
             let read = drive.read_parameter(row).await?;
-            let touched = cell.event != Event::Nothing;
+            let touched = cell.touched;
             if Some(read) != held && !touched {
                 stage.bench.notes.object(format!("{} reads {read}, the machine has {held:?}", row.code));
             }
@@ -222,7 +260,7 @@ async fn operate(cell: &Cell, stage: &mut Stage) -> Result<Option<Status>> {
         (Operation::WriteParameter, Some(row)) => {
             drive.write_parameter(row, 42).await?;
             let held = stage.bench.machine.peek(row.address);
-            let touched = cell.event != Event::Nothing;
+            let touched = cell.touched;
             if held != Some(42) && !touched {
                 stage
                     .bench
@@ -280,7 +318,7 @@ fn judge(
             notes.object(format!("a start was confirmed: {at_once:?}"));
         }
         (Operation::Start(_), Err(error))
-            if error.kind() == ErrorKind::Refused && moves && !before.ran && !twin.running =>
+            if error.kind() == ErrorKind::Refused && moves && !cell.runs && !before.ran && !twin.running =>
         {
             notes.object(format!("a start was refused ({error}): {seen:?}"));
         }
@@ -303,7 +341,7 @@ fn silences(cell: &Cell, stage: &Stage) {
     for violation in stage.simulated.violations() {
         // A request that was cut or changed on the way has another length for whoever listens.
         if !matches!(violation.breach, Breach::Collision { late: true, .. }) {
-            stage.bench.notes.breach(format!("a rule of the line was broken: {:?}", violation.breach));
+            stage.bench.notes.object(format!("a rule of the line was broken: {:?}", violation.breach));
         }
     }
 }

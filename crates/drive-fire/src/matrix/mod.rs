@@ -13,13 +13,14 @@ mod live;
 mod plants;
 mod stage;
 mod tap;
+mod telling;
 
 use std::{collections::BTreeMap, time::Instant};
 
 pub use axes::{Event, FarEnd, Operation, Subject, Way};
 pub use cell::{Cell, Plane};
 pub use fault::Fault;
-pub use live::{Lived, live};
+pub use live::{Lived, live, tell};
 pub use plants::find_plants;
 
 use crate::report::{Find, Told};
@@ -27,7 +28,13 @@ use crate::report::{Find, Told};
 /// The drive of a cell as its family makes it.
 #[must_use]
 pub fn open(cell: &Cell) -> Box<drive_testing::contract::Open> {
-    let family = cell.subject.family();
+    drive_of(cell.subject)
+}
+
+/// The same of a subject.
+#[must_use]
+pub fn drive_of(subject: Subject) -> Box<drive_testing::contract::Open> {
+    let family = subject.family();
     Box::new(move |port, slave| family.open_with(port, slave, &family.simulated_options()))
 }
 

@@ -12,13 +12,37 @@ use drive_sim::{Defects, Gateway, Model, SecondMaster, SimLine, SimSlave, Wiring
 use drive_testing::contract::Open;
 
 use super::{
-    Cell, FarEnd, Fault, Way,
+    Cell, FarEnd, Fault, Subject, Way,
     judge::{Bench, Judged, Notes},
     tap::Tap,
 };
 
 /// Where the drive is.
 pub(super) const ADDRESS: u8 = 3;
+
+/// Where a drive is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Site {
+    pub(super) subject: Subject,
+    pub(super) way: Way,
+    pub(super) far_end: FarEnd,
+    pub(super) seed: u64,
+    /// The process stands still now and then, so that a request may be late.
+    pub(super) stalls: bool,
+}
+
+impl From<&Cell> for Site {
+    fn from(cell: &Cell) -> Self {
+        let Cell { subject, way, far_end, .. } = *cell;
+        Self {
+            subject,
+            way,
+            far_end,
+            seed: cell.number ^ 0x5EED,
+            stalls: matches!(cell.fault, Fault::Stall(_)),
+        }
+    }
+}
 
 pub(super) struct Stage {
     pub(super) drive: Box<dyn Drive>,
@@ -30,20 +54,20 @@ pub(super) struct Stage {
     _line: Line,
 }
 
-fn machine(cell: &Cell) -> Box<dyn Model> {
-    cell.subject.family().machine(SetUp::ForTheBus).expect("each subject has a twin")
+fn machine(site: &Site) -> Box<dyn Model> {
+    site.subject.family().machine(SetUp::ForTheBus).expect("each subject has a twin")
 }
 
 /// What the gateway of this cell does; of one that is no gateway what any serial server does.
-fn habits(cell: &Cell) -> Gateway {
+fn habits(site: &Site) -> Gateway {
     let plain = Gateway {
-        rtu: cell.way == Way::RtuOverTcp,
+        rtu: site.way == Way::RtuOverTcp,
         attempts: 1,
         wait: Duration::from_millis(300),
-        tells: cell.way == Way::ModbusTcp,
+        tells: site.way == Way::ModbusTcp,
         ..Gateway::default()
     };
-    match cell.far_end {
+    match site.far_end {
         FarEnd::Serialising => Gateway { attempts: 3, wait: Duration::from_secs(1), tells: true, ..plain },
         FarEnd::Silent => Gateway { attempts: 3, wait: Duration::from_secs(1), tells: false, ..plain },
         FarEnd::Replaying => Gateway { replays: 3, ..plain },
@@ -54,25 +78,25 @@ fn habits(cell: &Cell) -> Gateway {
 }
 
 impl Stage {
-    /// The drive of this cell is made by `open`.
-    pub(super) fn new(cell: &Cell, open: &Open) -> Self {
-        let settings = cell.subject.family().capabilities().factory;
-        let spoken = match cell.way {
+    /// The drive at this site is made by `open`.
+    pub(super) fn new(site: &Site, open: &Open) -> Self {
+        let settings = site.subject.family().capabilities().factory;
+        let spoken = match site.way {
             Way::Ascii => drive_sim::Protocol::Ascii,
             Way::UniTelway => drive_sim::Protocol::UniTelway,
             _ => drive_sim::Protocol::Rtu,
         };
         let wiring =
-            Wiring { protocol: spoken, unpaced: cell.far_end == FarEnd::Fast, ..Wiring::rtu(settings) };
+            Wiring { protocol: spoken, unpaced: site.far_end == FarEnd::Fast, ..Wiring::rtu(settings) };
         let simulated = SimLine::new(wiring);
-        let watched = simulated.add_boxed(ADDRESS, machine(cell)).expect("the address is free");
+        let watched = simulated.add_boxed(ADDRESS, machine(site)).expect("the address is free");
         let twin_line = SimLine::new(wiring);
-        let twin = twin_line.add_boxed(ADDRESS, machine(cell)).expect("the address is free");
-        if cell.far_end == FarEnd::Twins {
-            simulated.add_beside(ADDRESS, machine(cell)).expect("it is an address");
+        let twin = twin_line.add_boxed(ADDRESS, machine(site)).expect("the address is free");
+        if site.far_end == FarEnd::Twins {
+            simulated.add_beside(ADDRESS, machine(site)).expect("it is an address");
         }
-        if cell.far_end == FarEnd::SecondMaster {
-            let row = cell.subject.family().capabilities().rows.iter().find(|row| row.access.is_readable());
+        if site.far_end == FarEnd::SecondMaster {
+            let row = site.subject.family().capabilities().rows.iter().find(|row| row.access.is_readable());
             let [high, low] = row.map_or(0, |row| row.address).to_be_bytes();
             let second = SecondMaster {
                 requests: vec![(ADDRESS, vec![3, high, low, 0, 1])],
@@ -80,11 +104,10 @@ impl Stage {
             };
             simulated.set_defects(Defects { second_master: Some(second), ..Defects::default() });
         }
-        let seed = cell.number ^ 0x5EED;
-        let tap = Tap::new(cell.way, seed, cell.far_end == FarEnd::Caching);
-        let config = LineConfig { slaves: [(ADDRESS, pause(cell))].into(), ..config(cell) };
-        let line = if cell.way.is_network() {
-            let (far, tap) = (simulated.behind(habits(cell)), tap.clone());
+        let tap = Tap::new(site.way, site.seed, site.far_end == FarEnd::Caching);
+        let config = LineConfig { slaves: [(ADDRESS, pause(site))].into(), ..config(site) };
+        let line = if site.way.is_network() {
+            let (far, tap) = (simulated.behind(habits(site)), tap.clone());
             let connect = move || ready(tap.before(far.connect()).ok_or_else(refused));
             Line::over_reopened(connect, config)
         } else {
@@ -93,8 +116,8 @@ impl Stage {
             Line::over_reopened(connect, config)
         };
         let notes = Notes::default();
-        let holds_back = cell.way.is_network() || matches!(cell.fault, Fault::Stall(_));
-        let bench = Bench { tap, machine: watched, notes, way: cell.way, holds_back };
+        let holds_back = site.way.is_network() || site.stalls;
+        let bench = Bench { tap, machine: watched, notes, way: site.way, holds_back };
         let port = Judged { line: line.slave(ADDRESS), bench: bench.clone(), terms: Terms::default() };
         let slave = SlaveAddress::try_from(ADDRESS).expect("it is one");
         let drive = open(Box::new(port) as Box<dyn Port>, slave);
@@ -128,13 +151,13 @@ fn refused() -> io::Error {
     io::ErrorKind::ConnectionRefused.into()
 }
 
-fn pause(cell: &Cell) -> SlaveSettings {
-    SlaveSettings { turnaround: cell.subject.family().capabilities().turnaround, ..SlaveSettings::default() }
+fn pause(site: &Site) -> SlaveSettings {
+    SlaveSettings { turnaround: site.subject.family().capabilities().turnaround, ..SlaveSettings::default() }
 }
 
-fn config(cell: &Cell) -> LineConfig {
-    let settings = cell.subject.family().capabilities().factory;
-    match cell.way {
+fn config(site: &Site) -> LineConfig {
+    let settings = site.subject.family().capabilities().factory;
+    match site.way {
         // As over a network, on a stream: there is no descriptor in virtual time.
         Way::RtuOverTcp => {
             LineConfig { endpoint: Endpoint::Stream, ..LineConfig::rtu_over_tcp("far-end:4001", settings) }
@@ -152,7 +175,7 @@ fn config(cell: &Cell) -> LineConfig {
                 double_window: Duration::from_millis(50),
                 ..LineConfig::stream(settings)
             };
-            match (way, cell.far_end) {
+            match (way, site.far_end) {
                 (Way::UniTelway, _) => serial,
                 (_, FarEnd::Fast) => LineConfig { echo: Echo::Auto, ..serial },
                 _ => LineConfig { echo: Echo::Auto, far_end_paces: Some(true), ..serial },

@@ -360,6 +360,11 @@ impl Cable {
             }
             _ => {}
         }
+        // What is said behind something that is still coming comes behind it.
+        if let Some(last) = self.due.iter().filter(|(_, bytes)| bytes.len() == 1).map(|(at, _)| *at).max() {
+            self.due.push((last + Duration::from_millis(1), answer));
+            return true;
+        }
         answer.is_empty() || self.far.write_all(&answer).await.is_ok()
     }
 

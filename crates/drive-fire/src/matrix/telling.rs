@@ -1,0 +1,130 @@
+//! A story, told step by step, and judged at each.
+
+use std::time::Duration;
+
+use drive_core::{Error, ErrorKind};
+use drive_testing::{contract::Open, truth::TOLERANCE};
+use tokio::time::{Instant, sleep, timeout};
+
+use super::{
+    Fault, Operation,
+    live::{Asks, Lived, PATIENCE, SETPOINT, operate, poll_for},
+    stage::{Around, Site, Stage},
+};
+use crate::story::{Step, Story};
+
+/// What was done so far.
+#[derive(Debug, Default)]
+struct Done {
+    /// A start was asked for, whatever became of it.
+    started: bool,
+    touched: bool,
+}
+
+pub(super) async fn tell(story: &Story, open: &Open) -> Lived {
+    let stalls = story.steps.iter().any(|step| matches!(step, Step::Strike(Fault::Stall(_), _)));
+    let Story { subject, way, far_end, .. } = *story;
+    let seed = story.steps.len() as u64;
+    let mut stage = Stage::new(&Site { subject, way, far_end, seed, stalls }, open);
+    let mut done = Done::default();
+    poll_for(&mut stage, Duration::from_secs(1)).await;
+    let _ = timeout(PATIENCE, stage.drive.set_setpoint(SETPOINT.into())).await;
+    for step in &story.steps {
+        match *step {
+            Step::Ask(operation) => {
+                if ask(story, &mut stage, operation, &mut done).await.is_none() {
+                    return Lived::Against(vec![format!("{operation} does not end in {PATIENCE:?}")]);
+                }
+            }
+            Step::Strike(fault, behind) => stage.bench.tap.strike(fault, behind),
+            Step::Happens(event) => {
+                done.touched = true;
+                let around = Around::of(&stage);
+                let (deeds, later) = event.deeds(subject);
+                deeds.iter().for_each(|deed| around.happens(deed));
+                if let Some((time, deed)) = later {
+                    sleep(time).await;
+                    around.happens(&deed);
+                }
+            }
+            Step::Live(seconds) => poll_for(&mut stage, Duration::from_secs(seconds.into())).await,
+        }
+    }
+    // Everything is well again, as long as it takes.
+    stage.bench.tap.calm();
+    let lasts = |step: &Step| if let Step::Strike(fault, _) = step { fault.lasts() } else { Duration::ZERO };
+    sleep(story.steps.iter().map(lasts).max().unwrap_or_default()).await;
+    poll_for(&mut stage, Duration::from_secs(8)).await;
+    at_the_end(&stage, &done);
+    let mut against = stage.bench.notes.against();
+    against.truncate(4);
+    if against.is_empty() {
+        return Lived::Told("told");
+    }
+    let beyond = story.is_beyond_telling().filter(|_| !stage.bench.notes.breaks_a_rule());
+    beyond.map_or(Lived::Against(against), Lived::BeyondTelling)
+}
+
+/// Asks, and judges what is told at once. `None`: it does not end.
+async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut Done) -> Option<()> {
+    let (ran, had_lease) = (stage.bench.machine.observe().running, stage.drive.lease().is_some());
+    let asked = Instant::now();
+    let asks = Asks { operation, subject: story.subject, touched: done.touched };
+    let told = timeout(PATIENCE, operate(asks, stage)).await.ok()?;
+    let seen = stage.bench.machine.observe();
+    match &told {
+        Ok(Some(status)) => stage.bench.judge_status(status, asked, operation == Operation::Status),
+        Err(Error::NotConfirmed { status, .. }) => stage.bench.judge_status(status, asked, false),
+        _ => {}
+    }
+    let twin_runs = stage.twin.observe().running;
+    let steers = seen.setpoint.abs() > TOLERANCE && seen.output_frequency.abs() > TOLERANCE;
+    match (operation, &told) {
+        (Operation::Start(_), Ok(_)) if !seen.running && !done.touched => {
+            stage.bench.notes.object(format!("a start was confirmed: {seen:?}"));
+        }
+        (Operation::Start(_), Err(error))
+            if error.kind() == ErrorKind::Refused
+                && seen.running
+                && steers
+                && !ran
+                && !had_lease
+                && !twin_runs
+                && !done.started =>
+        {
+            stage.bench.notes.object(format!("a start was refused ({error}): {seen:?}"));
+        }
+        _ => {}
+    }
+    done.started |= matches!(operation, Operation::Start(_));
+    if matches!(operation, Operation::Stop(_)) && told.is_ok() && !done.touched {
+        // Behind a confirmed stop it steers for nothing, or comes down.
+        let before = seen.output_frequency.abs();
+        poll_for(stage, Duration::from_secs(1)).await;
+        let seen = stage.bench.machine.observe();
+        if seen.running
+            && seen.output_frequency.abs() > before.max(TOLERANCE)
+            && !stage.twin.observe().running
+        {
+            stage.bench.notes.object(format!("a stop was confirmed: {seen:?}"));
+        }
+    }
+    Some(())
+}
+
+fn at_the_end(stage: &Stage, done: &Done) {
+    let notes = &stage.bench.notes;
+    for why in notes.doubled_edges(&stage.bench.machine) {
+        notes.breach(why);
+    }
+    let (seen, twin) = (stage.bench.machine.observe(), stage.twin.observe());
+    let steers = seen.setpoint.abs() > TOLERANCE && seen.output_frequency.abs() > TOLERANCE;
+    if !(seen.running && steers) || twin.running {
+        return;
+    }
+    if stage.drive.lease().is_none() {
+        notes.object(format!("it moves and no lease stands: {seen:?}"));
+    } else if !done.started {
+        notes.object(format!("nobody has started it: {seen:?}"));
+    }
+}
