@@ -8,7 +8,7 @@ use drive_families::Options;
 pub use drived_plant::plant::parameters::may_have_written;
 pub use drived_words::closing::close;
 
-use drived_words::{drive_options, drive_spec::DriveName, failure::Failure, signals::Ending};
+use drived_words::{drive_options, drive_spec::DriveName, failure::Failure, ports, signals::Ending};
 
 /// How long a request may wait until the line is quiet enough for it.
 const QUIET_WITHIN: Duration = Duration::from_secs(5);
@@ -35,7 +35,8 @@ pub fn words(name: DriveName, config: &LineConfig, error: &Error) -> String {
              format or protocol are others"
         ),
         (_, ErrorKind::NoAnswer) => format!(
-            "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}",
+            "{name} does not answer ({error}): see that it is switched on, wired, and set to address {} and {}; drived scan \
+             --line {config} finds who is there",
             name.slave, config.serial
         ),
         (_, ErrorKind::OutcomeUnknown) => {
@@ -59,7 +60,7 @@ pub async fn open_line_of(drive: Option<DriveName>, config: LineConfig) -> Resul
             let told = crate::explain(&path, drive).await;
             Err(Failure::Input(told.unwrap_or_else(|| OpenError::InUse { path }.to_string())))
         }
-        Err(error) => Err(Failure::Input(error.to_string())),
+        Err(error) => Err(Failure::Input(ports::refused(&error))),
     }
 }
 

@@ -1,6 +1,11 @@
 //! `drived explain`: what goes over a line, frame by frame, in words.
 
-use std::{collections::BTreeMap, path::PathBuf, time::Duration};
+use std::{
+    collections::BTreeMap,
+    io::{self, IsTerminal as _},
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use drive_bus::config::SerialText;
 use drive_core::SerialSettings;
@@ -26,14 +31,15 @@ const SECONDS: u64 = 10;
 
 /// Put what goes over a line into words: each frame, which drive, which register, which bit has changed, which silence was too short
 ///
-/// From a capture, a pcapng file as drived writes it; from a line of the running daemon; or from a port that is only
-/// listened to, to which nothing is ever written: frame by frame as they are heard, until Ctrl-C. Without the drives'
-/// families registers have numbers alone. Times are seconds since the first frame.
+/// From whatever has frames in it: a capture (pcapng or pcap, of drived, Wireshark or tcpdump, also one that is cut off), a log or a
+/// dump with bytes in hexadecimal in any dress, bytes as they were, from a file or a pipe, or the bytes themselves as words; from a
+/// line of the running daemon; or from a port that is only listened to, to which nothing is ever written: frame by frame as they
+/// are heard, until Ctrl-C. Without the drives' families registers have numbers alone. Times are seconds since the first frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The capture
-    #[arg(value_name = "FILE", required_unless_present_any = ["from", "line"], conflicts_with_all = ["from", "line"])]
-    file: Option<PathBuf>,
+    /// A file, or the bytes of frames such as 01 03 0C 81 00 01 D7 72; - or nothing for what comes through a pipe
+    #[arg(value_name = "FILE|HEX", conflicts_with_all = ["from", "line"])]
+    words: Vec<String>,
     /// A line of the running daemon, by its name
     #[arg(long, value_name = "LINE", conflicts_with = "line")]
     from: Option<String>,
@@ -41,7 +47,7 @@ pub struct Args {
     #[arg(long, value_name = "PORT", help = line_spec::TO_LISTEN_TO, conflicts_with = "serial")]
     line: Option<LineSpec>,
     /// For how many seconds; 10 of the daemon, until Ctrl-C from a port
-    #[arg(long, value_name = "SECONDS", conflicts_with = "file", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", conflicts_with = "words", value_parser = clap::value_parser!(u64).range(1..))]
     seconds: Option<u64>,
     /// Which drives are on the line
     #[arg(long, value_name = "FAMILY@ADDRESSES")]
@@ -55,6 +61,9 @@ pub struct Args {
     /// Which of its lines, if it has several
     #[arg(long, value_name = "NAME", requires = "config")]
     name: Option<String>,
+    /// The bytes are address and PDU, without the check behind them
+    #[arg(long, conflicts_with_all = ["from", "line"])]
+    no_check: bool,
     /// Show only what is wrong
     #[arg(long)]
     trouble: bool,
@@ -89,22 +98,24 @@ pub async fn run(args: Args) -> Result<(), Failure> {
             continue;
         }
         if args.daemon.is_json() {
-            output::say_as_it_is(json::line(&explained))?;
+            output::say_as_it_is(json::line(&timed(explained, frames.has_times())))?;
         } else {
-            say(&explained, began, explainer.late())?;
+            say(&explained, frames.has_times().then_some(began), explainer.late())?;
         }
+    }
+    if !args.daemon.is_json() {
+        frames.notes().iter().try_for_each(|note| output::say(format_args!("note: {note}")))?;
     }
     let counts = explainer.counts();
     if args.daemon.is_json() {
-        return output::say_as_it_is(json!({ "counts": counts }));
+        return output::say_as_it_is(json!({ "counts": counts, "notes": frames.notes() }));
     }
     say_counts(counts, explainer.late())
 }
 
 /// The frames that are asked for, and what is known of their line without the other options.
 async fn open(args: &Args, drives: &[DriveName]) -> Result<(Frames, Option<Known>), Failure> {
-    match (&args.file, &args.from, &args.line) {
-        (Some(file), ..) => Ok((Frames::of_file(file)?, None)),
+    match (&*args.words, &args.from, &args.line) {
         (_, Some(line), _) => {
             let seconds = args.seconds.unwrap_or(SECONDS);
             let (frames, known) = Frames::of_daemon(&args.daemon, line, seconds).await?;
@@ -120,8 +131,29 @@ async fn open(args: &Args, drives: &[DriveName]) -> Result<(Frames, Option<Known
             let known = Known { serial: Some(config.serial), late: None, drives: named(drives) };
             Ok((frames, Some(known)))
         }
-        _ => Err(Failure::Input("expected FILE, --from LINE or --line PORT".to_owned())),
+        ([], ..) if io::stdin().is_terminal() => Err(Failure::Input(
+            "explain what? a FILE, bytes such as 01 03 0C 81 00 01 D7 72, a pipe, --from LINE or --line PORT"
+                .to_owned(),
+        )),
+        ([], ..) => Ok((Frames::of_file(None, args.no_check)?, None)),
+        ([alone], ..) if alone == "-" => Ok((Frames::of_file(None, args.no_check)?, None)),
+        ([alone], ..) if is_file(alone) => {
+            Ok((Frames::of_file(Some(Path::new(alone)), args.no_check)?, None))
+        }
+        (words, ..) => Ok((Frames::of_words(words, args.no_check)?, None)),
     }
+}
+
+/// Whether a word is a file: one that is there, or one that is called as no bytes are.
+fn is_file(word: &str) -> bool {
+    let path = Path::new(word);
+    let is_hex = word.bytes().all(|byte| byte.is_ascii_hexdigit() || b" ,;:-_[]<>xXhH\\".contains(&byte));
+    path.exists() || !is_hex
+}
+
+/// What is told to a program of a frame whose time is not known.
+fn timed(explained: Explained, has_times: bool) -> Explained {
+    if has_times { explained } else { Explained { at: None, after: None, ..explained } }
 }
 
 async fn passed(until: Option<Instant>) {
@@ -131,9 +163,9 @@ async fn passed(until: Option<Instant>) {
     }
 }
 
-fn say(explained: &Explained, began: Duration, late: Option<Duration>) -> Result<(), Failure> {
+/// Says a frame, with its time since that of the first where times are known.
+fn say(explained: &Explained, began: Option<Duration>, late: Option<Duration>) -> Result<(), Failure> {
     let Explained { at, sent, slave, drive, text, details, trouble, after, .. } = explained;
-    let since = at.saturating_sub(began).as_micros();
     let way = match sent {
         Some(true) => ">",
         Some(false) => "<",
@@ -145,18 +177,23 @@ fn say(explained: &Explained, began: Duration, late: Option<Duration>) -> Result
         (Some(slave), None) => format!("slave {slave}: "),
         (None, None) => String::new(),
     };
-    let after = after.map(|after| match late {
+    let after = after.filter(|_| began.is_some()).map(|after| match late {
         Some(_) => format!(", after about {} ms", after.as_millis()),
         None => format!(", after {}", milliseconds(after)),
     });
     let after = after.unwrap_or_default();
-    let (seconds, rest) = (since / 1_000_000, since % 1_000_000 / 10);
-    output::say_behind(&format!("{seconds:>4}.{rest:05} {way} "), &format!("{who}{text}{after}"))?;
+    let time = at.zip(began).map_or_else(String::new, |(at, began)| {
+        let since = at.saturating_sub(began).as_micros();
+        let (seconds, rest) = (since / 1_000_000, since % 1_000_000 / 10);
+        format!("{seconds:>4}.{rest:05} ")
+    });
+    let below = " ".repeat(time.len());
+    output::say_behind(&format!("{time}{way} "), &format!("{who}{text}{after}"))?;
     for detail in details {
-        output::say_behind("             ", detail)?;
+        output::say_behind(&format!("{below}  "), detail)?;
     }
     for what in trouble {
-        output::say_behind("           ! ", what)?;
+        output::say_behind(&format!("{below}! "), what)?;
     }
     Ok(())
 }
@@ -189,7 +226,7 @@ pub(super) fn named(drives: &[DriveName]) -> BTreeMap<u8, (Family, String)> {
 }
 
 /// What a configuration says of the line.
-fn of_config(file: &std::path::Path, name: Option<&str>) -> Result<Known, Failure> {
+fn of_config(file: &Path, name: Option<&str>) -> Result<Known, Failure> {
     let config = Config::load(file).map_err(|error| Failure::Input(error.to_string()))?;
     let mut found = config.lines.iter().filter(|line| name.is_none_or(|name| line.name == name));
     let (Some(line), None) = (found.next(), found.next()) else {

@@ -1,19 +1,26 @@
 //! Frames of a line as they come: from a capture, from a port that is only listened to, from a line of the running daemon.
 
-use std::{collections::VecDeque, fs, path::Path, time::Duration};
+use std::{
+    collections::VecDeque,
+    fs,
+    io::{self, Read as _},
+    path::Path,
+    time::Duration,
+};
 
 use drive_bus::{
     LineConfig,
-    capture::{self, Captured, Dissector, Reader},
+    capture::{Captured, Dissector, Reader},
     listen::Listener,
 };
 use http_body_util::BodyExt as _;
 use hyper::body::Incoming;
 
+use super::taken::{self, Taken};
 use drived_client::{DaemonArgs, path_of};
 use drived_plant::plant::views::{LineView, StateView};
 use drived_words::explain::Known;
-use drived_words::{failure::Failure, line_spec::LineSpec};
+use drived_words::{failure::Failure, line_spec::LineSpec, ports};
 
 /// The longest capture that is read.
 const LONGEST: u64 = 256 << 20;
@@ -23,6 +30,8 @@ pub(super) struct Frames {
     source: Source,
     dissector: Dissector,
     late: Option<Duration>,
+    has_times: bool,
+    notes: Vec<String>,
 }
 
 enum Source {
@@ -32,24 +41,29 @@ enum Source {
 }
 
 impl Frames {
-    /// Those of a capture.
-    pub(super) fn of_file(file: &Path) -> Result<Self, Failure> {
-        let failed = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", file.display()));
-        let found = fs::metadata(file).map_err(|error| failed(&error))?;
-        if !found.is_file() || found.len() > LONGEST {
-            return Err(failed(&format_args!("expected a file of at most {} MiB", LONGEST >> 20)));
-        }
-        let bytes = fs::read(file).map_err(|error| failed(&error))?;
-        let recording = capture::read(&bytes).map_err(|error| failed(&error))?;
-        let (dissector, late) = (recording.dissector, recording.late);
-        Ok(Self { source: Source::File(recording.frames.into()), dissector, late })
+    /// Those that somebody has taken down.
+    fn of(taken: Taken) -> Self {
+        let Taken { dissector, late, has_times, frames, notes } = taken;
+        Self { source: Source::File(frames.into()), dissector, late, has_times, notes }
+    }
+
+    /// Those of words of the command line.
+    pub(super) fn of_words(words: &[String], without_check: bool) -> Result<Self, Failure> {
+        taken::read(words.join(" ").as_bytes(), without_check).map(Self::of).map_err(Failure::Input)
+    }
+
+    /// Those of a file, or of what comes on standard input until it ends.
+    pub(super) fn of_file(file: Option<&Path>, without_check: bool) -> Result<Self, Failure> {
+        taken(file, without_check).map(Self::of)
     }
 
     /// Those that are heard on a port from now on.
     pub(super) async fn of_port(config: &LineConfig) -> Result<Self, Failure> {
-        let listener = Listener::open(config).await.map_err(|error| Failure::Input(error.to_string()))?;
+        let listener =
+            Listener::open(config).await.map_err(|error| Failure::Input(ports::refused(&error)))?;
         let late = Some(listener.late());
-        Ok(Self { source: Source::Port(listener), dissector: Dissector::of(config), late })
+        let (dissector, notes) = (Dissector::of(config), Vec::new());
+        Ok(Self { source: Source::Port(listener), dissector, late, has_times: true, notes })
     }
 
     /// Those of a line of the running daemon from now on, for so many seconds, and what it knows of the line.
@@ -72,7 +86,8 @@ impl Frames {
             return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
         }
         let source = Source::Daemon(Box::new((answer.into_body(), Reader::default())));
-        Ok((Self { source, dissector: Dissector::Data, late: None }, known))
+        let (dissector, notes) = (Dissector::Data, Vec::new());
+        Ok((Self { source, dissector, late: None, has_times: true, notes }, known))
     }
 
     /// What the line speaks, as far as the frames that came have told it.
@@ -83,6 +98,16 @@ impl Frames {
     /// How late a frame is handed over at the most, where the line is only listened to.
     pub(super) const fn late(&self) -> Option<Duration> {
         self.late
+    }
+
+    /// Whether it is known when each came.
+    pub(super) const fn has_times(&self) -> bool {
+        self.has_times
+    }
+
+    /// What is to be known of them besides.
+    pub(super) fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The next frame; `None` when there are no more. Safe to drop.
@@ -118,6 +143,22 @@ impl Frames {
             }
         }
     }
+}
+
+/// What a file has, or what comes on standard input until it ends.
+pub(super) fn taken(file: Option<&Path>, without_check: bool) -> Result<Taken, Failure> {
+    let name = file.map_or_else(|| "standard input".to_owned(), |file| file.display().to_string());
+    let failed = |why: &dyn std::fmt::Display| Failure::Input(format!("{name}: {why}"));
+    let mut bytes = Vec::new();
+    let read = match file {
+        Some(file) => fs::File::open(file).and_then(|file| file.take(LONGEST + 1).read_to_end(&mut bytes)),
+        None => io::stdin().lock().take(LONGEST + 1).read_to_end(&mut bytes),
+    };
+    read.map_err(|error| failed(&error))?;
+    if bytes.len() as u64 > LONGEST {
+        return Err(failed(&format_args!("expected at most {} MiB", LONGEST >> 20)));
+    }
+    taken::read(&bytes, without_check).map_err(|why| failed(&why))
 }
 
 /// What the daemon's state says of a line.

@@ -20,5 +20,6 @@ pub mod poll;
 pub mod replay;
 pub mod scan;
 pub mod sim;
+mod taken;
 #[cfg(test)]
 mod testing;

@@ -5,6 +5,8 @@ use std::{collections::BTreeMap, fmt, str::FromStr};
 use drive_core::{SlaveAddress, SlaveAddressError};
 use drive_families::{Family, UnknownFamily};
 
+use crate::meant::{did_you_mean, nearest};
+
 /// One drive: a family at an address. It prints as it is written, `atv312@7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DriveName {
@@ -82,19 +84,19 @@ pub struct AddressTwice {
 /// A text that names no drives.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DriveSpecError {
-    #[error("expected FAMILY@ADDRESSES, such as atv312@1 or atv312@1-10,12")]
-    Form,
-    #[error(transparent)]
-    Family(#[from] UnknownFamily),
+    #[error("expected FAMILY@ADDRESSES, such as atv312@1 or atv312@1-10,12{0}")]
+    Form(String),
+    #[error("{unknown}{}", meant(unknown))]
+    Family { unknown: UnknownFamily },
     #[error("{0:?} is not an address or a range of addresses: expected 1 to 247 or a range such as 1-10")]
     Number(String),
     #[error(transparent)]
     Address(#[from] SlaveAddressError),
     #[error("{slave} is too high an address: the {family} has addresses 1 to {highest}")]
     TooHigh { slave: SlaveAddress, family: &'static str, highest: u8 },
-    #[error("the range {0} runs backwards")]
-    Backwards(String),
-    #[error("the address {0} is named twice")]
+    #[error("the range {first}-{last} runs backwards: did you mean {last}-{first}?")]
+    Backwards { first: SlaveAddress, last: SlaveAddress },
+    #[error("the address {0} is named twice: once is enough")]
     Twice(SlaveAddress),
 }
 
@@ -102,8 +104,10 @@ impl FromStr for DriveSpec {
     type Err = DriveSpecError;
 
     fn from_str(text: &str) -> Result<Self, DriveSpecError> {
-        let (family, addresses) = text.split_once('@').ok_or(DriveSpecError::Form)?;
-        let family: Family = family.parse()?;
+        // Somebody else's sign between them can mean nothing else.
+        let parts = text.split_once('@').or_else(|| text.split_once(':'));
+        let (family, addresses) = parts.ok_or_else(|| DriveSpecError::Form(missing(text)))?;
+        let family: Family = family.trim().parse().map_err(|unknown| DriveSpecError::Family { unknown })?;
         let Addresses(slaves) = addresses.parse()?;
         let capabilities = family.capabilities();
         match slaves.iter().find(|slave| slave.number() > capabilities.highest_address) {
@@ -117,7 +121,23 @@ impl FromStr for DriveSpec {
     }
 }
 
-/// Addresses in the order in which they were named, each at most once: `1-10,12`.
+/// Which families may have been meant by a name that is none.
+pub fn meant(unknown: &UnknownFamily) -> String {
+    let all: Vec<String> = Family::all().iter().map(ToString::to_string).collect();
+    did_you_mean(&nearest(&unknown.0, all.iter().map(String::as_str)))
+}
+
+/// What is missing where a family or an address stands alone.
+fn missing(text: &str) -> String {
+    match text.trim().parse::<Family>() {
+        Ok(family) => format!(": at which address? {family}@1, or drived scan finds it"),
+        Err(_) if text.parse::<Addresses>().is_ok() => ": of which family? drived scan finds it".to_owned(),
+        Err(_) => String::new(),
+    }
+}
+
+/// Addresses in the order in which they were named, each at most once: `1-10,12`. Spaces and semicolons part them too, and a range
+/// may be written as `1..3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Addresses(pub Vec<SlaveAddress>);
 
@@ -126,11 +146,18 @@ impl FromStr for Addresses {
 
     fn from_str(text: &str) -> Result<Self, DriveSpecError> {
         let mut slaves = Vec::new();
-        for part in text.split(',') {
+        let text = text.trim().replace("..=", "-").replace("..", "-").replace('–', "-");
+        // Spaces around a sign part nothing.
+        let parts =
+            text.split([',', ';']).flat_map(|part| match part.contains('-') || part.trim().is_empty() {
+                true => vec![part.trim()],
+                false => part.split_whitespace().collect(),
+            });
+        for part in parts {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
-            let (first, last) = (address(first)?, address(last)?);
+            let (first, last) = (address(first.trim())?, address(last.trim())?);
             if first > last {
-                return Err(DriveSpecError::Backwards(part.to_owned()));
+                return Err(DriveSpecError::Backwards { first, last });
             }
             for number in first.number()..=last.number() {
                 let slave = SlaveAddress::try_from(number)?;
@@ -182,6 +209,14 @@ mod tests {
     }
 
     #[test]
+    fn what_can_mean_nothing_else_is_understood() {
+        assert_eq!(numbers("atv312@1..3"), [1, 2, 3]);
+        assert_eq!(numbers("atv312@1 2 3"), [1, 2, 3]);
+        assert_eq!(numbers("atv312@1, 3 - 5; 7"), [1, 3, 4, 5, 7]);
+        assert_eq!(numbers("ATV312:7"), [7]);
+    }
+
+    #[test]
     fn drives_are_listed_as_they_could_be_written() {
         for text in ["atv312@7", "atv312@1-31", "atv312@1,2", "atv312@1-3,5,6,9-11", "atv312@1-3 atv21@4,5,9"]
         {
@@ -205,7 +240,10 @@ mod tests {
     #[test]
     fn what_no_drive_can_have_is_refused_with_the_reason() {
         for (text, reason) in [
-            ("atv312", "expected FAMILY@ADDRESSES"),
+            ("atv312", "at which address? atv312@1"),
+            ("1", "of which family?"),
+            ("", "expected FAMILY@ADDRESSES"),
+            ("atv321@1", "did you mean atv21 or atv312?"),
             ("atv999@1", "is not a family of drives: expected one of"),
             ("atv312@", "is not an address"),
             ("atv312@x", "is not an address"),
@@ -214,7 +252,7 @@ mod tests {
             ("atv312@300", "is not an address"),
             ("atv312@0", "0 is not a slave address"),
             ("atv312@248", "248 is not a slave address"),
-            ("atv312@5-2", "runs backwards"),
+            ("atv312@5-2", "runs backwards: did you mean 2-5?"),
             ("atv312@1-5,3", "named twice"),
             ("atv28@32", "addresses 1 to 31"),
         ] {

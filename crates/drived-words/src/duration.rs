@@ -7,25 +7,29 @@ use std::{str::FromStr, time::Duration};
 pub struct Time(pub Duration);
 
 impl FromStr for Time {
-    type Err = &'static str;
+    type Err = NoTime;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let text = text.trim();
         let digits = text.find(|character: char| !character.is_ascii_digit()).unwrap_or(text.len());
         let (number, unit) = text.split_at(digits);
-        let number: u32 = number.parse().map_err(|_| EXPECTED)?;
+        let number: u32 = number.parse().map_err(|_| NoTime(String::new()))?;
         let number = u64::from(number);
         match unit.trim_start() {
             "ms" => Ok(Self(Duration::from_millis(number))),
             "s" => Ok(Self(Duration::from_secs(number))),
             "min" => Ok(Self(Duration::from_secs(number * 60))),
             "" if number == 0 => Ok(Self(Duration::ZERO)),
-            _ => Err(EXPECTED),
+            "" => Err(NoTime(format!(": {number} of what? {number}s or {number}min"))),
+            _ => Err(NoTime(String::new())),
         }
     }
 }
 
-const EXPECTED: &str = "expected a whole number and a unit, such as 500ms, 1s or 2min";
+/// A text that is no time.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("expected a whole number and a unit, such as 500ms, 1s or 2min{0}")]
+pub struct NoTime(String);
 
 #[cfg(test)]
 mod tests {
@@ -42,7 +46,9 @@ mod tests {
             assert_eq!(text.parse(), Ok(Time(time)), "{text}");
         }
         for text in ["", "5", "s", "-1s", "1.5s", "1h30", "99999999999s"] {
-            assert_eq!(text.parse::<Time>(), Err(EXPECTED), "{text}");
+            let refused = text.parse::<Time>().unwrap_err().to_string();
+            assert!(refused.starts_with("expected a whole number and a unit"), "{text}: {refused}");
         }
+        assert!("5".parse::<Time>().unwrap_err().to_string().ends_with("5 of what? 5s or 5min"));
     }
 }

@@ -1,6 +1,7 @@
 //! What `--line` says: `PATH[,BAUD[,FORMAT[,PROTOCOL[,SETTING=VALUE]...]]]`, `rtu+tcp://HOST:PORT[,BAUD[,FORMAT]]` or `tcp://HOST:PORT`,
 //! and the settings that the drives on it share.
 
+mod meant;
 mod proposal;
 
 use std::{fmt, str::FromStr, time::Duration};
@@ -16,6 +17,7 @@ use drive_core::{
 };
 use drive_families::Options;
 
+use self::meant::meant;
 pub use self::proposal::proposal;
 use crate::drive_spec::DriveName;
 
@@ -70,7 +72,7 @@ impl FromStr for LineSpec {
     type Err = LineSpecError;
 
     fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        Ok(Self(text.parse()?))
+        Ok(Self(meant(text).parse()?))
     }
 }
 

@@ -5,7 +5,11 @@ use drive_core::{
     registers::{Factory, Range},
 };
 
-use crate::{failure::Failure, output};
+use crate::{
+    failure::Failure,
+    meant::{nearest, with_point},
+    output,
+};
 
 /// The word for a person's text, refused here when access or range forbid it: nothing is sent then.
 pub fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
@@ -17,12 +21,81 @@ pub fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
         range if range.is_empty() => "a number in its unit or a hexadecimal word such as 0627h".to_owned(),
         range => range,
     };
-    let word =
-        row.read(text).ok_or_else(|| refuse(format!("{text:?} is no value, expected: {}", expected())))?;
+    let word = read(row, text)
+        .ok_or_else(|| refuse(format!("{text:?} is no value, expected: {}{}", expected(), example(row))))?;
     if !row.range.allows(row.unit.number(word)) {
-        return Err(refuse(format!("{} is not allowed, expected: {}", row.show(word), expected())));
+        return Err(refuse(format!(
+            "{} is not allowed, expected: {}{}",
+            row.show(word),
+            expected(),
+            example(row)
+        )));
     }
     Ok(word)
+}
+
+/// The word for a text, also for one with a decimal comma, or with unit or mnemonic in other letters.
+fn read(row: &Row, text: &str) -> Option<u16> {
+    let text = text.trim();
+    let plain = |text: &str| {
+        let exact = row.read(text);
+        exact.or_else(|| {
+            let mut alike =
+                row.range.choices().iter().filter(|choice| choice.code.eq_ignore_ascii_case(text));
+            alike.next().filter(|_| alike.next().is_none()).map(|choice| choice.value)
+        })
+    };
+    let without_unit = || {
+        let (number, unit) = text.split_at_checked(text.len().checked_sub(row.unit.symbol.len())?)?;
+        let is_unit = !unit.is_empty() && unit.eq_ignore_ascii_case(row.unit.symbol);
+        is_unit.then(|| number.trim_end().to_owned())
+    };
+    plain(text)
+        .or_else(|| plain(&with_point(text)?))
+        .or_else(|| without_unit().and_then(|number| plain(&number).or_else(|| plain(&with_point(&number)?))))
+}
+
+/// A value as it could be typed, where the manual prints one in a unit.
+fn example(row: &Row) -> String {
+    match row.factory {
+        Factory::Value(word) if !row.unit.symbol.is_empty() => format!(", such as {}", brief(row, word)),
+        _ => String::new(),
+    }
+}
+
+/// Registers that may have been meant by a text that names none: those spelt alike, else some whose name has the word, else the
+/// one behind an address that was counted as 4xxxx.
+pub fn alike(rows: &'static [Row], text: &str) -> Vec<String> {
+    const NAMED: usize = 3;
+    let of_code = |code: &str| rows.iter().find(|row| row.code == code);
+    if let Some(number) =
+        text.strip_prefix('4').filter(|rest| rest.len() >= 4).and_then(|rest| rest.parse::<u16>().ok())
+    {
+        let behind = rows.iter().find(|row: &&Row| row.address == number);
+        return behind.map(|row| format!("{} ({})", row.address, row.code)).into_iter().collect();
+    }
+    let word = text.to_lowercase();
+    let begins = |row: &&Row| {
+        let code = row.code.to_lowercase();
+        code.len() > 1 && (code.starts_with(&word) || word.len() > 2 && word.starts_with(&code))
+    };
+    let named = |row: &&Row| {
+        word.len() > 2 && row.name.to_lowercase().split_whitespace().any(|part| part.starts_with(&word))
+    };
+    let settable = |row: &&Row| row.access.is_writable();
+    let mut found: Vec<&Row> = rows.iter().filter(begins).collect();
+    if found.is_empty() {
+        found = nearest(text, rows.iter().map(|row| row.code)).into_iter().filter_map(of_code).collect();
+    }
+    found.extend(rows.iter().filter(named).filter(settable).take(NAMED));
+    let mut codes: Vec<String> = Vec::new();
+    for row in found {
+        if !codes.iter().any(|code| code == row.code) {
+            codes.push(row.code.to_owned());
+        }
+    }
+    codes.truncate(NAMED);
+    codes
 }
 
 /// The factory setting of a row, in the unit that it has with the factory setting of what chooses that.
@@ -82,16 +155,31 @@ mod tests {
 
     #[test]
     fn what_range_and_access_forbid_is_refused_before_anything_is_sent() {
-        assert_eq!(wanted(&RAMP, "3.5 s"), Ok(35));
+        for text in ["3.5 s", "3.5", "3,5", "3,5 s", "3.5 S", "3,5S", "0023h"] {
+            assert_eq!(wanted(&RAMP, text), Ok(35), "{text}");
+        }
+        let list = Row { range: Range::OneOf(YES_NO), unit: Unit::CODE, ..RAMP };
+        assert_eq!(wanted(&list, "yes"), Ok(1));
         for (row, text, reason) in [
             (RAMP, "0", "0.0 s is not allowed, expected: 0.1 s to 999.9 s"),
-            (RAMP, "fast", "\"fast\" is no value, expected: 0.1 s to 999.9 s"),
+            (RAMP, "fast", "\"fast\" is no value, expected: 0.1 s to 999.9 s, such as 3.0 s"),
+            (RAMP, "3,500", "\"3,500\" is no value"),
             (Row { access: Access::Read, ..RAMP }, "3", "can only be read"),
             (Row { range: Range::OneOf(YES_NO), unit: Unit::CODE, ..RAMP }, "7", "expected: nO, YES"),
         ] {
             let Err(Failure::Input(message)) = wanted(&row, text) else { panic!("{text} was taken") };
             assert!(message.contains(reason), "{message}");
         }
+    }
+
+    #[test]
+    fn whoever_misses_a_register_is_told_what_is_called_alike() {
+        const ROWS: &[Row] = &[RAMP, Row { address: 3_201, code: "ETA", name: "status word", ..RAMP }];
+        assert_eq!(alike(ROWS, "ACCEL"), ["ACC"]);
+        assert_eq!(alike(ROWS, "acceleration"), ["ACC"]);
+        assert_eq!(alike(ROWS, "49001"), ["9001 (ACC)"]);
+        assert_eq!(alike(ROWS, "ETB"), ["ETA"]);
+        assert_eq!(alike(ROWS, "nonsense"), [""; 0]);
     }
 
     #[test]

@@ -20,19 +20,38 @@ pub struct Ending {
 impl Ending {
     #[cfg(unix)]
     pub fn listen() -> Result<Self, Failure> {
-        use signal_hook::{
-            consts::{SIGINT, SIGQUIT, SIGTERM},
-            low_level::pipe,
-        };
+        use signal_hook::consts::{SIGINT, SIGQUIT, SIGTERM};
+        Self::to(&[SIGINT, SIGTERM, SIGQUIT])
+    }
+
+    /// The same for a program whose picture is a terminal: that this is gone ends it in order too, unless whoever began it said that
+    /// it is to stay.
+    #[cfg(unix)]
+    pub fn listen_on_terminal() -> Result<Self, Failure> {
+        use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+        match is_hangup_ignored() {
+            true => Self::listen(),
+            false => Self::to(&[SIGINT, SIGTERM, SIGQUIT, SIGHUP]),
+        }
+    }
+
+    #[cfg(not(unix))]
+    pub fn listen_on_terminal() -> Result<Self, Failure> {
+        Self::listen()
+    }
+
+    #[cfg(unix)]
+    fn to(signals: &[i32]) -> Result<Self, Failure> {
+        use signal_hook::low_level::pipe;
         let listen = || {
             let (asked, asks) = tokio::net::UnixStream::pair()?;
             let asks = asks.into_std()?;
-            let signals = [SIGINT, SIGTERM, SIGQUIT].map(|signal| pipe::register(signal, asks.try_clone()?));
+            let signals = signals.iter().map(|&signal| pipe::register(signal, asks.try_clone()?));
             io::Result::Ok(Self {
                 #[cfg(any(test, feature = "testing"))]
                 at: None,
                 asked,
-                signals: signals.into_iter().collect::<io::Result<_>>()?,
+                signals: signals.collect::<io::Result<_>>()?,
             })
         };
         listen().map_err(|error| cannot_listen(&error))

@@ -5,7 +5,10 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
-use crate::commands::{audit, check, completions, export, names, token};
+use crate::{
+    commands::{audit, check, completions, export, names, token},
+    refused::one_line,
+};
 use drived_daemon::demo;
 use drived_daemon::run;
 use drived_line_tools::{capture, doctor, explain, families, init, plan, poll, replay, scan, sim};
@@ -163,19 +166,11 @@ pub(crate) fn refuse(error: &clap::Error) -> ExitCode {
             let _ = error.print();
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
-        _ => end(Err(Failure::Input(one_line(&error.to_string())))),
-    }
-}
-
-/// The first paragraph of clap's message on one line, and where the rest is told.
-fn one_line(message: &str) -> String {
-    let paragraph = message.split("\n\n").next().unwrap_or(message);
-    let words = paragraph.strip_prefix("error: ").unwrap_or(paragraph).split_whitespace();
-    let text = words.collect::<Vec<_>>().join(" ");
-    let usage = message.lines().find_map(|line| line.strip_prefix("Usage: "));
-    match usage {
-        Some(usage) => format!("{text} (usage: {usage})"),
-        None => text,
+        _ => {
+            let arguments: Vec<String> =
+                std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+            end(Err(Failure::Input(one_line(error, &arguments, &Cli::command()))))
+        }
     }
 }
 
@@ -231,18 +226,5 @@ mod tests {
             assert!(NOTES.contains(&format!("{code} {meaning}")), "{code}");
         }
         assert!(ENVIRONMENT.iter().take(2).all(|(name, _)| NOTES.contains(name)));
-    }
-
-    #[test]
-    fn what_is_refused_is_said_on_one_line_with_its_reason() {
-        for (arguments, reason) in [
-            (&["poll", "--line", "/dev/ttyUSB0", "--drive", "atv999@1"][..], "is not a family of drives"),
-            (&["poll", "--line", "/dev/ttyUSB0"], "--drive <FAMILY@ADDRESSES>"),
-            (&["fly"], "unrecognized subcommand 'fly'"),
-        ] {
-            let error = Cli::try_parse_from(["drived"].iter().chain(arguments)).unwrap_err();
-            let line = one_line(&error.to_string());
-            assert!(line.contains(reason) && !line.contains('\n'), "{line}");
-        }
     }
 }

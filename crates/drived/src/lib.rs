@@ -24,6 +24,7 @@ mod agreement;
 mod cli;
 mod commands;
 mod faces;
+mod refused;
 
 use std::process::ExitCode;
 

@@ -41,6 +41,20 @@ fn every_page_is_shown_without_a_warning() {
 }
 
 #[test]
+fn no_page_and_no_help_shows_the_marks_of_a_markup() {
+    let (folder, pages) = pages("man-marks");
+    for page in &pages {
+        let text = fs::read_to_string(page).expect("it is text");
+        assert!(!text.contains("**"), "{}", page.display());
+    }
+    for subcommand in ["scan", "report", "run", "explain", "replay"] {
+        let help = run(&[subcommand, "--help"]);
+        assert!(!help.assert_done().contains("**"), "{subcommand}: {help:?}");
+    }
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
 fn each_subcommand_has_a_page_that_tells_exit_codes_environment_and_its_options() {
     let (folder, pages) = pages("man-each");
     let read =

@@ -176,16 +176,24 @@ impl Row {
         listed.map(|choice| choice.value).or_else(|| self.unit.read(text))
     }
 
-    /// The row whose mnemonic or decimal or hexadecimal address is `text`.
+    /// The row whose mnemonic or decimal or hexadecimal address is `text`: `ACC`, `9001`, `W9001`, `2329h` or `0x2329`. A mnemonic
+    /// in other letters is found where no second one differs from it by these alone.
     #[must_use]
     pub fn find(rows: &'static [Self], text: &str) -> Option<&'static Self> {
         let by_code = rows.iter().find(|row| row.code == text);
         by_code.or_else(|| {
-            let address = match text.strip_suffix(['h', 'H']) {
-                Some(digits) => u16::from_str_radix(digits, 16).ok()?,
-                None => text.strip_prefix('W').unwrap_or(text).parse().ok()?,
+            let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_suffix(['h', 'H']));
+            let address = match hexadecimal {
+                Some(digits) => u16::from_str_radix(digits, 16),
+                None => text.strip_prefix('W').unwrap_or(text).parse(),
             };
-            rows.iter().find(|row| row.address == address)
+            match address {
+                Ok(address) => rows.iter().find(|row| row.address == address),
+                Err(_) => {
+                    let mut alike = rows.iter().filter(|row| row.code.eq_ignore_ascii_case(text));
+                    alike.next().filter(|_| alike.next().is_none())
+                }
+            }
         })
     }
 }

@@ -36,6 +36,7 @@ use drived_words::{
     failure::Failure,
     line_spec::{self, LineSpec},
     output::{self, Progress},
+    ports,
     signals::Ending,
 };
 
@@ -192,7 +193,7 @@ impl Ways for Port {
 
 /// Why a port cannot be had, and what to do.
 async fn refused(error: OpenError) -> Failure {
-    let OpenError::InUse { path } = &error else { return Failure::Input(error.to_string()) };
+    let OpenError::InUse { path } = &error else { return Failure::Input(ports::refused(&error)) };
     match client::whose(path).await {
         Some(whose) => Failure::Input(format!(
             "{} is {whose}: a line has one master, so end that first and let the doctor have the port; the daemon's own view of \

@@ -65,7 +65,7 @@ async fn captured(family: Family, protocol: &str, settings: SerialSettings) -> (
     line.close().await;
     drop(line);
     writing.finished().await.unwrap();
-    let recording = capture::read(&sink.0.lock().unwrap()).unwrap();
+    let recording = drive_bus::capture::read(&sink.0.lock().unwrap()).unwrap();
     (seen, recording)
 }
 
@@ -75,7 +75,7 @@ fn played_back(
 ) -> (SimLine, mpsc::UnboundedReceiver<NotRecorded>) {
     let (unknown, asked) = mpsc::unbounded_channel();
     let found = exchanges(recording, settings);
-    (line(spoken(recording).unwrap(), settings, &found, unknown).unwrap(), asked)
+    (line(spoken(recording).unwrap(), settings, &found, false, unknown).unwrap(), asked)
 }
 
 #[tokio::test(start_paused = true)]
@@ -110,7 +110,7 @@ fn recording(frames: &[(Direction, u64, Vec<u8>)]) -> Recording {
         let at = std::time::Duration::from_millis(1_000_000 + at);
         writer.write(&Captured { at, direction: *direction, bytes: bytes.clone().into() }).unwrap();
     }
-    capture::read(&file).unwrap()
+    drive_bus::capture::read(&file).unwrap()
 }
 
 #[tokio::test(start_paused = true)]
@@ -170,4 +170,35 @@ fn the_time_of_an_answer_counts_from_the_end_of_its_request() {
     // Heard by another the request has ended already when it is handed over: 40 - 4.01 ms.
     let heard = Recording { late: Some(std::time::Duration::ZERO), ..recording(&frames) };
     assert_eq!(exchanges(&heard, RTU)[&3][0].1.after.as_micros(), 35_989);
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_image_answers_any_question_of_the_registers_that_the_capture_has() {
+    use drive_core::tokio_modbus::{Request, client::Client as _};
+
+    let (sent, received) = (Direction::Sent, Direction::Received);
+    let recording = recording(&[
+        (sent, 0, rtu::frame(3, &[3, 0, 10, 0, 3]).to_vec()),
+        (received, 40, rtu::frame(3, &[3, 6, 0, 1, 0, 2, 0, 3]).to_vec()),
+        (sent, 100, rtu::frame(3, &[6, 0, 11, 0, 9]).to_vec()),
+        (received, 140, rtu::frame(3, &[6, 0, 11, 0, 9]).to_vec()),
+    ]);
+    let (unknown, mut asked) = mpsc::unbounded_channel();
+    let found = exchanges(&recording, RTU);
+    let simulated = line(drive_sim::Protocol::Rtu, RTU, &found, true, unknown).unwrap();
+    let line = Line::over(simulated.in_memory(), LineConfig { retries: 0, ..config("rtu", RTU) });
+    let ask = |request| {
+        let mut slave = line.slave(3);
+        async move {
+            slave.call(request).await.map(|answer| format!("{answer:?}")).map_err(PortError::from_modbus)
+        }
+    };
+    // Other blocks than were asked for, the later word over the earlier.
+    assert!(ask(Request::ReadHoldingRegisters(11, 2)).await.unwrap().contains("[9, 3]"));
+    assert!(ask(Request::ReadHoldingRegisters(12, 1)).await.unwrap().contains("[3]"));
+    assert!(ask(Request::WriteSingleRegister(12, 77)).await.is_ok());
+    assert!(ask(Request::ReadHoldingRegisters(10, 3)).await.unwrap().contains("[1, 9, 77]"));
+    assert!(asked.try_recv().is_err());
+    assert!(ask(Request::ReadHoldingRegisters(12, 2)).await.unwrap().contains("IllegalDataAddress"));
+    assert_eq!(asked.try_recv().unwrap(), (3, vec![3, 0, 13, 0, 1]));
 }

@@ -49,7 +49,7 @@ const LISTENING: Duration = Duration::from_secs(2);
 /// Each address is asked for one register; whoever answers, even by refusing, is read as each family would be. Speed and
 /// format are those of --line; with --standstill all others are tried too that a family can be set to, the likeliest first.
 ///
-/// **A drive whose communication watchdog is armed may begin to expect messages by the first one that it hears.** Whoever has
+/// Take care: a drive whose communication watchdog is armed may begin to expect messages by the first one that it hears. Whoever has
 /// answered is asked again and again until the scan ends, as often as its watchdog wants, and may trip after that. Scan while
 /// the motors stand. Exit code 1 when nobody answers.
 #[derive(Debug, clap::Args)]

@@ -38,9 +38,13 @@ pub struct Known {
 /// A frame in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explained {
-    /// When its last byte was handed over, since 1970.
-    #[serde(serialize_with = "crate::explain::as_milliseconds", rename = "time_unix_ms")]
-    pub at: Duration,
+    /// When its last byte was handed over, since 1970; `None` where that was not taken down.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "crate::explain::as_some_milliseconds",
+        rename = "time_unix_ms"
+    )]
+    pub at: Option<Duration>,
     /// Whether the master sent it, where that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sent: Option<bool>,
@@ -123,7 +127,7 @@ impl Explainer {
         };
         said.trouble.extend(timing.trouble);
         Explained {
-            at: frame.at,
+            at: Some(frame.at),
             sent,
             slave,
             drive: slave.and_then(|slave| self.known.drives.get(&slave)).map(|(_, name)| name.clone()),

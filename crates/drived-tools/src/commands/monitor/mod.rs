@@ -11,6 +11,7 @@ mod happening;
 mod model;
 mod source;
 mod stopping;
+mod terminal;
 mod view;
 mod words;
 
@@ -30,6 +31,7 @@ use tokio::{
 use self::{
     model::{Ask, Model},
     source::Source,
+    terminal::Shows,
 };
 use crate::commanded::UNCONFIRMED;
 use drived_client::DaemonArgs;
@@ -71,7 +73,11 @@ pub async fn run(args: Args) -> Result<(), Failure> {
             "monitor needs a terminal for its picture and its keys: drived watch prints what happens";
         return Err(Failure::Input(no_terminal.to_owned()));
     }
-    let mut ending = Ending::listen()?;
+    if Shows::of(|name| std::env::var(name).ok()) == Shows::Nothing {
+        let dumb = "monitor draws a picture, and TERM=dumb has none: drived watch prints what happens, or TERM=xterm drived monitor";
+        return Err(Failure::Input(dumb.to_owned()));
+    }
+    let mut ending = Ending::listen_on_terminal()?;
     let source = Source::open(&args).await?;
     let watched = match source.is_own() {
         true => "a line of its own, only read".to_owned(),
@@ -85,7 +91,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
 
 fn shown(model: &Arc<Mutex<Model>>) -> Result<Screen, Failure> {
     let model = Arc::clone(model);
-    let screen = Screen::open(move |frame| view::draw(&mut locked(&model), Instant::now(), frame));
+    let is_ascii = Shows::of(|name| std::env::var(name).ok()) == Shows::Ascii;
+    let screen = Screen::open(move |frame| {
+        view::draw(&mut locked(&model), Instant::now(), frame);
+        if is_ascii {
+            terminal::to_ascii(frame.buffer_mut());
+        }
+    });
     screen.ok_or_else(|| Failure::Input("the terminal cannot be drawn on".to_owned()))
 }
 

@@ -11,17 +11,20 @@ pub mod source;
 #[cfg(test)]
 mod testing;
 
-use drive_families::{Family, UnknownFamily};
+use std::path::PathBuf;
+
+use drive_families::Family;
 
 use self::{
     direct::{dump, get, save_all, set},
+    file::Backup,
     shown::list,
 };
 use crate::one_drive::OneDriveArgs;
 use drived_client::{DaemonArgs, Target};
 use drived_file::ledger::LedgerArgs;
 use drived_plant::plant::parameters::ParameterView;
-use drived_words::{failure::Failure, output};
+use drived_words::{drive_spec, failure::Failure, output};
 
 /// List, read and write the registers of a drive, by mnemonic or address
 #[derive(Debug, clap::Subcommand)]
@@ -51,7 +54,7 @@ pub enum Command {
         one: OneDriveArgs,
         /// The drive of the running daemon, which --line and --drive stand for otherwise; the mnemonic or the address of the
         /// register; and a number in its unit, a hexadecimal word such as 0627h, or the mnemonic of a listed value
-        #[arg(value_name = "[NAME] REGISTER VALUE", required = true, num_args = 2..=3, allow_negative_numbers = true)]
+        #[arg(value_name = "[NAME] REGISTER VALUE", required = true, num_args = 1..=3, allow_negative_numbers = true)]
         words: Vec<String>,
         /// Then save the drive's parameters to its EEPROM, all of them, as `drived param save` does, also when the value was
         /// there already
@@ -96,12 +99,12 @@ pub async fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Get { one, words } if one.is_on_line() => get(&one, &words).await,
         Command::Get { one, words } => remote::get(&one, &words).await,
-        Command::Set { one, words, save, ledger } => match (one.is_on_line(), &*words) {
+        Command::Set { one, words, save, ledger } => match (one.is_on_line(), &*apart(&words)) {
             (true, [register, value]) => set(&one, register, value, save, &ledger).await,
             (false, [name, register, value]) => remote::set(&one, name, register, value, save).await,
-            (true, _) => {
-                Err(Failure::Input("expected REGISTER and VALUE beside --line and --drive".to_owned()))
-            }
+            (true, _) => Err(Failure::Input(
+                "expected REGISTER and VALUE beside --line and --drive, such as ACC 4.5".to_owned(),
+            )),
             (false, _) => Err(Failure::Input(
                 "expected NAME, REGISTER and VALUE, or --line and --drive instead of the name".to_owned(),
             )),
@@ -116,11 +119,27 @@ pub async fn run(command: Command) -> Result<(), Failure> {
     }
 }
 
+/// The backups of these files and folders.
+pub(super) fn backups(paths: &[PathBuf]) -> Result<Vec<Backup>, Failure> {
+    restore::files(paths)?.iter().map(|path| Backup::read(path)).collect()
+}
+
+/// The words with `REGISTER=VALUE` as two.
+fn apart(words: &[String]) -> Vec<String> {
+    match words {
+        [before @ .., last] if last.contains('=') && before.len() < 2 => {
+            let parts = last.splitn(2, '=').map(|part| part.trim().to_owned());
+            before.iter().cloned().chain(parts).collect()
+        }
+        words => words.to_vec(),
+    }
+}
+
 /// A family by its name, or that of a drive of the running daemon.
 async fn family(of: &str, daemon: &DaemonArgs) -> Result<Family, Failure> {
     let unknown = match of.parse() {
         Ok(family) => return Ok(family),
-        Err(error) => Failure::Input(UnknownFamily::to_string(&error)),
+        Err(error) => Failure::Input(format!("{error}{}", drive_spec::meant(&error))),
     };
     // Where no daemon runs, it was meant for a family.
     let Ok(mut daemon) = daemon.connect().await else { return Err(unknown) };

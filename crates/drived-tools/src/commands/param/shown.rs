@@ -5,7 +5,9 @@ use drive_families::Family;
 
 use drived_words::{
     failure::Failure,
+    meant::did_you_mean,
     output::Table,
+    registers::alike,
     registers::{factory, range},
 };
 
@@ -28,8 +30,12 @@ pub(super) fn list(family: Family) -> Table {
 }
 /// The register that a person names, by mnemonic or address.
 pub(super) fn find(family: Family, text: &str) -> Result<&'static Row, Failure> {
-    Row::find(family.capabilities().rows, text).ok_or_else(|| {
-        Failure::Input(format!("{family} has no register {text:?}: see drived param list {family}"))
+    let rows = family.capabilities().rows;
+    Row::find(rows, text).ok_or_else(|| {
+        let meant = did_you_mean(&alike(rows, text));
+        let list = format!("drived param list {family} has all");
+        let why = if meant.is_empty() { format!(": {list}") } else { format!("{meant} {list}") };
+        Failure::Input(format!("{family} has no register {text:?}{why}"))
     })
 }
 

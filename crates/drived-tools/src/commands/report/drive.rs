@@ -8,15 +8,16 @@ use tokio::time::Instant;
 use super::{
     gather::DriveTold,
     parameters,
-    words::{cell, facts, milliseconds, moment, share, table, unread, untold},
+    words::{cell, facts, milliseconds, moment, own, share, table, unread, untold},
 };
+use crate::commands::param::file::Backup;
 use drived_screen::row::{Column, Row};
 use drived_words::{output, values};
 
 /// What it means that no communication watchdog runs.
 pub(super) const UNWATCHED: &str = "a motor keeps turning when the line is lost";
 
-pub(super) fn chapter(drive: &DriveTold) -> Markup {
+pub(super) fn chapter(drive: &DriveTold, before: Option<&[Backup]>) -> Markup {
     html! {
         section.drive id=(drive.anchor()) {
             h3 { (drive.name()) }
@@ -32,6 +33,7 @@ pub(super) fn chapter(drive: &DriveTold) -> Markup {
             }
             h4 { "Faults" }
             (faults(drive))
+            @if let Some(before) = before { h4 { "Changed since the backup" } (parameters::since(drive, before)) }
             h4 { "Parameters that differ from the factory setting" }
             (parameters::part(drive))
         }
@@ -236,16 +238,16 @@ fn faults(drive: &DriveTold) -> Markup {
     let kept = drive.family.as_ref().map_or(0, |family| family.capabilities().fault_history);
     html! {
         @for fault in &trips { (present(*fault, by_watchdog)) }
-        @if trips.is_empty() { p { "No fault is present." } }
+        @if trips.is_empty() { p { (own("No fault is present.")) } }
         @if let Some(trip) = trip { p { "The program saw it at " (moment(trip.time_unix_ms)) "." } }
         @match faults.reset_allowed {
-            Some(true) if !faults.present.is_empty() => p { "The drive would accept a reset." },
-            Some(false) => p { "The drive would not accept a reset: its cause is still there." },
+            Some(true) if !faults.present.is_empty() => p { (own("The drive would accept a reset.")) },
+            Some(false) => p { (own("The drive would not accept a reset: its cause is still there.")) },
             _ => {},
         }
         @for warning in &faults.warnings { p.alarm { "Alarm without a trip: " (warning) } }
-        @if kept == 0 { p.untold { "This family keeps no history of faults." } }
-        @else if faults.history.is_empty() { p { "The history of the drive is empty." } }
+        @if kept == 0 { p.untold { (own("This family keeps no history of faults.")) } }
+        @else if faults.history.is_empty() { p { (own("The history of the drive is empty.")) } }
         @else {
             (table("list", &["history", "code", "mnemonic", "meaning", "what to do"], 9, faults.history.iter().enumerate().map(past).collect()))
         }
@@ -256,8 +258,8 @@ fn present(fault: Option<Fault>, by_watchdog: bool) -> Markup {
     let remedy = fault.and_then(|fault| fault.remedy()).unwrap_or("see the manual of the drive");
     html! {
         div.trip {
-            p { strong { "Tripped: " (values::tripped(fault.as_ref())) } @if by_watchdog { ", by the communication watchdog" } }
-            p { "What to do: " (remedy) }
+            p { strong { (own("Tripped: ")) (values::tripped(fault.as_ref())) } @if by_watchdog { ", by the communication watchdog" } }
+            p { (own("What to do: ")) (remedy) }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `drived report`: what is known of drives and their lines, as one HTML file for the service file.
 
 mod drive;
+mod french;
 mod gather;
 mod line;
 mod own;
@@ -8,6 +9,7 @@ mod page;
 mod parameters;
 mod plot;
 mod program;
+mod sheet;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -20,7 +22,13 @@ use serde_json::json;
 
 #[cfg(any(test, feature = "testing"))]
 pub use self::summary::worst_of;
-use self::{gather::Gathered, own::Own, page::Page};
+use self::{
+    gather::Gathered,
+    own::Own,
+    page::{Page, Parties},
+    sheet::Sheet,
+};
+use super::param;
 use drived_client::{DaemonArgs, Way};
 use drived_words::{
     drive_options::OptionArgs,
@@ -29,6 +37,7 @@ use drived_words::{
     failure::Failure,
     line_spec::{self, LineSpec},
     output,
+    signals::Ending,
 };
 
 /// Write a report of drives and their lines into one HTML file, for the service file; nothing is written to a drive
@@ -37,8 +46,8 @@ use drived_words::{
 /// the plan beside what was measured. The file needs nothing else, and prints on A4. What could not be read stands in it with
 /// the reason; the exit code is 1 where a drive does not answer. All drives of the running daemon, unless some are named.
 ///
-/// With --line: **a drive whose communication watchdog is armed begins to expect messages by the first one that it hears, and
-/// trips when the report is done and nobody speaks to it any more.** Do that while the motors stand.
+/// With --line take care: a drive whose communication watchdog is armed begins to expect messages by the first one that it hears,
+/// and trips when the report is done and nobody speaks to it any more. Do that while the motors stand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Drives, groups or lines of the running daemon; without any, all its drives
@@ -55,10 +64,25 @@ pub struct Args {
     /// The file
     #[arg(long, value_name = "FILE")]
     to: PathBuf,
+    /// Write over a file that is there
+    #[arg(long)]
+    overwrite: bool,
+    /// The language of its own words; what drives and manuals say stays as it is
+    #[arg(long, value_name = "LANGUAGE", value_enum, default_value_t = Language::En)]
+    language: Language,
+    /// For whom it is; with him or the technician there is a block for signatures
+    #[arg(long, value_name = "TEXT")]
+    customer: Option<String>,
+    /// Who was there
+    #[arg(long, value_name = "TEXT")]
+    technician: Option<String>,
+    /// What the drives held before: backups of drived param backup, or a folder of them; what was changed since is told of each drive
+    #[arg(long, value_name = "FILE|FOLDER", conflicts_with = "without_parameters")]
+    before: Vec<PathBuf>,
     /// What stands at its head, such as the plant and its line
     #[arg(long, value_name = "TEXT", default_value = "Report on drives")]
     title: String,
-    /// What else is to be said: who was there, why, an order number; may be given several times
+    /// What else is to be said: why, an order number; may be given several times
     #[arg(long = "note", value_name = "TEXT")]
     notes: Vec<String>,
     /// Leave out the parameters, whose reading takes some seconds a drive
@@ -71,12 +95,28 @@ pub struct Args {
     daemon: DaemonArgs,
 }
 
+/// The languages of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Language {
+    En,
+    Fr,
+}
+
 /// Who tells it where no daemon does.
 const THE_LINE: &str = "the line itself, watched for this report; nothing was written to it";
 
 pub async fn run(args: Args) -> Result<(), Failure> {
-    let (way, own) = args.source().await?;
-    let gathered = Gathered::read(&way, &args.names, !args.without_parameters).await;
+    let sheet = Sheet::begin(&args.to, args.overwrite)?;
+    let before = param::backups(&args.before)?;
+    let mut ending = Ending::listen()?;
+    let (way, own, gathered) = tokio::select! {
+        biased;
+        () = ending.asked() => {
+            return Err(Failure::Drive("asked to end: there is no report, and nothing was written to a drive".to_owned()));
+        }
+        read = args.read() => read?,
+    };
+    drop(way);
     let source = if own.is_some() { THE_LINE } else { "the running daemon" };
     if let Some(own) = own {
         own.close().await;
@@ -85,12 +125,17 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let page = Page {
         title: &args.title,
         notes: &args.notes,
+        parties: Parties { customer: args.customer.as_deref(), technician: args.technician.as_deref() },
+        before: (!args.before.is_empty()).then_some(&before),
         source,
         written: Local::now().fixed_offset(),
         gathered: &gathered,
     };
-    std::fs::write(&args.to, page.html().into_string())
-        .map_err(|error| Failure::Input(format!("{}: {error}", args.to.display())))?;
+    let html = page.html().into_string();
+    sheet.write(&match args.language {
+        Language::En => html,
+        Language::Fr => french::translated(&html),
+    })?;
     let silent = gathered.silent();
     let written = json!({ "file": args.to, "drives": gathered.drives.len(), "silent": silent });
     args.daemon.say(&written, || {
@@ -114,6 +159,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// Everything that is reported, and the line that was opened for it.
+    async fn read(&self) -> Result<(Way, Option<Own>, Result<Gathered, Failure>), Failure> {
+        let (way, own) = self.source().await?;
+        let gathered = Gathered::read(&way, &self.names, !self.without_parameters).await;
+        Ok((way, own, gathered))
+    }
+
     /// The way to who answers, and the line that was opened for it.
     async fn source(&self) -> Result<(Way, Option<Own>), Failure> {
         let Some(line) = &self.line else {

@@ -7,8 +7,9 @@ use super::{
     drive,
     gather::Gathered,
     line, program, summary,
-    words::{facts, moment, unread},
+    words::{facts, moment, own, unread},
 };
+use crate::commands::param::file::Backup;
 use drived_words::output;
 
 /// How it looks, on a screen and on A4.
@@ -19,10 +20,20 @@ const STYLE: &str = include_str!("report.css");
 pub(super) struct Page<'a> {
     pub(super) title: &'a str,
     pub(super) notes: &'a [String],
+    pub(super) parties: Parties<'a>,
+    /// What the drives held before, as somebody has kept it.
+    pub(super) before: Option<&'a [Backup]>,
     /// Who answered.
     pub(super) source: &'a str,
     pub(super) written: DateTime<FixedOffset>,
     pub(super) gathered: &'a Gathered,
+}
+
+/// Who ordered what is reported, and who did it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Parties<'a> {
+    pub(super) customer: Option<&'a str>,
+    pub(super) technician: Option<&'a str>,
 }
 
 impl Page<'_> {
@@ -53,10 +64,11 @@ impl Page<'_> {
                             }
                         }
                         h2.new { "Drives" }
-                        @for told in drives { (drive::chapter(told)) }
+                        @for told in drives { (drive::chapter(told, self.before)) }
                         section { h2.new { "Alarms" } (program::alarms(events, &names)) }
                         section { h2 { "Settings of the program" } (program::settings(drives)) }
                         section { h2 { "How this report is to be read" } (reading()) }
+                        (self.parties.signatures())
                     }
                 }
             }
@@ -67,7 +79,11 @@ impl Page<'_> {
         let daemon = &self.gathered.state.daemon;
         let drives = self.gathered.drives.len();
         let silent = self.gathered.silent().len();
-        let mut rows = vec![
+        let mut rows = Vec::new();
+        for (label, who) in [("customer", self.parties.customer), ("technician", self.parties.technician)] {
+            rows.extend(who.map(|who| (label.to_owned(), html! { (who) })));
+        }
+        rows.extend([
             ("written".to_owned(), html! { (self.written.format("%Y-%m-%d %H:%M:%S %:z")) }),
             (
                 "told by".to_owned(),
@@ -84,22 +100,47 @@ impl Page<'_> {
                     @if silent > 0 { ", " strong { (silent) " of them without an answer" } }
                 },
             ),
-        ];
+        ]);
         rows.extend(self.notes.iter().map(|note| ("note".to_owned(), html! { (note) })));
         facts(rows)
+    }
+}
+
+impl Parties<'_> {
+    /// Where they sign, if anybody is named.
+    fn signatures(self) -> Markup {
+        let named = [("technician", self.technician), ("customer", self.customer)];
+        html! {
+            @if named.iter().any(|(_, who)| who.is_some()) {
+                section.signatures {
+                    h2 { "Signatures" }
+                    div.columns {
+                        @for (label, who) in named {
+                            div.block.signature {
+                                p { (own(label)) @if let Some(who) = who { ": " (who) } }
+                                div.line {}
+                                p.note { (own("place and date")) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 
 fn reading() -> Markup {
     html! {
         ul {
-            li { "Counts begin when the daemon began, or when the line was opened; hours and energy are the drive's own." }
-            li { "“not read” says that something was asked for and did not come, with the reason; “not told by this family” that "
-                "its manual has no such value; “–” that there is nothing to count yet." }
-            li { "Factory settings are those of the manuals. A parameter for which the manual prints a rule instead of a number "
-                "cannot be judged, and stands in a list of its own." }
-            li { "A figure of the plan is the longest there can be while no commands are given. “as the line has been” is the "
-                "same with the answer times that were measured." }
+            @for sentence in READING { li { (own(sentence)) } }
         }
     }
 }
+
+const READING: [&str; 5] = [
+    "Counts begin when the daemon began, or when the line was opened; hours and energy are the drive's own.",
+    "“not read” says that something was asked for and did not come, with the reason; “not told by this family” that its manual has no such value; “–” that there is nothing to count yet.",
+    "Factory settings are those of the manuals. A parameter for which the manual prints a rule instead of a number cannot be judged, and stands in a list of its own.",
+    "A figure of the plan is the longest there can be while no commands are given. “as the line has been” is the same with the answer times that were measured.",
+    "States, faults and the words of the program are as the program and the manuals say them.",
+];

@@ -4,9 +4,12 @@ use maud::{Markup, html};
 
 use super::{
     gather::{Compared, DriveTold},
-    words::{cell, table, unread},
+    words::{cell, own, table, unread},
 };
-use crate::commands::param::diff::{Cell, Difference};
+use crate::commands::param::{
+    diff::{Cell, Comparison, Difference},
+    file::Backup,
+};
 use drived_words::output;
 
 pub(super) fn part(drive: &DriveTold) -> Markup {
@@ -20,17 +23,37 @@ fn differences(compared: &Compared) -> Markup {
     let comparison = &compared.factory;
     let same = output::counted(comparison.same, "parameter is", "parameters are");
     html! {
-        @if comparison.differences.is_empty() { p { "None." } }
+        @if comparison.differences.is_empty() { p { (own("None.")) } }
         @else {
             (table("list parameters", &["parameter", "name", "value", "factory"], 2, comparison.differences.iter().map(differing).collect()))
         }
         p.note { (same) " as the manual prints the factory setting. Read at " (compared.held.head.date) "." }
         @if !comparison.unjudged.is_empty() {
             details open {
-                summary { (output::counted(comparison.unjudged.len(), "parameter", "parameters")) " cannot be judged" }
+                summary.counted { (output::counted(comparison.unjudged.len(), "parameter", "parameters")) " cannot be judged" }
                 (table("list parameters", &["parameter", "name", "value", "why"], 9, comparison.unjudged.iter().map(unjudged).collect()))
             }
         }
+    }
+}
+
+/// What a drive held when a backup was made of it, and holds otherwise now.
+pub(super) fn since(drive: &DriveTold, before: &[Backup]) -> Markup {
+    let held = match &drive.parameters {
+        Ok(compared) => &compared.held,
+        Err(why) => return html! { p { (unread(why)) } },
+    };
+    let is_it = |backup: &&Backup| backup.head.name == drive.name() && backup.head.family == held.head.family;
+    let Some(before) = before.iter().find(is_it) else {
+        return html! { p.note { (own("No backup from before has this drive.")) } };
+    };
+    let comparison = Comparison::of(before, held, true);
+    html! {
+        @if comparison.differences.is_empty() { p { (own("Nothing was changed.")) } }
+        @else {
+            (table("list parameters", &["parameter", "name", "before", "now"], 2, comparison.differences.iter().map(differing).collect()))
+        }
+        p.note { (before.head.date) " – " (held.head.date) }
     }
 }
 

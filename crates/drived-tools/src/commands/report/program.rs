@@ -32,7 +32,7 @@ pub(super) fn settings(drives: &[DriveTold]) -> Markup {
     }
     html! {
         @for (shown, names) in alike {
-            div.block { h4 { (names.join(", ")) } (PreEscaped(shown)) }
+            div.block { h4.names { (names.join(", ")) } (PreEscaped(shown)) }
         }
     }
 }

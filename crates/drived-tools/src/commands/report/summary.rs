@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use super::{
     drive::UNWATCHED,
     gather::{DriveTold, Gathered, LEFT_OUT, Told},
-    words::{cell, share, table, unread},
+    words::{cell, own, share, table, unread},
 };
 use drived_plant::plant::views::{DriveView, LineDetailView, LineLink};
 use drived_screen::row::{Column, Row};
@@ -58,7 +58,7 @@ pub(super) fn attention(gathered: &Gathered) -> Markup {
     let lines: Vec<Markup> = gathered.lines.iter().flat_map(of_line).collect();
     html! {
         @if all.is_empty() && lines.is_empty() {
-            p { "Nothing: every drive answers, none has a fault, and every line is as it was planned." }
+            p { (own("Nothing: every drive answers, none has a fault, and every line is as it was planned.")) }
         } @else {
             ul {
                 @for (finding, drives) in &all { li {

@@ -15,7 +15,7 @@ use drive_sim::{SimLine, SimSlave, Wiring};
 use super::{
     gather::Gathered,
     own::{LINE, Own},
-    page::Page,
+    page::{Page, Parties},
 };
 use drived_config::config::LinePart;
 use drived_plant::plant::views::LineLink;
@@ -60,7 +60,17 @@ impl Bench {
 fn html(gathered: &Gathered) -> String {
     let notes = ["order <4711> & \"more\"".to_owned()];
     let written = Local::now().fixed_offset();
-    Page { title: "Hall 3", notes: &notes, source: "a test", written, gathered }.html().into_string()
+    Page {
+        title: "Hall 3",
+        notes: &notes,
+        parties: Parties { customer: Some("Mill & Sons"), technician: Some("A. Turner") },
+        before: None,
+        source: "a test",
+        written,
+        gathered,
+    }
+    .html()
+    .into_string()
 }
 
 /// The chapter of a drive, without its tags: its texts, one a line.
@@ -190,7 +200,9 @@ async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
     gathered.events = Ok(serde_json::from_value(event).unwrap());
     let notes = [name.to_owned()];
     let written = Local::now().fixed_offset();
-    let page = Page { title: name, notes: &notes, source: name, written, gathered: &gathered };
+    let (parties, before) = (Parties { customer: Some(name), technician: None }, None);
+    let page =
+        Page { title: name, notes: &notes, parties, before, source: name, written, gathered: &gathered };
     let html = page.html().into_string();
     assert!(html.matches("&lt;script&gt;").count() > 10, "it is shown");
     for tag in ["<script", "<img", "onerror=alert(2)>\"", "http://", "https://", "url(", "@import"] {
@@ -200,4 +212,70 @@ async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
     let tags = html.split('<').filter_map(|part| Some(part.split_once('>')?.0));
     let bare = tags.flat_map(|tag| tag.split('"').step_by(2).collect::<Vec<_>>());
     assert!(bare.into_iter().all(|outside| !outside.contains("onerror")));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_words_of_a_report_are_french_and_none_is_missing() {
+    let bench = Bench::new();
+    bench.machine(Family::ATV312).trip(9);
+    bench.machine(Family::ATV28).mute();
+    let english = html(&bench.read(true).await);
+    let missing = super::french::untranslated(&english);
+    // Registers of the manuals and keys of the configuration are nobody's to translate.
+    let named = |text: &&String| {
+        let of_rows = Family::BUILT_IN.iter().flat_map(|family| family.capabilities().rows);
+        !of_rows.map(|row| row.name).any(|name| name == text.as_str()) && !text.contains("by the plan, ")
+    };
+    let missing: Vec<_> = missing.iter().filter(named).filter(|text| !is_setting(&english, text)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+    let french = super::french::translated(&english);
+    for text in [
+        "lang=\"fr\"",
+        "Les variateurs en un coup d’œil",
+        "Déclenché : ",
+        "technicien",
+        "Mill &amp; Sons",
+        "lieu et date",
+    ] {
+        assert!(french.contains(text), "{text}");
+    }
+    // What was said by others is as it was.
+    for text in ["Hall 3", "order &lt;4711&gt;", "ATV312"] {
+        assert_eq!(french.matches(text).count(), english.matches(text).count(), "{text}");
+    }
+}
+
+/// Whether a label stands among the settings of the program, which are called as in the configuration.
+fn is_setting(html: &str, label: &str) -> bool {
+    let settings = html.split("Settings of the program").nth(1).unwrap();
+    let settings = settings.split("How this report").next().unwrap();
+    settings.contains(&format!("<th scope=\"row\">{label}</th>"))
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_was_changed_since_a_backup_stands_with_both_values() {
+    let bench = Bench::new();
+    let before = bench.read(true).await;
+    let backups: Vec<_> =
+        before.drives.iter().filter_map(|drive| Some(drive.parameters.as_ref().ok()?.held.clone())).collect();
+    // ACC, 3.0 s from the factory (BBV52816 p. 12).
+    assert!(bench.machine(Family::ATV312).poke(9_001, 45));
+    let now = bench.read(true).await;
+    let page = Page {
+        title: "Hall 3",
+        notes: &[],
+        parties: Parties::default(),
+        before: Some(&backups),
+        source: "a test",
+        written: Local::now().fixed_offset(),
+        gathered: &now,
+    };
+    let html = page.html().into_string();
+    let changed = chapter(&html, "atv312@4");
+    let since = &changed[changed.find("Changed since the backup").unwrap()..];
+    let since = &since[..since.find("Parameters that differ").unwrap()];
+    assert!(since.contains("ACC") && since.contains("3.0 s") && since.contains("4.5 s"), "{since}");
+    assert!(!since.contains("dEC"), "{since}");
+    assert!(chapter(&html, "atv21@1").contains("Nothing was changed."));
+    assert!(!html.contains("place and date"), "nobody is to sign");
 }

@@ -10,14 +10,19 @@ use super::gather::DriveTold;
 use drived_plant::plant::views::DriveView;
 use drived_words::output;
 
+/// A sentence of the program's own, which has other words in another language.
+pub(super) fn own(text: &str) -> Markup {
+    html! { span.own { (text) } }
+}
+
 /// What was not read, and why.
 pub(super) fn unread(why: &str) -> Markup {
-    html! { span.unread { "not read: " (why) } }
+    html! { span.unread { (own("not read: ")) (why) } }
 }
 
 /// What a drive does not have to tell.
 pub(super) fn untold() -> Markup {
-    html! { span.untold { "not told by this family" } }
+    html! { span.untold { (own("not told by this family")) } }
 }
 
 /// Labels with their values.

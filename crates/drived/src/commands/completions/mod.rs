@@ -6,7 +6,6 @@
 mod known;
 mod offers;
 mod place;
-mod ports;
 mod words;
 
 use self::{

@@ -7,8 +7,8 @@ use drive_families::Family;
 use super::{
     known::Known,
     place::{Cursor, Place},
-    ports,
 };
+use drived_words::ports;
 
 /// What a word means is told in so many characters.
 const BRIEF: usize = 60;

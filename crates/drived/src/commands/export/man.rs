@@ -59,7 +59,7 @@ fn of(command: &mut Command, parent: Option<&str>, pages: &mut Vec<(String, Stri
     section(&mut page, "SYNOPSIS", usage.lines().map(|line| vec![bold(line.trim())]));
     let whole = command.get_long_about().map(ToString::to_string).unwrap_or_default();
     // The first paragraph is its name already.
-    let paragraphs = whole.split("\n\n").skip(1).map(|paragraph| vec![roman(paragraph.replace('\n', " "))]);
+    let paragraphs = whole.split("\n\n").skip(1).map(|paragraph| marked(&paragraph.replace('\n', " ")));
     section(&mut page, "DESCRIPTION", paragraphs);
     let arguments: Vec<&Arg> = command.get_arguments().filter(|argument| !argument.is_hide_set()).collect();
     list(&mut page, "OPTIONS", arguments.into_iter().map(entry));
@@ -112,8 +112,14 @@ fn list(page: &mut Roff, heading: &str, entries: impl IntoIterator<Item = (Vec<I
         }
         page.control("TP", []);
         page.text(term);
-        page.text([roman(meaning)]);
+        page.text(marked(&meaning));
     }
+}
+
+/// A text whose parts between two asterisks on each side are bold, as its writer meant them.
+fn marked(text: &str) -> Vec<Inline> {
+    let parts = text.split("**").enumerate();
+    parts.map(|(index, part)| if index % 2 == 1 { bold(part) } else { roman(part) }).collect()
 }
 
 /// Markdown without its marks, and without where its links lead.

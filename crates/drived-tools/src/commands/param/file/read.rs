@@ -60,7 +60,23 @@ impl Backup {
         if bytes.len() as u64 > LARGEST {
             return Err(failed("it is larger than any backup of parameters, 1 MiB".to_owned()));
         }
-        let text = String::from_utf8(bytes).map_err(|_| failed("it is no text in UTF-8".to_owned()))?;
+        // The first block of pcapng, or the number of a pcap in one of its two orders and two resolutions.
+        let is_capture = [
+            &[0x0A, 0x0D, 0x0D, 0x0A],
+            &[0xA1, 0xB2, 0xC3, 0xD4],
+            &[0xD4, 0xC3, 0xB2, 0xA1],
+            &[0xA1, 0xB2, 0x3C, 0x4D],
+            &[0x4D, 0x3C, 0xB2, 0xA1],
+        ]
+        .iter()
+        .any(|first: &&[u8; 4]| bytes.starts_with(*first));
+        let text = String::from_utf8(bytes).map_err(|_| match is_capture {
+            true => failed(
+                "it is a capture and no backup: drived explain reads it, drived param backup makes a backup"
+                    .to_owned(),
+            ),
+            false => failed("it is no text in UTF-8: drived param backup makes a backup".to_owned()),
+        })?;
         Self::parse(path, &text)
     }
 

@@ -124,7 +124,7 @@ pub(super) async fn run(args: Args) -> Result<(), Failure> {
 }
 
 /// The files, those of a folder in the order of their names.
-fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files = Vec::new();
     for path in paths {
         if !path.is_dir() {

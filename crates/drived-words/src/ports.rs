@@ -2,9 +2,57 @@
 
 use std::{fs, path::Path};
 
+use drive_bus::OpenError;
+
+/// So many ports are named behind a refusal.
+const NAMED: usize = 6;
+
 /// The paths of the serial ports, those first whose name tells the adapter wherever it is plugged in.
-pub(super) fn all() -> Vec<String> {
+pub fn all() -> Vec<String> {
     in_folders(Path::new("/dev"), Path::new("/sys/class/tty"))
+}
+
+/// Why a port cannot be had, and what there is instead.
+pub fn refused(error: &OpenError) -> String {
+    match error {
+        OpenError::NotFound { path } => {
+            format!("there is no serial port {}{}", path.display(), instead(path, &all()))
+        }
+        OpenError::Serial { path, .. } if path.is_dir() => {
+            format!("{} is a folder and no serial port{}", path.display(), instead(path, &all()))
+        }
+        OpenError::Serial { path, reason } if !is_terminal(path) => {
+            let instead = instead(path, &all());
+            format!("{} is no serial port ({reason}){instead}", path.display())
+        }
+        OpenError::Connect { .. } => {
+            format!("{error}: see that host and port are those of the gateway, and that it is switched on")
+        }
+        error => error.to_string(),
+    }
+}
+
+/// Whether a port is there that a driver made for characters: its own failure is worth more than the names of others.
+fn is_terminal(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    path.starts_with("/dev") && name.starts_with("tty") || path.starts_with("/dev/pts")
+}
+
+/// The ports that are there, for whoever named another one.
+fn instead(path: &Path, ports: &[String]) -> String {
+    let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let is_meant = |port: &&String| {
+        Path::new(port).file_name().is_some_and(|last| last.to_string_lossy().to_lowercase() == name)
+    };
+    if let Some(meant) = ports.iter().find(is_meant) {
+        return format!(": did you mean {meant}?");
+    }
+    let named = ports.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match ports.len() {
+        0 => ": none is present, plug the adapter in (it comes as /dev/ttyUSB0 or /dev/ttyACM0)".to_owned(),
+        1..=NAMED => format!(": present: {named}"),
+        more => format!(": present: {named} and {} more", more - NAMED),
+    }
 }
 
 fn in_folders(dev: &Path, tty: &Path) -> Vec<String> {
@@ -37,6 +85,18 @@ fn names(folder: &Path) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whoever_names_a_port_that_is_not_there_is_told_which_are() {
+        let present = ["/dev/ttyUSB0".to_owned(), "/dev/ttyS4".to_owned()];
+        let told = |path: &str| instead(Path::new(path), &present);
+        assert_eq!(told("ttyUSB0"), ": did you mean /dev/ttyUSB0?");
+        assert_eq!(told("/dev/ttyusb0"), ": did you mean /dev/ttyUSB0?");
+        assert_eq!(told("COM3"), ": present: /dev/ttyUSB0, /dev/ttyS4");
+        assert!(instead(Path::new("COM3"), &[]).contains("none is present"));
+        let many: Vec<String> = (0..9).map(|number| format!("/dev/ttyS{number}")).collect();
+        assert!(instead(Path::new("COM3"), &many).ends_with("/dev/ttyS5 and 3 more"));
+    }
 
     #[test]
     fn ports_that_are_there_are_offered_and_those_that_could_be_are_not() {
