@@ -23,8 +23,8 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, AnswerDelay, BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Reaction,
-    Registers, Row, SerialSettings, SlaveAddress, StopMode, Watch, WatchdogCapability,
+    Absent, AnswerDelay, BroadcastWrite, Capabilities, Control, Direction, ExceptionMeaning, Port, Quantity,
+    Reaction, Registers, Row, SerialSettings, SlaveAddress, StopMode, Watch, WatchdogCapability,
     serial::CharacterFormat,
 };
 
@@ -81,6 +81,12 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     // RUN may stand until the motor does: a second look, of three exchanges, shows that its output goes down.
     stop_exchanges: 7,
     measurement_exchanges: 2,
+    quantities: &[
+        Quantity::OutputFrequency,
+        Quantity::Current,
+        Quantity::OutputVoltage,
+        Quantity::DcBusVoltage,
+    ],
     ..Capabilities::least("3g3ev", "Omron 3G3EV")
 };
 

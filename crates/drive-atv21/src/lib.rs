@@ -41,8 +41,9 @@ mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Reaction, Recognised, Refusal,
-    Registers, Result, SlaveAddress, Status, StopMode, Watch, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Quantity, Reaction, Recognised,
+    Refusal, Registers, Result, SlaveAddress, Status, StopMode, Watch, WatchdogCapability,
+    serial::CharacterFormat,
 };
 
 use crate::{blocks::WriteSlot, in_effect::ReadBlock, proof::Proof};
@@ -91,6 +92,16 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     statuses_per_turn: proof::STATUSES_PER_TURN,
     stop_exchanges: 7,
     measurement_exchanges: reading::SLOW_SET.len() as u8 + 1,
+    quantities: &[
+        Quantity::OutputFrequency,
+        Quantity::CurrentShare,
+        Quantity::Speed,
+        Quantity::Torque,
+        Quantity::InputPower,
+        Quantity::OutputPower,
+        Quantity::RunningTime,
+        Quantity::PoweredTime,
+    ],
     ..Capabilities::least("atv21", "Schneider Altivar 21")
 };
 

@@ -15,8 +15,8 @@ mod setpoint;
 pub mod words;
 
 use drive_core::{
-    Absent, Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SerialSettings, SlaveAddress,
-    Speed, StopMode, serial::CharacterFormat,
+    Absent, Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SerialSettings,
+    SlaveAddress, Speed, StopMode, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -50,6 +50,16 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     status_words: 11,
     stop_exchanges: 5,
     measurement_exchanges: 6,
+    quantities: &[
+        Quantity::OutputFrequency,
+        Quantity::Current,
+        Quantity::Speed,
+        Quantity::LineVoltage,
+        Quantity::Torque,
+        Quantity::DriveThermal,
+        Quantity::MotorThermal,
+        Quantity::RunningTime,
+    ],
     ..Capabilities::least("atv28", "Schneider Altivar 28")
 };
 

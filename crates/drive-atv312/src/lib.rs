@@ -19,7 +19,7 @@ mod settings;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Port, Registers, Row, SlaveAddress, StopMode,
+    Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SlaveAddress, StopMode,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
@@ -56,6 +56,16 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     fault_history: 4,
     status_words: 6,
     measurement_exchanges: 6,
+    quantities: &[
+        Quantity::OutputFrequency,
+        Quantity::Current,
+        Quantity::Speed,
+        Quantity::LineVoltage,
+        Quantity::Torque,
+        Quantity::DriveThermal,
+        Quantity::MotorThermal,
+        Quantity::RunningTime,
+    ],
     ..Capabilities::least("atv312", "Schneider Altivar 312")
 };
 

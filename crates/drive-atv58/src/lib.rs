@@ -15,7 +15,7 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Class, ExceptionMeaning, Port, Registers, Result, Row, SerialSettings,
+    Absent, Capabilities, Class, ExceptionMeaning, Port, Quantity, Registers, Result, Row, SerialSettings,
     SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
@@ -73,6 +73,13 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     broadcast_stops: &[StopMode::Ramp, StopMode::Fast, StopMode::Freewheel],
     status_words: 9,
     measurement_exchanges: 2,
+    quantities: &[
+        Quantity::OutputFrequency,
+        Quantity::Current,
+        Quantity::LineVoltage,
+        Quantity::DriveThermal,
+        Quantity::MotorThermal,
+    ],
     ..Capabilities::least("atv58", "Schneider Altivar 58 with card VW3-A58303")
 };
 

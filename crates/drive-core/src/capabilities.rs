@@ -4,6 +4,7 @@ use std::{fmt, time::Duration};
 
 use crate::{
     address::SlaveAddress,
+    quantity::Quantity,
     registers::{Restoring, Row, Scaled},
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,
@@ -91,6 +92,9 @@ pub struct Capabilities {
     pub stop_exchanges: u8,
     /// Exchanges of one [`Drive::measurements`](crate::Drive::measurements).
     pub measurement_exchanges: u8,
+    /// The values that a drive of it can show, whatever a single drive or its configuration holds back: who announces values
+    /// before a drive was seen announces these. One that stands here may be missing in a drive; one that does not is never there.
+    pub quantities: &'static [Quantity],
 }
 
 /// A setting by which a drive waits before it answers.
@@ -119,7 +123,8 @@ impl AnswerDelay {
 
 impl Capabilities {
     /// A family that does the least: functions 03 and 06, one word at a time, addresses up to 247, 9600 and 19200 bit/s, 8E1,
-    /// a stop along the ramp, one exchange of eight words for a status and one for the measurements; nothing else. A family of your own says
+    /// a stop along the ramp, one exchange of eight words for a status and one for the measurements; nothing else. That it
+    /// might show any value is the one thing that is taken for given. A family of your own says
     /// what is different and ends with `..Capabilities::least(…)`, so that what is added here later breaks nothing:
     ///
     /// ```
@@ -170,6 +175,7 @@ impl Capabilities {
             statuses_per_turn: STATUSES_PER_TURN,
             stop_exchanges: 4,
             measurement_exchanges: 1,
+            quantities: Quantity::ALL,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Capabilities, FaultEntry, Row, SerialSettings, StopMode, interned,
+    Capabilities, FaultEntry, Quantity, Row, SerialSettings, StopMode, interned,
     registers::{Access, Confidence, Factory, Form, Range, Storage, Unit},
     serial::CharacterFormat,
 };
@@ -71,8 +71,22 @@ impl Profile {
             statuses_per_turn: 0,
             stop_exchanges: status_exchanges.saturating_mul(3).saturating_add(2),
             measurement_exchanges: u8::try_from(slow.len()).unwrap_or(u8::MAX),
+            quantities: interned::list(&self.quantities()),
             ..least
         })
+    }
+
+    /// The values that its file names.
+    fn quantities(&self) -> Vec<Quantity> {
+        let see = &self.file.see;
+        let named = [
+            (Quantity::OutputFrequency, see.output.given().is_some()),
+            (Quantity::Current, see.current.given().is_some()),
+            (Quantity::Speed, see.speed.given().is_some()),
+            (Quantity::OutputVoltage, see.output_voltage.given().is_some()),
+            (Quantity::DcBusVoltage, see.dc_bus_voltage.given().is_some()),
+        ];
+        named.into_iter().filter(|(_, is_named)| *is_named).map(|(quantity, _)| quantity).collect()
     }
 
     /// What its fault codes mean.

@@ -8,7 +8,10 @@ use tokio::{
     time::Instant,
 };
 
-use super::{Answer, Answers, Refusal, Refused};
+use super::{
+    Answer, Answers, Refusal, Refused,
+    alarms::{AlarmsAnswer, AlarmsOrder},
+};
 use drived_doors::{
     Caller,
     audit::{Audit, Kind, Record},
@@ -17,6 +20,7 @@ use drived_plant::{
     follow::{Follower, News},
     plant::{
         Plant,
+        alarms::{AlarmDone, AlarmRejected},
         commands::{ActionWord, OutcomeWord, Request, Told},
     },
 };
@@ -28,12 +32,10 @@ const FOLLOWED: usize = 256;
 /// The id and the action of a message, as far as they are known.
 type Named = (Option<String>, Option<ActionWord>);
 
-/// A command that waits for its record in the audit log.
-pub(super) struct Order<A> {
-    pub(super) caller: Caller,
-    pub(super) request: Request,
-    pub(super) record: Record,
-    pub(super) answers: A,
+/// What waits for its record in the audit log.
+pub(super) enum Order<A> {
+    Command { caller: Caller, request: Request, record: Record, answers: A },
+    Alarms { caller: Caller, order: AlarmsOrder, record: Record, answers: A },
 }
 
 /// What carries commands out.
@@ -56,14 +58,43 @@ impl Counter {
 
     /// Carries out what waits, one after the other, when it stands in the audit log.
     pub(super) async fn work<A: Answers + Sync>(self: Arc<Self>, mut orders: mpsc::Receiver<Order<A>>) {
-        while let Some(Order { caller, request, record, answers }) = orders.recv().await {
+        while let Some(order) = orders.recv().await {
+            let (caller, record, answers, named) = order.head();
             if let Err(error) = self.audit.record(record.clone()).done().await {
-                let named = named(&request);
-                self.refuse(&caller, record, &answers, named, Refusal::Audit(error.to_string()));
+                self.refuse(caller, record.clone(), answers, named, Refusal::Audit(error.to_string()));
                 continue;
             }
-            self.begin(&caller, request, record, &answers);
+            match order {
+                Order::Command { caller, request, record, answers } => {
+                    self.begin(&caller, request, record, &answers);
+                }
+                Order::Alarms { caller, order, record, answers } => {
+                    self.act_on_alarms(&caller, order, record, &answers);
+                }
+            }
         }
+    }
+
+    fn act_on_alarms(&self, caller: &Caller, order: AlarmsOrder, record: Record, answers: &impl Answers) {
+        let AlarmsOrder { id, asked } = order;
+        let done = self.plant.act_on_alarms(caller, &asked);
+        let refused = done.iter().find_map(|one| one.done.as_ref().err());
+        let outcome = match refused {
+            Some(_) => OutcomeWord::Refused,
+            None if done.is_empty() => OutcomeWord::Nothing,
+            None => OutcomeWord::Confirmed,
+        };
+        self.answered(caller, record, id.clone(), outcome);
+        answers.tell(Answer::Alarms(&AlarmsAnswer {
+            id,
+            outcome,
+            reason: refused.map(AlarmRejected::reason),
+            text: refused.map(ToString::to_string),
+            alarms: done.iter().map(AlarmDone::told).collect(),
+            caller: caller.name.clone(),
+            origin: caller.origin.clone(),
+            time_unix_ms: unix(Instant::now()),
+        }));
     }
 
     fn begin(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
@@ -140,6 +171,17 @@ impl Counter {
         let outcome = json!(outcome).as_str().map(str::to_owned);
         let answer = Record { id, outcome, ..Record::new(Kind::Answer, caller, record.what) };
         self.audit.record(answer).whenever();
+    }
+}
+
+impl<A> Order<A> {
+    fn head(&self) -> (&Caller, &Record, &A, Named) {
+        match self {
+            Self::Command { caller, request, record, answers } => (caller, record, answers, named(request)),
+            Self::Alarms { caller, order, record, answers } => {
+                (caller, record, answers, (order.id.clone(), None))
+            }
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 //! motor, and a stop is taken whatever it looks like. Commands are carried out in the order in which they come, each when it
 //! stands in the audit log, except that a stop waits for nothing.
 
+mod alarms;
 mod counter;
 mod pace;
 mod refusal;
@@ -19,7 +20,10 @@ use tokio::{
     time::Instant,
 };
 
-pub use self::refusal::{Refusal, Refused};
+pub use self::{
+    alarms::{AlarmMessage, AlarmsAnswer},
+    refusal::{Refusal, Refused},
+};
 use self::{
     counter::{Counter, Order},
     pace::Pace,
@@ -52,6 +56,7 @@ pub trait Answers: Clone + Send + 'static {
 #[derive(Debug, Clone, Copy)]
 pub enum Answer<'a> {
     Command(&'a CommandView),
+    Alarms(&'a AlarmsAnswer),
     Refused(&'a Refused),
 }
 
@@ -103,8 +108,7 @@ impl<A: Answers + Sync> Desk<A> {
     /// Takes a message.
     pub fn take(&mut self, mut message: Message<A>) {
         let stop = message.said.stops();
-        let pace = self.paces.entry(std::mem::take(&mut message.pace_of));
-        let in_time = pace.or_insert_with(|| Pace::new(message.arrived)).allows(message.arrived);
+        let in_time = self.is_in_time(std::mem::take(&mut message.pace_of), message.arrived);
         if !in_time && stop.is_none() {
             // Nothing of a flood reaches the audit log, which is there for everybody.
             return;
@@ -133,10 +137,15 @@ impl<A: Answers + Sync> Desk<A> {
             Err(refusal) => return self.counter.refuse(&caller, record, &answers, named, refusal),
         };
         let (audited, to) = (record.clone(), answers.clone());
-        let order = Order { caller: caller.clone(), request, record: audited, answers: to };
+        let order = Order::Command { caller: caller.clone(), request, record: audited, answers: to };
         if self.orders.try_send(order).is_err() {
             self.counter.refuse(&caller, record, &answers, named, Refusal::Busy);
         }
+    }
+
+    /// Whether somebody keeps the pace that everybody has.
+    fn is_in_time(&mut self, pace_of: String, arrived: Instant) -> bool {
+        self.paces.entry(pace_of).or_insert_with(|| Pace::new(arrived)).allows(arrived)
     }
 
     /// What a message that is no stop asks for.
@@ -161,14 +170,9 @@ impl<A: Answers + Sync> Desk<A> {
             (true, None) => request.lifetime,
             (false, longest) => longest.unwrap_or(message.lifetime),
         };
-        if let Some(sent) = [message.sent_unix_ms, issued_unix_ms].into_iter().flatten().min() {
-            let age = age(sent, message.arrived)?;
-            if age >= request.lifetime {
-                return Err(Refusal::Expired { age, lifetime: request.lifetime });
-            }
-            // Its time has run since it was sent; and the same command is the same again, whenever it comes.
-            request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
-        }
+        // Its time has run since it was sent; and the same command is the same again, whenever it comes.
+        let age = judge_time([message.sent_unix_ms, issued_unix_ms], message.arrived, request.lifetime)?;
+        request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
         if message.needs_id && request.id.is_none() {
             return Err(Refusal::IdNeeded);
         }
@@ -180,6 +184,13 @@ impl<A: Answers + Sync> Desk<A> {
         let body = Some(message.said.body.clone()).filter(|body| *body != Value::Null);
         Record { body, ..Record::new(Kind::Command, &message.caller, message.what.clone()) }
     }
+}
+
+/// How old a message is that says when it was sent, within its lifetime.
+fn judge_time(sent: [Option<u64>; 2], arrived: Instant, lifetime: Duration) -> Result<Duration, Refusal> {
+    let Some(sent) = sent.into_iter().flatten().min() else { return Ok(Duration::ZERO) };
+    let age = age(sent, arrived)?;
+    if age >= lifetime { Err(Refusal::Expired { age, lifetime }) } else { Ok(age) }
 }
 
 /// How old something is that was sent then, by a clock that may differ.

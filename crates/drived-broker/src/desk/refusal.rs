@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use drived_plant::plant::commands::{ActionWord, OutcomeWord, Rejected};
+use drived_plant::plant::{
+    LastCommandView,
+    commands::{ActionWord, OutcomeWord, Rejected},
+};
 use drived_words::strict::Unclear;
 
 /// Why a message does nothing.
@@ -79,4 +82,21 @@ pub struct Refused {
     pub caller: String,
     pub origin: String,
     pub time_unix_ms: u64,
+}
+
+impl Refused {
+    /// The same as what became of the last command of a drive.
+    pub fn as_last(&self) -> LastCommandView {
+        LastCommandView {
+            id: self.id.clone(),
+            action: self.action,
+            command: None,
+            outcome: self.outcome,
+            reason: Some(self.reason.into()),
+            text: Some(self.text.clone()),
+            caller: self.caller.clone(),
+            origin: self.origin.clone(),
+            arrived_unix_ms: self.time_unix_ms,
+        }
+    }
 }

@@ -11,7 +11,7 @@ use tokio::{sync::watch, time::Instant};
 
 use super::{
     Face,
-    topics::{Asking, Meant, Verb},
+    topics::{Meant, Verb},
 };
 use crate::{
     broker::{Arrived, Kept, Message, Qos},
@@ -21,7 +21,10 @@ use drived_config::{kept::sha256, names::Kind};
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::{
     follow::SETTLES_FOR,
-    plant::commands::{Action, LIFETIME, OutcomeWord, Said, Target, is_id},
+    plant::{
+        alarms::AlarmsSaid,
+        commands::{Action, LIFETIME, OutcomeWord, Said, Target, is_id},
+    },
 };
 use drived_words::strict::Unclear;
 
@@ -47,6 +50,8 @@ pub(super) struct Commanding {
 #[derive(Clone)]
 struct To {
     face: Arc<Face>,
+    /// The drive that was meant, where it was one.
+    drive: Option<String>,
     outcome: String,
     response: Option<String>,
     correlation: Option<bytes::Bytes>,
@@ -101,17 +106,34 @@ impl Commanding {
         if arrived.topic == face.topics.echo() {
             return self.echoed(arrived);
         }
-        let Some(asking) = face.topics.asked(&arrived.topic) else { return };
         let late = self.is_late(arrived).then_some(Refusal::Late);
-        // Those whom the configuration does not name have one pace together.
-        let named = asking.commander.clone().filter(|name| face.config.commanders.contains_key(name));
+        let doubt = if arrived.retain { Some(Refusal::Retained) } else { late };
+        if let Some(commander) = face.topics.asked_of_alarms(&arrived.topic) {
+            self.desk.take_alarms(desk::AlarmMessage {
+                said: AlarmsSaid::of(std::str::from_utf8(&arrived.payload).unwrap_or_default()),
+                caller: caller(face, commander.as_deref()),
+                pace_of: self.pace_of(commander.as_deref()),
+                doubt,
+                arrived: arrived.at,
+                sent_unix_ms: None,
+                what: format!("MQTT {}", arrived.topic),
+                answers: self.answers(arrived, face.topics.alarms_outcome(), None),
+            });
+            return;
+        }
+        let Some(asking) = face.topics.asked(&arrived.topic) else { return };
+        let target = target(face, &asking.meant);
+        let drive = match &target {
+            Some(Target::Drive(name)) => Some(name.clone()),
+            _ => None,
+        };
         let expires = arrived.expires_in_s.filter(|seconds| *seconds > 0);
         self.desk.take(desk::Message {
             said: said(asking.verb, &arrived.payload),
-            caller: caller(face, &asking),
-            pace_of: named.unwrap_or_default(),
-            target: target(face, &asking.meant),
-            doubt: if arrived.retain { Some(Refusal::Retained) } else { late },
+            caller: caller(face, asking.commander.as_deref()),
+            pace_of: self.pace_of(asking.commander.as_deref()),
+            target,
+            doubt,
             arrived: arrived.at,
             sent_unix_ms: None,
             lifetime: LIFETIME,
@@ -119,17 +141,22 @@ impl Commanding {
             needs_id: arrived.repeated || arrived.qos == Qos::AtLeastOnce,
             id: arrived.properties.correlation.as_deref().map(id_of),
             what: format!("MQTT {}", arrived.topic),
-            answers: To {
-                face: Arc::clone(face),
-                outcome: face.topics.outcome(&asking.meant),
-                response: arrived
-                    .properties
-                    .response_topic
-                    .clone()
-                    .filter(|topic| face.topics.is_foreign(topic)),
-                correlation: arrived.properties.correlation.clone(),
-            },
+            answers: self.answers(arrived, face.topics.outcome(&asking.meant), drive),
         });
+    }
+
+    /// Those whom the configuration does not name have one pace together.
+    fn pace_of(&self, commander: Option<&str>) -> String {
+        let named = commander.filter(|name| self.face.config.commanders.contains_key(*name));
+        named.unwrap_or_default().to_owned()
+    }
+
+    /// Where it is told what becomes of what has arrived.
+    fn answers(&self, arrived: &Arrived, outcome: String, drive: Option<String>) -> To {
+        let face = Arc::clone(&self.face);
+        let response = arrived.properties.response_topic.clone();
+        let response = response.filter(|topic| face.topics.is_foreign(topic));
+        To { face, drive, outcome, response, correlation: arrived.properties.correlation.clone() }
     }
 }
 
@@ -174,10 +201,10 @@ fn id_of(correlation: &[u8]) -> String {
 }
 
 /// Who asks, and what he may do.
-fn caller(face: &Face, asking: &Asking) -> Caller {
-    let name = asking.commander.clone().unwrap_or_else(|| NAMELESS.to_owned());
+fn caller(face: &Face, commander: Option<&str>) -> Caller {
+    let name = commander.unwrap_or(NAMELESS).to_owned();
     let role = match face.config.commanders.is_empty() {
-        true => asking.commander.is_none().then_some(Role::Operate),
+        true => commander.is_none().then_some(Role::Operate),
         false => face.config.commanders.get(&name).copied(),
     };
     Caller::new(name, "mqtt", role.map_or(Rights::NONE, Role::rights))
@@ -207,7 +234,13 @@ impl Answers for To {
     /// Publishes it: where everybody hears it, and where it was asked for. What is not known yet is accepted.
     fn tell(&self, answer: Answer<'_>) {
         let payload = match answer {
-            Answer::Refused(refused) => json!(refused),
+            Answer::Alarms(done) => json!(done),
+            Answer::Refused(refused) => {
+                if let Some(drive) = &self.drive {
+                    self.face.plant.note_refused_command(drive, refused.as_last());
+                }
+                json!(refused)
+            }
             Answer::Command(view) => {
                 let mut said = json!(view);
                 if view.outcome == OutcomeWord::Pending {

@@ -138,7 +138,7 @@ impl Gone {
         for id in due {
             self.rest.remove(&id);
             if !has_drive(face, &id) {
-                for what in ["state", "measurements", "fault", "availability"] {
+                for what in ["state", "measurements", "fault", "alarms", "last_command", "availability"] {
                     face.tell_for_good(face.topics.drive_of(&id, what), "");
                 }
             }
@@ -160,6 +160,7 @@ impl Gone {
         for id in std::mem::take(&mut self.lines) {
             if !lines.iter().any(|line| face.topics.id(Kind::Line, &line.name) == id) {
                 face.tell_for_good(face.topics.line_of(&id), "");
+                face.tell_for_good(format!("{}/alarms", face.topics.line_of(&id)), "");
             }
         }
     }

@@ -3,9 +3,11 @@
 //! Everything stands on [`broker`](crate::broker), which never holds up anybody. State is retained and expires, so that
 //! nothing of a daemon that is gone looks alive; commands are judged by the [desk](crate::desk) before the plant hears of them.
 
+mod alarms;
 mod commanding;
 mod discovery;
 mod gone;
+mod last;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -20,7 +22,10 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use self::{commanding::Commanding, discovery::Discovered, gone::Gone, telling::Teller, topics::Topics};
+use self::{
+    alarms::Alarms, commanding::Commanding, discovery::Discovered, gone::Gone, last::LastCommands,
+    telling::Teller, topics::Topics,
+};
 use crate::broker::{
     Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
     config::{Address, Discovery, MqttConfig, host_name},
@@ -212,6 +217,7 @@ async fn keep(
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut tellers: HashMap<Arc<str>, Watched> = HashMap::new();
     let (mut daemon, mut gone) = (telling::Daemon::default(), Gone::new());
+    let (mut alarms, mut last) = (Alarms::new(&face), LastCommands::new(&face));
     let mut birth = None;
     let mut happened = Some(face.plant.fleet().events());
     loop {
@@ -235,6 +241,8 @@ async fn keep(
                     face.tell_for_good(face.topics.status(), "online");
                     face.anew.send_modify(|number| *number += 1);
                     daemon.tell(&face, true);
+                    alarms.tell(&face, true);
+                    last.tell(&face, true);
                     commanding.connected();
                 }
                 Some(Event::Disconnected) => {}
@@ -260,6 +268,8 @@ async fn keep(
                 look(&face, &mut tellers, &mut gone);
                 gone.look(&face);
                 daemon.tell(&face, false);
+                alarms.tell(&face, false);
+                last.tell(&face, false);
                 commanding.call();
             }
             () = born => {
@@ -267,7 +277,11 @@ async fn keep(
                 face.tell_for_good(face.topics.status(), "online");
                 face.anew.send_modify(|number| *number += 1);
                 daemon.tell(&face, true);
+                alarms.tell(&face, true);
+                last.tell(&face, true);
             }
+            () = alarms.changed() => alarms.tell(&face, false),
+            () = last.changed() => last.tell(&face, false),
         }
     }
 }

@@ -104,7 +104,7 @@ impl Teller {
         let (face, name) = (&self.face, self.drive.name());
         let reachable = if snapshot.link == Link::Connected { "online" } else { "offline" };
         let Parts { state, measurements, fault } = Parts::of(&DriveView::of(&self.line, &self.drive));
-        self.discovered.tell(face, &self.drive, snapshot, &state, &measurements, again);
+        self.discovered.tell(face, &self.drive, again);
         let parts = [state, measurements, fault].map(Value::Object);
         let values = (reachable, parts.clone().map(ageless));
         for (at, (what, part)) in ["state", "measurements", "fault"].into_iter().zip(parts).enumerate() {

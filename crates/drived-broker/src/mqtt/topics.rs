@@ -1,8 +1,9 @@
-//! The topics: `<base>/status`, `<base>/line/<id>`, `<base>/drive/<id>/…`, `<base>/group/<id>/…`, `<base>/all/…`.
+//! The topics: `<base>/status`, `<base>/line/<id>`, `<base>/drive/<id>/…`, `<base>/group/<id>/…`, `<base>/all/…`, `<base>/alarms`.
 
 use drived_config::names::{Kind, Names, topic_id};
 
 use crate::broker::config::MqttConfig;
+use drived_plant::plant::alarms::Owner;
 
 /// What asks for something: the last levels before the commander.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,6 +135,43 @@ impl Topics {
         format!("{}/drive/{id}/{what}", self.base)
     }
 
+    /// All alarms of somebody.
+    pub(super) fn alarms(&self, owner: &Owner) -> String {
+        self.of_owner(owner, "alarms")
+    }
+
+    /// An alarm of somebody that has come, as it comes.
+    pub(super) fn alarm(&self, owner: &Owner) -> String {
+        self.of_owner(owner, "alarm")
+    }
+
+    fn of_owner(&self, owner: &Owner, what: &str) -> String {
+        match owner {
+            Owner::Program => format!("{}/{what}", self.base),
+            Owner::Line(name) => format!("{}/{what}", self.line(name)),
+            Owner::Drive(name) => self.drive(name, what),
+        }
+    }
+
+    /// Where somebody of this name asks that something is done with alarms.
+    pub(super) fn asking_of_alarms(&self, commander: Option<&str>) -> String {
+        let commander = commander.map(|name| format!("/{name}")).unwrap_or_default();
+        format!("{}/alarms/command{commander}", self.base)
+    }
+
+    /// Where it is told what was done with alarms.
+    pub(super) fn alarms_outcome(&self) -> String {
+        format!("{}/alarms/outcome", self.base)
+    }
+
+    /// Who asks by a topic that something is done with alarms; `None`: it asks for nothing of that.
+    pub(super) fn asked_of_alarms(&self, topic: &str) -> Option<Option<String>> {
+        match topic.strip_prefix(&self.asking_of_alarms(None))? {
+            "" => Some(None),
+            commander => Some(Some(commander.strip_prefix('/').filter(|name| is_name(name))?.to_owned())),
+        }
+    }
+
     /// Where it is told what became of commands.
     pub(super) fn outcome(&self, meant: &Meant) -> String {
         match meant {
@@ -173,7 +211,6 @@ impl Topics {
                 "" => None,
                 commander => Some(commander.strip_prefix('/')?.to_owned()),
             };
-            let is_name = |name: &str| !name.is_empty() && topic_id(name) == name;
             let named = commander.as_deref().is_none_or(is_name);
             named.then(|| Asking { meant: meant.clone(), verb, commander })
         })
@@ -184,7 +221,8 @@ impl Topics {
         let whom = ["drive/+", "group/+", "all"];
         let what = ["command", "stop", "set", "reset", "release"];
         let filter = |whom| what.into_iter().map(move |what| format!("{}/{whom}/{what}/#", self.base));
-        whom.into_iter().flat_map(filter).collect()
+        let alarms = format!("{}/#", self.asking_of_alarms(None));
+        whom.into_iter().flat_map(filter).chain([alarms]).collect()
     }
 
     /// Where Home Assistant says that it has begun.
@@ -228,6 +266,11 @@ impl Topics {
         let is_topic = !topic.is_empty() && topic.len() <= 1_024 && !topic.contains(['+', '#', '\0']);
         is_topic && !topic.starts_with('$') && !below(&self.base) && !below(&self.prefix) && !below("spBv1.0")
     }
+}
+
+/// Whether a level may name a commander.
+fn is_name(name: &str) -> bool {
+    !name.is_empty() && topic_id(name) == name
 }
 
 /// Whether a message to this topic is taken also in a flood: a stop, whatever it says, and what the daemon says to itself.

@@ -14,15 +14,16 @@ use tokio::{
     time::Instant,
 };
 
-use super::metrics::{COMMAND, SETPOINT, SPEED_SETPOINT};
+use super::metrics::{ALARMS_COMMAND, COMMAND, SETPOINT, SPEED_SETPOINT};
 use crate::{
     broker::Arrived,
     broker::config::SparkplugConfig,
-    desk::{Answer, Answers, Desk, Message, Refusal},
+    desk::{AlarmMessage, Answer, Answers, Desk, Message, Refusal},
 };
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::plant::{
     Plant,
+    alarms::AlarmsSaid,
     commands::{Action, Said, Target},
 };
 use drived_words::{json::unix, strict::Unclear};
@@ -36,15 +37,15 @@ pub(super) struct Commanding {
     caller: Caller,
     /// How old a command may be that does not say so itself.
     lifetime: Duration,
-    /// What became of the last command of a drive.
-    outcomes: mpsc::Sender<(String, Json)>,
+    /// What became of the last command of a drive, or of the last that was done with alarms.
+    outcomes: mpsc::Sender<(Option<String>, Json)>,
 }
 
-/// The drive whose last command it is.
+/// The drive whose last command it is; `None`: it was about alarms.
 #[derive(Clone)]
 struct To {
-    drive: String,
-    outcomes: mpsc::Sender<(String, Json)>,
+    drive: Option<String>,
+    outcomes: mpsc::Sender<(Option<String>, Json)>,
 }
 
 impl Commanding {
@@ -53,7 +54,7 @@ impl Commanding {
         plant: Plant,
         audit: Audit,
         closing: watch::Receiver<bool>,
-        outcomes: mpsc::Sender<(String, Json)>,
+        outcomes: mpsc::Sender<(Option<String>, Json)>,
     ) -> Self {
         let rights = config.commands.map_or(Rights::NONE, Role::rights);
         let origin = format!("sparkplug {}", config.name.group);
@@ -65,15 +66,15 @@ impl Commanding {
     /// what it writes.
     pub(super) fn handle(&mut self, command: Command, arrived: &Arrived, is_alive: bool) {
         let Command { device, timestamp, is_retained, writes } = command;
-        let Some(drive) = device.map(|device| device.as_str().to_owned()) else {
-            tracing::debug!("Sparkplug: {}: no metric of the node can be written", arrived.topic);
-            return;
-        };
         for write in writes {
             let unborn = (!is_alive).then_some(Refusal::NotBorn);
             let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
             let undated = timestamp.is_none().then(undated);
             let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated) };
+            let Some(drive) = device.as_ref().map(|device| device.as_str().to_owned()) else {
+                self.handle_alarms(write, doubt, timestamp, arrived);
+                continue;
+            };
             self.desk.take(Message {
                 needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
                 doubt: read_only(&write).or(doubt),
@@ -87,9 +88,37 @@ impl Commanding {
                 longest: None,
                 id: None,
                 what: format!("MQTT {}", arrived.topic),
-                answers: To { drive: drive.clone(), outcomes: self.outcomes.clone() },
+                answers: To { drive: Some(drive), outcomes: self.outcomes.clone() },
             });
         }
+    }
+
+    /// Takes what a host writes to the node: that something is done with alarms.
+    fn handle_alarms(
+        &mut self,
+        write: Result<Write, WriteError>,
+        doubt: Option<Refusal>,
+        sent_unix_ms: Option<u64>,
+        arrived: &Arrived,
+    ) {
+        let Ok(Write { name, value: Value::String(text) }) = write else {
+            tracing::debug!("Sparkplug: {}: of the node only {ALARMS_COMMAND} can be written", arrived.topic);
+            return;
+        };
+        if name != ALARMS_COMMAND {
+            tracing::debug!("Sparkplug: {}: {name} cannot be written", arrived.topic);
+            return;
+        }
+        self.desk.take_alarms(AlarmMessage {
+            said: AlarmsSaid::of(&text),
+            caller: self.caller.clone(),
+            pace_of: String::new(),
+            doubt,
+            arrived: arrived.at,
+            sent_unix_ms,
+            what: format!("MQTT {}", arrived.topic),
+            answers: To { drive: None, outcomes: self.outcomes.clone() },
+        });
     }
 }
 
@@ -132,6 +161,7 @@ impl Answers for To {
             Answer::Command(view) => {
                 (Some(&view.id), view.outcome, view.reason.as_deref(), view.text.as_deref())
             }
+            Answer::Alarms(done) => (done.id.as_ref(), done.outcome, done.reason, done.text.as_deref()),
             Answer::Refused(refused) => {
                 (refused.id.as_ref(), refused.outcome, Some(refused.reason), Some(refused.text.as_str()))
             }

@@ -1,7 +1,9 @@
 //! Which metrics there are, and where in the objects of the API their values stand.
 
 use drive_sparkplug::{DataType, Definition, Quality, Reading, Value};
-use serde_json::Value as Json;
+use serde_json::{Value as Json, json};
+
+use drived_plant::plant::alarms::{OwnAlarms, Owner};
 
 /// A metric: its name, its type, and the pointer to its value.
 type Row = (&'static str, DataType, &'static str);
@@ -10,6 +12,7 @@ type Row = (&'static str, DataType, &'static str);
 pub(super) const SETPOINT: &str = "Control/Setpoint";
 pub(super) const SPEED_SETPOINT: &str = "Control/Speed Setpoint";
 pub(super) const COMMAND: &str = "Control/Command";
+pub(super) const ALARMS_COMMAND: &str = "Alarms/Command";
 
 /// What the daemon has.
 #[rustfmt::skip]
@@ -31,6 +34,40 @@ const LINE: &[Row] = &[
     ("Errors/Mismatched", DataType::UInt64, "/errors/mismatched"),
     ("Errors/Exception", DataType::UInt64, "/errors/exception"),
     ("Errors/Foreign", DataType::UInt64, "/errors/foreign"),
+];
+
+/// What was done last with alarms, by what a host has written to the node.
+#[rustfmt::skip]
+const DONE: &[Row] = &[
+    (ALARMS_COMMAND, DataType::String, ""),
+    ("Alarms/LastCommand/Id", DataType::String, "/id"),
+    ("Alarms/LastCommand/Outcome", DataType::String, "/outcome"),
+    ("Alarms/LastCommand/Reason", DataType::String, "/reason"),
+    ("Alarms/LastCommand/Text", DataType::String, "/text"),
+    ("Alarms/LastCommand/Time", DataType::DateTime, "/time_unix_ms"),
+];
+
+/// The alarms of the program, of each line and of each drive, below `Alarms`: of the node, for a device is silent while it is lost.
+#[rustfmt::skip]
+const ALARMS: &[Row] = &[
+    ("Problem", DataType::Boolean, "/problem"),
+    ("Active", DataType::UInt32, "/active"),
+    ("Waiting", DataType::UInt32, "/waiting_count"),
+    ("State", DataType::String, "/alarms/0/state"),
+    ("Number", DataType::UInt64, "/alarms/0/id"),
+    ("Kind", DataType::String, "/alarms/0/kind"),
+    ("Severity", DataType::String, "/alarms/0/severity"),
+    ("Text", DataType::String, "/alarms/0/text"),
+    ("Remedy", DataType::String, "/alarms/0/remedy"),
+    ("First", DataType::DateTime, "/alarms/0/first_unix_ms"),
+    ("Last", DataType::DateTime, "/alarms/0/last_unix_ms"),
+    ("Count", DataType::UInt32, "/alarms/0/count"),
+    ("Acknowledged By", DataType::String, "/alarms/0/acknowledged/by"),
+    ("Acknowledged", DataType::DateTime, "/alarms/0/acknowledged/unix_ms"),
+    ("Note", DataType::String, "/alarms/0/acknowledged/note"),
+    ("Shelved Until", DataType::DateTime, "/alarms/0/shelved/until_unix_ms"),
+    ("Suppressed By", DataType::UInt64, "/alarms/0/suppressed_by"),
+    ("All", DataType::String, "/all"),
 ];
 
 /// What each drive has. A value that its family does not have is null.
@@ -97,13 +134,29 @@ pub(super) fn of_a_drive() -> Vec<Definition> {
     DRIVE.iter().map(|&(name, data_type, _)| Definition::new(name, data_type)).collect()
 }
 
-/// The metrics of the daemon and of lines of these names.
-pub(super) fn of_the_node(lines: &[String]) -> Vec<Definition> {
-    let own = DAEMON.iter().map(|&(name, data_type, _)| Definition::new(name, data_type));
-    let lines = lines.iter().flat_map(|line| {
+/// The metrics of the daemon, of lines of these names, and of the alarms of these.
+pub(super) fn of_the_node<'a>(
+    lines: impl IntoIterator<Item = &'a String>,
+    owners: impl IntoIterator<Item = &'a Owner>,
+) -> Vec<Definition> {
+    let own = [DAEMON, DONE].into_iter().flatten();
+    let own = own.map(|&(name, data_type, _)| Definition::new(name, data_type));
+    let lines = lines.into_iter().flat_map(|line| {
         LINE.iter().map(move |&(name, data_type, _)| Definition::new(below(line, name), data_type))
     });
-    own.chain(lines).collect()
+    let alarms = owners.into_iter().flat_map(|owner| {
+        ALARMS.iter().map(move |&(name, data_type, _)| Definition::new(of_alarms(owner, name), data_type))
+    });
+    own.chain(lines).chain(alarms).collect()
+}
+
+/// The name of a metric of somebody's alarms.
+fn of_alarms(owner: &Owner, name: &str) -> String {
+    match owner {
+        Owner::Program => format!("Alarms/{name}"),
+        Owner::Line(line) => below(line, &format!("Alarms/{name}")),
+        Owner::Drive(drive) => format!("Drives/{drive}/Alarms/{name}"),
+    }
 }
 
 /// The name of a metric of a line.
@@ -116,6 +169,26 @@ pub(super) fn read_daemon(daemon: &Json, now_unix_ms: u64) -> impl Iterator<Item
     DAEMON
         .iter()
         .map(move |&(name, data_type, pointer)| (name, good(value(daemon, data_type, pointer), now_unix_ms)))
+}
+
+/// What was done last with alarms.
+pub(super) fn read_done(done: &Json, now_unix_ms: u64) -> impl Iterator<Item = (&'static str, Reading)> {
+    DONE.iter()
+        .map(move |&(name, data_type, pointer)| (name, good(value(done, data_type, pointer), now_unix_ms)))
+}
+
+/// What somebody's alarms are like.
+pub(super) fn read_alarms(
+    owner: &Owner,
+    alarms: &OwnAlarms,
+    now_unix_ms: u64,
+) -> impl Iterator<Item = (String, Reading)> {
+    let mut object = json!(alarms);
+    object["waiting_count"] = alarms.waiting.len().into();
+    object["all"] = object["alarms"].to_string().into();
+    ALARMS.iter().map(move |&(name, data_type, pointer)| {
+        (of_alarms(owner, name), good(value(&object, data_type, pointer), now_unix_ms))
+    })
 }
 
 /// What a line's object says.

@@ -33,7 +33,7 @@ use crate::{
 use drived_doors::audit::Audit;
 use drived_plant::{
     counts::{Id, Samples},
-    plant::{Plant, views::DriveView},
+    plant::{Plant, alarms::Owner, views::DriveView},
 };
 use drived_words::{failure::Failure, json::unix};
 
@@ -90,7 +90,7 @@ impl Sparkplug {
             rebirth_pause: config.rebirth_pause,
             commands: config.commands.is_some(),
         };
-        let node = EdgeNode::new(settings, metrics::of_the_node(&[]), now())
+        let node = EdgeNode::new(settings, metrics::of_the_node([], []), now())
             .map_err(|error| Failure::Input(format!("mqtt.sparkplug: {error}")))?;
         let subscribe = |of: drive_sparkplug::Subscription| Subscription {
             filter: of.filter,
@@ -147,8 +147,8 @@ impl Prepared {
         let (leave, leaves) = oneshot::channel();
         let fleet_events = plant.fleet().events();
         let commanding = Commanding::new(&config, plant.clone(), audit, closes, outcomes);
-        let (drives, lines) = Default::default();
-        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, lines };
+        let (drives, names) = Default::default();
+        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, names };
         let task = tokio::spawn(face.run(events, number, told, fleet_events, leaves, interval));
         Sparkplug { broker, closing, leave, task }
     }
@@ -163,8 +163,8 @@ struct Face {
     connection: Option<u64>,
     commanding: Commanding,
     drives: HashMap<String, Seen>,
-    /// The names of the lines.
-    lines: BTreeSet<String>,
+    /// The names of the lines and of the drives by which the metrics of the node are defined.
+    names: (BTreeSet<String>, BTreeSet<String>),
 }
 
 /// A drive as it was told last.
@@ -181,7 +181,7 @@ impl Face {
         mut self,
         mut events: mpsc::Receiver<Event>,
         number: Arc<Mutex<(u64, BdSeq)>>,
-        mut told: mpsc::Receiver<(String, Json)>,
+        mut told: mpsc::Receiver<(Option<String>, Json)>,
         mut fleet_events: Events,
         mut leaves: oneshot::Receiver<()>,
         pace: Duration,
@@ -191,6 +191,7 @@ impl Face {
         let mut lines = interval(LINES);
         lines.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut has_more, mut is_over) = (false, false);
+        let mut alarms = self.plant.alarm_changes();
         loop {
             let deadline = self.node.deadline().map(Instant::from_std);
             let again = has_more.then(|| Instant::now() + ROOM).into_iter().chain(deadline).min();
@@ -213,7 +214,11 @@ impl Face {
                     Some(Event::Message(arrived)) => self.hear(&arrived),
                     None => return events,
                 },
-                Some((drive, last)) = told.recv() => self.tell_outcome(&drive, last),
+                Some((drive, last)) = told.recv() => match drive {
+                    Some(drive) => self.tell_outcome(&drive, last),
+                    None => self.tell_done(&last),
+                },
+                Ok(()) = alarms.changed() => self.look_at_alarms(),
                 received = fleet_events.recv(), if !is_over => match received {
                     // A trip, a loss: at once.
                     Received::Event(_) | Received::Missed(_) => self.look(),
@@ -330,14 +335,18 @@ impl Face {
         (seen.snapshot, seen.freshness) = (Some(snapshot), freshness);
     }
 
-    /// Sets what the daemon and its lines are like. Lines that have come or gone are told by births.
+    /// Sets what the daemon, its lines and all alarms are like. Lines and drives that have come or gone are told by births.
     fn look_at_lines(&mut self) {
         let (lines, at) = (self.plant.lines(), now());
-        let names: BTreeSet<String> = lines.iter().map(|line| line.name.clone()).collect();
-        if names != self.lines {
-            let definitions = metrics::of_the_node(&names.iter().cloned().collect::<Vec<_>>());
-            match self.node.define(definitions, at) {
-                Ok(()) => self.lines = names,
+        let drives = self.plant.fleet().drives();
+        let names: (BTreeSet<String>, BTreeSet<String>) = (
+            lines.iter().map(|line| line.name.clone()).collect(),
+            drives.iter().map(|drive| drive.name().to_string()).collect(),
+        );
+        if names != self.names {
+            let owners = owners(&names);
+            match self.node.define(metrics::of_the_node(&names.0, &owners), at) {
+                Ok(()) => self.names = names,
                 Err(error) => tracing::error!("Sparkplug: {error}"),
             }
         }
@@ -350,7 +359,34 @@ impl Face {
         for (metric, reading) in metrics::read_daemon(&version, at.unix_ms) {
             let _ = self.node.set_node(metric, reading);
         }
+        self.look_at_alarms();
     }
+
+    /// Sets what the alarms of everybody are like.
+    fn look_at_alarms(&mut self) {
+        let (mut alarms, at) = (self.plant.alarms().together(), now());
+        for owner in owners(&self.names) {
+            let own = alarms.remove(&owner).unwrap_or_default();
+            for (metric, reading) in metrics::read_alarms(&owner, &own, at.unix_ms) {
+                let _ = self.node.set_node(&metric, reading);
+            }
+        }
+    }
+
+    /// Says what was done with alarms by what a host has written.
+    fn tell_done(&mut self, done: &Json) {
+        for (metric, reading) in metrics::read_done(done, now().unix_ms) {
+            let _ = self.node.set_node(metric, reading);
+        }
+        self.look_at_alarms();
+        self.carry_out();
+    }
+}
+
+/// Who can have alarms, of these lines and drives.
+fn owners((lines, drives): &(BTreeSet<String>, BTreeSet<String>)) -> Vec<Owner> {
+    let lines = lines.iter().cloned().map(Owner::Line);
+    std::iter::once(Owner::Program).chain(lines).chain(drives.iter().cloned().map(Owner::Drive)).collect()
 }
 
 /// Waits until a time, or for ever.

@@ -10,7 +10,7 @@ use crate::{
     desk::testing::{NO_OBJECTS, REFUSED, STOPS},
 };
 use drived_doors::Role;
-use drived_plant::plant::testing::TestPlant;
+use drived_plant::plant::{alarms::Owner, testing::TestPlant};
 
 /// A plant, its face, and the broker that it is on.
 struct Bench {
@@ -290,7 +290,8 @@ fn what_is_old_is_stale_with_its_last_value_and_what_was_never_read_is_bad_witho
 #[test]
 fn the_readme_lists_every_metric_with_its_type() {
     let manual = include_str!("../../../drived/README.md");
-    let node = metrics::of_the_node(&["<line>".to_owned()]);
+    let owners = [Owner::Program, Owner::Line("<line>".to_owned()), Owner::Drive("<drive>".to_owned())];
+    let node = metrics::of_the_node(&["<line>".to_owned()], &owners);
     for Definition { name, data_type } in node.into_iter().chain(metrics::of_a_drive()) {
         let row = format!("| `{name}` | {data_type:?} | ");
         assert!(manual.contains(&row), "{row}");

@@ -3,6 +3,7 @@
 pub mod alarms;
 pub mod commands;
 pub mod history;
+mod last;
 pub mod parameters;
 mod progress;
 pub mod recent;
@@ -27,6 +28,7 @@ use tokio::{
     time::Instant,
 };
 
+pub use self::last::LastCommandView;
 use self::views::{
     DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, NoticeView,
     PlannedLineView, SettingsView, StateView,
@@ -35,6 +37,7 @@ use self::{
     alarms::KeptAlarms,
     commands::{Log, Stopped},
     history::{History, HistoryView},
+    last::LastCommands,
     parameters::Words,
     progress::Progress,
     recent::{Recent, RecentView},
@@ -68,6 +71,7 @@ struct Inner {
     words: Words,
     progress: Progress,
     recent: Recent,
+    last_commands: LastCommands,
     tally: Tally,
     usage: Usage,
     alarms: alarms::Desk,
@@ -95,6 +99,7 @@ impl Plant {
             words: Words::default(),
             progress: Progress::default(),
             recent: Recent::default(),
+            last_commands: LastCommands::default(),
             tally: Tally::default(),
             usage: Usage::default(),
             alarms: alarms::Desk::new(kept),

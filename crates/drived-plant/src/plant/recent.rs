@@ -100,6 +100,7 @@ impl Inner {
 
     /// Tells a command as it is now.
     pub(super) fn tell_command(&self, command: &CommandView) {
+        self.note_last_commands(command);
         let revision = self.revisions.push(Subject::Command, command);
         let several = command.several.as_ref();
         let several = several.map(|several| SeveralView { drives: Vec::new(), ..several.clone() });

@@ -4,8 +4,10 @@
 mod keep;
 mod looks;
 mod rights;
+mod said;
 #[cfg(test)]
 mod tests;
+mod together;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -18,7 +20,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{sync::watch, time::Instant};
 
-pub use self::keep::KeptAlarms;
+pub use self::{
+    keep::KeptAlarms,
+    said::{AlarmDone, AlarmsAsked, AlarmsSaid},
+    together::{OwnAlarms, Owner, SeenAlarm},
+};
 use super::{Inner, Plant, revisions::Subject};
 use drived_config::rights::Caller;
 use drived_words::json::unix;

@@ -1,0 +1,82 @@
+//! What is asked to be done with alarms: taken by the same desk as commands, and for as long.
+
+use serde::Serialize;
+use serde_json::Value;
+use tokio::time::Instant;
+
+use super::{Answers, Desk, Refusal, counter::Order, judge_time};
+use drived_doors::{
+    Caller,
+    audit::{Kind, Record},
+};
+use drived_plant::plant::{
+    alarms::{AlarmsAsked, AlarmsSaid},
+    commands::{LIFETIME, OutcomeWord},
+};
+
+/// A message about alarms, as a broker's face has it.
+pub struct AlarmMessage<A> {
+    pub said: AlarmsSaid,
+    pub caller: Caller,
+    /// Whose pace it comes at.
+    pub pace_of: String,
+    /// What the face itself has against it.
+    pub doubt: Option<Refusal>,
+    pub arrived: Instant,
+    /// When it was sent, by the clock of its sender.
+    pub sent_unix_ms: Option<u64>,
+    /// For the audit log.
+    pub what: String,
+    pub answers: A,
+}
+
+/// What is asked, and by what it is known.
+#[derive(Debug, Clone)]
+pub(super) struct AlarmsOrder {
+    pub(super) id: Option<String>,
+    pub(super) asked: AlarmsAsked,
+}
+
+/// What was done with alarms, as it is told. It is `confirmed` where something was done with each of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlarmsAnswer {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    pub outcome: OutcomeWord,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+    /// What became of each.
+    pub alarms: Vec<Value>,
+    pub caller: String,
+    pub origin: String,
+    pub time_unix_ms: u64,
+}
+
+impl<A: Answers + Sync> Desk<A> {
+    /// Takes a message about alarms.
+    pub fn take_alarms(&mut self, message: AlarmMessage<A>) {
+        let AlarmMessage { said, caller, pace_of, doubt, arrived, sent_unix_ms, what, answers } = message;
+        if !self.is_in_time(pace_of, arrived) {
+            return;
+        }
+        let AlarmsSaid { body, id, issued_unix_ms, asked } = said;
+        let record = Record { body: Some(body), ..Record::new(Kind::Command, &caller, what) };
+        let closing = self.closing.borrow().then_some(Refusal::Closing);
+        let judged = match doubt.or(closing) {
+            Some(doubt) => Err(doubt),
+            None => asked.map_err(Refusal::from).and_then(|asked| {
+                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME).map(|_| asked)
+            }),
+        };
+        let order = match judged {
+            Ok(asked) => AlarmsOrder { id: id.clone(), asked },
+            Err(refusal) => return self.counter.refuse(&caller, record, &answers, (id, None), refusal),
+        };
+        let (by, audited, to) = (caller.clone(), record.clone(), answers.clone());
+        if self.orders.try_send(Order::Alarms { caller: by, order, record: audited, answers: to }).is_err() {
+            self.counter.refuse(&caller, record, &answers, (id, None), Refusal::Busy);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What became of the last command of each drive, for faces that show it beside the drive.
+
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    sync::{Mutex, PoisonError},
+};
+
+use serde::{Deserialize, Serialize};
+use tokio::sync::watch;
+
+use super::{
+    Inner, Plant,
+    commands::{ActionWord, OutcomeWord},
+    views::CommandView,
+};
+
+/// What became of a command of a drive, whoever gave it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LastCommandView {
+    /// Absent where what came had no name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// Absent where it cannot be understood.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub action: Option<ActionWord>,
+    /// The same in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+    pub outcome: OutcomeWord,
+    /// Why, in one word.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<Cow<'static, str>>,
+    /// Why, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+    pub caller: String,
+    /// Where it came from.
+    pub origin: String,
+    /// When it arrived.
+    pub arrived_unix_ms: u64,
+}
+
+/// The last of each drive.
+#[derive(Default)]
+pub(super) struct LastCommands {
+    by_drive: Mutex<BTreeMap<String, LastCommandView>>,
+    /// How often one of them has changed.
+    changed: watch::Sender<u64>,
+}
+
+impl Plant {
+    /// What became of the last command of a drive; `None`: there was none since the program began.
+    pub fn last_command(&self, drive: &str) -> Option<LastCommandView> {
+        self.0.last_commands.by_drive.lock().unwrap_or_else(PoisonError::into_inner).get(drive).cloned()
+    }
+
+    /// A reader of how often one of them has changed.
+    pub fn last_command_changes(&self) -> watch::Receiver<u64> {
+        self.0.last_commands.changed.subscribe()
+    }
+
+    /// A face has refused a command of a drive before the plant heard of it.
+    pub fn note_refused_command(&self, drive: &str, refused: LastCommandView) {
+        self.0.note_last_command(drive, refused);
+    }
+}
+
+impl Inner {
+    /// Notes what became of a command, for each drive that it was for.
+    pub(super) fn note_last_commands(&self, command: &CommandView) {
+        let several = command.several.iter().flat_map(|several| &several.drives);
+        for part in std::iter::once(command).chain(several) {
+            if let Some(drive) = &part.drive {
+                self.note_last_command(drive, LastCommandView::of(part));
+            }
+        }
+    }
+
+    /// What arrived earlier is not the last, though its outcome may come later.
+    fn note_last_command(&self, drive: &str, last: LastCommandView) {
+        let mut commands = self.last_commands.by_drive.lock().unwrap_or_else(PoisonError::into_inner);
+        if commands.get(drive).is_some_and(|known| known.arrived_unix_ms > last.arrived_unix_ms) {
+            return;
+        }
+        if commands.insert(drive.to_owned(), last).is_none() {
+            // Drives come and go: who is not there any more is not remembered.
+            commands.retain(|name, _| self.fleet.drive(name).is_some());
+        }
+        self.last_commands.changed.send_modify(|times| *times += 1);
+    }
+}
+
+impl LastCommandView {
+    fn of(command: &CommandView) -> Self {
+        Self {
+            id: Some(command.id.clone()),
+            action: Some(command.action),
+            command: Some(command.command.clone()),
+            outcome: command.outcome,
+            reason: command.reason.clone(),
+            text: command.text.clone(),
+            caller: command.caller.clone(),
+            origin: command.origin.clone(),
+            arrived_unix_ms: command.time_unix_ms,
+        }
+    }
+}
