@@ -67,7 +67,7 @@ use self::{
 pub use self::{
     network::Network,
     refusal::lacking,
-    tls::{identity, private},
+    tls::{believed, identity, private, secret},
     token_desk::{
         MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_days, of_hours, replaced,
     },

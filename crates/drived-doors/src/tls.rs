@@ -6,7 +6,7 @@ use tokio::net::TcpStream;
 use tokio_rustls::{
     TlsAcceptor,
     rustls::{
-        ServerConfig,
+        RootCertStore, ServerConfig,
         crypto::ring,
         pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
     },
@@ -60,6 +60,45 @@ pub fn identity(files: &TlsFiles) -> Result<(Vec<CertificateDer<'static>>, Priva
     let secret = PrivateKeyDer::from_pem_file(key).map_err(|error| of(key, &error))?;
     private(key)?;
     Ok((chain, secret))
+}
+
+/// Those who are believed: the certificates of a file, in PEM, or without one those of the system.
+///
+/// # Errors
+///
+/// The file is missing or has none in it, or this system believes nobody.
+pub fn believed(authorities: Option<&Path>) -> Result<RootCertStore, String> {
+    let mut roots = RootCertStore::empty();
+    match authorities {
+        Some(file) => {
+            for certificate in CertificateDer::pem_file_iter(file).map_err(|error| of(file, &error))? {
+                let certificate = certificate.map_err(|error| of(file, &error))?;
+                roots.add(certificate).map_err(|error| of(file, &error))?;
+            }
+            if roots.is_empty() {
+                return Err(of(file, &"there is no certificate in it: expected PEM"));
+            }
+        }
+        None => {
+            // A certificate of the system that cannot be used is no reason to believe nobody.
+            roots.add_parsable_certificates(rustls_native_certs::load_native_certs().certs);
+            if roots.is_empty() {
+                return Err("this system believes nobody: expected authorities = \"FILE\"".to_owned());
+            }
+        }
+    }
+    Ok(roots)
+}
+
+/// What stands in the file of a secret, without the end of its line.
+///
+/// # Errors
+///
+/// It is missing, or can be read by everybody.
+pub fn secret(file: &Path) -> Result<String, String> {
+    private(file)?;
+    let text = std::fs::read_to_string(file).map_err(|error| of(file, &error))?;
+    Ok(text.trim_end_matches(['\r', '\n']).to_owned())
 }
 
 /// Refuses a secret that everybody on this machine can read.

@@ -36,7 +36,7 @@ settings! {
     snapshots: Parsed<Time> = "`\"5s\"`", |to, said| to.snapshots = snapshots(said.0.0)?;
     /// how long the exit may take
     shutdown: Parsed<Time> = "`\"60s\"`", |to, said| to.shutdown = said.0.0;
-    /// the folder of what outlives the daemon: `tokens`, `audit`, `watchdogs.json`, `names.json`, `sparkplug-bd-seq`; beside the configuration
+    /// the folder of what outlives the daemon: `tokens`, `audit`, `watchdogs.json`, `names.json`, `alarms.json`, `webhooks.json`, `sparkplug-bd-seq`; beside the configuration
     /// unless the path is whole
     state: PathBuf = "the folder that systemd names in `STATE_DIRECTORY`; else one of this user for this configuration, in `$XDG_STATE_HOME/drived` or `~/.local/state/drived`",
         |to, said| to.kept.state = Some(said.clone());
@@ -78,7 +78,7 @@ impl File {
 }
 
 /// The faces that a program may be built without, each with the feature of `drived` that builds it in.
-const FEATURES: [(&str, &str); 2] = [("gateways", "gateway"), ("mqtt", "mqtt")];
+const FEATURES: [(&str, &str); 3] = [("gateways", "gateway"), ("mqtt", "mqtt"), ("webhooks", "webhook")];
 
 /// Refuses the table of a face that this program was built without, and says how it is built in.
 pub(super) fn not_built_in(source: Source<'_>, left: &DeTable<'_>) -> Result<(), ConfigError> {

@@ -96,7 +96,7 @@ fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
 fn parsed(text: &str) -> Result<Config, ConfigError> {
     static FACES: Once = Once::new();
     FACES.call_once(|| {
-        [drived_gateway::FACE, drived_broker::FACE]
+        [drived_gateway::FACE, drived_broker::FACE, drived_webhook::FACE]
             .map(drived_face::add)
             .into_iter()
             .for_each(Result::unwrap);
@@ -446,6 +446,33 @@ fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
 }
 
 #[test]
+fn a_webhook_says_what_it_lacks_and_shows_no_path() {
+    let with = |entry: &str| read(&format!("[[webhooks]]\n{entry}\n{BROKER}"));
+    let there = "url = \"https://hooks.example.com/services/T0/secret\"";
+    let config = with(there).unwrap();
+    let shown = format!("{:?}", config.face("webhooks").unwrap().meaning());
+    assert!(shown.contains("https://hooks.example.com") && !shown.contains("services"), "{shown}");
+    for (entry, told) in [
+        ("", "expected url = "),
+        ("url = \"hooks.example.com\"", "url: \"hooks.example.com\": expected https://HOST/PATH"),
+        ("url = \"http://10.0.0.7/a\"", "url: alarms and tokens would cross the network in clear"),
+        ("text = \"{drvie}\"", "{drvie}: expected one of {host}, {of}"),
+        ("severity = \"note\"", "expected one of warning, alarm"),
+        ("body = \"text\"\nfield = \"text\"", "field: expected body or field, not both"),
+        ("timeout = \"0\"", "timeout: 0ns: expected 1s to 60s"),
+        ("name = \"\"", "expected a name without control characters"),
+        ("[[webhooks]]\nurl = \"http://[::1]:9/\"", "two webhooks are named \"webhook\""),
+    ] {
+        let said = if told.contains("url") { entry.to_owned() } else { format!("{there}\n{entry}") };
+        let error = with(&said).expect_err(told);
+        assert!(error.contains(told), "{error}\nexpected {told}");
+    }
+    with("url = \"http://10.0.0.7/a\"\nplain = true").unwrap();
+    let many: Vec<String> = (0..17).map(|number| format!("{there}\nname = \"{number}\"")).collect();
+    assert!(with(&many.join("\n[[webhooks]]\n")).unwrap_err().contains("expected at most 16"));
+}
+
+#[test]
 fn a_network_has_the_addresses_that_begin_as_it_does() {
     for (network, inside, outside) in [
         ("10.0.0.0/24", "10.0.0.255", "10.0.1.0"),
@@ -655,14 +682,15 @@ fn the_readme_says_of_each_key_what_its_table_declares() {
 
 #[test]
 fn a_key_that_says_its_default_changes_nothing() {
-    let file = |[top, line, drive, gateway]: [&str; 4]| {
+    let file = |[top, line, drive, gateway, webhook]: [&str; 5]| {
         let (port, names) = ("lines.a.port = \"/dev/ttyUSB0\"", "line = \"a\"\ndrive = \"atv312@1\"");
         let drive = format!("[[drives]]\n{names}\ncontrol = true\n{drive}");
-        let config =
-            read(&format!("{top}\n{port}\n{line}\n{drive}\n[[gateways]]\nline = \"a\"\n{gateway}\n"));
+        let config = read(&format!(
+            "{top}\n{port}\n{line}\n{drive}\n[[gateways]]\nline = \"a\"\n{gateway}\n[[webhooks]]\nurl = \"https://a/\"\n{webhook}\n"
+        ));
         config.map(|config| format!("{config:?}"))
     };
-    let plain = file([""; 4]).unwrap();
+    let plain = file([""; 5]).unwrap();
     let mut tried = 0;
     for (head, keys) in tables() {
         for key in keys {
@@ -675,13 +703,14 @@ fn a_key_that_says_its_default_changes_nothing() {
             let said = format!("{} = {said}", key.name);
             let config = match &*head {
                 "Top level" if key.name.starts_with('[') => continue,
-                "Top level" => file([&said, "", "", ""]),
-                "`[lines.NAME]`" => file(["", &format!("lines.a.{said}"), "", ""]),
+                "Top level" => file([&said, "", "", "", ""]),
+                "`[lines.NAME]`" => file(["", &format!("lines.a.{said}"), "", "", ""]),
                 // It is refused without the time that it is about.
                 _ if key.name == "on_client_silence" => continue,
-                "`[[gateways]]`" => file(["", "", "", &said]),
+                "`[[gateways]]`" => file(["", "", "", &said, ""]),
+                "`[[webhooks]]`" => file(["", "", "", "", &said]),
                 _ if key.name == "control" => continue,
-                _ => file(["", "", &said, ""]),
+                _ => file(["", "", &said, "", ""]),
             };
             assert_eq!(config.as_ref(), Ok(&plain), "{said}");
             tried += 1;

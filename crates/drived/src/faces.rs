@@ -8,6 +8,8 @@ const FACES: &[&dyn Face] = &[
     drived_gateway::FACE,
     #[cfg(feature = "mqtt")]
     drived_broker::FACE,
+    #[cfg(feature = "webhook")]
+    drived_webhook::FACE,
 ];
 
 /// Makes the program know them.

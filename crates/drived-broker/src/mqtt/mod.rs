@@ -13,7 +13,7 @@ mod telling;
 mod tests;
 mod topics;
 
-use std::{collections::HashMap, fs, sync::Arc, time::Duration};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use drive_fleet::{DriveHandle, Received};
 use tokio::{
@@ -31,7 +31,7 @@ use crate::broker::{
     config::{Address, Discovery, MqttConfig, host_name},
 };
 use drived_config::names::{Kind, Names};
-use drived_doors::{audit::Audit, private};
+use drived_doors::{audit::Audit, secret};
 use drived_plant::{
     counts::{Id, Samples},
     plant::Plant,
@@ -166,12 +166,8 @@ pub fn options(config: &MqttConfig) -> Result<Options, Failure> {
 
 fn login(config: &MqttConfig) -> Result<Option<Login>, Failure> {
     let Some(user) = config.user.clone() else { return Ok(None) };
-    let password = config.password.as_ref().map(|file| {
-        private(file)?;
-        let text = fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-        Ok(text.trim_end_matches(['\r', '\n']).to_owned())
-    });
-    let password = password.transpose().map_err(|error: String| Failure::Input(format!("mqtt: {error}")))?;
+    let password = config.password.as_deref().map(secret).transpose();
+    let password = password.map_err(|error| Failure::Input(format!("mqtt: {error}")))?;
     Ok(Some(Login { user, password }))
 }
 

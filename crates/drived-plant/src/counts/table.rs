@@ -175,6 +175,12 @@ metrics! {
     SparkplugArrived: Counter, "drived_sparkplug_arrived_messages_total", [], "Messages for the edge node that were looked at.";
     SparkplugLost: Counter, "drived_sparkplug_dropped_messages_total", ["reason"],
         "Messages of the edge node, or for it, that were lost; reasons as for MQTT.";
+    WebhookWaiting: Gauge, "drived_webhook_queue_messages", ["receiver"], "Messages that wait for a receiver of alarms.";
+    WebhookTaken: Counter, "drived_webhook_sent_messages_total", ["receiver"], "Messages that the receiver has taken.";
+    WebhookFailed: Counter, "drived_webhook_failed_attempts_total", ["receiver", "reason"],
+        "Attempts in vain, by the reason: unreachable, timeout, status or refused.";
+    WebhookLost: Counter, "drived_webhook_dropped_messages_total", ["receiver", "reason"],
+        "Messages that were lost: refused by the receiver, or no_room.";
 
     ProcessCpu: Counter, "process_cpu_seconds_total", [], "User and system processor time.";
     ProcessFds: Gauge, "process_open_fds", [], "Open file descriptors.";

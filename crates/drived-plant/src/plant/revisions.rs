@@ -169,6 +169,16 @@ fn frame(number: u64, name: &str, data: &str) -> String {
     format!("id: {number}\nevent: {name}\ndata: {data}\n\n")
 }
 
+/// The number of a frame and its data, if it is of this subject.
+pub fn data_of(frame: &[u8], subject: Subject) -> Option<(u64, &[u8])> {
+    let mut lines = frame.split(|byte| *byte == b'\n');
+    let mut field = |name: &str| lines.next()?.strip_prefix(name.as_bytes());
+    let number = std::str::from_utf8(field("id: ")?).ok()?.parse().ok()?;
+    let is_it = field("event: ")? == subject.name().as_bytes();
+    let data = field("data: ")?;
+    is_it.then_some((number, data))
+}
+
 /// How far somebody has read.
 #[derive(Debug)]
 pub struct Reader {
@@ -198,6 +208,8 @@ mod tests {
             panic!("frames")
         };
         assert_eq!(frames.len(), 2, "a reader that comes again goes on where it was");
+        assert_eq!(data_of(&frames[0], Subject::Event), Some((first + 3, &b"2"[..])));
+        assert_eq!(data_of(&frames[1], Subject::Event), None, "it is a tick");
     }
 
     #[tokio::test(start_paused = true)]
