@@ -55,6 +55,11 @@ pub trait Face: Sync {
     /// # Errors
     /// What is wrong, with file, line and field: [`Written::read`] and [`Source::error`] make it.
     fn configure(&self, written: Written<'_>, site: &Site<'_>) -> Result<Box<dyn Configured>, ConfigError>;
+
+    /// What holds where the file has no table of it; `None`: there is no such face then.
+    fn unsaid(&self, _site: &Site<'_>) -> Option<Box<dyn Configured>> {
+        None
+    }
 }
 
 /// What else the file says, as far as a face has to fit to it.

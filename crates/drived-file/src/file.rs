@@ -78,7 +78,8 @@ impl File {
 }
 
 /// The faces that a program may be built without, each with the feature of `drived` that builds it in.
-const FEATURES: [(&str, &str); 3] = [("gateways", "gateway"), ("mqtt", "mqtt"), ("webhooks", "webhook")];
+const FEATURES: [(&str, &str); 4] =
+    [("gateways", "gateway"), ("history", "history"), ("mqtt", "mqtt"), ("webhooks", "webhook")];
 
 /// Refuses the table of a face that this program was built without, and says how it is built in.
 pub(super) fn not_built_in(source: Source<'_>, left: &DeTable<'_>) -> Result<(), ConfigError> {

@@ -53,7 +53,7 @@ pub struct Config {
     pub doors: DoorsConfig,
     pub lines: Vec<LinePart>,
     pub groups: Vec<Group>,
-    /// The faces that have a table, by its name, in the order in which the program knows them.
+    /// The faces that have a table, and those that are there without one, by its name, in the order in which the program knows them.
     pub faces: Vec<(&'static str, Box<dyn Configured>)>,
 }
 
@@ -83,7 +83,7 @@ impl Config {
         let mut written = Vec::new();
         for face in drived_face::all() {
             let of_face = tables.get_mut().remove(face.table());
-            written.extend(of_face.map(|value| (face, Written::new(source, value))));
+            written.push((face, of_face.map(|value| Written::new(source, value))));
         }
         file::not_built_in(source, tables.get_ref())?;
         let raw = File::deserialize(Deserializer::from(tables)).map_err(wrong)?;
@@ -107,9 +107,14 @@ impl Config {
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups(source, of(&raw.groups), names)?;
         let site = Site::new(&lines, &groups, &state);
-        let configured =
-            written.into_iter().map(|(face, written)| Ok((face.table(), face.configure(written, &site)?)));
-        let faces = configured.collect::<Result<_, ConfigError>>()?;
+        let mut faces = Vec::new();
+        for (face, written) in written {
+            let configured = match written {
+                Some(written) => Some(face.configure(written, &site)?),
+                None => face.unsaid(&site),
+            };
+            faces.extend(configured.map(|configured| (face.table(), configured)));
+        }
         let doors = DoorsConfig::read(source, of(&raw.http), of(&raw.socket), state)?;
         Ok(Self { doors, faces, snapshots, shutdown, lines, groups })
     }

@@ -19,6 +19,8 @@ impl FromStr for Time {
             "ms" => Ok(Self(Duration::from_millis(number))),
             "s" => Ok(Self(Duration::from_secs(number))),
             "min" => Ok(Self(Duration::from_secs(number * 60))),
+            "h" => Ok(Self(Duration::from_secs(number * 3_600))),
+            "d" => Ok(Self(Duration::from_secs(number * 86_400))),
             "" if number == 0 => Ok(Self(Duration::ZERO)),
             "" => Err(NoTime(format!(": {number} of what? {number}s or {number}min"))),
             _ => Err(NoTime(String::new())),
@@ -41,6 +43,8 @@ mod tests {
             ("500ms", Duration::from_millis(500)),
             ("1s", Duration::from_secs(1)),
             ("2 min", Duration::from_secs(120)),
+            ("3h", Duration::from_secs(10_800)),
+            ("90d", Duration::from_secs(7_776_000)),
             ("0", Duration::ZERO),
         ] {
             assert_eq!(text.parse(), Ok(Time(time)), "{text}");

@@ -1,6 +1,6 @@
 //! The words of `drived`: what a person writes on the command line, read, and what a person and a program read of it.
 //!
-//! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]),
+//! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]), a moment ([`moment`]),
 //!   and an object that a program sends ([`strict`], [`object`]).
 //! - What is told: results and tables ([`output`]), objects ([`json`]), measurements ([`values`]), parameters
 //!   ([`registers`]), frames of a line in words ([`explain`]), and the [log](`logging`).
@@ -25,6 +25,7 @@ pub mod json;
 pub mod line_spec;
 pub mod logging;
 pub mod meant;
+pub mod moment;
 pub mod object;
 pub mod output;
 pub mod ports;

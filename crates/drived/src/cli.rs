@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use tracing::Level;
 
+#[cfg(feature = "history")]
+use crate::commands::{history, why};
 use crate::{
     commands::{audit, check, completions, export, names, token},
     refused::one_line,
@@ -26,6 +28,7 @@ A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; alarms, watch, monitor, reload
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain; replay plays it back
+What happened:      history, and why at a moment
 The service file:   report, of the running daemon or of one line
 The plant's drives: check, plan, run, names, token, audit, each with --config FILE; export for its alerts and board
 Your shell:         completions, for subcommands, options, and the names of drives and parameters
@@ -84,6 +87,10 @@ pub(crate) enum Command {
     Token(token::Command),
     #[command(subcommand)]
     Audit(audit::Command),
+    #[cfg(feature = "history")]
+    History(history::Args),
+    #[cfg(feature = "history")]
+    Why(why::Args),
 }
 
 impl Command {
@@ -131,6 +138,10 @@ impl Command {
             Self::Names(command) => names::run(command),
             Self::Token(command) => token::run(command).await,
             Self::Audit(command) => audit::run(command),
+            #[cfg(feature = "history")]
+            Self::History(args) => history::run(&args),
+            #[cfg(feature = "history")]
+            Self::Why(args) => why::run(&args),
         }
     }
 }

@@ -6,6 +6,8 @@ use drived_face::{Face, TableTaken};
 const FACES: &[&dyn Face] = &[
     #[cfg(feature = "gateway")]
     drived_gateway::FACE,
+    #[cfg(feature = "history")]
+    drived_history::FACE,
     #[cfg(feature = "mqtt")]
     drived_broker::FACE,
     #[cfg(feature = "webhook")]

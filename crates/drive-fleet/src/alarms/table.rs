@@ -21,16 +21,19 @@ pub enum AlarmKind {
     LineFinding,
     /// The audit log cannot be written, so that only stops are carried out.
     AuditLog,
+    /// The history cannot be written: what happens now is not known later.
+    History,
     /// The configuration could not be read again, or a reload has left a motor that may turn.
     Reload,
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 5] = [
+const OTHERS: [AlarmKind; 6] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
     AlarmKind::AuditLog,
+    AlarmKind::History,
     AlarmKind::Reload,
 ];
 
@@ -79,6 +82,12 @@ impl AlarmKind {
                 "audit_log",
                 "the audit log cannot be written, only stops are carried out",
                 Severity::Alarm,
+                "see whether its disk is full; the log of the program says why",
+            ),
+            Self::History => row(
+                "history",
+                "the history cannot be written, what happens now is not known later",
+                Severity::Warning,
                 "see whether its disk is full; the log of the program says why",
             ),
             Self::Reload => row(

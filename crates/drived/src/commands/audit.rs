@@ -2,13 +2,14 @@
 
 use std::{path::PathBuf, str::FromStr};
 
-use chrono::{DateTime, Days, Local, NaiveDateTime, NaiveTime, TimeZone as _};
+use chrono::{DateTime, Local};
 use serde_json::json;
 
 use super::token::ConfigArgs;
 use drived_doors::audit::{Filter, Found, Verdict, shown, verify_since};
 use drived_words::{
     failure::Failure,
+    moment,
     output::{self, JsonArgs, Table},
 };
 
@@ -80,33 +81,13 @@ impl LogArgs {
 pub(crate) struct Time(u64);
 
 impl FromStr for Time {
-    type Err = &'static str;
+    type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let time = moment(text, Local::now())
-            .ok_or("expected 03:12, \"2026-11-21 03:12\" or 2026-11-21T03:12:00+01:00")?;
-        u64::try_from(time.timestamp_millis()).map(Self).map_err(|_| "expected a time after 1970")
+        let time = moment::said(text, &Local::now()).map_err(|error| error.to_string())?.at;
+        let unix_ms = u64::try_from(time.timestamp_millis());
+        unix_ms.map(Self).map_err(|_| "expected a time after 1970".to_owned())
     }
-}
-
-/// A time without a day is the last one that has been.
-fn moment(text: &str, now: DateTime<Local>) -> Option<DateTime<Local>> {
-    if let Ok(whole) = DateTime::parse_from_rfc3339(text) {
-        return Some(whole.with_timezone(&Local));
-    }
-    let day = ["%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S"]
-        .into_iter()
-        .find_map(|form| NaiveDateTime::parse_from_str(text, form).ok());
-    let time =
-        || ["%H:%M", "%H:%M:%S"].into_iter().find_map(|form| NaiveTime::parse_from_str(text, form).ok());
-    let local = match day {
-        Some(day) => day,
-        None => {
-            let today = now.date_naive().and_time(time()?);
-            if today <= now.naive_local() { today } else { today.checked_sub_days(Days::new(1))? }
-        }
-    };
-    Local.from_local_datetime(&local).earliest()
 }
 
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
@@ -173,22 +154,5 @@ fn verify(file: PathBuf, since: Option<&str>, json: JsonArgs) -> Result<(), Fail
         Verdict::Broken { file, line, why } => {
             Err(Failure::Drive(format!("{}:{line}: the chain is broken: {why}", file.display())))
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_time_without_a_day_is_the_last_one_that_has_been() {
-        let now = Local.with_ymd_and_hms(2026, 11, 21, 9, 0, 0).unwrap();
-        let told = |text: &str| moment(text, now).map(|time| time.naive_local().to_string());
-        assert_eq!(told("03:12").as_deref(), Some("2026-11-21 03:12:00"));
-        assert_eq!(told("23:10:05").as_deref(), Some("2026-11-20 23:10:05"));
-        assert_eq!(told("2026-11-01 03:12").as_deref(), Some("2026-11-01 03:12:00"));
-        let whole = moment("2026-11-21T03:12:00+01:00", now).unwrap();
-        assert_eq!(whole.timestamp(), 1_795_227_120);
-        assert_eq!(told("soon"), None);
     }
 }

@@ -4,5 +4,9 @@ pub(crate) mod audit;
 pub(crate) mod check;
 pub(crate) mod completions;
 pub(crate) mod export;
+#[cfg(feature = "history")]
+pub(crate) mod history;
 pub(crate) mod names;
 pub(crate) mod token;
+#[cfg(feature = "history")]
+pub(crate) mod why;

@@ -1,0 +1,82 @@
+//! `[history]`: what is kept, for how long, and where.
+
+use std::path::{Path, PathBuf};
+
+use drived_config::config::{Entry as _, settings, within};
+use drived_face::{ConfigError, Site, Source};
+
+use crate::{forecast::Forecast, write::Limits};
+
+/// The file of the state folder.
+const FILE: &str = "history.sqlite";
+
+/// The black box of a configuration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HistoryConfig {
+    /// Where; `None`: nothing is kept.
+    pub file: Option<PathBuf>,
+    pub limits: Limits,
+    pub forecast: Forecast,
+}
+
+/// What is said, while it is read.
+#[allow(unreachable_pub, reason = "the table that sets it is declared as public")]
+#[derive(Debug, Clone)]
+pub struct Draft {
+    is_on: bool,
+    file: Option<PathBuf>,
+    polled_hours: u32,
+    minute_days: u32,
+    years: u32,
+    megabytes: u32,
+}
+
+settings! {
+    /// `[history]`.
+    HistoryEntry sets Draft;
+
+    /// `false`: nothing is kept
+    on: bool = "`true`, where there is a state folder", |to, said| to.is_on = *said;
+    /// another file; beside the configuration unless the path is whole
+    file: PathBuf = "`history.sqlite` in the state folder", |to, said| to.file = Some(said.clone());
+    /// how many hours values are kept as they were read, 1 to 8760
+    polled_hours: u32 = "`48`", |to, said| to.polled_hours = within(*said, 1..=8_760, "")?;
+    /// how many days their least, mean and greatest of each minute are kept, 1 to 3660
+    minute_days: u32 = "`90`", |to, said| to.minute_days = within(*said, 1..=3_660, "")?;
+    /// how many years those of each hour, events, alarms and commands are kept, 1 to 50
+    years: u32 = "`10`", |to, said| to.years = within(*said, 1..=50, "")?;
+    /// how large the file may become, in MiB, 16 to 1048576; what is finest goes first then
+    size_mib: u32 = "`2048`", |to, said| to.megabytes = within(*said, 16..=1_048_576, "")?;
+}
+
+impl Default for Draft {
+    fn default() -> Self {
+        Self { is_on: true, file: None, polled_hours: 48, minute_days: 90, years: 10, megabytes: 2_048 }
+    }
+}
+
+impl HistoryConfig {
+    /// What holds where the file says nothing.
+    #[must_use]
+    pub fn unsaid(site: &Site<'_>) -> Self {
+        Self::from(Draft::default(), None, site)
+    }
+
+    /// What the file says.
+    ///
+    /// # Errors
+    /// A key says what cannot be.
+    pub fn read(source: Source<'_>, entry: &HistoryEntry, site: &Site<'_>) -> Result<Self, ConfigError> {
+        let mut draft = Draft::default();
+        entry.set(source, &mut draft)?;
+        Ok(Self::from(draft, source.file.parent(), site))
+    }
+
+    fn from(draft: Draft, beside: Option<&Path>, site: &Site<'_>) -> Self {
+        let Draft { is_on, file, polled_hours, minute_days, years, megabytes } = draft;
+        let said = file.map(|file| beside.unwrap_or(Path::new("")).join(file));
+        let file = said.or_else(|| site.state.folder.as_ref().map(|folder| folder.join(FILE)));
+        let limits = Limits::of(polled_hours, minute_days, years, megabytes);
+        Self { file: file.filter(|_| is_on), limits, forecast: Forecast::of(site, &limits) }
+    }
+}

@@ -1,0 +1,160 @@
+//! The black box as a [`Face`]: it is there also where the file says nothing of it.
+
+use std::{any::Any, pin::Pin, thread::JoinHandle, time::Duration};
+
+use drived_config::config::Entry as _;
+use drived_face::{
+    ConfigError, Configured, Face, Failure, Key, Meaning, Open, Opening, Site, Surroundings, Written, same,
+};
+use serde_json::{Map, Value, json};
+use tokio::sync::watch;
+
+use crate::{
+    config::{HistoryConfig, HistoryEntry},
+    listen::{Clocks, Listening},
+    write::{
+        inbox::Inbox,
+        writer::{Health, Writer},
+    },
+};
+
+/// What a program adds that has a black box.
+pub const FACE: &dyn Face = &BlackBox;
+
+/// What a file says of the history, of the face with its table.
+#[must_use]
+pub fn config_of(face: &dyn Configured) -> Option<&HistoryConfig> {
+    (face as &dyn Any).downcast_ref()
+}
+
+/// How long the disk has for what is written last.
+const ENDED_WITHIN: Duration = Duration::from_secs(5);
+
+struct BlackBox;
+
+const ROW: Key = Key::of_table(
+    "[history]",
+    &["what the [history](#history) keeps"],
+    "values of two days, minutes of 90 days, and hours, events, alarms and commands of ten years, in 2 GiB at the most",
+);
+
+impl Face for BlackBox {
+    fn table(&self) -> &'static str {
+        "history"
+    }
+
+    fn row(&self) -> &'static Key {
+        &ROW
+    }
+
+    fn keys(&self) -> &'static [Key] {
+        HistoryEntry::KEYS
+    }
+
+    fn configure(&self, written: Written<'_>, site: &Site<'_>) -> Result<Box<dyn Configured>, ConfigError> {
+        let source = written.source();
+        let entry: HistoryEntry = written.read()?;
+        Ok(Box::new(HistoryConfig::read(source, &entry, site)?))
+    }
+
+    fn unsaid(&self, site: &Site<'_>) -> Option<Box<dyn Configured>> {
+        Some(Box::new(HistoryConfig::unsaid(site)))
+    }
+}
+
+impl Configured for HistoryConfig {
+    fn is_same(&self, other: &dyn Configured) -> bool {
+        same(self, other)
+    }
+
+    fn meaning(&self) -> Vec<Meaning> {
+        let Some(file) = &self.file else {
+            return vec![Meaning { head: "no history is kept".to_owned(), rows: Vec::new() }];
+        };
+        let days = |milliseconds: i64| milliseconds / 86_400_000;
+        let rows = vec![
+            (
+                "kept",
+                format!(
+                    "values as they were read for {} h, of each minute for {} days, of each hour, events, alarms and commands for {} years",
+                    self.limits.polled_ms / 3_600_000,
+                    days(self.limits.minutes_ms),
+                    days(self.limits.years_ms) / 366,
+                ),
+            ),
+            (
+                "size",
+                format!(
+                    "{} at the most; {} by then if every value moves at every poll",
+                    mebibytes(u64::try_from(self.limits.bytes).unwrap_or_default()),
+                    mebibytes(self.forecast.bytes),
+                ),
+            ),
+            (
+                "written",
+                format!("{} a day then, which wears an SD card", mebibytes(self.forecast.bytes_a_day)),
+            ),
+        ];
+        vec![Meaning { head: format!("history: in {}", file.display()), rows }]
+    }
+
+    fn object(&self) -> Map<String, Value> {
+        let object = json!({
+            "file": self.file,
+            "largest_bytes": self.limits.bytes,
+            "forecast_bytes": self.forecast.bytes,
+            "forecast_bytes_a_day": self.forecast.bytes_a_day,
+        });
+        Map::from_iter([("history".to_owned(), object)])
+    }
+
+    fn prepare(&self) -> Result<Opening, Failure> {
+        let config = self.clone();
+        Ok(Box::new(move |around| Box::new(Recorder::open(config, around))))
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{} MiB", bytes.div_ceil(1 << 20))
+}
+
+/// The open black box.
+struct Recorder(Option<Recording>);
+
+struct Recording {
+    listening: Listening,
+    inbox: Inbox,
+    writing: Option<JoinHandle<()>>,
+}
+
+impl Recorder {
+    fn open(config: HistoryConfig, around: &Surroundings) -> Self {
+        let Some(path) = config.file else { return Self(None) };
+        let (inbox, clocks) = (Inbox::default(), Clocks::begin());
+        let (health, seen) = watch::channel(Health::Opening);
+        let listening = Listening::start(&around.plant, &inbox, clocks, seen);
+        let clock = move || clocks.now();
+        let writer =
+            Writer { path, limits: config.limits, inbox: inbox.clone(), clock, health: health.clone() };
+        let writing = writer.start();
+        if let Err(error) = &writing {
+            health.send_replace(Health::Failing(error.to_string()));
+        }
+        Self(Some(Recording { listening, inbox, writing: writing.ok() }))
+    }
+}
+
+impl Open for Recorder {
+    /// It goes on: what becomes of the motors is what somebody will ask for.
+    fn closing(&self) {}
+
+    fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
+        Box::pin(async move {
+            let Some(Recording { listening, inbox, writing }) = self.0 else { return };
+            drop(listening);
+            inbox.end();
+            let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));
+            let _ = tokio::time::timeout(ENDED_WITHIN, joined).await;
+        })
+    }
+}

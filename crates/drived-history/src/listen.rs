@@ -1,0 +1,319 @@
+//! Listens to the plant: every drive's snapshots, the stream of what happens, and each line minute by minute. It takes what there is, and
+//! waits for nobody.
+
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
+
+use drive_fleet::{DriveHandle, Snapshot};
+use drived_face::Plant;
+use drived_plant::plant::{
+    revisions::Next,
+    views::{CommandView, NoticeView},
+};
+use serde::Deserialize;
+use tokio::{
+    sync::watch,
+    task::{AbortHandle, JoinSet},
+    time::{Instant, MissedTickBehavior, interval},
+};
+
+use crate::{
+    quantity::{Quantity, Set, of_measurements, of_status},
+    record::{Kind, LineMinute, Moment, Record},
+    tracker::Tracker,
+    write::{
+        inbox::{Inbox, Shown},
+        writer::Health,
+    },
+};
+
+/// Between two looks at who belongs to the fleet.
+const LOOK: Duration = Duration::from_secs(1);
+const MINUTE: Duration = Duration::from_secs(60);
+/// What is longer is kept without what the API told: a command for a thousand drives.
+const LONGEST_BODY: usize = 256 << 10;
+
+/// Both clocks of the daemon.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clocks(Instant);
+
+impl Clocks {
+    /// From now on.
+    #[must_use]
+    pub(crate) fn begin() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Now.
+    #[must_use]
+    pub(crate) fn now(&self) -> Moment {
+        let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        Moment { steady_ms: self.of(Instant::now()), wall_ms: milliseconds(wall) }
+    }
+
+    fn of(&self, at: Instant) -> i64 {
+        match at.checked_duration_since(self.0) {
+            Some(after) => milliseconds(after),
+            None => -milliseconds(self.0.duration_since(at)),
+        }
+    }
+}
+
+fn milliseconds(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
+}
+
+/// Listens until it is dropped.
+pub(crate) struct Listening(#[expect(dead_code, reason = "its tasks end with it")] JoinSet<()>);
+
+impl Listening {
+    /// Begins to listen.
+    #[must_use]
+    pub(crate) fn start(
+        plant: &Plant,
+        inbox: &Inbox,
+        clocks: Clocks,
+        health: watch::Receiver<Health>,
+    ) -> Self {
+        let mut tasks = JoinSet::new();
+        tasks.spawn(drives(plant.clone(), inbox.clone(), clocks));
+        tasks.spawn(stream(plant.clone(), inbox.clone(), clocks));
+        tasks.spawn(lines(plant.clone(), inbox.clone(), clocks));
+        tasks.spawn(tell(plant.clone(), health));
+        Self(tasks)
+    }
+}
+
+/// A task that ends with whoever holds this.
+struct Ending(AbortHandle);
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+/// Follows the drives that there are, those that a reload has brought too.
+async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
+    let mut followed: BTreeMap<Arc<str>, Ending> = BTreeMap::new();
+    let mut looks = interval(LOOK);
+    looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        looks.tick().await;
+        for drive in plant.fleet().drives() {
+            if followed.get(drive.name()).is_none_or(|known| known.0.is_finished()) {
+                let name = Arc::clone(drive.name());
+                let task = tokio::spawn(follow(drive, inbox.clone(), clocks));
+                followed.insert(name, Ending(task.abort_handle()));
+            }
+        }
+    }
+}
+
+async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
+    let mut watch = drive.watch();
+    let mut sets = Set::ALL.map(|set| (set, Tracker::default()));
+    loop {
+        let snapshot = Arc::clone(&watch.borrow_and_update());
+        for (set, tracker) in &mut sets {
+            let Some((at, max_age, values)) = read(*set, &snapshot) else { continue };
+            if *set == Set::Status && snapshot.retracted {
+                // What it showed counts for nothing any more, and what comes next is no continuation of it.
+                tracker.break_off();
+                continue;
+            }
+            let Some(seen) = tracker.see(clocks.of(at), milliseconds(max_age), &values) else { continue };
+            let shown = Shown { drive: Arc::clone(drive.name()), set: *set, seen };
+            if inbox.show(shown).is_err() {
+                tracker.break_off();
+            }
+        }
+        if watch.changed().await.is_err() {
+            return;
+        }
+    }
+}
+
+/// When a set was read, how old it may become, and what it shows.
+type Reading = (Instant, Duration, Vec<(Quantity, i64)>);
+
+/// What is known of a set of a drive.
+fn read(set: Set, snapshot: &Snapshot) -> Option<Reading> {
+    match set {
+        Set::Status => {
+            let status = snapshot.status.as_ref()?;
+            Some((status.at, snapshot.max_age, of_status(&status.value, snapshot)))
+        }
+        Set::Measurements => {
+            let measured = snapshot.measurements.as_ref()?;
+            Some((measured.at, snapshot.measurements_max_age, of_measurements(&measured.value)))
+        }
+    }
+}
+
+/// Keeps what the event stream tells.
+async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
+    let mut reader = plant.revisions().reader(None);
+    loop {
+        match plant.revisions().next(&mut reader).await {
+            Next::Frames(frames) => {
+                for frame in frames {
+                    let told = std::str::from_utf8(&frame).ok().and_then(|frame| said(frame, clocks.now()));
+                    let Some(mut record) = told else { continue };
+                    // Whoever asks what else happened on a line finds it by that.
+                    if let (None, Some(drive)) = (&record.line, &record.drive) {
+                        record.line = plant.fleet().drive(drive).map(|drive| drive.line().0.to_string());
+                    }
+                    inbox.record(record);
+                }
+            }
+            // How many there were nobody knows.
+            Next::Reset(_) => inbox.lose_records(1),
+            Next::End => return,
+        }
+    }
+}
+
+/// An event as the stream tells it, as far as it is looked at here.
+#[derive(Deserialize)]
+struct Told {
+    time_unix_ms: i64,
+    event: String,
+    #[serde(default)]
+    drive: Option<String>,
+    alarm: bool,
+    text: String,
+}
+
+/// An alarm likewise.
+#[derive(Deserialize)]
+struct ToldAlarm {
+    state: String,
+    #[serde(default)]
+    drive: Option<String>,
+    #[serde(default)]
+    line: Option<String>,
+    text: String,
+}
+
+/// What a frame of the event stream says, as a record; `None`: it is of a drive's or a line's values.
+fn said(frame: &str, now: Moment) -> Option<Record> {
+    let (head, data) = frame.split_once("\ndata: ")?;
+    let (_, name) = head.split_once("\nevent: ")?;
+    let data = data.trim_end();
+    let body = (data.len() <= LONGEST_BODY).then(|| data.to_owned());
+    let record = Record { body, ..Record::of_history(now, "", "") };
+    match name {
+        "event" => {
+            let told: Told = serde_json::from_str(data).ok()?;
+            let at = Moment { wall_ms: told.time_unix_ms, ..now };
+            let kind = if told.drive.is_some() { Kind::Event } else { Kind::Notice };
+            let Told { event, drive, alarm, text, .. } = told;
+            Some(Record { at, kind, what: event, drive, is_alarm: alarm, text, ..record })
+        }
+        "alarm" => {
+            let ToldAlarm { state, drive, line, text } = serde_json::from_str(data).ok()?;
+            let is_alarm = state == "unacknowledged";
+            Some(Record { kind: Kind::Alarm, what: state, drive, line, is_alarm, text, ..record })
+        }
+        "command" => {
+            let told: CommandView = serde_json::from_str(data).ok()?;
+            let at = Moment { wall_ms: i64::try_from(told.time_unix_ms).unwrap_or(i64::MAX), ..now };
+            Some(Record {
+                at,
+                kind: Kind::Command,
+                what: told.action.name().to_owned(),
+                drive: told.drive.clone(),
+                text: in_words(&told),
+                act: Some(format!("{}:{}", told.time_unix_ms, told.id)),
+                ..record
+            })
+        }
+        _ => None,
+    }
+}
+
+/// A command in a sentence: what, by whom, from where, and what became of it.
+fn in_words(command: &CommandView) -> String {
+    let CommandView { caller, origin, outcome, .. } = command;
+    let several =
+        command.several.as_ref().map(|_| format!(" ({})", command.several_in_words())).unwrap_or_default();
+    let of = command.group.as_ref().map(|group| format!(" of group {group}")).unwrap_or_default();
+    let why = command.text.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
+    format!(
+        "{}{of} by {caller} from {origin}: {}{several}{why}",
+        command.command,
+        outcome.to_string().replace('_', " ")
+    )
+}
+
+/// Counts each line, minute by minute.
+async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
+    let mut before: BTreeMap<Arc<str>, Counted> = BTreeMap::new();
+    let mut minutes = interval(MINUTE);
+    minutes.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        minutes.tick().await;
+        for (name, line) in plant.fleet().lines() {
+            let stats = line.stats();
+            let slaves = stats.slaves.values();
+            let sum = |of: fn(&drive_bus::stats::SlaveStats) -> u64| slaves.clone().map(of).sum::<u64>();
+            let counted = Counted {
+                sent: sum(|slave| slave.sent),
+                answered: sum(|slave| slave.outcomes.answered),
+                damaged: sum(|slave| slave.outcomes.damaged + slave.outcomes.mismatches),
+                missing: sum(|slave| slave.outcomes.timeouts),
+                elapsed: stats.elapsed,
+                busy: stats.busy,
+            };
+            let last = before.insert(Arc::clone(&name), counted);
+            // One that was opened anew, or is seen for the first time, counts from its beginning.
+            let last = last.filter(|last| last.elapsed <= counted.elapsed).unwrap_or_default();
+            let elapsed = counted.elapsed.saturating_sub(last.elapsed).as_millis().max(1);
+            let busy = counted.busy.saturating_sub(last.busy).as_millis() * 1_000 / elapsed;
+            inbox.line(LineMinute {
+                wall_ms: clocks.now().wall_ms,
+                line: name,
+                sent: counted.sent.saturating_sub(last.sent),
+                answered: counted.answered.saturating_sub(last.answered),
+                damaged: counted.damaged.saturating_sub(last.damaged),
+                missing: counted.missing.saturating_sub(last.missing),
+                busy_permille: u64::try_from(busy.min(1_000)).unwrap_or(1_000),
+                is_open: stats.opened > stats.lost,
+            });
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Counted {
+    sent: u64,
+    answered: u64,
+    damaged: u64,
+    missing: u64,
+    elapsed: Duration,
+    busy: Duration,
+}
+
+/// Tells as an alarm that the history cannot be written, and when it can again.
+async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
+    let mut is_told = false;
+    loop {
+        let now = health.borrow_and_update().clone();
+        let text = match (&now, is_told) {
+            (Health::Failing(why), false) => Some(format!("the history cannot be written: {why}")),
+            (Health::Writing, true) => Some("the history is written again".to_owned()),
+            _ => None,
+        };
+        if let Some(text) = text {
+            is_told = !is_told;
+            plant.tell_notice(NoticeView::new("history", is_told, text));
+        }
+        if health.changed().await.is_err() {
+            return;
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The reading half: what is known of a quantity between two moments, in steps, and what happened. Each answer has an end.
+//!
+//! Moments are milliseconds since 1970 by the wall's clock as it stood then. Where that clock was set back, what was told twice of one time is
+//! given in the order of the daemon's own clock.
+
+mod frames;
+mod records;
+mod steps;
+
+use std::{collections::BTreeSet, path::Path};
+
+use rusqlite::{Connection, OptionalExtension as _, params};
+
+pub use self::{
+    frames::{Frame, frames},
+    records::{Filter, Found, records},
+    steps::{Told, pack_minutes, steps},
+};
+use crate::{
+    chunk::{Chunk, piece_of},
+    column::unpack,
+    curve::{Piece, joined},
+    quantity::{Quantity, Set},
+    store::{self, StoreError},
+};
+
+/// The bits of a chunk's number that are its source's.
+pub const SOURCE_BITS: u32 = 20;
+/// No block is longer than this, so that none that begins earlier has to be looked at.
+pub const LONGEST_BLOCK_MS: i64 = 2 * 3_600_000;
+
+/// The file, opened to be read; it may be written meanwhile.
+#[derive(Debug)]
+pub struct History(pub Connection);
+
+impl History {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be read here.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        store::open_to_read(path).map(Self)
+    }
+}
+
+/// The drives of which there is something.
+///
+/// # Errors
+/// It cannot be read.
+pub fn drives(connection: &Connection) -> Result<Vec<String>, StoreError> {
+    let mut find = connection.prepare_cached("SELECT DISTINCT drive FROM source ORDER BY drive")?;
+    let rows = find.query_map([], |row| row.get(0))?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}
+
+/// The quantities of a drive that are kept as they were read between two moments.
+///
+/// # Errors
+/// It cannot be read.
+pub fn quantities(
+    connection: &Connection,
+    drive: &str,
+    from: i64,
+    to: i64,
+) -> Result<BTreeSet<Quantity>, StoreError> {
+    let mut all = BTreeSet::new();
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        let source = source?;
+        let mut find = connection.prepare_cached(
+            "SELECT DISTINCT quantity FROM block WHERE source = ?1 AND start_ms <= ?2 AND end_ms >= ?3",
+        )?;
+        let rows = find.query_map(params![source, to, from], |row| row.get(0).map(Quantity))?;
+        for quantity in rows {
+            all.insert(quantity?);
+        }
+        for (_, start, end, data) in chunks(connection, source, from, to)? {
+            all.extend(Chunk::unpacked(start, end, &data)?.columns.into_keys());
+        }
+    }
+    Ok(all)
+}
+
+/// What is known of a quantity between two moments, as it was read: one piece for each time the clock was not set in.
+///
+/// # Errors
+/// It cannot be read.
+pub fn pieces(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<Vec<Piece>, StoreError> {
+    let mut all: Vec<(i64, Piece)> = Vec::new();
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        let source = source?;
+        let mut find = connection.prepare_cached(
+            "SELECT segment, start_ms, end_ms, data FROM block
+             WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4 AND end_ms >= ?5
+             ORDER BY segment, start_ms, id",
+        )?;
+        let rows = find.query_map(
+            params![source, quantity.0, from.saturating_sub(LONGEST_BLOCK_MS), to, from],
+            |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get::<_, Vec<u8>>(3)?)),
+        )?;
+        for row in rows {
+            let (segment, start, end, data) = row?;
+            all.push((segment, Piece { start, end, points: unpack(start, &data)? }));
+        }
+        for (segment, start, end, data) in chunks(connection, source, from, to)? {
+            all.push((segment, piece_of(quantity, start, end, &data)?));
+        }
+    }
+    // A quantity is of one source; what is in blocks is older than what is in chunks, within each segment.
+    all.sort_by_key(|(segment, piece)| (*segment, piece.start));
+    let mut pieces = Vec::new();
+    for of_one in all.chunk_by(|(one, _), (other, _)| one == other) {
+        let whole = joined(of_one.iter().map(|(_, piece)| piece.clone()));
+        pieces
+            .extend(whole.and_then(|whole| whole.between(from, to)).filter(|piece| !piece.points.is_empty()));
+    }
+    Ok(pieces)
+}
+
+/// The number of a set of a drive.
+fn source(connection: &Connection, drive: &str, set: Set) -> Result<Option<i64>, StoreError> {
+    let mut find = connection.prepare_cached("SELECT id FROM source WHERE drive = ?1 AND part = ?2")?;
+    Ok(find.query_row(params![drive, set.name()], |row| row.get(0)).optional()?)
+}
+
+/// A chunk as it is written: its segment, start, end, and bytes.
+type Packed = (i64, i64, i64, Vec<u8>);
+
+/// The chunks of a source between two moments.
+fn chunks(connection: &Connection, source: i64, from: i64, to: i64) -> Result<Vec<Packed>, StoreError> {
+    // A flush begins where its oldest chunk does.
+    let mut find = connection.prepare_cached(
+        "SELECT flush.segment, chunk.start_ms, chunk.end_ms, chunk.data
+         FROM flush JOIN chunk ON chunk.id = ((flush.id << ?1) | ?2)
+         WHERE flush.end_ms >= ?3 AND flush.start_ms <= ?4 AND chunk.end_ms >= ?3 AND chunk.start_ms <= ?4
+         ORDER BY flush.id",
+    )?;
+    let rows = find.query_map(params![SOURCE_BITS, source, from, to], |row| {
+        Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
+    })?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,83 @@
+//! What happened, in words.
+
+use rusqlite::{Connection, params};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+
+use crate::store::StoreError;
+
+/// Which of what happened is meant.
+#[derive(Debug, Clone, Default)]
+pub struct Filter<'a> {
+    pub from_ms: i64,
+    pub to_ms: i64,
+    /// One drive, and what concerns its line or the program.
+    pub drive: Option<&'a str>,
+    /// Those of this kind only.
+    pub kind: Option<&'a str>,
+    /// So many at the most.
+    pub limit: usize,
+    /// The number of the last that the reader has: only what stands behind it.
+    pub after: i64,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct Found {
+    /// Its place in the order of the file, which the wall's clock does not change.
+    pub number: i64,
+    /// The run of the daemon.
+    pub run: i64,
+    /// By the wall's clock as it stood then.
+    pub time_unix_ms: i64,
+    /// By the daemon's own clock, since its run began.
+    pub steady_ms: i64,
+    /// `event`, `command`, `alarm`, `notice`, or `history`: what the black box tells of itself.
+    pub kind: String,
+    /// In one word.
+    pub what: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<String>,
+    pub alarm: bool,
+    pub text: String,
+    /// As the API told it then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<serde_json::Value>")]
+    pub body: Option<Box<RawValue>>,
+}
+
+/// What happened, in the daemon's own order.
+///
+/// # Errors
+/// It cannot be read.
+pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<Found>, StoreError> {
+    let mut find = connection.prepare_cached(
+        "SELECT id, run, wall_ms, steady_ms, kind, what, drive, line, alarm, text, body FROM record
+         WHERE wall_ms BETWEEN ?1 AND ?2 AND id > ?3
+           AND (?4 IS NULL OR drive = ?4 OR drive IS NULL) AND (?5 IS NULL OR kind = ?5)
+         ORDER BY id LIMIT ?6",
+    )?;
+    let limit = i64::try_from(filter.limit).unwrap_or(i64::MAX);
+    let rows = find.query_map(
+        params![filter.from_ms, filter.to_ms, filter.after, filter.drive, filter.kind, limit],
+        |row| {
+            Ok(Found {
+                number: row.get(0)?,
+                run: row.get(1)?,
+                time_unix_ms: row.get(2)?,
+                steady_ms: row.get(3)?,
+                kind: row.get(4)?,
+                what: row.get(5)?,
+                drive: row.get(6)?,
+                line: row.get(7)?,
+                alarm: row.get(8)?,
+                text: row.get(9)?,
+                body: row.get::<_, Option<String>>(10)?.and_then(|body| RawValue::from_string(body).ok()),
+            })
+        },
+    )?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,183 @@
+//! What is known of a quantity in steps of equal length.
+
+use rusqlite::{Connection, params};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{chunks, pieces, source};
+use crate::{
+    chunk::piece_of,
+    column::{pack_numbers, unpack_numbers},
+    curve::{Step, Steps},
+    quantity::{Quantity, Set},
+    store::StoreError,
+};
+
+const MINUTE_MS: i64 = 60_000;
+const HOUR_MS: i64 = 3_600_000;
+
+/// One step, in the quantity's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Told {
+    /// When it begins, in milliseconds since 1970.
+    pub start_unix_ms: i64,
+    pub least: f64,
+    pub mean: f64,
+    pub greatest: f64,
+    /// The share of the step for which something is known, from 0 to 1.
+    pub known: f64,
+}
+
+/// The steps of a quantity between two moments; a step of which nothing is known is not there. From a minute on they are summed up from
+/// what was kept in minutes, or, where that is not kept any more, in hours: those stand at the beginning of their hour.
+///
+/// # Errors
+/// It cannot be read.
+pub fn steps(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+    length_ms: i64,
+) -> Result<Vec<Told>, StoreError> {
+    let length_ms = length_ms.max(1);
+    let from = from - from.rem_euclid(length_ms);
+    let mut steps = Steps::of(length_ms);
+    if length_ms % MINUTE_MS != 0 || !quantity.is_number() {
+        pieces(connection, drive, quantity, from, to)?.into_iter().for_each(|piece| steps.add(piece));
+    } else {
+        for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+            let source = source?;
+            let minutes_from = match length_ms % HOUR_MS {
+                0 => i64::MAX,
+                _ => oldest_minute(connection, source, quantity)?.unwrap_or(i64::MAX),
+            };
+            add_hours(
+                connection,
+                &mut steps,
+                source,
+                quantity,
+                from,
+                to.min(minutes_from.saturating_sub(1)),
+            )?;
+            add_minutes(connection, &mut steps, source, quantity, from.max(minutes_from), to)?;
+            for (_, start, end, data) in chunks(connection, source, from, to)? {
+                if let Some(piece) = piece_of(quantity, start, end, &data)?.between(from, to) {
+                    steps.add(piece);
+                }
+            }
+        }
+    }
+    let told = |(start, step): (i64, Step)| Told {
+        start_unix_ms: start,
+        least: quantity.value(step.least as f64),
+        mean: quantity.value(step.mean),
+        greatest: quantity.value(step.greatest as f64),
+        known: (step.known_ms as f64 / length_ms as f64).min(1.0),
+    };
+    Ok(steps.all.into_iter().map(told).collect())
+}
+
+fn oldest_minute(
+    connection: &Connection,
+    source: i64,
+    quantity: Quantity,
+) -> Result<Option<i64>, StoreError> {
+    let mut find =
+        connection.prepare_cached("SELECT min(start_ms) FROM minute WHERE source = ?1 AND quantity = ?2")?;
+    // Hours are whole where they are told instead.
+    let oldest: Option<i64> = find.query_row(params![source, quantity.0], |row| row.get(0))?;
+    Ok(oldest.map(|start| start - start.rem_euclid(HOUR_MS)))
+}
+
+fn add_hours(
+    connection: &Connection,
+    steps: &mut Steps,
+    source: i64,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<(), StoreError> {
+    let mut find = connection.prepare_cached(
+        "SELECT start_ms, least, mean, greatest, known_ms FROM hour
+         WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4",
+    )?;
+    let rows = find.query_map(params![source, quantity.0, from, to], |row| {
+        let step =
+            Step { least: row.get(1)?, mean: row.get(2)?, greatest: row.get(3)?, known_ms: row.get(4)? };
+        Ok((row.get(0)?, step))
+    })?;
+    for row in rows {
+        let (start, step) = row?;
+        steps.add_step(start, step);
+    }
+    Ok(())
+}
+
+fn add_minutes(
+    connection: &Connection,
+    steps: &mut Steps,
+    source: i64,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<(), StoreError> {
+    let mut find = connection.prepare_cached(
+        "SELECT start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4",
+    )?;
+    let earliest = from.saturating_sub(super::LONGEST_BLOCK_MS);
+    let rows = find.query_map(params![source, quantity.0, earliest, to], |row| {
+        Ok((row.get::<_, i64>(0)?, row.get::<_, Vec<u8>>(1)?))
+    })?;
+    for row in rows {
+        let (start, data) = row?;
+        for (at, step) in unpack_minutes(start, &data)? {
+            if (from..=to).contains(&at) {
+                steps.add_step(at, step);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Minutes as bytes, from the first on: all beginnings, then all least, and so on, each by its difference.
+#[must_use]
+pub fn pack_minutes(start: i64, minutes: &[(i64, Step)]) -> Vec<u8> {
+    let mut numbers = Vec::with_capacity(minutes.len() * 5);
+    let mut before = start;
+    for (at, _) in minutes {
+        numbers.push((at - before) / MINUTE_MS);
+        before = *at;
+    }
+    let mut before = 0;
+    for (_, step) in minutes {
+        numbers.push(step.least.wrapping_sub(before));
+        before = step.least;
+    }
+    // Within a step of a count.
+    numbers.extend(minutes.iter().map(|(_, step)| (step.mean.round() as i64).wrapping_sub(step.least)));
+    numbers.extend(minutes.iter().map(|(_, step)| step.greatest.wrapping_sub(step.least)));
+    numbers.extend(minutes.iter().map(|(_, step)| MINUTE_MS - step.known_ms));
+    pack_numbers(&numbers)
+}
+
+fn unpack_minutes(start: i64, data: &[u8]) -> Result<Vec<(i64, Step)>, StoreError> {
+    let numbers = unpack_numbers(data)?;
+    let count = numbers.len() / 5;
+    let (mut at, mut least) = (start, 0_i64);
+    let row = |part: usize, place: usize| numbers.get(part * count + place).copied().unwrap_or_default();
+    Ok((0..count)
+        .map(|place| {
+            at = at.wrapping_add(row(0, place).wrapping_mul(MINUTE_MS));
+            least = least.wrapping_add(row(1, place));
+            let step = Step {
+                least,
+                mean: least.wrapping_add(row(2, place)) as f64,
+                greatest: least.wrapping_add(row(3, place)),
+                known_ms: MINUTE_MS.wrapping_sub(row(4, place)),
+            };
+            (at, step)
+        })
+        .collect())
+}

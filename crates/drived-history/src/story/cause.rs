@@ -1,0 +1,269 @@
+//! Why something happened, as far as the facts say so.
+
+use super::{
+    Certainty::{Likely, NotKnown, Said, Seen},
+    Sentence,
+    facts::{Cause, Facts, body},
+};
+use crate::read::Found;
+
+/// What comes within this time of each other may have one cause.
+const TOGETHER_MS: i64 = 5_000;
+/// A command may be the cause of what the drive does within this time.
+const OBEYED_MS: i64 = 10_000;
+/// A silence may be the cause of a trip of the watchdog within this time.
+const SILENT_MS: i64 = 90_000;
+
+/// Why this happened, the surest first. It is never empty.
+pub(super) fn causes(facts: &Facts, about: &Found) -> Vec<Sentence> {
+    let mut said = match &*about.what {
+        "tripped" => of_trip(facts, about),
+        "lost" => of_loss(facts, about),
+        "state_changed" => of_change(facts, about),
+        "control_taken" => vec![
+            Sentence::of(Said, format!("the drive says so: {}", about.text)),
+            Sentence::of(NotKnown, "who it was cannot be seen from the line"),
+        ],
+        "output_blocked" | "reference_taken" | "command_overridden" => vec![
+            Sentence::of(Said, format!("the drive's own words show it: {}", about.text)),
+            Sentence::of(NotKnown, "who or what did it at the drive cannot be seen from the line"),
+        ],
+        "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
+        _ if about.kind == "command" => {
+            vec![Sentence::of(Seen, format!("it was asked for here: {}", about.text))]
+        }
+        _ => vec![Sentence::of(Seen, about.text.clone())],
+    };
+    said.extend(program(facts, about.time_unix_ms));
+    said
+}
+
+fn of_trip(facts: &Facts, about: &Found) -> Vec<Sentence> {
+    let at = about.time_unix_ms;
+    let fault = body(about).fault;
+    let (by_watchdog, is_found) = fault.map_or((false, false), |fault| (fault.by_watchdog, fault.found));
+    // What the drive said of it was read a moment later.
+    let explained = facts.records.iter().find(|found| {
+        found.what == "trip_explained" && found.number > about.number && facts.is_of_drive(found)
+    });
+    let text = explained.map_or(&about.text, |explained| &explained.text);
+    let mut said = vec![Sentence::of(Said, format!("the drive itself says what it tripped by: {text}"))];
+    if is_found {
+        said.push(Sentence::of(
+            NotKnown,
+            "it was found tripped when it was seen again: when that happened is not known",
+        ));
+    }
+    if by_watchdog {
+        said.extend(of_silence(facts, at));
+    } else {
+        said.push(Sentence::of(NotKnown, "what brought it there (load, mains, wiring, setting) the line does not show; the values before it are below"));
+    }
+    let (tripped, lost) =
+        (facts.elsewhere("tripped", at, TOGETHER_MS), facts.elsewhere("lost", at, TOGETHER_MS));
+    if !tripped.is_empty() || !lost.is_empty() {
+        let mut parts = Vec::new();
+        if !tripped.is_empty() {
+            parts.push(format!("{} tripped", names(&tripped)));
+        }
+        if !lost.is_empty() {
+            parts.push(format!("{} fell silent", names(&lost)));
+        }
+        let text = format!(
+            "{} within {} s of it: one cause outside of this drive, such as the mains, is likely",
+            parts.join(" and "),
+            TOGETHER_MS / 1_000
+        );
+        said.push(Sentence::of(Likely, text));
+    }
+    if let Some(asked) = asked_before(facts, about, &["start", "setpoint", "stop"]) {
+        said.push(
+            Sentence::of(Seen, format!("shortly before it somebody had asked: {}", asked.text))
+                .at(asked.time_unix_ms),
+        );
+    }
+    said
+}
+
+/// Why a drive heard nothing for so long that its watchdog acted.
+fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let within = |found: &&Found| (at - SILENT_MS..=at).contains(&found.time_unix_ms);
+    let own = facts
+        .records
+        .iter()
+        .filter(within)
+        .find(|found| found.what == "lost" && found.drive.as_deref() == Some(&*facts.drive));
+    match own {
+        Some(lost) => {
+            let mut said = vec![
+                Sentence::of(Seen, format!("it had not answered before: {}", lost.text))
+                    .at(lost.time_unix_ms),
+            ];
+            said.extend(of_loss(facts, lost));
+            said
+        }
+        None => vec![Sentence::of(
+            NotKnown,
+            "why it heard no message for so long is not known: nothing of it was seen from here",
+        )],
+    }
+}
+
+fn of_loss(facts: &Facts, about: &Found) -> Vec<Sentence> {
+    let at = about.time_unix_ms;
+    let away = facts.records.iter().find(|found| {
+        let is_near = (found.time_unix_ms - at).abs() <= 4 * TOGETHER_MS;
+        is_near
+            && found.kind == "alarm"
+            && found.line == facts.line
+            && found.drive.is_none()
+            && matches!(&*found.what, "unacknowledged" | "acknowledged" | "shelved")
+            && body_of_alarm(found).as_deref() == Some("line_away")
+    });
+    if let Some(away) = away {
+        return vec![
+            Sentence::of(Seen, format!("the port of the line was away: {}", away.text)).at(away.time_unix_ms),
+            Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"),
+        ];
+    }
+    let neighbours = facts.neighbours();
+    let lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
+    let on_line: Vec<&Found> = lost.into_iter().filter(|found| found.line == facts.line).collect();
+    match on_line.len() {
+        0 => {
+            let others = match neighbours.is_empty() {
+                true => "it is the only drive that is known of its line".to_owned(),
+                false => "no other drive of its line was lost with it".to_owned(),
+            };
+            vec![
+                Sentence::of(Seen, others),
+                Sentence::of(
+                    NotKnown,
+                    "its supply, its branch of the cable, its address or its settings: which, the line does not show",
+                ),
+            ]
+        }
+        _ => vec![
+            Sentence::of(Seen, format!("{} of its line fell silent with it", names(&on_line))),
+            Sentence::of(
+                Likely,
+                "what they share is the likely cause: the cable, its adapter, or the supply of these drives; which of them is not known",
+            ),
+        ],
+    }
+}
+
+fn of_change(facts: &Facts, about: &Found) -> Vec<Sentence> {
+    match body(about).cause {
+        Some(Cause::Command { commander, door }) => {
+            let door = door.map(|door| format!(" through {door}")).unwrap_or_default();
+            let mut said = vec![Sentence::of(Seen, format!("{commander} asked for it{door}"))];
+            said.extend(
+                asked_before(facts, about, &["start", "stop", "release", "reset"])
+                    .map(|asked| Sentence::of(Seen, asked.text.clone()).at(asked.time_unix_ms)),
+            );
+            said
+        }
+        Some(Cause::Policy { policy }) => {
+            let policy = policy.replace('_', " ");
+            vec![Sentence::of(Seen, format!("this program did it by itself, by its policy: {policy}"))]
+        }
+        Some(Cause::Found) => vec![Sentence::of(
+            NotKnown,
+            "it was found so when the drive was seen again: when and why it changed is not known",
+        )],
+        Some(Cause::Drive) | None => {
+            let mut said = Vec::new();
+            match asked_before(facts, about, &["stop", "release"]) {
+                Some(asked) => said.push(
+                    Sentence::of(Likely, format!("a command of here came shortly before: {}", asked.text))
+                        .at(asked.time_unix_ms),
+                ),
+                None => said.push(Sentence::of(Seen, "nobody here asked for it")),
+            }
+            said.push(Sentence::of(
+                NotKnown,
+                "its terminals, its panel, another master or the drive itself: which of them it was is not known, but for what its words show below",
+            ));
+            said
+        }
+    }
+}
+
+fn of_unconfirmed_stop(facts: &Facts, about: &Found) -> Vec<Sentence> {
+    let mut said = Vec::new();
+    if let Some(asked) = asked_before(facts, about, &["stop"]) {
+        said.push(
+            Sentence::of(Seen, format!("the stop was asked for here: {}", asked.text)).at(asked.time_unix_ms),
+        );
+    }
+    said.push(Sentence::of(Seen, format!("the drive did not show that it had stopped: {}", about.text)));
+    let is_lost = facts.records.iter().any(|found| {
+        found.what == "lost"
+            && facts.is_of_drive(found)
+            && (found.time_unix_ms - about.time_unix_ms).abs() <= SILENT_MS
+    });
+    said.push(match is_lost {
+        true => Sentence::of(
+            NotKnown,
+            "it did not answer at that time: whether its motor turned nobody here knows",
+        ),
+        false => {
+            Sentence::of(NotKnown, "it answered, and why it did not stop its words do not say for certain")
+        }
+    });
+    said
+}
+
+/// What the program itself has to do with it: it was not there, or its clock was set.
+fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let is_near = |found: &&Found| {
+        found.kind == "history" && (at - SILENT_MS..=at + TOGETHER_MS).contains(&found.time_unix_ms)
+    };
+    facts
+        .records
+        .iter()
+        .filter(is_near)
+        .filter(|found| {
+            matches!(&*found.what, "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped")
+        })
+        .map(|found| Sentence::of(Seen, found.text.clone()).at(found.time_unix_ms))
+        .collect()
+}
+
+/// The last command to the drive shortly before something, of these actions.
+fn asked_before<'a>(facts: &'a Facts, about: &Found, actions: &[&str]) -> Option<&'a Found> {
+    let at = about.time_unix_ms;
+    facts.records.iter().rev().find(|found| {
+        found.kind == "command"
+            && actions.contains(&&*found.what)
+            && facts.is_of_drive(found)
+            && (at - OBEYED_MS..=at).contains(&found.time_unix_ms)
+            && was_sent(facts, found)
+    })
+}
+
+/// Whether a command was, or may have been, on the wire: one that was refused moved nothing.
+fn was_sent(facts: &Facts, found: &Found) -> bool {
+    let outcome = facts.of_several(found).map(|one| one.outcome).or_else(|| body(found).outcome);
+    !matches!(outcome.as_deref(), Some("refused" | "expired" | "superseded" | "nothing"))
+}
+
+fn body_of_alarm(found: &Found) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Alarm {
+        kind: String,
+    }
+    let alarm: Alarm = serde_json::from_str(found.body.as_ref()?.get()).ok()?;
+    Some(alarm.kind)
+}
+
+fn names(found: &[&Found]) -> String {
+    let mut names: Vec<&str> = found.iter().filter_map(|found| found.drive.as_deref()).collect();
+    names.sort_unstable();
+    names.dedup();
+    match names.len() {
+        0..=5 => names.join(", "),
+        more => format!("{} and {} more", names[..5].join(", "), more - 5),
+    }
+}

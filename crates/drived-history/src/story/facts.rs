@@ -1,0 +1,184 @@
+//! What the file holds of a drive around a moment.
+
+use std::collections::BTreeSet;
+
+use rusqlite::Connection;
+use serde::Deserialize;
+
+use crate::{
+    quantity::Quantity,
+    read::{Filter, Found, pieces, records},
+    store::StoreError,
+};
+
+/// So long before a moment it is looked,
+pub(super) const BEFORE_MS: i64 = 10 * 60_000;
+/// and so long after.
+pub(super) const AFTER_MS: i64 = 10 * 60_000;
+/// So many records at the most: a plant that tells more in twenty minutes is told of in part, and it is said.
+const RECORDS: usize = 20_000;
+
+/// What is known around a moment.
+pub(super) struct Facts {
+    pub(super) drive: String,
+    pub(super) line: Option<String>,
+    pub(super) from: i64,
+    pub(super) to: i64,
+    /// Of the whole plant, in the daemon's order.
+    pub(super) records: Vec<Found>,
+    pub(super) is_cut: bool,
+    /// How much of the time something is known of the drive, from 0 to 1.
+    pub(super) known: f64,
+    /// Times in which nothing is, longer than a few polls.
+    pub(super) gaps: Vec<(i64, i64)>,
+}
+
+/// A gap that is told: shorter ones are lost polls.
+const GAP_MS: i64 = 5_000;
+
+impl Facts {
+    pub(super) fn gather(connection: &Connection, drive: &str, at: i64) -> Result<Self, StoreError> {
+        let (from, to) = (at - BEFORE_MS, at + AFTER_MS);
+        let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
+        let records = records(connection, &filter)?;
+        let of_drive = |found: &&Found| found.drive.as_deref() == Some(drive);
+        let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
+        let spans: Vec<(i64, i64)> = pieces(connection, drive, Quantity::STATE, from, to)?
+            .into_iter()
+            .flat_map(|piece| known_spans(&piece.closed()))
+            .collect();
+        let known: i64 = spans.iter().map(|(start, end)| end - start).sum();
+        let mut gaps = Vec::new();
+        let mut until = from;
+        for (start, end) in spans {
+            if start - until > GAP_MS {
+                gaps.push((until, start));
+            }
+            until = until.max(end);
+        }
+        if to - until > GAP_MS {
+            gaps.push((until, to));
+        }
+        let is_cut = records.len() >= RECORDS;
+        let known = known as f64 / (to - from) as f64;
+        Ok(Self { drive: drive.to_owned(), line, from, to, records, is_cut, known, gaps })
+    }
+
+    /// Whether a record is of this drive: what happened to it, or a command that was for it too.
+    pub(super) fn is_of_drive(&self, found: &Found) -> bool {
+        found.drive.as_deref() == Some(&*self.drive) || self.of_several(found).is_some()
+    }
+
+    /// What became of a command for several at this drive.
+    pub(super) fn of_several(&self, found: &Found) -> Option<OfOne> {
+        if found.kind != "command" || found.drive.is_some() {
+            return None;
+        }
+        let several: OfSeveral = serde_json::from_str(found.body.as_ref()?.get()).ok()?;
+        several.drives.into_iter().find(|one| one.drive.as_deref() == Some(&*self.drive))
+    }
+
+    /// The other drives of its line.
+    pub(super) fn neighbours(&self) -> BTreeSet<&str> {
+        let is_near = |found: &&Found| self.line.is_some() && found.line == self.line;
+        let names = self.records.iter().filter(is_near).filter_map(|found| found.drive.as_deref());
+        names.filter(|name| *name != self.drive).collect()
+    }
+
+    /// Events of this name at other drives, not farther from a moment than this.
+    pub(super) fn elsewhere(&self, what: &str, at: i64, within: i64) -> Vec<&Found> {
+        let is_one = |found: &&Found| {
+            found.kind == "event"
+                && found.what == what
+                && found.drive.as_deref().is_some_and(|drive| drive != self.drive)
+                && (found.time_unix_ms - at).abs() <= within
+        };
+        self.records.iter().filter(is_one).collect()
+    }
+}
+
+/// The times in which something is known, of points that end with nothing.
+fn known_spans(points: &[crate::column::Point]) -> Vec<(i64, i64)> {
+    let mut spans = Vec::new();
+    let mut since = None;
+    for point in points {
+        match (point.count, since) {
+            (Some(_), None) => since = Some(point.at),
+            (None, Some(start)) => {
+                spans.push((start, point.at - 1));
+                since = None;
+            }
+            _ => {}
+        }
+    }
+    spans
+}
+
+/// A command for several drives, as far as it is looked at here.
+#[derive(Debug, Deserialize)]
+struct OfSeveral {
+    #[serde(default)]
+    drives: Vec<OfOne>,
+}
+
+/// What became of it at one of them.
+#[derive(Debug, Deserialize)]
+pub(super) struct OfOne {
+    pub(super) drive: Option<String>,
+    pub(super) outcome: String,
+}
+
+/// An event as far as it is looked at here.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Body {
+    #[serde(default)]
+    pub(super) cause: Option<Cause>,
+    #[serde(default)]
+    pub(super) from: Option<String>,
+    #[serde(default)]
+    pub(super) to: Option<String>,
+    #[serde(default)]
+    pub(super) fault: Option<Fault>,
+    #[serde(default)]
+    pub(super) words: Vec<Word>,
+    #[serde(default)]
+    pub(super) last_known_unix_ms: Option<i64>,
+    #[serde(default)]
+    pub(super) outcome: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "by", rename_all = "snake_case")]
+pub(super) enum Cause {
+    Command {
+        commander: String,
+        #[serde(default)]
+        door: Option<String>,
+    },
+    Policy {
+        policy: String,
+    },
+    Drive,
+    Found,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Fault {
+    #[serde(default)]
+    pub(super) by_watchdog: bool,
+    #[serde(default)]
+    pub(super) found: bool,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Word {
+    pub(super) code: String,
+    pub(super) value: u16,
+    #[serde(default)]
+    pub(super) before: Option<u16>,
+}
+
+/// What the API told of it; nothing where that was not kept or is of another kind.
+pub(super) fn body(found: &Found) -> Body {
+    found.body.as_ref().and_then(|body| serde_json::from_str(body.get()).ok()).unwrap_or_default()
+}

@@ -1,0 +1,316 @@
+//! What goes wrong with a file, and what is lost then, counted.
+
+use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
+
+use drived_config::testing::Folder;
+use rusqlite::Connection;
+use tokio::sync::watch;
+
+use super::{BEGIN_MS, Pump, event, moment};
+use crate::{
+    quantity::Quantity,
+    read::{Filter, Found, History, records},
+    record::Moment,
+    store::{self, StoreError, schema},
+    write::{
+        Limits,
+        archive::Archive,
+        inbox::{Batch, Inbox, Lost},
+        tidy,
+        writer::{Health, Writer},
+    },
+};
+
+const HZ: Quantity = Quantity::OUTPUT_FREQUENCY;
+
+fn all(connection: &Connection) -> Vec<Found> {
+    let filter = Filter { from_ms: 0, to_ms: i64::MAX, limit: 1_000_000, ..Filter::default() };
+    records(connection, &filter).unwrap()
+}
+
+fn words(connection: &Connection) -> Vec<String> {
+    all(connection).into_iter().map(|found| found.what).collect()
+}
+
+#[test]
+fn a_newer_file_and_one_of_another_program_are_left_as_they_are() {
+    let folder = Folder::new("history-newer");
+    for (name, application, version) in
+        [("newer", schema::APPLICATION, schema::version() + 1), ("foreign", 0, 1)]
+    {
+        let path = folder.file(name);
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("CREATE TABLE theirs (a)").unwrap();
+        other.pragma_update(None, "application_id", application).unwrap();
+        other.pragma_update(None, "user_version", version).unwrap();
+        drop(other);
+        let before = fs::read(&path).unwrap();
+        let refused = store::open(&path).unwrap_err();
+        assert!(refused.is_lasting() && !refused.is_damage(), "{refused}");
+        assert!(History::open(&path).is_err());
+        assert_eq!(fs::read(&path).unwrap(), before);
+    }
+}
+
+#[test]
+fn a_second_daemon_is_refused_and_a_reader_is_not() {
+    let folder = Folder::new("history-two");
+    let path = folder.file("history.sqlite");
+    let first = store::open(&path).unwrap();
+    assert!(matches!(store::open(&path), Err(StoreError::InUse(_))));
+    assert!(History::open(&path).is_ok());
+    drop(first);
+    assert!(store::open(&path).is_ok());
+}
+
+#[test]
+fn a_damaged_file_is_put_aside_with_all_that_belongs_to_it() {
+    let folder = Folder::new("history-damaged");
+    let path = folder.file("history.sqlite");
+    fs::write(&path, vec![0x5A; 20_000]).unwrap();
+    let opened = store::open(&path).unwrap();
+    let (aside, _) = opened.aside.unwrap();
+    assert_eq!(fs::read(aside).unwrap(), vec![0x5A; 20_000]);
+    assert!(all(&opened.store.connection).is_empty());
+}
+
+#[test]
+fn a_run_that_was_killed_is_told_by_the_next_and_one_that_ended_is_not() {
+    let folder = Folder::new("history-killed");
+    let path = folder.file("history.sqlite");
+    for (is_ended, expected) in [(true, "began"), (false, "began"), (true, "began_after_kill")] {
+        let mut store = store::open(&path).unwrap().store;
+        let mut archive = Archive::begin(moment(0));
+        archive.begin_run(&mut store.connection, "test").unwrap();
+        let known: Vec<String> = words(&store.connection);
+        assert_eq!(known.last().map(String::as_str), Some(expected), "{known:?}");
+        archive.record(event(moment(5), "pump", "tripped"));
+        archive.write_records(&mut store.connection, moment(6)).unwrap();
+        if is_ended {
+            archive.end_run(&mut store.connection, moment(10)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_full_disk_loses_nothing_for_as_long_as_there_is_room_in_memory_and_counts_what_it_loses_then() {
+    let folder = Folder::new("history-full");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    // No page more than there is: what a full disk answers.
+    let pages: i64 = store.connection.pragma_query_value(None, "page_count", |row| row.get(0)).unwrap();
+    let set = |connection: &Connection, pages: i64| {
+        let _: i64 =
+            connection.pragma_update_and_check(None, "max_page_count", pages, |row| row.get(0)).unwrap();
+    };
+    set(&store.connection, pages);
+    let (mut steady, mut failed, mut readings) = (0, 0, 0);
+    while steady < 24 * 3_600_000 {
+        steady += 250;
+        // Every reading leaves the deadband.
+        pump.read(&mut archive, moment(steady), &[(HZ, if steady % 500 == 0 { 0 } else { 5_000 })]);
+        readings += 1;
+        if steady % 600_000 == 0 {
+            archive.record(event(moment(steady), "pump", &"x".repeat(3_000)));
+            failed += u32::from(archive.write_records(&mut store.connection, moment(steady)).is_err());
+        }
+        if archive.is_due(moment(steady)) {
+            archive.close(moment(steady));
+            failed += u32::from(archive.write_values(&mut store.connection).is_err());
+        }
+        assert!(archive.points() <= 260_000, "memory has a bound");
+    }
+    assert!(failed > 1_000, "{failed}");
+    let lost = archive.lost();
+    assert!(lost.values > 50_000 && lost.values < 120_000 && lost.records == 0, "{lost:?} of {readings}");
+    // There is room again.
+    set(&store.connection, i64::from(i32::MAX));
+    archive.write_records(&mut store.connection, moment(steady)).unwrap();
+    archive.write_values(&mut store.connection).unwrap();
+    let told = all(&store.connection);
+    assert_eq!(told.iter().filter(|found| found.drive.is_some()).count(), 144, "no record was lost");
+    let hole = told.iter().find(|found| found.what == "hole").unwrap();
+    assert!(hole.text.starts_with(&format!("{} readings and 0 records", lost.values)), "{}", hole.text);
+    // Each point that is not told as lost is there; each flush tells its first once more.
+    let points: Vec<_> = crate::read::pieces(&store.connection, "pump", HZ, 0, i64::MAX).unwrap();
+    let kept: usize = points.iter().map(|piece| piece.points.len()).sum();
+    assert!((kept as i64 + lost.values as i64 - readings).abs() < 1_000, "{kept} kept of {readings}");
+}
+
+#[test]
+fn what_no_room_was_for_is_a_record() {
+    let folder = Folder::new("history-hole");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let mut archive = Archive::begin(moment(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    archive.take(Batch { lost: Lost { values: 7, records: 2 }, ..Batch::default() }, moment(1_000));
+    archive.write_records(&mut store.connection, moment(3_000)).unwrap();
+    let told = all(&store.connection);
+    let hole = told.last().unwrap();
+    assert!(hole.alarm && hole.text.starts_with("7 readings and 2 records of the last 2 s"), "{}", hole.text);
+    archive.write_records(&mut store.connection, moment(4_000)).unwrap();
+    assert_eq!(all(&store.connection).len(), told.len(), "once");
+}
+
+#[test]
+fn a_clock_that_is_set_back_makes_two_tellings_of_one_time_in_the_order_of_the_daemons_own() {
+    let folder = Folder::new("history-clock");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    let back = 3_600_000;
+    for second in 0..1_200 {
+        let by = if second < 600 { 0 } else { back };
+        let now = Moment { steady_ms: second * 1_000, wall_ms: BEGIN_MS + second * 1_000 - by };
+        archive.look_at_clock(now);
+        pump.read(&mut archive, now, &[(HZ, second * 10)]);
+        if second % 300 == 0 {
+            archive.record(event(now, "pump", "event"));
+        }
+        archive.write_records(&mut store.connection, now).unwrap();
+    }
+    let end = Moment { steady_ms: 1_200_000, wall_ms: BEGIN_MS + 1_200_000 - back };
+    archive.end_run(&mut store.connection, end).unwrap();
+    while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
+    let told = all(&store.connection);
+    let steady: Vec<i64> = told.iter().map(|found| found.steady_ms).collect();
+    assert!(steady.is_sorted(), "{steady:?}");
+    let stepped: Vec<&Found> = told.iter().filter(|found| found.what == "clock_stepped").collect();
+    assert_eq!(stepped.len(), 1);
+    assert!(stepped[0].text.starts_with("the clock was set back by 3600.0 s"), "{}", stepped[0].text);
+    let pieces = crate::read::pieces(&store.connection, "pump", HZ, 0, i64::MAX).unwrap();
+    let spans: Vec<(i64, i64)> =
+        pieces.iter().map(|piece| (piece.start - BEGIN_MS, piece.end - BEGIN_MS)).collect();
+    assert_eq!(spans, [(0, 599_000), (599_000 - back, 1_199_000 - back)]);
+    let values: Vec<Option<i64>> =
+        pieces.iter().flat_map(|piece| &piece.points).map(|point| point.count).collect();
+    assert!(values.is_sorted(), "the later telling stands behind the earlier");
+}
+
+#[test]
+fn what_is_too_much_goes_and_what_is_finest_goes_first() {
+    let folder = Folder::new("history-size");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    let mut random = fastrand::Rng::with_seed(4);
+    for step in 1..200_000_i64 {
+        let now = moment(step * 1_000);
+        pump.read(&mut archive, now, &[(HZ, random.i64(0..5_000))]);
+        if archive.is_due(now) {
+            archive.close(now);
+        }
+    }
+    archive.record(event(moment(5), "pump", "tripped"));
+    archive.end_run(&mut store.connection, moment(200_000_000)).unwrap();
+    let end = BEGIN_MS + 210_000_000;
+    while tidy::compact(&mut store.connection, end).unwrap() {}
+    let count = |table: &str| -> i64 {
+        store.connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap()
+    };
+    let (hours, minutes, records) = (count("hour"), count("minute"), count("record"));
+    assert!(count("block") > 50 && hours > 50, "{} {hours}", count("block"));
+    let limits = Limits { bytes: 300_000, ..Limits::default() };
+    assert!(tidy::used_bytes(&store.connection).unwrap() > limits.bytes);
+    while tidy::trim(&store.connection, end, &limits).unwrap() {}
+    assert!(tidy::used_bytes(&store.connection).unwrap() <= limits.bytes);
+    assert!(count("block") < 50, "{}", count("block"));
+    assert_eq!((count("hour"), count("minute"), count("record")), (hours, minutes, records));
+    // By age.
+    while tidy::trim(&store.connection, end + Limits::default().years_ms, &Limits::default()).unwrap() {}
+    assert_eq!((count("block"), count("minute"), count("record")), (0, 0, 0));
+}
+
+/// A writer on a folder, with its inbox and its health.
+fn writer(path: std::path::PathBuf) -> (Inbox, watch::Receiver<Health>, std::thread::JoinHandle<()>) {
+    let (health, seen) = watch::channel(Health::Opening);
+    let (inbox, began) = (Inbox::default(), std::time::Instant::now());
+    let clock = move || moment(i64::try_from(began.elapsed().as_millis()).unwrap());
+    let writer = Writer { path, limits: Limits::default(), inbox: inbox.clone(), clock, health };
+    (inbox, seen, writer.start().unwrap())
+}
+
+async fn becomes(health: &mut watch::Receiver<Health>, is_so: fn(&Health) -> bool) {
+    tokio::time::timeout(Duration::from_secs(60), health.wait_for(is_so)).await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn a_folder_that_cannot_be_written_is_told_and_the_writer_goes_on_by_itself() {
+    let folder = Folder::new("history-readonly");
+    let (place, path) = (folder.file("place"), folder.file("place/history.sqlite"));
+    // Something else stands in the way of its folder: root may write into any.
+    fs::write(&place, "").unwrap();
+    let (inbox, mut health, thread) = writer(path.clone());
+    becomes(&mut health, |health| matches!(health, Health::Failing(_))).await;
+    inbox.record(event(moment(1), "pump", "tripped"));
+    fs::remove_file(&place).unwrap();
+    fs::create_dir(&place).unwrap();
+    fs::set_permissions(&place, fs::Permissions::from_mode(0o700)).unwrap();
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    inbox.end();
+    thread.join().unwrap();
+    let history = History::open(&path).unwrap();
+    assert_eq!(words(&history.0), ["began", "tripped", "ended"]);
+}
+
+#[tokio::test]
+async fn a_file_that_is_damaged_while_it_is_written_is_put_aside_and_a_new_one_begun() {
+    let folder = Folder::new("history-midway");
+    let path = folder.file("history.sqlite");
+    let (inbox, mut health, thread) = writer(path.clone());
+    inbox.record(event(moment(1), "pump", "tripped"));
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    // Somebody overwrites it: its pages, its log, and the index of that.
+    for ending in ["", "-wal", "-shm"] {
+        let file = folder.file(&format!("history.sqlite{ending}"));
+        let length = fs::metadata(&file).unwrap().len();
+        let open = fs::OpenOptions::new().write(true).open(&file).unwrap();
+        std::os::unix::fs::FileExt::write_all_at(&open, &vec![0x5A; usize::try_from(length).unwrap()], 0)
+            .unwrap();
+    }
+    let aside = || {
+        fs::read_dir(folder.file(""))
+            .unwrap()
+            .flatten()
+            .any(|entry| entry.file_name().to_string_lossy().contains(".damaged-"))
+    };
+    let mut number = 0;
+    while !aside() {
+        assert!(number < 200, "it is not noticed");
+        number += 1;
+        inbox.record(event(moment(number), "pump", "tripped"));
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    inbox.end();
+    thread.join().unwrap();
+    let told = words(&History::open(&path).unwrap().0);
+    assert!(told.contains(&"damaged".to_owned()) && told.contains(&"ended".to_owned()), "{told:?}");
+}
+
+#[test]
+fn frames_of_a_trip_are_kept_when_the_values_around_it_are_not() {
+    let folder = Folder::new("history-frame");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    for second in 1..400 {
+        let now = moment(second * 1_000);
+        pump.read(&mut archive, now, &[(HZ, second * 10)]);
+        if second == 200 {
+            archive.record(event(now, "pump", "tripped"));
+        }
+    }
+    archive.end_run(&mut store.connection, moment(400_000)).unwrap();
+    while crate::write::frames::fill(&mut store.connection, BEGIN_MS + 400_000).unwrap() {}
+    while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
+    while tidy::trim(&store.connection, BEGIN_MS + 60 * 86_400_000, &Limits::default()).unwrap() {}
+    assert_eq!(crate::read::pieces(&store.connection, "pump", HZ, 0, i64::MAX).unwrap(), []);
+    let frames = crate::read::frames(&store.connection, "pump", 0, i64::MAX).unwrap();
+    let [frame] = &frames[..] else { panic!("{frames:?}") };
+    assert_eq!((&*frame.why, frame.at_unix_ms), ("tripped", BEGIN_MS + 200_000));
+    let (quantity, piece) = &frame.curves[0];
+    assert_eq!((*quantity, piece.start, piece.end), (HZ, BEGIN_MS + 140_000, BEGIN_MS + 230_000));
+    assert_eq!(piece.points.len(), 91);
+}

@@ -1,0 +1,155 @@
+//! What waits for the writer: [`Inbox`], which takes or refuses at once, whatever the disk does.
+
+use std::{
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use crate::{
+    quantity::Set,
+    record::{LineMinute, Record},
+    tracker::Seen,
+};
+
+/// Sets of values that wait: of a thousand drives those of eight seconds.
+const VALUES: usize = 16_384;
+/// Records that wait.
+const RECORDS: usize = 2_048;
+
+/// What a drive has shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shown {
+    pub drive: Arc<str>,
+    pub set: Set,
+    pub seen: Seen,
+}
+
+/// What was taken out of the inbox at once.
+#[derive(Debug, Default)]
+pub struct Batch {
+    pub shown: Vec<Shown>,
+    pub records: Vec<Record>,
+    pub lines: Vec<LineMinute>,
+    pub lost: Lost,
+    pub is_end: bool,
+}
+
+/// How much could not be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lost {
+    /// Times at which a drive was read.
+    pub values: u64,
+    pub records: u64,
+}
+
+impl Lost {
+    #[must_use]
+    pub const fn is_nothing(&self) -> bool {
+        self.values == 0 && self.records == 0
+    }
+
+    pub const fn add(&mut self, other: Self) {
+        self.values += other.values;
+        self.records += other.records;
+    }
+}
+
+/// A cheap handle.
+#[derive(Debug, Clone, Default)]
+pub struct Inbox(Arc<Inner>);
+
+#[derive(Debug, Default)]
+struct Inner {
+    waiting: Mutex<Batch>,
+    rings: Condvar,
+}
+
+/// It was not taken, and is counted as lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Full;
+
+impl Inbox {
+    /// Takes what a drive has shown.
+    ///
+    /// # Errors
+    /// [`Full`]: what comes next has to begin anew.
+    pub fn show(&self, shown: Shown) -> Result<(), Full> {
+        let mut waiting = self.lock();
+        if waiting.shown.len() >= VALUES {
+            waiting.lost.values += 1;
+            return Err(Full);
+        }
+        waiting.shown.push(shown);
+        Ok(())
+    }
+
+    /// Takes a record, and wakes the writer for it.
+    pub fn record(&self, record: Record) {
+        let mut waiting = self.lock();
+        if waiting.records.len() >= RECORDS {
+            waiting.lost.records += 1;
+        } else {
+            waiting.records.push(record);
+            self.0.rings.notify_one();
+        }
+    }
+
+    /// Takes what was counted of a line within a minute.
+    pub fn line(&self, minute: LineMinute) {
+        let mut waiting = self.lock();
+        if waiting.lines.len() < RECORDS {
+            waiting.lines.push(minute);
+        }
+    }
+
+    /// Somebody has lost records before they came here.
+    pub fn lose_records(&self, records: u64) {
+        self.lock().lost.records += records;
+    }
+
+    /// Nothing comes any more.
+    pub fn end(&self) {
+        self.lock().is_end = true;
+        self.0.rings.notify_one();
+    }
+
+    /// What has come, after `patience` or as soon as a record is there.
+    #[must_use]
+    pub fn take(&self, patience: Duration) -> Batch {
+        let is_quiet = |waiting: &mut Batch| waiting.records.is_empty() && !waiting.is_end;
+        let waited = self.0.rings.wait_timeout_while(self.lock(), patience, is_quiet);
+        let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let is_end = waiting.is_end;
+        Batch { is_end, ..std::mem::replace(&mut *waiting, Batch { is_end, ..Batch::default() }) }
+    }
+
+    /// Lets what comes wait together for this long, unless nothing comes any more.
+    pub fn gather(&self, time: Duration) {
+        let waited = self.0.rings.wait_timeout_while(self.lock(), time, |waiting| !waiting.is_end);
+        drop(waited);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Batch> {
+        self.0.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_it_has_no_room_for_is_counted_and_nobody_waits() {
+        let inbox = Inbox::default();
+        let seen = Seen { at: 0, is_after_gap: true, changed: Vec::new() };
+        let shown = Shown { drive: "pump".into(), set: Set::Status, seen };
+        for _ in 0..VALUES {
+            assert_eq!(inbox.show(shown.clone()), Ok(()));
+        }
+        assert_eq!(inbox.show(shown.clone()), Err(Full));
+        let batch = inbox.take(Duration::ZERO);
+        assert_eq!((batch.shown.len(), batch.lost), (VALUES, Lost { values: 1, records: 0 }));
+        assert_eq!(inbox.show(shown), Ok(()));
+        assert!(inbox.take(Duration::ZERO).lost.is_nothing(), "it is told once");
+    }
+}

@@ -1,0 +1,10 @@
+//! The writing half: what the daemon tells is [taken](inbox) without waiting, [gathered](archive) in memory, and written by one thread.
+
+pub mod archive;
+pub mod frames;
+pub mod inbox;
+mod limits;
+pub mod tidy;
+pub mod writer;
+
+pub use self::limits::Limits;

@@ -1,0 +1,223 @@
+//! What is done with the file beside writing: an hour that is over becomes blocks and steps, and what is too old or too much goes.
+
+use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
+
+use super::Limits;
+use crate::{
+    chunk::Chunk,
+    column::pack,
+    curve::{Piece, Step, Steps, joined},
+    quantity::Quantity,
+    read::{SOURCE_BITS, pack_minutes},
+    store::StoreError,
+};
+
+const MINUTE_MS: i64 = 60_000;
+const HOUR_MS: i64 = 3_600_000;
+/// So many rows go at once, so that nothing else waits for long.
+const AT_ONCE: i64 = 500;
+
+/// Makes blocks of one source of the oldest hour that is over; gives whether there may be more.
+///
+/// # Errors
+/// It cannot be read or written.
+pub fn compact(connection: &mut Connection, now_ms: i64) -> Result<bool, StoreError> {
+    let Some(hour) = Hour::oldest(connection, now_ms)? else { return Ok(false) };
+    let first = hour.flushes.first().copied().unwrap_or_default();
+    let last = hour.flushes.last().copied().unwrap_or_default();
+    let within = [first << SOURCE_BITS, (last + 1) << SOURCE_BITS];
+    let transaction = connection.transaction()?;
+    let next: Option<i64> = transaction
+        .query_row("SELECT id FROM chunk WHERE id >= ?1 AND id < ?2 LIMIT 1", within, |row| row.get(0))
+        .optional()?;
+    match next {
+        Some(chunk) => hour.compact(&transaction, chunk & ((1 << SOURCE_BITS) - 1))?,
+        None => {
+            transaction.execute("DELETE FROM flush WHERE id BETWEEN ?1 AND ?2", [first, last])?;
+        }
+    }
+    transaction.commit()?;
+    Ok(true)
+}
+
+/// The flushes that begin in one hour by one clock.
+struct Hour {
+    segment: i64,
+    flushes: Vec<i64>,
+}
+
+impl Hour {
+    fn oldest(connection: &Connection, now_ms: i64) -> Result<Option<Self>, StoreError> {
+        let mut find =
+            connection.prepare_cached("SELECT id, segment, start_ms FROM flush ORDER BY id LIMIT 4000")?;
+        let mut rows = find.query([])?;
+        let mut hour: Option<(Self, i64)> = None;
+        while let Some(row) = rows.next()? {
+            let (id, segment, start): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(2)?);
+            let begins = start - start.rem_euclid(HOUR_MS);
+            match &mut hour {
+                None => hour = Some((Self { segment, flushes: vec![id] }, begins)),
+                Some((known, of)) if known.segment == segment && *of == begins => known.flushes.push(id),
+                // Something came after it: it is over.
+                Some(_) => return Ok(hour.map(|(hour, _)| hour)),
+            }
+        }
+        Ok(hour.filter(|(_, begins)| begins + HOUR_MS + MINUTE_MS <= now_ms).map(|(hour, _)| hour))
+    }
+
+    fn compact(&self, transaction: &Transaction<'_>, source: i64) -> Result<(), StoreError> {
+        let mut chunks = Vec::new();
+        {
+            let mut find =
+                transaction.prepare_cached("SELECT start_ms, end_ms, data FROM chunk WHERE id = ?1")?;
+            let mut delete = transaction.prepare_cached("DELETE FROM chunk WHERE id = ?1")?;
+            for flush in &self.flushes {
+                let id = (flush << SOURCE_BITS) | source;
+                let chunk: Option<(i64, i64, Vec<u8>)> =
+                    find.query_row([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).optional()?;
+                if let Some((start, end, data)) = chunk {
+                    chunks.push(Chunk::unpacked(start, end, &data)?);
+                    delete.execute([id])?;
+                }
+            }
+        }
+        let quantities: std::collections::BTreeSet<Quantity> =
+            chunks.iter().flat_map(|chunk| chunk.columns.keys().copied()).collect();
+        for quantity in quantities {
+            let pieces = chunks.iter().map(|chunk| Piece {
+                start: chunk.start,
+                end: chunk.end,
+                points: chunk.columns.get(&quantity).cloned().unwrap_or_default(),
+            });
+            // What stood still for more than an hour before is no part of a block of this one.
+            for piece in joined(pieces).into_iter().flat_map(short) {
+                self.write(transaction, source, quantity, piece)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        transaction: &Transaction<'_>,
+        source: i64,
+        quantity: Quantity,
+        piece: Piece,
+    ) -> Result<(), StoreError> {
+        let points = i64::try_from(piece.points.len()).unwrap_or(i64::MAX);
+        transaction
+            .prepare_cached(
+                "INSERT INTO block (source, quantity, segment, start_ms, end_ms, points, data)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+            )?
+            .execute(params![
+                source,
+                quantity.0,
+                self.segment,
+                piece.start,
+                piece.end,
+                points,
+                pack(piece.start, &piece.points),
+            ])?;
+        if !quantity.is_number() {
+            return Ok(());
+        }
+        let (mut minutes, mut hours) = (Steps::of(MINUTE_MS), Steps::of(HOUR_MS));
+        minutes.add(piece.clone());
+        hours.add(piece);
+        let minutes: Vec<(i64, Step)> = minutes.all.into_iter().collect();
+        if let Some((start, _)) = minutes.first() {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)",
+                )?
+                .execute(params![source, quantity.0, start, pack_minutes(*start, &minutes)])?;
+        }
+        for (start, step) in hours.all {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO hour (source, quantity, start_ms, least, mean, greatest, known_ms)
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)
+                     ON CONFLICT DO UPDATE SET
+                        least = min(least, excluded.least), greatest = max(greatest, excluded.greatest),
+                        mean = CASE known_ms + excluded.known_ms WHEN 0 THEN (mean + excluded.mean) / 2
+                            ELSE (mean * known_ms + excluded.mean * excluded.known_ms) / (known_ms + excluded.known_ms) END,
+                        known_ms = known_ms + excluded.known_ms",
+                )?
+                .execute(params![
+                    source,
+                    quantity.0,
+                    start,
+                    step.least,
+                    step.mean,
+                    step.greatest,
+                    step.known_ms
+                ])?;
+        }
+        Ok(())
+    }
+}
+
+/// Parts of a piece that are no longer than a block may be.
+fn short(piece: Piece) -> Vec<Piece> {
+    let mut parts = Vec::new();
+    let mut start = piece.start;
+    loop {
+        let end = (start - start.rem_euclid(HOUR_MS) + HOUR_MS).min(piece.end);
+        parts.extend(piece.clone().between(start, end).filter(|part| !part.points.is_empty()));
+        if end >= piece.end {
+            return parts;
+        }
+        start = end;
+    }
+}
+
+/// Takes away some of what is too old, or, where the file is too large, of what is oldest; gives whether there may be more.
+///
+/// # Errors
+/// It cannot be read or written.
+pub fn trim(connection: &Connection, now_ms: i64, limits: &Limits) -> Result<bool, StoreError> {
+    let old = [
+        ("block", "end_ms", limits.polled_ms),
+        ("minute", "start_ms", limits.minutes_ms),
+        ("record", "wall_ms", limits.years_ms),
+        ("frame", "at_ms", limits.years_ms),
+    ];
+    let mut gone = 0;
+    for (table, column, age) in old {
+        gone += trim_table(connection, table, &format!("{column} < {}", now_ms.saturating_sub(age)))?;
+    }
+    gone += connection
+        .execute("DELETE FROM line_minute WHERE wall_ms < ?1", [now_ms.saturating_sub(limits.minutes_ms)])?;
+    if used_bytes(connection)? > limits.bytes {
+        // What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
+        for table in ["block", "minute"] {
+            gone += trim_table(connection, table, "1")?;
+            if gone > 0 {
+                return Ok(true);
+            }
+        }
+        gone +=
+            connection.execute("DELETE FROM hour WHERE start_ms = (SELECT min(start_ms) FROM hour)", [])?;
+        gone += trim_table(connection, "record", "1")?;
+    }
+    connection.execute("DELETE FROM frame_block WHERE frame NOT IN (SELECT id FROM frame)", [])?;
+    Ok(gone > 0)
+}
+
+/// The oldest rows of a table, as far as they are so.
+fn trim_table(connection: &Connection, table: &str, so: &str) -> Result<usize, StoreError> {
+    let sql = format!(
+        "DELETE FROM {table} WHERE id IN (SELECT id FROM (SELECT * FROM {table} ORDER BY id LIMIT {AT_ONCE}) WHERE {so})"
+    );
+    Ok(connection.prepare_cached(&sql)?.execute([])?)
+}
+
+/// How much of the file is in use.
+///
+/// # Errors
+/// It cannot be read.
+pub fn used_bytes(connection: &Connection) -> Result<i64, StoreError> {
+    let number = |name| connection.pragma_query_value(None, name, |row| row.get::<_, i64>(0));
+    Ok((number("page_count")? - number("freelist_count")?) * number("page_size")?)
+}

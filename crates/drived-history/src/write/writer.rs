@@ -1,0 +1,176 @@
+//! The one thread that writes. Whatever the disk does, nobody waits for it.
+
+use std::{
+    path::PathBuf,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use tokio::sync::watch;
+
+use super::{Limits, archive::Archive, frames, inbox::Inbox, tidy};
+use crate::{
+    record::{Moment, Record},
+    store::{self, Store, StoreError},
+};
+
+/// Between two looks at what has come. A record is written at once, and no second one within this time.
+const LOOK: Duration = Duration::from_millis(500);
+/// Before a file that cannot be written is tried again.
+const TRIED_AGAIN: Duration = Duration::from_secs(2);
+/// For so long at a time the file is tidied before anything else is looked at.
+const TIDIED: Duration = Duration::from_millis(200);
+
+/// Whether it is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Health {
+    /// It has not been opened yet.
+    Opening,
+    /// It is.
+    Writing,
+    /// It is not: why.
+    Failing(String),
+}
+
+/// What a writer is given.
+pub struct Writer<C> {
+    pub path: PathBuf,
+    pub limits: Limits,
+    pub inbox: Inbox,
+    /// Both clocks.
+    pub clock: C,
+    pub health: watch::Sender<Health>,
+}
+
+impl<C: Fn() -> Moment + Send + 'static> Writer<C> {
+    /// Begins to write, until the inbox ends.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(self) -> std::io::Result<JoinHandle<()>> {
+        std::thread::Builder::new().name("history".to_owned()).spawn(move || Work::new(self).run())
+    }
+}
+
+struct Work<C> {
+    writer: Writer<C>,
+    archive: Archive,
+    store: Option<Store>,
+    tried: Option<Instant>,
+    /// It is not tried again before somebody does something about the file.
+    is_given_up: bool,
+    has_to_tidy: bool,
+}
+
+impl<C: Fn() -> Moment> Work<C> {
+    fn new(writer: Writer<C>) -> Self {
+        let archive = Archive::begin((writer.clock)());
+        Self { writer, archive, store: None, tried: None, is_given_up: false, has_to_tidy: true }
+    }
+
+    fn run(mut self) {
+        loop {
+            let began = Instant::now();
+            let batch = self.writer.inbox.take(LOOK);
+            let (now, is_end) = ((self.writer.clock)(), batch.is_end);
+            self.archive.take(batch, now);
+            self.archive.look_at_clock(now);
+            if is_end || self.archive.is_due(now) {
+                self.archive.close(now);
+                self.has_to_tidy = true;
+            }
+            let may_try = self.tried.is_none_or(|tried| tried.elapsed() >= TRIED_AGAIN) || is_end;
+            if may_try && !self.is_given_up {
+                let worked = self.work(now, is_end);
+                self.tell(worked);
+            }
+            if is_end {
+                return;
+            }
+            // Records that come one by one are written together.
+            self.writer.inbox.gather(LOOK.saturating_sub(began.elapsed()));
+        }
+    }
+
+    fn work(&mut self, now: Moment, is_end: bool) -> Result<(), StoreError> {
+        let mut store = match self.store.take() {
+            Some(store) => store,
+            None => self.open(now)?,
+        };
+        let connection = &mut store.connection;
+        let written = (|| {
+            if self.archive.has_records() {
+                self.archive.write_records(connection, now)?;
+            }
+            self.archive.write_values(connection)?;
+            if is_end {
+                return self.archive.end_run(connection, now);
+            }
+            let began = Instant::now();
+            while self.has_to_tidy && began.elapsed() < TIDIED {
+                self.has_to_tidy = frames::fill(connection, now.wall_ms.saturating_sub(60_000))?
+                    || tidy::compact(connection, now.wall_ms)?
+                    || tidy::trim(connection, now.wall_ms, &self.writer.limits)?;
+            }
+            Ok(())
+        })();
+        if let Err(error) = &written
+            && error.is_damage()
+        {
+            drop(store);
+            let aside = store::put_aside(&self.writer.path)?;
+            self.tell_aside(&aside, &error.to_string(), now);
+            self.archive.begin_file(now);
+            return Err(StoreError::Damaged(error.to_string()));
+        }
+        self.store = Some(store);
+        written
+    }
+
+    fn open(&mut self, now: Moment) -> Result<Store, StoreError> {
+        let mut opened = store::open(&self.writer.path)?;
+        if let Some((aside, why)) = &opened.aside {
+            self.tell_aside(aside, why, now);
+        }
+        self.archive
+            .begin_run(&mut opened.store.connection, concat!("drived ", env!("CARGO_PKG_VERSION")))?;
+        Ok(opened.store)
+    }
+
+    fn tell_aside(&mut self, aside: &std::path::Path, why: &str, now: Moment) {
+        let text = format!(
+            "the history was damaged ({why}): it is in {} now, and a new one was begun",
+            aside.display()
+        );
+        tracing::error!("{text}");
+        self.archive.record(Record { is_alarm: true, ..Record::of_history(now, "damaged", text) });
+    }
+
+    /// Says whether it is written, once each time that changes.
+    fn tell(&mut self, worked: Result<(), StoreError>) {
+        let health = match worked {
+            Ok(()) => {
+                self.tried = None;
+                Health::Writing
+            }
+            Err(error) => {
+                self.tried = Some(Instant::now());
+                self.is_given_up = error.is_lasting();
+                // What is begun anew is tried at once.
+                if matches!(error, StoreError::Damaged(_)) {
+                    self.tried = None;
+                }
+                Health::Failing(error.to_string())
+            }
+        };
+        let is_other = |known: &Health| std::mem::discriminant(known) != std::mem::discriminant(&health);
+        if is_other(&self.writer.health.borrow()) {
+            match &health {
+                Health::Failing(why) => tracing::error!("the history cannot be written: {why}"),
+                Health::Writing => tracing::info!("the history is written to {}", self.writer.path.display()),
+                Health::Opening => {}
+            }
+            self.writer.health.send_replace(health);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Moments as a person says them: `03:12`, `yesterday 03:12`, `2026-11-21 03:12`, `2026-11-21T03:12:00+01:00`, `now`.
+
+use chrono::{DateTime, Days, LocalResult, NaiveDateTime, NaiveTime, TimeZone};
+
+/// A moment that somebody has said.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Said<Tz: TimeZone> {
+    pub at: DateTime<Tz>,
+    /// The same time of the day was there once more: in autumn an hour comes twice, and the first is meant unless it is said otherwise.
+    pub again: Option<DateTime<Tz>>,
+}
+
+/// A text that is no moment.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NoMoment {
+    #[error(
+        "{0:?}: expected 03:12, \"yesterday 03:12\", \"2026-11-21 03:12\", 2026-11-21T03:12:00+01:00 or now"
+    )]
+    Unread(String),
+    #[error("{0} did not exist here: the clocks were put forward over it")]
+    LeftOut(NaiveDateTime),
+}
+
+/// Reads a moment. A time without a day is the last one that has been.
+///
+/// # Errors
+/// [`NoMoment`]: it is none.
+pub fn said<Tz: TimeZone>(text: &str, now: &DateTime<Tz>) -> Result<Said<Tz>, NoMoment> {
+    let text = text.trim();
+    if let Ok(whole) = DateTime::parse_from_rfc3339(text) {
+        return Ok(Said { at: whole.with_timezone(&now.timezone()), again: None });
+    }
+    if text == "now" {
+        return Ok(Said { at: now.clone(), again: None });
+    }
+    let local = local(text, now.naive_local()).ok_or_else(|| NoMoment::Unread(text.to_owned()))?;
+    match now.timezone().from_local_datetime(&local) {
+        LocalResult::Single(at) => Ok(Said { at, again: None }),
+        LocalResult::Ambiguous(at, again) => Ok(Said { at, again: Some(again) }),
+        LocalResult::None => Err(NoMoment::LeftOut(local)),
+    }
+}
+
+fn local(text: &str, now: NaiveDateTime) -> Option<NaiveDateTime> {
+    let whole = ["%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%S%.f"];
+    if let Some(whole) = whole.into_iter().find_map(|form| NaiveDateTime::parse_from_str(text, form).ok()) {
+        return Some(whole);
+    }
+    let (day, time) = match text.split_once(char::is_whitespace) {
+        Some((day @ ("today" | "yesterday"), time)) => (Some(day), time.trim_start()),
+        Some(_) => return None,
+        None => (None, text),
+    };
+    let time =
+        ["%H:%M", "%H:%M:%S%.f"].into_iter().find_map(|form| NaiveTime::parse_from_str(time, form).ok())?;
+    let today = now.date().and_time(time);
+    match day {
+        Some("yesterday") => today.checked_sub_days(Days::new(1)),
+        None if today > now => today.checked_sub_days(Days::new(1)),
+        _ => Some(today),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use chrono::{FixedOffset, NaiveDate, Offset as _};
+
+    use super::*;
+
+    /// Paris in 2026: the clocks go forward on 29 March at 02:00, and back on 25 October at 03:00.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Paris;
+
+    fn at(month: u32, day: u32, hour: u32, minute: u32) -> NaiveDateTime {
+        NaiveDate::from_ymd_opt(2026, month, day).unwrap().and_hms_opt(hour, minute, 0).unwrap()
+    }
+
+    fn hours(hours: i32) -> FixedOffset {
+        FixedOffset::east_opt(hours * 3_600).unwrap()
+    }
+
+    impl TimeZone for Paris {
+        type Offset = FixedOffset;
+
+        fn from_offset(_: &FixedOffset) -> Self {
+            Self
+        }
+
+        fn offset_from_local_date(&self, day: &NaiveDate) -> LocalResult<FixedOffset> {
+            self.offset_from_local_datetime(&day.and_time(NaiveTime::MIN))
+        }
+
+        fn offset_from_local_datetime(&self, local: &NaiveDateTime) -> LocalResult<FixedOffset> {
+            let (winter, summer) = (hours(1), hours(2));
+            match *local {
+                local if local < at(3, 29, 2, 0) || local >= at(10, 25, 3, 0) => LocalResult::Single(winter),
+                local if local < at(3, 29, 3, 0) => LocalResult::None,
+                local if local < at(10, 25, 2, 0) => LocalResult::Single(summer),
+                _ => LocalResult::Ambiguous(summer, winter),
+            }
+        }
+
+        fn offset_from_utc_date(&self, day: &NaiveDate) -> FixedOffset {
+            self.offset_from_utc_datetime(&day.and_time(NaiveTime::MIN))
+        }
+
+        fn offset_from_utc_datetime(&self, utc: &NaiveDateTime) -> FixedOffset {
+            let is_summer = *utc >= at(3, 29, 1, 0) && *utc < at(10, 25, 1, 0);
+            hours(if is_summer { 2 } else { 1 })
+        }
+    }
+
+    fn read(text: &str, now: NaiveDateTime) -> Result<(String, Option<String>), NoMoment> {
+        let now = Paris.from_local_datetime(&now).earliest().unwrap();
+        said(text, &now).map(|said| (said.at.to_rfc3339(), said.again.map(|again| again.to_rfc3339())))
+    }
+
+    #[test]
+    fn a_moment_is_read_as_a_person_says_it() {
+        let now = at(11, 21, 9, 0);
+        for (text, expected) in [
+            ("03:12", "2026-11-21T03:12:00+01:00"),
+            ("23:10:05", "2026-11-20T23:10:05+01:00"),
+            ("yesterday 03:12", "2026-11-20T03:12:00+01:00"),
+            ("today 23:00", "2026-11-21T23:00:00+01:00"),
+            ("2026-07-01 03:12", "2026-07-01T03:12:00+02:00"),
+            ("2026-07-01T03:12", "2026-07-01T03:12:00+02:00"),
+            ("2026-11-21T03:12:00Z", "2026-11-21T04:12:00+01:00"),
+            ("now", "2026-11-21T09:00:00+01:00"),
+        ] {
+            assert_eq!(read(text, now), Ok((expected.to_owned(), None)), "{text}");
+        }
+        for text in ["soon", "tomorrow 03:12", "25:00", "2026-13-01 03:12", ""] {
+            assert_eq!(read(text, now), Err(NoMoment::Unread(text.to_owned())));
+        }
+    }
+
+    #[test]
+    fn the_hour_that_comes_twice_is_told_and_the_one_that_is_left_out_refused() {
+        let (first, again) = ("2026-10-25T02:30:00+02:00".to_owned(), "2026-10-25T02:30:00+01:00".to_owned());
+        assert_eq!(read("2026-10-25 02:30", at(11, 1, 9, 0)), Ok((first, Some(again))));
+        assert_eq!(read("2026-03-29 02:30", at(11, 1, 9, 0)), Err(NoMoment::LeftOut(at(3, 29, 2, 30))));
+        assert_eq!(Paris.offset_from_utc_datetime(&at(7, 1, 0, 0)).fix(), hours(2));
+    }
+}

@@ -1,0 +1,352 @@
+//! `drived history`: what a drive did between two moments, read from the black box, beside a running daemon or without one.
+
+use std::path::PathBuf;
+
+use chrono::{DateTime, Local};
+use drived_file::Config;
+use drived_history::{
+    config::HistoryConfig,
+    curve::Piece,
+    quantity::{Quantity, TABLE},
+    read::{self, Filter, Found, History, Told},
+    store::StoreError,
+};
+use drived_words::{
+    duration::Time,
+    failure::Failure,
+    moment,
+    output::{self, JsonArgs, Table},
+};
+use serde_json::json;
+
+/// Show what a drive did, and what happened to it, between two moments
+///
+/// It is read from the history that the daemon keeps, whether that runs or not. A value is told from when it was read to when it was read
+/// again or was too old; where nothing was known there is nothing. Times are those of this machine's zone; where the clock goes back in
+/// autumn the first of the two hours is meant, unless the time has its offset: 2026-10-25T02:30:00+01:00.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The drive
+    #[arg(value_name = "NAME")]
+    name: String,
+    /// From when: 03:12, "yesterday 03:12", "2026-11-21 03:12"; half an hour ago unless it is said
+    #[arg(long, value_name = "TIME")]
+    from: Option<String>,
+    /// Until when; now unless it is said
+    #[arg(long, value_name = "TIME", conflicts_with = "lasts")]
+    to: Option<String>,
+    /// For how long, from then on: 30min, 2h, 90d
+    #[arg(long = "for", value_name = "TIME")]
+    lasts: Option<Time>,
+    /// Which value, again for each: output_frequency_hz, current_a, state, and so on
+    #[arg(long = "value", value_name = "NAME")]
+    values: Vec<String>,
+    /// In steps of this length, each with its least, mean and greatest
+    #[arg(long, value_name = "TIME")]
+    every: Option<Time>,
+    /// Print comma-separated values, one value or step a line, and nothing of what happened
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    #[command(flatten)]
+    place: HistoryArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+/// Where the history is.
+#[derive(Debug, clap::Args)]
+pub(crate) struct HistoryArgs {
+    /// The configuration, whose state folder keeps the history
+    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
+    config: PathBuf,
+    /// The file of the history itself, wherever it is
+    #[arg(long, value_name = "FILE", conflicts_with = "config")]
+    file: Option<PathBuf>,
+}
+
+impl HistoryArgs {
+    /// Opens it, where it has something of this drive.
+    pub(crate) fn open(&self, drive: &str) -> Result<History, Failure> {
+        let history = History::open(&self.path()?).map_err(failed)?;
+        let known = read::drives(&history.0).map_err(failed)?;
+        match known.iter().any(|name| name == drive) {
+            true => Ok(history),
+            false => {
+                let known = if known.is_empty() { "none yet".to_owned() } else { known.join(", ") };
+                Err(Failure::Input(format!("the history has nothing of a drive {drive:?}: it has {known}")))
+            }
+        }
+    }
+
+    fn path(&self) -> Result<PathBuf, Failure> {
+        if let Some(file) = &self.file {
+            return Ok(file.clone());
+        }
+        let config = Config::load(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
+        let face = config.face("history").and_then(drived_history::config_of);
+        let file = face.and_then(|HistoryConfig { file, .. }| file.clone());
+        file.ok_or_else(|| {
+            Failure::Input(format!("{}: no history is kept by this configuration", self.config.display()))
+        })
+    }
+}
+
+pub(crate) fn failed(error: StoreError) -> Failure {
+    Failure::Input(error.to_string())
+}
+
+/// A moment that somebody has said, in milliseconds since 1970; an hour that comes twice is told.
+pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
+    let said = moment::said(text, &Local::now()).map_err(|error| Failure::Input(error.to_string()))?;
+    if let Some(again) = said.again {
+        output::complain(format_args!(
+            "{text} was twice: {} is meant; for the second write {}",
+            said.at.to_rfc3339(),
+            again.to_rfc3339()
+        ));
+    }
+    Ok(said.at.timestamp_millis())
+}
+
+/// A moment as a person reads it, with the zone's offset.
+pub(crate) fn said(unix_ms: i64) -> String {
+    local(unix_ms)
+        .map_or_else(|| unix_ms.to_string(), |time| time.format("%Y-%m-%d %H:%M:%S%.3f").to_string())
+}
+
+pub(crate) fn offset(unix_ms: i64) -> String {
+    local(unix_ms).map(|time| format!("UTC{}", time.format("%:z"))).unwrap_or_default()
+}
+
+fn local(unix_ms: i64) -> Option<DateTime<Local>> {
+    DateTime::from_timestamp_millis(unix_ms).map(|time| time.with_timezone(&Local))
+}
+
+/// What is shown to a person who has not said which values.
+const SHOWN: [Quantity; 5] =
+    [Quantity::STATE, Quantity::OUTPUT_FREQUENCY, Quantity::SETPOINT, Quantity::CURRENT, Quantity::TORQUE];
+/// So many rows of values a person is shown at the most, unless the steps are said.
+const ROWS: i64 = 40;
+/// So many records are read at once.
+const AT_ONCE: usize = 1_000;
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let now = Local::now().timestamp_millis();
+    let from = args.from.as_ref().map_or(Ok(now - 1_800_000), |text| moment_of(text))?;
+    let to = match (&args.to, args.lasts) {
+        (Some(to), _) => moment_of(to)?,
+        (None, Some(Time(lasts))) => {
+            from.saturating_add(i64::try_from(lasts.as_millis()).unwrap_or(i64::MAX))
+        }
+        (None, None) => now,
+    };
+    if to < from {
+        return Err(Failure::Input(format!(
+            "{} is before {}: expected a time that ends after it begins",
+            said(to),
+            said(from)
+        )));
+    }
+    let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
+    let history = args.place.open(&args.name)?;
+    let asked = Asked { drive: &args.name, from, to, history: &history };
+    match (args.csv, args.json.is_json()) {
+        (true, _) => asked.csv(&quantities, args.every),
+        (_, true) => asked.json(&quantities, args.every),
+        _ => asked.show(&quantities, args.every),
+    }
+}
+
+fn named(name: &str) -> Result<Quantity, Failure> {
+    Quantity::named(name).ok_or_else(|| {
+        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
+        Failure::Input(format!("{name:?} is no value: expected one of {}, or word_ADDRESS", names.join(", ")))
+    })
+}
+
+struct Asked<'a> {
+    drive: &'a str,
+    from: i64,
+    to: i64,
+    history: &'a History,
+}
+
+impl Asked<'_> {
+    fn pieces(&self, quantity: Quantity) -> Result<Vec<Piece>, Failure> {
+        read::pieces(&self.history.0, self.drive, quantity, self.from, self.to).map_err(failed)
+    }
+
+    fn steps(&self, quantity: Quantity, length_ms: i64) -> Result<Vec<Told>, Failure> {
+        read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms).map_err(failed)
+    }
+
+    /// Those that are meant, or all of which there is something.
+    fn meant(&self, quantities: &[Quantity]) -> Result<Vec<Quantity>, Failure> {
+        if !quantities.is_empty() {
+            return Ok(quantities.to_vec());
+        }
+        let all = read::quantities(&self.history.0, self.drive, self.from, self.to).map_err(failed)?;
+        Ok(match all.is_empty() {
+            // What is kept in steps alone has its names nowhere else.
+            true => (0..u32::try_from(TABLE.len()).unwrap_or_default()).map(Quantity).collect(),
+            false => all.into_iter().collect(),
+        })
+    }
+
+    /// All that happened, some at a time.
+    fn each_record(&self, mut each: impl FnMut(&Found) -> Result<(), Failure>) -> Result<(), Failure> {
+        let mut after = 0;
+        loop {
+            let filter = Filter {
+                from_ms: self.from,
+                to_ms: self.to,
+                drive: Some(self.drive),
+                limit: AT_ONCE,
+                after,
+                ..Filter::default()
+            };
+            let found = read::records(&self.history.0, &filter).map_err(failed)?;
+            found.iter().try_for_each(&mut each)?;
+            match found.last() {
+                Some(last) if found.len() == AT_ONCE => after = last.number,
+                _ => return Ok(()),
+            }
+        }
+    }
+
+    fn csv(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
+        match every {
+            None => output::say_as_it_is("time,time_unix_ms,value,is")?,
+            Some(_) => output::say_as_it_is("time,time_unix_ms,value,least,mean,greatest,known")?,
+        }
+        for quantity in self.meant(quantities)? {
+            match every {
+                None => {
+                    for piece in self.pieces(quantity)? {
+                        for point in piece.closed() {
+                            let is = point.count.map(|count| quantity.text(count)).unwrap_or_default();
+                            output::say_as_it_is(format_args!(
+                                "{},{},{quantity},{is}",
+                                whole(point.at),
+                                point.at
+                            ))?;
+                        }
+                    }
+                }
+                Some(every) => {
+                    for step in self.steps(quantity, length(every))? {
+                        let Told { start_unix_ms, least, mean, greatest, known } = step;
+                        output::say_as_it_is(format_args!(
+                            "{},{start_unix_ms},{quantity},{least},{mean:.3},{greatest},{known:.4}",
+                            whole(start_unix_ms)
+                        ))?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn json(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
+        for quantity in self.meant(quantities)? {
+            let name = quantity.to_string();
+            match every {
+                None => {
+                    for point in self.pieces(quantity)?.into_iter().flat_map(Piece::closed) {
+                        let is = point.count.map(|count| match quantity.is_number() {
+                            true => json!(quantity.value(count as f64)),
+                            false => json!(quantity.text(count)),
+                        });
+                        output::say_as_it_is(json!({ "time_unix_ms": point.at, "value": name, "is": is }))?;
+                    }
+                }
+                Some(every) => {
+                    for step in self.steps(quantity, length(every))? {
+                        output::say_as_it_is(json!({ "value": name, "step": step }))?;
+                    }
+                }
+            }
+        }
+        self.each_record(|found| output::say_as_it_is(json!(found)))
+    }
+
+    fn show(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
+        let (from, to) = (self.from, self.to);
+        output::say(format_args!("{}, {} to {} ({})", self.drive, said(from), said(to), offsets(from, to)))?;
+        let quantities = if quantities.is_empty() { SHOWN.to_vec() } else { quantities.to_vec() };
+        let length = every.map_or_else(|| step(to - from), length);
+        let mut rows: std::collections::BTreeMap<i64, Vec<Option<Told>>> = std::collections::BTreeMap::new();
+        for (place, quantity) in quantities.iter().enumerate() {
+            for told in self.steps(*quantity, length)? {
+                let row = rows.entry(told.start_unix_ms).or_insert_with(|| vec![None; quantities.len()]);
+                row[place] = Some(told);
+            }
+        }
+        if rows.is_empty() {
+            output::say("no values are known of that time")?;
+        } else {
+            let heads = quantities.iter().map(ToString::to_string).chain(["known".to_owned()]);
+            let mut table = Table::headed(["from".to_owned()].into_iter().chain(heads));
+            for (start, told) in &rows {
+                let known = told.iter().flatten().map(|told| told.known).fold(0.0, f64::max);
+                let cells =
+                    quantities.iter().zip(told).map(|(quantity, told)| in_words(*quantity, told.as_ref()));
+                let first = [said(*start)].into_iter().chain(cells);
+                table.cells(first.chain([format!("{:.0} %", known * 100.0)]));
+            }
+            output::say_table(table)?;
+        }
+        let (mut table, mut any) = (Table::new(["time", "what", ""]), false);
+        self.each_record(|found| {
+            any = true;
+            let alarm = if found.alarm { "ALARM" } else { "" };
+            table.row([
+                said(found.time_unix_ms),
+                format!("{}: {}", found.kind, found.text),
+                alarm.to_owned(),
+            ]);
+            Ok(())
+        })?;
+        if !any {
+            return output::say("nothing is recorded of that time");
+        }
+        output::say_table(table)
+    }
+}
+
+/// The offsets of the zone at both ends, where they differ.
+fn offsets(from: i64, to: i64) -> String {
+    let (first, last) = (offset(from), offset(to));
+    if first == last { first } else { format!("{first}, then {last}: the clocks were changed between") }
+}
+
+/// A moment that no zone changes.
+fn whole(unix_ms: i64) -> String {
+    local(unix_ms).map_or_else(
+        || unix_ms.to_string(),
+        |time| time.to_rfc3339_opts(chrono::SecondsFormat::Millis, false),
+    )
+}
+
+fn in_words(quantity: Quantity, told: Option<&Told>) -> String {
+    let Some(told) = told else { return "-".to_owned() };
+    let text = |value: f64| quantity.text((value * quantity.per() as f64).round() as i64);
+    let (least, greatest) = (text(told.least), text(told.greatest));
+    match quantity.is_number() {
+        _ if least == greatest => least,
+        true => format!("{least} .. {} .. {greatest}", text(told.mean)),
+        // Which lay between them the words do not tell.
+        false => format!("{least}, {greatest}"),
+    }
+}
+
+fn length(Time(every): Time) -> i64 {
+    i64::try_from(every.as_millis()).unwrap_or(i64::MAX).max(1)
+}
+
+/// Steps in which a time has few enough rows.
+fn step(lasts: i64) -> i64 {
+    const STEPS: [i64; 13] = [1, 2, 5, 10, 30, 60, 300, 600, 1_800, 3_600, 10_800, 86_400, 604_800];
+    let fits = STEPS.into_iter().map(|seconds| seconds * 1_000).find(|step| lasts / step <= ROWS);
+    fits.unwrap_or(lasts / ROWS)
+}
