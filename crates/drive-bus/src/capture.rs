@@ -3,6 +3,42 @@
 //! Each frame is a packet of link type 252 (`WIRESHARK_UPPER_PDU`), which names the dissector to be used: `mbrtu` or
 //! `mbtcp`. The direction is in the packet's flags: outbound is the master. Formats: the IETF draft
 //! draft-ietf-opsawg-pcapng, and `epan/exported_pdu.h` of Wireshark for the tags.
+//!
+//! ```
+//! use drive_bus::{Line, LineConfig, capture};
+//! use drive_core::SerialSettings;
+//! # use std::sync::{Arc, Mutex};
+//! # use tokio_modbus::client::{Context, Reader};
+//! # #[derive(Clone, Default)]
+//! # struct File(Arc<Mutex<Vec<u8>>>);
+//! # impl std::io::Write for File {
+//! #     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+//! #         self.0.lock().unwrap().write(bytes)
+//! #     }
+//! #     fn flush(&mut self) -> std::io::Result<()> {
+//! #         Ok(())
+//! #     }
+//! # }
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+//! # plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+//! # let file = File::default();
+//! let line = Line::over(plant.in_memory(), LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+//! let writing = line.capture(file.clone())?; // or a std::fs::File
+//! # let mut drive: Context = line.slave(1).into();
+//! # drive.read_holding_registers(3201, 1).await??;
+//! line.close().await;
+//! writing.finished().await?;
+//!
+//! # let bytes = file.0.lock().unwrap().clone();
+//! let recording = capture::read(&bytes)?;
+//! let frames: Vec<_> = recording.frames.iter().map(|frame| frame.direction).collect();
+//! assert_eq!(frames, [capture::Direction::Sent, capture::Direction::Received]);
+//! # Ok(())
+//! # }
+//! ```
 
 mod pcapng;
 

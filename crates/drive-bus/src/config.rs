@@ -383,6 +383,17 @@ impl LineConfig {
 }
 
 /// What is special about one slave.
+///
+/// ```
+/// use drive_bus::{LineConfig, SlaveSettings};
+/// use drive_core::SerialSettings;
+/// use std::time::Duration;
+///
+/// // The pause that a 3G3EV needs at 9600 bit/s: 24 bits and 10 ms.
+/// let pause = SlaveSettings { turnaround: Duration::from_micros(12_500), ..SlaveSettings::default() };
+/// let config = LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT).slave(5, pause);
+/// assert_eq!(config.slaves[&5].response_timeout, None, "the line's own");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct SlaveSettings {
     /// Silence that this slave needs after its answer before the next request **to it** (3G3EV: 24 bits + 10 ms).

@@ -7,6 +7,18 @@ use crate::protocol::time;
 /// What is known of a gateway: a box, or a program, between a network and the drives' own line. It goes on with a question
 /// after its master has given up, and most serve one question at a time, so that a drive that does not answer holds up all
 /// others, and a stop. The line finds out what is not set, and asks no more than one such question at a time.
+///
+/// ```
+/// use drive_bus::{Gateway, LineConfig};
+/// use std::time::Duration;
+///
+/// let gateway: Gateway = "3x1s".parse()?;
+/// assert_eq!((gateway.at_once, gateway.wait), (Some(1), Some(Duration::from_secs(3))));
+/// let config = LineConfig { gateway: Some(gateway), ..LineConfig::modbus_tcp("10.0.0.5:502") };
+/// // What it may be waiting for is in front of a stop.
+/// assert!(config.worst_case_stop(5, 18) > Duration::from_secs(3));
+/// # Ok::<(), drive_bus::GatewayError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Gateway {
     /// How many requests it serves at once. `None`: the line finds out.
@@ -61,6 +73,9 @@ impl fmt::Display for Gateway {
         }
     }
 }
+
+#[cfg(feature = "serde")]
+drive_core::written_as_text!(Gateway);
 
 impl FromStr for Gateway {
     type Err = GatewayError;

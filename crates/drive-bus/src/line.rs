@@ -25,6 +25,28 @@ use crate::{
 
 /// One line and the task that owns its port. Cheap to clone; when the last handle ([`Line`] or [`Slave`]) is gone, the
 /// exchange that is under way finishes and the port is closed.
+///
+/// ```
+/// use drive_bus::{Line, LineConfig};
+/// use drive_core::SerialSettings;
+/// use tokio_modbus::client::{Context, Reader};
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let stream = plant.in_memory();
+/// // On a port: Line::open(LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT)).await?
+/// let line = Line::over(stream, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+///
+/// let mut drive: Context = line.slave(1).into();
+/// assert_eq!(drive.read_holding_registers(3201, 1).await??, [0x0240]); // switch on disabled
+///
+/// assert_eq!(line.stats().slaves[&1].outcomes.answered, 1);
+/// line.close().await;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Line {
     pub(crate) handle: Arc<Handle>,

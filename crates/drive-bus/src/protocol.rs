@@ -24,6 +24,17 @@ pub use drive_unitelway::{NetworkHeader, UniTelwaySettings};
 const LAST_ON_A_LINE: u8 = 247;
 
 /// The protocol of a line. Families never see which one it is. Those whose feature is not compiled in do not exist.
+///
+/// ```
+/// use drive_bus::{LineConfig, Protocol};
+/// use drive_core::SerialSettings;
+///
+/// let ascii: Protocol = "ascii".parse()?;
+/// let config = LineConfig { protocol: ascii, ..LineConfig::serial("/dev/ttyUSB0", SerialSettings::MODBUS_DEFAULT) };
+/// assert!(config.protocol.is_ascii() && config.protocol.is_paced());
+/// assert_eq!(Protocol::default().to_string(), "rtu");
+/// # Ok::<(), drive_bus::protocol::ProtocolError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Protocol {

@@ -27,6 +27,29 @@ use crate::{
 /// # Errors
 /// A slave's exception is the inner error of a call. Everything else is a [`PortError`] inside
 /// [`tokio_modbus::Error::Transport`]; [`PortError::from_modbus`] takes it out.
+///
+/// ```
+/// use drive_bus::{Line, LineConfig};
+/// use drive_core::{Class, PortError, SerialSettings, Terms};
+/// use std::time::Duration;
+/// use tokio_modbus::{Request, client::Client};
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let stream = plant.in_memory();
+/// let line = Line::over(stream, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+/// let mut slave = line.slave(1).with_terms(Terms::of(Class::Status).within(Duration::from_secs(1)));
+/// let eta = Request::ReadHoldingRegisters(3201, 1);
+/// assert!(slave.call(eta.clone()).await?.is_ok());
+///
+/// machine.mute();
+/// let error = slave.call(eta).await.unwrap_err();
+/// assert!(matches!(PortError::from_modbus(error), PortError::Timeout { .. }));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Slave {
     pub(crate) handle: Arc<Handle>,

@@ -1,5 +1,8 @@
 //! What a line counts, always: per slave, per class, for the line as a whole.
 
+#[cfg(feature = "serde")]
+mod json;
+
 use std::{collections::BTreeMap, time::Duration};
 
 use drive_core::Class;
@@ -16,6 +19,19 @@ const OCTAVES: usize = 26;
 /// A histogram of durations with a resolution of 9 to 12 %, from 1 µs to 67 s. It keeps the buckets from the shortest to
 /// the longest that was counted: a drive that answers steadily needs few, and there are thirty thousand drives on a
 /// thousand lines.
+///
+/// ```
+/// use drive_bus::stats::Histogram;
+/// use std::time::Duration;
+///
+/// let mut waits = Histogram::new();
+/// for millis in 1..=100 {
+///     waits.record(Duration::from_millis(millis));
+/// }
+/// // The longest exactly, a quantile an eighth too long at the most.
+/// assert_eq!((waits.count(), waits.max()), (100, Duration::from_millis(100)));
+/// assert!(waits.quantile(500) >= Duration::from_millis(50) && waits.quantile(500) < Duration::from_millis(57));
+/// ```
 #[derive(Clone, PartialEq, Eq)]
 pub struct Histogram {
     first: usize,
@@ -172,6 +188,18 @@ pub const BOUNDS: [Duration; 14] = {
 };
 
 /// Durations counted by the fixed [`BOUNDS`], so that those of many slaves, lines and hosts can be added up.
+///
+/// ```
+/// use drive_bus::stats::{BOUNDS, Spread};
+/// use std::time::Duration;
+///
+/// let mut exchanges = Spread::default();
+/// exchanges.record(Duration::from_millis(21));
+/// exchanges.record(Duration::from_secs(3));
+/// let within: Vec<_> = BOUNDS.iter().zip(exchanges.up_to()).filter(|(_, count)| *count > 0).collect();
+/// assert_eq!(*within[0].0, Duration::from_millis(25));
+/// assert_eq!(exchanges.up_to().last(), Some(2));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Spread {
     /// One for each bound and one for what is longer, up to the last that is not zero: most drives need few.
@@ -205,6 +233,7 @@ impl Spread {
 
 /// How the calls ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[non_exhaustive]
 pub struct Outcomes {
     /// With an answer.
@@ -231,6 +260,7 @@ pub struct Outcomes {
 
 /// What the line knows of one slave.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[non_exhaustive]
 pub struct SlaveStats {
     /// Requests sent, retries and probes included.
@@ -256,12 +286,18 @@ pub struct SlaveStats {
     /// Whether it is off-line now.
     pub offline: bool,
     /// How long it takes until it is asked whether it is back, as far as is known; `None` unless it is off-line.
+    #[cfg_attr(feature = "serde", serde(rename = "next_probe_ns", with = "drive_core::serialize::maybe_ns"))]
     pub next_probe: Option<Duration>,
     /// The response timeout that holds now.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "response_timeout_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub response_timeout: Duration,
     /// What its own link had counted when it was last read, by
     /// [`link_counters`](crate::unite::UniTe::link_counters) on a UNI-TELWAY line. Feature `unitelway`.
     #[cfg(feature = "unitelway")]
+    #[cfg_attr(feature = "serde", serde(with = "json::link"))]
     pub link: Option<LinkCounters>,
     /// From the end of a request to the first character of its answer, as computed from the answer's end and length.
     pub response: Histogram,
@@ -285,6 +321,7 @@ impl SlaveStats {
 
 /// What the line knows of one class.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[non_exhaustive]
 pub struct ClassStats {
     /// Requests sent for the first time.
@@ -297,6 +334,7 @@ pub struct ClassStats {
 
 /// What is known of the gateway between a connection and its drives, see [`Gateway`](crate::Gateway).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct FarEndStats {
     /// Questions in vain that it may still be at.
@@ -306,6 +344,7 @@ pub struct FarEndStats {
     /// It was seen, or is set, that it serves no more.
     pub no_more: bool,
     /// How long it waits for a drive that does not answer.
+    #[cfg_attr(feature = "serde", serde(rename = "wait_ns", with = "drive_core::serialize::duration_ns"))]
     pub wait: Duration,
     /// Where that is from.
     pub wait_is: WaitIs,
@@ -319,6 +358,7 @@ pub struct FarEndStats {
 
 /// Whether a far end serves a second connection of this line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum SecondConnection {
     /// None was needed yet, or none is to be opened.
@@ -326,11 +366,16 @@ pub enum SecondConnection {
     /// It was answered over it.
     Granted,
     /// It is not granted, for this reason, and was given up.
-    GivenUp(&'static str),
+    GivenUp(#[cfg_attr(feature = "serde", serde(deserialize_with = "drive_core::serialize::kept"))] Word),
 }
+
+/// A reason of this crate's. Derived code that reads it must not take its lifetime for that of what is read, which it does where
+/// it sees the reference.
+type Word = &'static str;
 
 /// How it is known how long a gateway waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum WaitIs {
     /// Nobody knows: [`Gateway::ASSUMED_WAIT`](crate::Gateway::ASSUMED_WAIT).
     Assumed,
@@ -341,17 +386,44 @@ pub enum WaitIs {
 }
 
 /// What a line has counted since it was opened.
+///
+/// ```
+/// use drive_bus::{Line, LineConfig};
+/// use drive_core::{Class, SerialSettings};
+/// # use tokio_modbus::client::{Context, Reader};
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let stream = plant.in_memory();
+/// let line = Line::over(stream, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+/// # let mut drive: Context = line.slave(1).into();
+/// # drive.read_holding_registers(3201, 1).await??;
+/// let stats = line.stats();
+/// for (slave, told) in &stats.slaves {
+///     println!("{slave}: {} answers, {:?} p99", told.outcomes.answered, told.response.quantile(990));
+/// }
+/// assert_eq!(stats.class(Class::Status).sent, 1);
+/// assert_eq!((stats.foreign, stats.noise_bytes), (0, 0), "nobody else is on this line");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[non_exhaustive]
 pub struct Stats {
     /// Since when, as a duration.
+    #[cfg_attr(feature = "serde", serde(rename = "elapsed_ns", with = "drive_core::serialize::duration_ns"))]
     pub elapsed: Duration,
     /// Time in which the line was needed: the characters of requests and answers, the silences that the protocol and
     /// the slaves want, and the slaves' own time to answer. What is missing to `elapsed` was idle or lost to the host.
+    #[cfg_attr(feature = "serde", serde(rename = "busy_ns", with = "drive_core::serialize::duration_ns"))]
     pub busy: Duration,
     /// Per slave, those that were asked.
     pub slaves: BTreeMap<u8, SlaveStats>,
     /// Per class, the most urgent first, as [`Class::ALL`].
+    #[cfg_attr(feature = "serde", serde(with = "json::classes"))]
     pub classes: [ClassStats; 5],
     /// The silence kept before each request, from the end of the last activity to the write.
     pub silence: Histogram,
@@ -382,6 +454,10 @@ pub struct Stats {
     /// The longest wait of a Stop until its first bit, while the line goes on as it has: with the response times that it
     /// has learned, the longest exchange that was asked, and foreign frames and damage only where there were any. Beside
     /// it stands [`LineConfig::worst_case_stop`](crate::LineConfig::worst_case_stop), which holds whatever happens.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "worst_case_stop_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub worst_case_stop: Duration,
 }
 

@@ -29,6 +29,15 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const JUDGED_WITHIN: Duration = CONFIRMED_WITHIN.saturating_mul(2);
 
 /// How long a call of each class may wait until it is sent. `None`: as long as its caller waits.
+///
+/// ```
+/// use std::time::Duration;
+/// use drive_core::{Class, Lifetimes};
+///
+/// let lifetimes = Lifetimes { status: Some(Duration::from_millis(500)), ..Lifetimes::default() };
+/// assert_eq!(lifetimes.of(Class::Command), Some(Duration::from_secs(1)), "never carried out late");
+/// assert_eq!(lifetimes.of(Class::Stop), None, "a stop does not expire");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lifetimes {
     /// Stops. They do not expire by default.

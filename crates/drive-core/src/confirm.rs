@@ -17,6 +17,26 @@ const PAUSE: (Duration, Duration) = (Duration::from_millis(10), Duration::from_m
 
 /// The time in which a command has to show. It is a time and not a number of readings: twenty readings are half a second
 /// on a slow line and a few milliseconds on TCP.
+///
+/// ```
+/// use drive_core::Confirming;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() {
+/// # let mut readings = 0;
+/// # let mut reads_so = || { readings += 1; readings == 4 };
+/// let mut confirming = Confirming::begin();
+/// let confirmed = loop {
+///     if reads_so() {
+///         break true;
+///     }
+///     if !confirming.again().await {
+///         break false; // two seconds are over
+///     }
+/// };
+/// assert!(confirmed);
+/// # }
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Confirming {
     until: Instant,

@@ -148,6 +148,19 @@ impl fmt::Display for SetpointProblem {
 }
 
 /// What went wrong with a drive.
+///
+/// ```
+/// use drive_core::{Command, Direction, Error, ErrorKind, Refusal, SlaveAddress};
+///
+/// let error = Error::Refused {
+///     slave: SlaveAddress::MIN,
+///     command: Command::Start(Direction::Forward),
+///     reason: Refusal::Fault(9),
+/// };
+/// // A program decides by the kind, a person reads the text.
+/// assert_eq!(error.kind(), ErrorKind::Refused);
+/// assert!(error.to_string().starts_with("slave 1: "), "{error}");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

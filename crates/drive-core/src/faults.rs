@@ -30,6 +30,18 @@ impl FaultEntry {
 }
 
 /// A fault that a drive reported: its number always, and what the manual says of it where it says something.
+///
+/// ```
+/// use drive_core::{Fault, FaultEntry};
+///
+/// static FAULTS: &[FaultEntry] =
+///     &[FaultEntry::new(9, "OCF", "overcurrent", "check the motor and the settings of its plate")];
+///
+/// let fault = Fault::lookup(FAULTS, 9);
+/// assert_eq!(fault.to_string(), "9 OCF: overcurrent");
+/// // A code that the manual does not list keeps its number.
+/// assert_eq!(Fault::lookup(FAULTS, 77).to_string(), "77 ?: a code that the manual does not list");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Fault {
     /// The vendor's code.
@@ -71,6 +83,15 @@ impl fmt::Display for Fault {
 }
 
 /// The faults of a drive.
+///
+/// ```
+/// use drive_core::{Fault, Faults};
+///
+/// let faults = Faults { present: vec![Fault { code: 9, entry: None }], ..Faults::default() };
+/// let codes: Vec<_> = faults.present.iter().map(|fault| fault.code).collect();
+/// assert_eq!(codes, [9]);
+/// assert_eq!(faults.reset_allowed, None, "this drive does not say");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -5,6 +5,19 @@ use std::fmt;
 use crate::status::RawWord;
 
 /// What a drive says it is. Two drives that differ in any part are different drives.
+///
+/// ```
+/// use drive_core::Identity;
+///
+/// let remembered = Identity {
+///     vendor: Some("Telemecanique".to_owned()),
+///     model: Some("ATV312H075M2".to_owned()),
+///     ..Identity::default()
+/// };
+/// let found = Identity { version: Some("5.1".to_owned()), ..remembered.clone() };
+/// assert_ne!(remembered, found);
+/// assert_eq!(found.to_string(), "Telemecanique ATV312H075M2 5.1");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -131,6 +131,21 @@ impl Descent {
 
 /// The shaft behind the output, from status to status. Pure: time is an argument. It is not forgotten when a line is lost: a
 /// motor that turned then may coast when the line is back.
+///
+/// ```
+/// use std::time::Duration;
+/// use drive_core::{Frequency, Motion, Output, Shaft};
+/// use tokio::time::Instant;
+///
+/// let (mut shaft, now) = (Shaft::new(), Instant::now());
+/// shaft.set_coast_time(Some(Duration::from_secs(20)));
+/// assert_eq!(shaft.see(now, Output::Driven, Some(Frequency::from_hertz(50))), Motion::Driven);
+/// // No output is no standstill: the motor coasts, until its owner's time is over.
+/// let cut = now + Duration::from_secs(1);
+/// assert_eq!(shaft.see(cut, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
+/// let later = cut + Duration::from_secs(20);
+/// assert_eq!(shaft.see(later, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Shaft {
     past: Past,

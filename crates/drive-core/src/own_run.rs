@@ -64,6 +64,18 @@ impl Evidence {
 }
 
 /// The run command of this side, from before it is written until the drive's own words showed that it stands no more.
+///
+/// ```
+/// use drive_core::{Direction, Evidence, Lease, OwnRun, RunWord, Told, Verdict};
+///
+/// let mut run = OwnRun::new();
+/// run.give(Lease::new(Direction::Forward, 0x000F)); // before the word is written
+/// run.was_written();
+/// // In force is what all of the drive's own words show, and not that the word was sent.
+/// let shown = Evidence { word: RunWord::Stands, command: Told::Yes, output: Told::Yes, reference: Told::NotTold };
+/// assert_eq!(run.judge(&shown), Some(Verdict::NotKnown));
+/// assert_eq!(run.judge(&Evidence { reference: Told::Yes, ..shown }), Some(Verdict::InForce));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OwnRun {
     lease: Option<Lease>,

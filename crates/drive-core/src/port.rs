@@ -1,6 +1,6 @@
 //! The way from a drive to its line: [`Port`], the terms of a call, and what can go wrong on the way.
 
-use std::{fmt, io, time::Duration};
+use std::{io, time::Duration};
 
 use async_trait::async_trait;
 use tokio::time::Instant;
@@ -11,7 +11,17 @@ use crate::address::SlaveAddress;
 /// How urgent a call is. A line serves a higher class first, always.
 ///
 /// The order of the variants is the order of urgency: `Class::Stop > Class::Background`.
+///
+/// ```
+/// use drive_core::Class;
+///
+/// assert!(Class::Stop > Class::Command);
+/// assert_eq!("keep-alive".parse(), Ok(Class::KeepAlive));
+/// assert_eq!(Class::ALL[0], Class::Stop);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Class {
     /// What nobody waits for: parameters, histories, slow measurements.
     Background,
@@ -31,20 +41,18 @@ impl Class {
     pub const ALL: [Self; 5] = [Self::Stop, Self::Command, Self::KeepAlive, Self::Status, Self::Background];
 }
 
-impl fmt::Display for Class {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Background => "background",
-            Self::Status => "status",
-            Self::KeepAlive => "keep-alive",
-            Self::Command => "command",
-            Self::Stop => "stop",
-        })
-    }
-}
+crate::named! { Class {
+    Background => "background",
+    Status => "status",
+    KeepAlive => "keep-alive",
+    Command => "command",
+    Stop => "stop",
+} }
 
 /// What sending a write twice would do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Effect {
     /// The value is a level: writing it twice does what writing it once does. It may be retried inside its
     /// lifetime.
@@ -56,6 +64,17 @@ pub enum Effect {
 
 /// The terms under which the calls that follow travel: how urgent, for how long, and whether a write may be
 /// repeated.
+///
+/// ```
+/// use std::time::Duration;
+/// use drive_core::{Class, Effect, Terms};
+///
+/// // A setpoint: not sent after a second, and the next takes the place of one that still waits.
+/// let setpoint = Terms::of(Class::Command).within(Duration::from_secs(1)).replacing(8502);
+/// assert_eq!((setpoint.effect, setpoint.replaces), (Effect::Level, Some(8502)));
+/// // A reset is written once, whatever becomes of its answer.
+/// assert_eq!(Terms::of(Class::Command).edge().effect, Effect::Edge);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Terms {
     /// How urgent.
@@ -178,6 +197,14 @@ impl Port for Box<dyn Port> {
 }
 
 /// Why a call brought no answer, as far as the line knows.
+///
+/// ```
+/// use drive_core::PortError;
+///
+/// // How it comes out of a tokio-modbus call on a line.
+/// let error = drive_core::tokio_modbus::Error::Transport(PortError::Expired.into_io());
+/// assert_eq!(PortError::from_modbus(error), PortError::Expired);
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {

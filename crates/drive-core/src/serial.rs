@@ -14,6 +14,13 @@ pub enum Parity {
 }
 
 /// Data bits, parity and stop bits of a character, written as the manuals write it: `8E1`, `7O2`, `8N1`.
+///
+/// ```
+/// use drive_core::serial::CharacterFormat;
+///
+/// assert_eq!("8E1".parse(), Ok(CharacterFormat::F8E1));
+/// assert_eq!(CharacterFormat::F8E1.bits(), 11, "with its start bit");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CharacterFormat {
     data_bits: u8,
@@ -115,6 +122,17 @@ impl FromStr for CharacterFormat {
 }
 
 /// Speed and character format of a serial line.
+///
+/// ```
+/// use drive_core::SerialSettings;
+///
+/// let settings: SerialSettings = "9600 8N1".parse()?;
+/// // Ten bits a character: the silence between two frames is 3.5 of them.
+/// assert_eq!(settings.characters(8).as_micros(), 8_333);
+/// assert_eq!(settings.t3_5().as_micros(), 3_645);
+/// assert_eq!(SerialSettings::default().to_string(), "19200 8E1");
+/// # Ok::<(), drive_core::serial::SerialSettingsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SerialSettings {
     baud: u32,
@@ -216,9 +234,23 @@ impl FromStr for SerialSettings {
     }
 }
 
+#[cfg(feature = "serde")]
+crate::written_as_text!(CharacterFormat, SerialSettings);
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn settings_are_written_as_their_text_and_what_is_none_is_named() {
+        let settings: SerialSettings = serde_json::from_str("\"9600 8N2\"").unwrap();
+        assert_eq!(serde_json::to_string(&settings).unwrap(), "\"9600 8N2\"");
+        assert_eq!(serde_json::to_string(&settings.format()).unwrap(), "\"8N2\"");
+        let error = serde_json::from_str::<SerialSettings>("\"5 8E1\"").unwrap_err().to_string();
+        assert!(error.starts_with("5 bit/s is not a serial speed"), "{error}");
+        assert!(serde_json::from_str::<SerialSettings>("19200").is_err());
+    }
 
     #[test]
     fn t3_5_follows_the_real_character_length_up_to_19200_and_is_fixed_above() {

@@ -87,6 +87,118 @@ pub mod maybe_ms {
     }
 }
 
+/// A time in nanoseconds, whole, that is also read back as the very same, for `#[serde(with = "…")]`: for what is counted or
+/// planned, of which a millisecond is much. Longer ones than a `u64` holds, 584 years, are written as that.
+pub mod duration_ns {
+    use super::{Deserialize, Deserializer, Duration, Serialize, Serializer, whole_ns};
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+        whole_ns(*time).serialize(serializer)
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
+        u64::deserialize(deserializer).map(Duration::from_nanos)
+    }
+}
+
+/// The same, or none.
+pub mod maybe_ns {
+    use super::{Deserialize, Deserializer, Duration, Serialize, Serializer, whole_ns};
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
+        time.map(whole_ns).serialize(serializer)
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Duration>, D::Error> {
+        Ok(Option::<u64>::deserialize(deserializer)?.map(Duration::from_nanos))
+    }
+}
+
+/// A value of which the text says everything, as that text, for `#[serde(with = "…")]`: what its `Display` writes, and its
+/// `FromStr` reads.
+///
+/// ```
+/// use drive_core::SerialSettings;
+///
+/// #[derive(serde::Serialize, serde::Deserialize)]
+/// struct Wiring {
+///     #[serde(with = "drive_core::serialize::as_text")]
+///     address: std::net::SocketAddr,
+///     // This one is written so by itself.
+///     serial: SerialSettings,
+/// }
+///
+/// let text = r#"{"address":"10.0.0.5:502","serial":"19200 8E1"}"#;
+/// let wiring: Wiring = serde_json::from_str(text)?;
+/// assert_eq!(serde_json::to_string(&wiring)?, text);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+pub mod as_text {
+    use std::{fmt::Display, str::FromStr};
+
+    use super::{Deserialize, Deserializer, Serializer, de};
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(value)
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// Those of the deserializer, and what the text is not.
+    pub fn deserialize<'de, T, D>(deserializer: D) -> Result<T, D::Error>
+    where
+        T: FromStr<Err: Display>,
+        D: Deserializer<'de>,
+    {
+        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
+    }
+}
+
+/// Has a type written and read as its text, by [`as_text`].
+#[doc(hidden)]
+#[macro_export]
+macro_rules! written_as_text {
+    ($($type:ty),+ $(,)?) => {$(
+        impl ::serde::Serialize for $type {
+            fn serialize<S: ::serde::Serializer>(
+                &self,
+                serializer: S,
+            ) -> ::std::result::Result<S::Ok, S::Error> {
+                $crate::serialize::as_text::serialize(self, serializer)
+            }
+        }
+
+        impl<'de> ::serde::Deserialize<'de> for $type {
+            fn deserialize<D: ::serde::Deserializer<'de>>(
+                deserializer: D,
+            ) -> ::std::result::Result<Self, D::Error> {
+                $crate::serialize::as_text::deserialize(deserializer)
+            }
+        }
+    )+};
+}
+
 /// A moment as its age in milliseconds that is also read back, for `#[serde(with = "…")]`: as long before it is read as it
 /// was before it was written.
 pub mod age_ms {
@@ -194,6 +306,10 @@ pub(crate) fn there_is_room_for(bytes: usize) -> bool {
 /// Those of the deserializer.
 pub fn kept<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
     Ok(text(&String::deserialize(deserializer)?))
+}
+
+fn whole_ns(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
 fn whole_ms(time: Duration) -> u64 {

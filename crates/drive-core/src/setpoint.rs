@@ -8,6 +8,13 @@ use std::{fmt, str::FromStr};
 use crate::units::{Frequency, Percent, Speed, UnitError};
 
 /// Direction of rotation, as the drive names it.
+///
+/// ```
+/// use drive_core::Direction;
+///
+/// assert_eq!("Reverse".parse(), Ok(Direction::Reverse));
+/// assert_eq!("left".parse::<Direction>().unwrap_err().to_string(), "expected one of forward, reverse");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
@@ -92,6 +99,13 @@ impl FromStr for Setpoint {
 }
 
 /// How to stop.
+///
+/// ```
+/// use drive_core::StopMode;
+///
+/// assert_eq!("DC injection".parse(), Ok(StopMode::DcInjection));
+/// assert_eq!(StopMode::ALL.map(|mode| mode.to_string()).join(", "), "ramp, fast, freewheel, DC injection");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -32,6 +32,22 @@ pub struct RawWord {
 /// The fast set: what control and safety need, in the fewest exchanges that the family's limits allow.
 ///
 /// A field is `None` when the family has no such value or it cannot be known in these exchanges. Nothing is guessed.
+///
+/// ```
+/// use drive_core::{Frequency, Motion, RawWord, State, Status};
+///
+/// // As a family makes it of the words that it has read.
+/// let status = Status {
+///     state: State::Running,
+///     output_frequency: Some(Frequency::from_hertz(30)),
+///     motion: Motion::Driven,
+///     raw: vec![RawWord { address: 3201, code: "ETA", value: 0x0227 }],
+///     ..Status::default()
+/// };
+/// assert!(!status.is_fault() && !status.is_undriven());
+/// assert_eq!(status.raw(3201), Some(0x0227));
+/// assert_eq!(status.current, None, "what was not told is not 0");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
@@ -185,6 +201,14 @@ impl fmt::Display for Status {
 /// The slow set: what a person or a trend wants to see.
 ///
 /// `None` where the family has no such value.
+///
+/// ```
+/// use drive_core::{Measurements, Percent};
+///
+/// let told = Measurements { motor_thermal: Some(Percent::from_percent(82)), ..Measurements::default() };
+/// let warm = told.motor_thermal.is_some_and(|thermal| thermal > Percent::from_percent(80));
+/// assert!(warm && told.dc_bus_voltage.is_none());
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -5,6 +5,15 @@
 pub const STATUSES_PER_TURN: u16 = 20;
 
 /// Whose turn it is. Each of `n` things is read within `n` times so many statuses as there are from turn to turn.
+///
+/// ```
+/// use drive_core::Turns;
+///
+/// // Two things, one of them behind every third status.
+/// let mut turns = Turns::every(3);
+/// let read: Vec<_> = (0..6).map(|_| turns.pass(2)).collect();
+/// assert_eq!(read, [None, None, Some(0), None, None, Some(1)]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turns {
     every: u16,

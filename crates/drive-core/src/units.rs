@@ -126,22 +126,57 @@ decimal_unit! {
 }
 decimal_unit! {
     /// A speed in revolutions per minute, without a sign.
+    ///
+    /// ```
+    /// use drive_core::Speed;
+    ///
+    /// assert_eq!("1450 rpm".parse(), Ok(Speed::from_rpm(1_450)));
+    /// ```
     Speed(u32), from_rpm, rpm, 0, "rpm"
 }
 decimal_unit! {
     /// A current in tenths of an ampere.
+    ///
+    /// ```
+    /// use drive_core::Current;
+    ///
+    /// let (measured, limit) = (Current::from_deciamperes(93), Current::from_deciamperes(85));
+    /// assert!(measured > limit);
+    /// assert_eq!(measured.saturating_sub(limit).to_string(), "0.8 A");
+    /// ```
     Current(u32), from_deciamperes, deciamperes, 1, "A"
 }
 decimal_unit! {
     /// A voltage in tenths of a volt.
+    ///
+    /// ```
+    /// use drive_core::Voltage;
+    ///
+    /// assert_eq!(Voltage::from_decivolts(5_402).to_string(), "540.2 V");
+    /// ```
     Voltage(u32), from_decivolts, decivolts, 1, "V"
 }
 decimal_unit! {
     /// A share in hundredths of a percent, signed (torque has a direction).
+    ///
+    /// ```
+    /// use drive_core::Percent;
+    ///
+    /// let torque = Percent::from_percent(-35);
+    /// assert_eq!(torque.to_string(), "-35.00 %");
+    /// assert_eq!(torque.checked_add(Percent::from_hundredths(50)), Some(Percent::from_hundredths(-3_450)));
+    /// ```
     Percent(i32), from_hundredths, hundredths, 2, "%"
 }
 decimal_unit! {
     /// A power in tens of watts (0.01 kW).
+    ///
+    /// ```
+    /// use drive_core::Power;
+    ///
+    /// assert_eq!("0.75 kW".parse(), Ok(Power::from_decawatts(75)));
+    /// assert!("750 W".parse::<Power>().is_err(), "a unit is not guessed");
+    /// ```
     Power(i32), from_decawatts, decawatts, 2, "kW"
 }
 

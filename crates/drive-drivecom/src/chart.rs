@@ -3,6 +3,17 @@
 use drive_core::State;
 
 /// A state of the chart, from the status word ETA under the mask 006Fh.
+///
+/// ```
+/// use drive_core::State;
+/// use drive_drivecom::ChartState;
+///
+/// // ETA of a motor that runs.
+/// let state = ChartState::of(0x0627).expect("the manual's table has it");
+/// assert_eq!(state, ChartState::OperationEnabled);
+/// assert_eq!(state.state(true, State::Running), State::Running);
+/// assert_eq!(ChartState::of(0x0001), None, "a pattern that it does not have");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ChartState {
     /// Initialising; the drive leaves it by itself.

@@ -28,6 +28,15 @@ bitflags! {
     /// `CMD` and `CMDD`, p. 16 and 19. Bits 4 to 6 and 8 to 10 are reserved and stay 0. Bits 11 to 14 have these meanings
     /// at the access levels L1 and L2; at L3 bits 11 and 12 have them in the factory setting, and each of 11 to 15 has
     /// the function that was assigned to it.
+    ///
+    /// ```
+    /// use drive_core::Direction;
+    /// use drive_drivecom::ControlWord;
+    ///
+    /// assert!(ControlWord::run(Direction::Forward).is_run());
+    /// assert_eq!(ControlWord::run(Direction::Reverse).direction(), Direction::Reverse);
+    /// assert!(!ControlWord::from_bits_retain(0x0006).is_run(), "shutdown");
+    /// ```
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     pub struct ControlWord: u16 {
         /// Switch on.

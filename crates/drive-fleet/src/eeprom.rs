@@ -40,6 +40,17 @@ drive_core::named! { EepromUse {
 /// What is known of the writes to a drive's EEPROM. Whoever keeps it beyond the life of the program, from
 /// [`EepromWritten`](crate::EventKind::EepromWritten), gives it to the next as
 /// [`eeprom_before`](crate::DriveSettings::eeprom_before).
+///
+/// ```
+/// use drive_fleet::{EEPROM_WRITES_A_DAY, EepromLedger};
+///
+/// let mut ledger = EepromLedger::default();
+/// for _ in 0..EEPROM_WRITES_A_DAY {
+///     ledger.count();
+/// }
+/// assert!(ledger.is_worn());
+/// assert_eq!(ledger.to_string(), "24 writes today, 24 in all");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

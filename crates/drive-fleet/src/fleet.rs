@@ -50,6 +50,37 @@ impl Members {
 ///
 /// [`shutdown`](Self::shutdown) is the end that acts by each drive's policy. When the last handle is dropped without it
 /// the tasks end and nothing is written: the drives go on until their own watchdogs act.
+///
+/// ```
+/// use drive_atv312::Atv312;
+/// use drive_core::{Direction, Frequency, StopMode};
+/// use drive_fleet::{DriveSettings, Fleet};
+/// use std::time::Duration;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// let fleet = Fleet::builder()
+///     .line("north", line)
+///     .drive("north", 1, DriveSettings::controlled("pump 1"), |port, slave| Box::new(Atv312::new(port, slave)))
+///     .start()?;
+///
+/// let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+/// pump.ready(Duration::from_secs(10)).await?;
+/// assert!(pump.start_at(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+/// # assert!(machine.observe().running);
+/// assert!(fleet.stop_all(StopMode::Ramp).await.is_confirmed());
+///
+/// for (drive, action) in fleet.shutdown(Duration::from_secs(30)).await {
+///     println!("{drive}: {action}");
+/// }
+/// # assert!(!machine.observe().running);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Fleet {
     pub(crate) inner: Arc<Inner>,
@@ -217,6 +248,41 @@ async fn exit_action(entry: &Entry) -> ExitAction {
 }
 
 /// A reader of the fleet's events: by [`recv`](Self::recv), or as a [`Stream`] that ends with the fleet.
+///
+/// ```
+/// use drive_fleet::{EventKind, Received};
+/// # use std::time::Duration;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// # let fleet = drive_fleet::Fleet::builder()
+/// #     .line("north", line)
+/// #     .drive("north", 1, drive_fleet::DriveSettings::controlled("pump 1"), |port, slave| {
+/// #         Box::new(drive_atv312::Atv312::new(port, slave))
+/// #     })
+/// #     .start()?;
+/// let mut events = fleet.events();
+/// # machine.trip(9);
+/// let trip = loop {
+///     match events.recv().await {
+///         Received::Event(event) => {
+///             println!("{}: {}", event.drive, event.kind);
+///             if let EventKind::Tripped(trip) = event.kind {
+///                 break trip;
+///             }
+///         }
+///         Received::Missed(events) => println!("{events} events were missed"),
+///         Received::End => return Ok(()),
+///     }
+/// };
+/// assert!(trip.status.value.is_fault());
+/// # Ok(())
+/// # }
+/// ```
 pub struct Events {
     /// The wait for the next; `None` when the fleet has ended.
     next: Option<Next>,

@@ -119,6 +119,45 @@ impl fmt::Display for GroupFailure {
 impl std::error::Error for GroupFailure {}
 
 /// Several drives of a fleet, commanded together: as of each drive, a command is given when its method returns. A drive that has left the fleet since refuses every command.
+///
+/// ```
+/// use drive_atv312::Atv312;
+/// use drive_core::{Direction, Frequency, StopMode};
+/// use drive_fleet::{DriveSettings, Fleet, GroupStart, Until};
+/// use std::time::Duration;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # for address in 1..=2 {
+/// #     plant.add(address, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # }
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// let pump = |name| DriveSettings::controlled(name);
+/// let fleet = Fleet::builder()
+///     .line("north", line)
+///     .drive("north", 1, pump("pump 1"), |port, slave| Box::new(Atv312::new(port, slave)))
+///     .drive("north", 2, pump("pump 2"), |port, slave| Box::new(Atv312::new(port, slave)))
+///     .start()?;
+/// # for drive in fleet.drives() {
+/// #     drive.ready(Duration::from_secs(10)).await?;
+/// # }
+/// let pumps = fleet.group(["pump 1", "pump 2"])?;
+/// let start = GroupStart {
+///     direction: Direction::Forward,
+///     setpoint: Some(Frequency::from_hertz(20).into()),
+///     spacing: Duration::from_secs(2),
+///     until: Until::InForce,
+/// };
+/// // All of them, or none.
+/// for (drive, outcome) in pumps.start(start).await? {
+///     println!("{drive}: {outcome}");
+/// }
+/// assert!(pumps.stop(StopMode::Ramp).await.is_confirmed());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Group {
     fleet: Fleet,

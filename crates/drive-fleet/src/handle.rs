@@ -82,6 +82,37 @@ impl Entry {
 /// Each method that commands the drive has **given the command when it returns**, before anything is awaited, and returns a
 /// ticket that tells what becomes of it. An order whose [`Ticket`] is dropped before its outcome was heard is withdrawn, and a
 /// start is taken back; a stop never is, whoever drops its [`StopTicket`].
+///
+/// # Example
+///
+/// ```
+/// # use drive_core::{Direction, Frequency, StopMode};
+/// # use std::time::Duration;
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// # let fleet = drive_fleet::Fleet::builder()
+/// #     .line("north", line)
+/// #     .drive("north", 1, drive_fleet::DriveSettings::controlled("pump 1"), |port, slave| {
+/// #         Box::new(drive_atv312::Atv312::new(port, slave))
+/// #     })
+/// #     .start()?;
+/// # let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+/// # pump.ready(Duration::from_secs(10)).await?;
+/// // Who commands stands in every event of it.
+/// let pump = pump.commanded_by("night shift");
+/// let started = pump.run(Direction::Forward, Frequency::from_hertz(30)).await;
+/// assert!(started.is_confirmed(), "{started}");
+///
+/// let seen = pump.snapshot();
+/// assert_eq!(seen.setpoint, Some(Frequency::from_hertz(30).into()));
+/// assert!(pump.stop(StopMode::Ramp).await.is_confirmed());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct DriveHandle {
     pub(crate) entry: Arc<Entry>,

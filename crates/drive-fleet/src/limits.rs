@@ -6,6 +6,22 @@ use drive_core::{Frequency, Setpoint};
 use tokio::time::Instant;
 
 /// Limits of the setpoints that a fleet gives to a drive, besides the drive's own.
+///
+/// ```
+/// use drive_core::Frequency;
+/// use drive_fleet::{Band, FrequencyLimits};
+///
+/// let limits = FrequencyLimits {
+///     low: Some(Frequency::from_hertz(20)),
+///     high: Some(Frequency::from_hertz(50)),
+///     // The frame resonates between 31 and 34 Hz.
+///     forbidden: vec![Band { low: Frequency::from_hertz(31), high: Frequency::from_hertz(34) }],
+///     ..FrequencyLimits::default()
+/// };
+/// assert!(limits.check().is_ok());
+/// let wrong = FrequencyLimits { high: Some(Frequency::from_hertz(10)), ..limits };
+/// println!("{}", wrong.check().unwrap_err());
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",

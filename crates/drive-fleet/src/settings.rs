@@ -51,6 +51,21 @@ macro_rules! settings {
 
 settings! {
     /// Settings of one drive.
+    ///
+    /// ```
+    /// use drive_core::{Frequency, Reaction, StopMode};
+    /// use drive_fleet::{DriveSettings, FrequencyLimits, OnLoss, WatchdogContract};
+    /// use std::time::Duration;
+    ///
+    /// let pump = DriveSettings {
+    ///     limits: FrequencyLimits { high: Some(Frequency::from_hertz(45)), ..FrequencyLimits::default() },
+    ///     watchdog: Some(WatchdogContract { timeout: Duration::from_secs(5), reaction: Reaction::Ramp }),
+    ///     on_loss: OnLoss::Stop(StopMode::Ramp),
+    ///     ..DriveSettings::controlled("pump 1")
+    /// };
+    /// assert!(pump.control && pump.limits.check().is_ok());
+    /// assert!(!DriveSettings::watched("meter").control, "it is only read");
+    /// ```
     pub struct DriveSettings {
         /// Whether anything is ever written to it. `false`: it is only read, and every command is refused, stops included
         /// (rule 11).
@@ -161,6 +176,14 @@ impl DriveSettings {
 
 /// Who may command a drive. Commands carry the name that
 /// [`DriveHandle::commanded_by`](crate::DriveHandle::commanded_by) gave them.
+///
+/// ```
+/// use drive_fleet::Commanders;
+///
+/// let commanders = Commanders::Only(vec!["SCADA".to_owned()]);
+/// assert!(commanders.allow("SCADA") && !commanders.allow("laptop"));
+/// assert!(Commanders::default().allow("laptop"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -255,6 +255,38 @@ pub struct Counters {
 }
 
 /// What a fleet knows of a drive at one moment.
+///
+/// ```
+/// use drive_fleet::{Freshness, Link};
+/// use tokio::time::Instant;
+/// # use std::time::Duration;
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// # let fleet = drive_fleet::Fleet::builder()
+/// #     .line("north", line)
+/// #     .drive("north", 1, drive_fleet::DriveSettings::controlled("pump 1"), |port, slave| {
+/// #         Box::new(drive_atv312::Atv312::new(port, slave))
+/// #     })
+/// #     .start()?;
+/// # let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+/// let seen = pump.wait_until(|seen| seen.link == Link::Connected).await;
+/// // A value counts only while it is fresh.
+/// assert_eq!(seen.freshness(Instant::now()), Freshness::Fresh);
+/// let status = seen.fresh_status(Instant::now()).ok_or("it is old")?;
+/// assert!(status.is_undriven() && !seen.started_here());
+///
+/// machine.mute();
+/// let seen = pump.wait_until(|seen| seen.link == Link::Lost).await;
+/// let concerns = seen.concerns(Instant::now());
+/// assert_eq!(concerns[0].kind.word(), "lost");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Snapshot {
     /// The drive's name.

@@ -5,6 +5,16 @@ use std::{fmt, time::Duration};
 use drive_core::StopMode;
 
 /// How a drive is to be stopped: by a mode alone, or for how long direct current is to be injected.
+///
+/// ```
+/// use drive_core::StopMode;
+/// use drive_fleet::StopOrder;
+/// use std::time::Duration;
+///
+/// assert_eq!(StopOrder::from(StopMode::Fast).to_string(), "fast stop");
+/// let held = StopOrder::injecting(Duration::from_secs(3));
+/// assert_eq!(held.to_string(), "DC injection stop held for 3s");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct StopOrder {
     /// The mode.

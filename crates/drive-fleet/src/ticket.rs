@@ -31,6 +31,39 @@ use crate::{
 ///   would stand in the drive.
 ///
 /// Once its outcome was heard, dropping it does nothing.
+///
+/// # Example
+///
+/// ```
+/// # use drive_core::{Direction, Frequency};
+/// # use std::time::Duration;
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// # let fleet = drive_fleet::Fleet::builder()
+/// #     .line("north", line)
+/// #     .drive("north", 1, drive_fleet::DriveSettings::controlled("pump 1"), |port, slave| {
+/// #         Box::new(drive_atv312::Atv312::new(port, slave))
+/// #     })
+/// #     .start()?;
+/// # let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+/// # pump.ready(Duration::from_secs(10)).await?;
+/// // It is on its way, and in force long before the motor has reached its speed.
+/// let run = pump.run(Direction::Forward, Frequency::from_hertz(50));
+/// assert!(run.in_force().await.is_confirmed());
+/// assert!(!machine.observe().output_frequency.eq(&5_000));
+/// assert!(run.finished().await.is_confirmed());
+///
+/// // Who waits no longer has heard of nothing: what he has started is stopped again.
+/// let slower = pump.run(Direction::Forward, Frequency::from_hertz(10));
+/// assert!(tokio::time::timeout(Duration::from_secs(1), slower).await.is_err());
+/// machine.wait_until(|seen| !seen.running).await;
+/// # Ok(())
+/// # }
+/// ```
 #[must_use = "an order is withdrawn when its ticket is dropped before its outcome was heard"]
 pub struct Ticket {
     /// `None` when it is dropped.
@@ -119,6 +152,35 @@ impl fmt::Debug for Ticket {
 ///
 /// Awaiting it gives what [`finished`](Self::finished) gives. **A stop is never withdrawn**: when the ticket is dropped it is
 /// repeated all the same until the drive stands.
+///
+/// # Example
+///
+/// ```
+/// # use drive_core::{Direction, Frequency, StopMode};
+/// # use std::time::Duration;
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+/// # let plant = drive_sim::SimLine::new(drive_sim::Wiring::rtu(settings));
+/// # let machine = plant.add(1, drive_sim::models::atv312::Atv312::under_bus_control())?;
+/// # let line = drive_bus::Line::over(plant.in_memory(), drive_bus::LineConfig::stream(settings));
+/// # let fleet = drive_fleet::Fleet::builder()
+/// #     .line("north", line)
+/// #     .drive("north", 1, drive_fleet::DriveSettings::controlled("pump 1"), |port, slave| {
+/// #         Box::new(drive_atv312::Atv312::new(port, slave))
+/// #     })
+/// #     .start()?;
+/// # let pump = fleet.drive("pump 1").ok_or("no such pump")?;
+/// # pump.ready(Duration::from_secs(10)).await?;
+/// # assert!(pump.start_at(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+/// let stop = pump.stop(StopMode::Ramp);
+/// // No run command is in force any more; the motor comes down.
+/// assert!(stop.in_force().await.is_confirmed());
+/// assert!(stop.finished().await.is_confirmed());
+/// # assert!(!machine.observe().running);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 #[must_use = "a stop that is not confirmed is an alarm"]
 pub struct StopTicket {

@@ -6,6 +6,17 @@ use crate::{
 };
 
 /// A profile that was checked. What its file holds is whole: each name that it uses is one of its own.
+///
+/// ```
+/// use drive_profile::{Level, read, shipped};
+///
+/// let v20 = shipped::find("v20").expect("it is shipped");
+/// assert_eq!((v20.key(), v20.level()), ("v20", Level::Motion));
+///
+/// // A text that is no profile is refused with its lines.
+/// let refusals = read("profile = 1").unwrap_err();
+/// assert!(refusals.0.iter().all(|refusal| refusal.line >= 1 && !refusal.write.is_empty()));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Profile {
     pub(crate) file: File,

@@ -58,6 +58,16 @@ pub const ALWAYS: PerMillion = 1_000_000;
 /// The faults of one line: seed, rates, and how often each has struck.
 ///
 /// Each kind has a sequence of its own, so switching one on or off does not move the others.
+///
+/// ```
+/// use drive_core::SerialSettings;
+/// use drive_sim::{Fault, Faults, SimLine, Wiring};
+///
+/// let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// // One answer in a hundred is lost, and one in a thousand damaged; the same seed gives the same ones.
+/// line.set_faults(Faults::seeded(7).with(Fault::Lost, 10_000).with(Fault::Flipped, 1_000));
+/// assert_eq!(line.injected(Fault::Lost), 0, "nobody has asked for anything yet");
+/// ```
 #[derive(Debug, Clone)]
 pub struct Faults {
     kinds: Vec<Kind>,

@@ -113,6 +113,30 @@ impl fmt::Display for LineConfig {
     }
 }
 
+/// `tcp://HOST:PORT`, or else the path of a serial port. What is spoken there, and how fast, says a [`LineConfig`].
+///
+/// ```
+/// use drive_bus::Endpoint;
+///
+/// assert_eq!("tcp://10.0.0.5:502".parse(), Ok(Endpoint::Tcp("10.0.0.5:502".to_owned())));
+/// let port: Endpoint = "/dev/ttyUSB0".parse()?;
+/// assert_eq!(port, Endpoint::Serial("/dev/ttyUSB0".into()));
+/// assert!("http://10.0.0.5".parse::<Endpoint>().is_err());
+/// # Ok::<(), drive_bus::config::LineTextError>(())
+/// ```
+impl FromStr for Endpoint {
+    type Err = LineTextError;
+
+    fn from_str(text: &str) -> Result<Self, LineTextError> {
+        if let Some(address) = text.strip_prefix("tcp://") {
+            return connection(address);
+        }
+        // A stream is brought by a program: no text opens one.
+        let is_path = !text.is_empty() && !text.contains("://") && text != Self::Stream.to_string();
+        if is_path { serial_port(text) } else { Err(LineTextError::Form) }
+    }
+}
+
 impl FromStr for LineText {
     type Err = LineTextError;
 

@@ -57,6 +57,9 @@ impl fmt::Display for Protocol {
     }
 }
 
+#[cfg(feature = "serde")]
+drive_core::written_as_text!(Protocol);
+
 impl FromStr for Protocol {
     type Err = ProtocolError;
 

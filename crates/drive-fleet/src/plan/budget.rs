@@ -17,18 +17,35 @@ const FED: usize = 5;
 
 /// What a line gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LineBudget {
     /// Speed and format; `None` for Modbus TCP, which takes no time for characters and keeps no silences.
     pub serial: Option<SerialSettings>,
     /// What is spoken with these characters.
     pub protocol: Protocol,
     /// The usual time from a request to its answer.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "response_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub response: Duration,
     /// How long the line waits for an answer that does not come.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "response_timeout_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub response_timeout: Duration,
     /// The silence after a broadcast.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "broadcast_turnaround_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub broadcast_turnaround: Duration,
     /// The extra silence before a request to another slave than the last.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "slave_change_gap_ns", with = "drive_core::serialize::duration_ns")
+    )]
     pub slave_change_gap: Duration,
     /// After how many unanswered requests the line counts a slave as off-line.
     pub offline_after: u32,

@@ -30,17 +30,44 @@ const BACKGROUND_PPM: u64 = 50_000;
 const COMMANDS_PPM: u64 = 100_000;
 
 /// What a line will be like.
+///
+/// ```
+/// use drive_bus::LineConfig;
+/// use drive_core::SerialSettings;
+/// use drive_fleet::{Demand, LineBudget, Periods, plan};
+/// use std::time::Duration;
+///
+/// let budget = LineBudget::of(&LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+/// let demand = |number| Demand {
+///     drive: format!("pump {number}"),
+///     capabilities: &drive_atv312::CAPABILITIES,
+///     watchdog_capability: drive_atv312::CAPABILITIES.watchdog,
+///     periods: Periods { running: Duration::from_secs(1), rest: Duration::from_secs(1), ..Periods::default() },
+///     watchdog: None,
+/// };
+/// let ten: Vec<_> = (1..=10).map(demand).collect();
+/// let planned = plan(budget, &ten)?;
+/// assert!(!planned.is_overloaded() && planned.status_age(Duration::from_secs(1)) < Duration::from_secs(3));
+///
+/// // Forty are more than a segment carries, and the problem says so in words.
+/// let forty: Vec<_> = (1..=40).map(demand).collect();
+/// assert!(plan(budget, &forty).unwrap_err().to_string().contains("stations"));
+/// # Ok::<(), drive_fleet::PlanProblem>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct LinePlan {
     /// One status of every living drive, one after the other, with what proves their run commands and with the frames that their
     /// watchdogs get between two of them, and what the probes of dead ones take meanwhile.
+    #[cfg_attr(feature = "serde", serde(rename = "sweep_ns", with = "drive_core::serialize::duration_ns"))]
     pub sweep: Duration,
     /// The share of the line that the polls and the watchdogs take while every drive runs, and the probes of dead ones,
     /// in millionths. It is more than a million where they want more than the line has.
     pub utilisation_ppm: u64,
     /// From the last frame that the drive with the shortest watchdog heard to the next, at the latest. `None` without
     /// watchdogs.
+    #[cfg_attr(feature = "serde", serde(rename = "feed_gap_ns", with = "drive_core::serialize::maybe_ns"))]
     pub feed_gap: Option<Duration>,
     budget: LineBudget,
     drives: u32,
@@ -49,8 +76,16 @@ pub struct LinePlan {
     /// Exchanges of the stops of all, each from its first word until it is confirmed.
     stop_exchanges: u32,
     /// The statuses of every drive alone, one after the other, and the probes of dead ones.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "statuses_ns", with = "drive_core::serialize::duration_ns")
+    )]
     statuses: Duration,
     /// The measurements of every drive, one after the other.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "slow_sweep_ns", with = "drive_core::serialize::duration_ns")
+    )]
     slow_sweep: Duration,
     /// What the measurements leave of the line, in millionths.
     slow_ppm: u64,
@@ -87,7 +122,7 @@ impl LinePlan {
     /// come on top.
     #[must_use]
     pub fn status_age(&self, period: Duration) -> Duration {
-        period + self.status_wait()
+        period.saturating_add(self.status_wait())
     }
 
     /// What a status waits for the others: all of them come first, the frames that watchdogs want meanwhile, and what the line gives
@@ -107,7 +142,7 @@ impl LinePlan {
     #[must_use]
     pub fn measurements_age(&self, period: Duration) -> Duration {
         let left = self.left_ppm().saturating_add(self.slow_ppm).max(BACKGROUND_PPM);
-        period + stretched(self.slow_sweep, left.min(WHOLE_PPM))
+        period.saturating_add(stretched(self.slow_sweep, left.min(WHOLE_PPM)))
     }
 
     /// How a drive whose watchdog has this time is fed.
@@ -130,26 +165,32 @@ impl LinePlan {
     #[must_use]
     pub fn stop_all(&self, mute: u32) -> Duration {
         let lost = mute.saturating_mul(self.budget.offline_after.max(1));
-        self.budget.lost_slot()
-            + self.budget.broadcast_turnaround
-            + self.budget.read_slot().saturating_mul(self.stop_exchanges)
-            + self.budget.lost_slot().saturating_mul(lost)
+        // A plan that was read may say anything.
+        let all = self.budget.read_slot().saturating_mul(self.stop_exchanges);
+        let lost = self.budget.lost_slot().saturating_mul(lost);
+        let before = self.budget.lost_slot().saturating_add(self.budget.broadcast_turnaround);
+        before.saturating_add(all).saturating_add(lost)
     }
 }
 
 /// How a watchdog is fed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Feed {
     /// The watchdog's time.
+    #[cfg_attr(feature = "serde", serde(rename = "timeout_ns", with = "drive_core::serialize::duration_ns"))]
     pub timeout: Duration,
     /// The part of it after which the drive is given a frame of its own.
+    #[cfg_attr(feature = "serde", serde(rename = "after_ns", with = "drive_core::serialize::duration_ns"))]
     pub after: Duration,
     /// How many answers of other drives may fail to come just then.
     pub lost_answers: u32,
     /// The time that they take.
+    #[cfg_attr(feature = "serde", serde(rename = "lost_ns", with = "drive_core::serialize::duration_ns"))]
     pub lost: Duration,
     /// A frame for every watched drive.
+    #[cfg_attr(feature = "serde", serde(rename = "frames_ns", with = "drive_core::serialize::duration_ns"))]
     pub frames: Duration,
     /// How many watched drives.
     pub watched: u32,
@@ -159,7 +200,7 @@ impl Feed {
     /// From the last frame that the drive heard to the next, at the latest.
     #[must_use]
     pub fn heard_within(&self) -> Duration {
-        self.after + self.lost + self.frames
+        self.after.saturating_add(self.lost).saturating_add(self.frames)
     }
 
     /// Whether the drive hears something before its watchdog runs out.
@@ -180,6 +221,7 @@ pub fn plan(budget: LineBudget, drives: &[Demand]) -> Result<LinePlan, PlanProbl
 
 /// What a line would be like, and why it would not work, if it would not.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Forecast {
     /// The figures, also of a line that cannot work.
     pub plan: LinePlan,

@@ -7,6 +7,7 @@ use crate::supervisor::checks::FEED_PART;
 
 /// Why a plan does not work, with the arithmetic.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum PlanProblem {
     /// More drives than one of them allows on a segment.
@@ -14,7 +15,8 @@ pub enum PlanProblem {
         /// The drive that allows the fewest.
         drive: String,
         /// What it is.
-        family: &'static str,
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "drive_core::serialize::kept"))]
+        family: Word,
         /// How many it allows.
         most: u8,
         /// How many drives the line has.
@@ -25,6 +27,10 @@ pub enum PlanProblem {
     /// The polls want more than the line has.
     Overloaded {
         /// One status of every drive.
+        #[cfg_attr(
+            feature = "serde",
+            serde(rename = "sweep_ns", with = "drive_core::serialize::duration_ns")
+        )]
         sweep: Duration,
         /// How many drives.
         drives: usize,
@@ -43,13 +49,29 @@ pub enum PlanProblem {
         /// The drive.
         drive: String,
         /// From one status to the next.
+        #[cfg_attr(
+            feature = "serde",
+            serde(rename = "period_ns", with = "drive_core::serialize::duration_ns")
+        )]
         period: Duration,
         /// What a status may have to wait for the others.
+        #[cfg_attr(
+            feature = "serde",
+            serde(rename = "wait_ns", with = "drive_core::serialize::duration_ns")
+        )]
         wait: Duration,
         /// The oldest status that counts as fresh.
+        #[cfg_attr(
+            feature = "serde",
+            serde(rename = "max_age_ns", with = "drive_core::serialize::duration_ns")
+        )]
         max_age: Duration,
     },
 }
+
+/// A family's name. Derived code that reads it must not take its lifetime for that of what is read, which it does where it sees the
+/// reference.
+type Word = &'static str;
 
 impl fmt::Display for PlanProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -80,14 +102,14 @@ impl fmt::Display for PlanProblem {
                 Answers(feed.lost_answers),
                 Short(feed.frames),
                 feed.watched,
-                Short((feed.lost + feed.frames) * FEED_PART),
+                Short(feed.lost.saturating_add(feed.frames).saturating_mul(FEED_PART)),
             ),
             Self::Stale { drive, period, wait, max_age } => write!(
                 f,
                 "a status of {drive} may be {} old before the next one comes, {} of the period and {} of waiting for \
                  the other drives, and from {} on the drive counts as lost: lengthen max_age, shorten the period, or \
                  raise the speed",
-                Short(*period + *wait),
+                Short(period.saturating_add(*wait)),
                 Short(*period),
                 Short(*wait),
                 Short(*max_age),

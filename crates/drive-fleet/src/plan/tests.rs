@@ -204,3 +204,73 @@ fn a_stop_of_all_counts_the_exchanges_that_the_family_says() {
     every.iter_mut().for_each(|demand| demand.capabilities = &TWO_LOOKS);
     assert_eq!(plan(budget(), &every).unwrap().stop_all(0) - before, budget().read_slot() * 30);
 }
+
+#[cfg(feature = "serde")]
+#[test]
+fn a_plan_reads_back_as_it_is_written_and_goes_on_calculating() {
+    use serde_json::{from_value, json, to_value};
+
+    let unitelway = LineConfig {
+        protocol: "unitelway,header=simplified".parse().unwrap(),
+        ..LineConfig::stream("9600 8O1".parse().unwrap())
+    };
+    for budget in [budget(), LineBudget::of(&unitelway)] {
+        let plan = plan(budget, &drives(3, 1_000 * MS, Some(4_000 * MS))).unwrap();
+        let read: LinePlan = from_value(to_value(plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
+        assert_eq!(read.feed(4_000 * MS), plan.feed(4_000 * MS));
+        assert_eq!(read.stop_all(2), plan.stop_all(2));
+    }
+    let written = to_value(budget()).unwrap();
+    assert_eq!(written["serial"], "19200 8E1");
+    assert_eq!((&written["protocol"], &written["response_ns"]), (&json!("rtu"), &json!(10_000_000)));
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn every_problem_of_a_plan_reads_back_with_its_arithmetic() {
+    let crowded = plan(budget(), &drives(40, 5_000 * MS, None)).unwrap_err();
+    let overloaded = plan(budget(), &drives(31, 500 * MS, None)).unwrap_err();
+    let starved = plan(budget(), &drives(31, 5_000 * MS, Some(500 * MS))).unwrap_err();
+    let mut tight = drives(20, 1_000 * MS, None);
+    tight.iter_mut().for_each(|demand| demand.periods.max_age = 2_001 * MS);
+    let stale = plan(budget(), &tight).unwrap_err();
+    assert!(matches!(
+        (&crowded, &overloaded, &starved, &stale),
+        (
+            PlanProblem::Stations { .. },
+            PlanProblem::Overloaded { .. },
+            PlanProblem::Starved { .. },
+            PlanProblem::Stale { .. }
+        )
+    ));
+    for problem in [crowded, overloaded, starved, stale] {
+        let read: PlanProblem = serde_json::from_value(serde_json::to_value(&problem).unwrap()).unwrap();
+        assert_eq!((read.to_string(), &read), (problem.to_string(), &problem));
+    }
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn a_plan_that_says_the_impossible_overflows_nothing() {
+    let mut written = serde_json::to_value(plan(budget(), &drives(3, 1_000 * MS, None)).unwrap()).unwrap();
+    let least =
+        ["fresh_ppm", "fed_ppm", "slow_ppm", "utilisation_ppm", "sweep_ns", "statuses_ns", "slow_sweep_ns"];
+    for key in least {
+        written[key] = u64::MAX.into();
+    }
+    for key in ["watched", "dead", "drives", "stop_exchanges"] {
+        written[key] = u32::MAX.into();
+    }
+    for key in ["response_ns", "response_timeout_ns", "broadcast_turnaround_ns"] {
+        written["budget"][key] = u64::MAX.into();
+    }
+    let read: LinePlan = serde_json::from_value(written).unwrap();
+    assert_eq!(read.feed(Duration::MAX).heard_within(), Duration::MAX);
+    assert_eq!(read.stop_all(u32::MAX), Duration::MAX);
+    assert!(read.status_age(Duration::MAX) == Duration::MAX && read.left_ppm() == 0);
+    assert!(read.measurements_age(Duration::MAX) == Duration::MAX && read.rest_after(MS) < SECOND);
+}
+
+#[cfg(feature = "serde")]
+const SECOND: Duration = Duration::from_secs(1);

@@ -18,6 +18,27 @@ use crate::{
 const LOOK: Duration = Duration::from_millis(1);
 
 /// One drive of a [`SimLine`], as somebody beside the machine reaches it: a handle that is cheap to clone.
+///
+/// ```
+/// use drive_core::SerialSettings;
+/// use drive_sim::{SimLine, Wiring, models::atv312::Atv312};
+///
+/// # #[tokio::main(flavor = "current_thread", start_paused = true)]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// let drive = line.add(1, Atv312::under_bus_control())?;
+/// // LFr, the reference on the bus, as its registers hold it.
+/// assert!(drive.poke(8502, 300));
+/// assert_eq!(drive.peek(8502), Some(300));
+///
+/// drive.trip(9);
+/// assert_eq!(drive.wait_until(|seen| seen.trip.is_some()).await.trip, Some(9));
+/// // What is only in its RAM goes with its supply.
+/// drive.power_cycle();
+/// assert_eq!(drive.peek(8502), Some(0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct SimSlave {
     pub(super) line: SimLine,

@@ -78,6 +78,21 @@ pub enum AddressError {
 ///
 /// It is served to a master in memory, on a pty, on a serial port or on TCP; see the methods named `serve_…` and
 /// [`in_memory`](Self::in_memory). All endpoints of one line reach the same drives.
+///
+/// ```
+/// use drive_core::SerialSettings;
+/// use drive_sim::{SimLine, Wiring, models::atv312::Atv312};
+///
+/// let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+/// for address in 1..=3 {
+///     line.add(address, Atv312::under_bus_control())?;
+/// }
+/// assert!(line.add(3, Atv312::under_bus_control()).is_err(), "somebody has that address");
+/// assert_eq!(line.slaves().len(), 3);
+/// // What a master does wrong is recorded.
+/// assert_eq!(line.violations(), []);
+/// # Ok::<(), drive_sim::AddressError>(())
+/// ```
 #[derive(Clone)]
 pub struct SimLine {
     wiring: Wiring,
