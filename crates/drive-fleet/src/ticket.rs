@@ -57,8 +57,9 @@ use crate::{
 /// assert!(!machine.observe().output_frequency.eq(&5_000));
 /// assert!(run.finished().await.is_confirmed());
 ///
-/// // Nobody hears of this one: the motor is stopped again.
-/// drop(pump.start(Direction::Forward));
+/// // Who waits no longer has heard of nothing: what he has started is stopped again.
+/// let slower = pump.run(Direction::Forward, Frequency::from_hertz(10));
+/// assert!(tokio::time::timeout(Duration::from_secs(1), slower).await.is_err());
 /// machine.wait_until(|seen| !seen.running).await;
 /// # Ok(())
 /// # }

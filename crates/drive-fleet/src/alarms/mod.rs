@@ -50,29 +50,19 @@ const GONE_AFTER: u64 = 10_000;
 /// All alarms of a plant.
 ///
 /// ```
-/// use drive_fleet::{
-///     ConcernKind,
-///     alarms::{AlarmKind, Alarms, Condition, Look},
-/// };
+/// use std::collections::BTreeMap;
+/// use drive_fleet::alarms::{AlarmKind, Alarms, Look};
 ///
-/// let kind = AlarmKind::Drive(ConcernKind::Tripped);
-/// let look = |there: &[AlarmKind]| Look {
-///     drive: Some("pump 1".to_owned()),
-///     line: Some("north".to_owned()),
-///     there: there
-///         .iter()
-///         .map(|kind| Condition { kind: *kind, mark: None, since_unix_ms: None, detail: None, remedy: None })
-///         .collect(),
-///     seen: vec![kind],
-/// };
+/// // Of a drive it is `Look::at_drive`, of a line `Look::at_line`.
+/// let full = BTreeMap::from([(AlarmKind::AuditLog, "no space left on device".to_owned())]);
 /// let mut alarms = Alarms::default();
-/// alarms.look(&[look(&[kind])], 1_000);
+/// alarms.look(&[Look::at_program(&full)], 1_000);
 /// let id = alarms.all()[0].id;
 ///
 /// // It is over when it is so no more, and somebody has taken note of it: in either order.
-/// alarms.acknowledge(id, "Anna", Some("belt changed"), 2_000)?;
+/// alarms.acknowledge(id, "Anna", Some("disk ordered"), 2_000)?;
 /// assert!(alarms.all()[0].is_active());
-/// alarms.look(&[look(&[])], 3_000);
+/// alarms.look(&[Look::at_program(&BTreeMap::new())], 3_000);
 /// assert!(alarms.all().is_empty());
 /// # Ok::<(), drive_fleet::alarms::AlarmRefused>(())
 /// ```
