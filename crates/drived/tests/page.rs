@@ -111,6 +111,31 @@ fn a_trend_is_the_daemons_record_by_the_daemons_clock_and_a_setpoint_the_one_tha
 }
 
 #[test]
+fn a_cable_is_one_row_and_three_clicks_put_right_what_it_has_left_at_every_drive() {
+    look_at_three_pumps("folded");
+}
+
+#[test]
+fn an_alarm_calls_and_is_acknowledged_with_a_note_shelved_and_taken_back() {
+    look_at_three_pumps("alarms");
+}
+
+#[test]
+fn a_setpoint_of_somebody_else_is_said_and_his_name_stands_beside_it() {
+    look_at_three_pumps("somebody");
+}
+
+#[test]
+fn every_time_is_the_daemons_with_its_zone() {
+    look_at_three_pumps("zones");
+}
+
+#[test]
+fn every_view_is_whole_in_both_languages_at_three_widths_and_high_enough_for_a_thumb() {
+    look_at_three_pumps("touched");
+}
+
+#[test]
 fn no_view_breaks_a_rule_of_axe() {
     look_at_three_pumps("axe");
     look_at_three_pumps("axe_dark");
@@ -138,7 +163,7 @@ fn two_hundred_drives_are_listed_and_searched() {
 /// Three pumps, of which whoever has no token sees and stops all; the tokens that a scene asks for are for all and for one.
 fn look_at_three_pumps(scene: &str) {
     let Some(python) = python() else { return };
-    let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-3"]);
+    let mut pumps = Sim::serve(&format!("page-{scene}"), &["atv312@1-6"]);
     let state = path(&format!("page-{scene}-state"));
     let text = format!(
         "state = {:?}\n[lines.north]\nport = \"{}\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-3\"\nname = \"pump {{}}\"\ncontrol = true\nslow = \"60min\"\n[groups]\n\"the pumps of the second hall behind the old boiler house\" = [\"pump 1\", \"pump 2\", \"pump 3\"]\n",
@@ -153,14 +178,17 @@ fn look_at_three_pumps(scene: &str) {
         ),
         _ => text,
     };
+    let text = if scene == "folded" { text.replace("atv312@1-3", "atv312@1-6") } else { text };
     let config = File::new(&format!("page-{scene}"), &text);
     let token = |words: &[&str]| {
         let add = ["token", "add", "--role", "operate", "--config", config.path()];
         run(&[&add, words].concat()).assert_done().trim().to_owned()
     };
     let tokens: &[String] = match scene {
-        "trip" | "questions" | "axe" | "axe_dark" => &[token(&["operator"])],
-        "scoped" => &[token(&["operator"]), token(&["second", "--drive", "pump 2"])],
+        "trip" | "questions" | "axe" | "axe_dark" | "folded" | "alarms" | "touched" => {
+            &[token(&["operator"])]
+        }
+        "scoped" | "somebody" => &[token(&["operator"]), token(&["second", "--drive", "pump 2"])],
         _ => &[],
     };
     look(&python, scene, &["run", "--config", config.path()], tokens, Some(&mut pumps));

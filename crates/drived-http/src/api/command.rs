@@ -17,6 +17,7 @@ use tokio::time::Instant;
 use super::{
     ask::{Arrived, By, Named, Sent, Stopping, Viewer, Wait},
     problem::Problem,
+    selected::{Selected, StoppingSelected},
 };
 use drived_doors::Caller;
 use drived_plant::plant::{
@@ -51,6 +52,18 @@ pub(super) async fn to_group<B: Asks>(
     carry_out(&plant, &caller, request, wait).await
 }
 
+/// A command to drives that somebody has selected.
+pub(super) async fn to_selected<B: Asks>(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    Sent(Selected { drives, body }): Sent<Selected<B>>,
+) -> Result<Response, Problem> {
+    let request = request(Target::Selected(drives), body, arrived)?;
+    carry_out(&plant, &caller, request, wait).await
+}
+
 /// A stop of a drive.
 pub(super) async fn stop_drive(
     State(plant): State<Plant>,
@@ -73,6 +86,17 @@ pub(super) async fn stop_group(
     Stopping(said): Stopping,
 ) -> Result<Response, Problem> {
     carry_out(&plant, &caller, stop(Target::Group(name), said, arrived), wait).await
+}
+
+/// A stop of drives that somebody has selected.
+pub(super) async fn stop_selected(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Arrived(arrived): Arrived,
+    Wait(wait): Wait,
+    StoppingSelected(drives, said): StoppingSelected,
+) -> Result<Response, Problem> {
+    carry_out(&plant, &caller, stop(Target::Selected(drives), said, arrived), wait).await
 }
 
 /// A stop of all drives.

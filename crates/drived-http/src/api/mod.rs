@@ -13,6 +13,7 @@ mod problem;
 mod read;
 mod reload;
 mod routes;
+mod selected;
 mod stream;
 #[cfg(test)]
 mod testing;

@@ -53,6 +53,10 @@ pub(super) async fn history(
     plant.history(&name, since_unix_ms).map(|history| fresh(&history)).ok_or_else(|| no_drive(&name))
 }
 
+pub(super) async fn curves(State(plant): State<Plant>, _: Viewer) -> Response {
+    fresh(&plant.curves())
+}
+
 pub(super) async fn lines(State(plant): State<Plant>, _: Viewer) -> Response {
     fresh(&plant.lines())
 }

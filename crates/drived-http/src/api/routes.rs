@@ -13,7 +13,9 @@ use super::{
     alarms::{self, Acknowledge, Shelve, Unshelve},
     capture, command, demo, health,
     parameter::{self, NewValue},
-    read, reload, stream,
+    read, reload,
+    selected::Selected,
+    stream,
 };
 use drived_doors::{
     LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, Rotation, SessionView, TOKENS, TokensView,
@@ -22,7 +24,7 @@ use drived_plant::plant::{
     Plant,
     alarms::AlarmsView,
     commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
-    history::HistoryView,
+    history::{CurvesView, HistoryView},
     parameters::{ParameterView, WrittenView},
     recent::RecentView,
     views::{CommandView, DriveView, LineDetailView, LineView, SettingsView, StateView},
@@ -276,6 +278,12 @@ fn reads() -> Vec<Route> {
         Route::get("/api/v1/drives/{name}/history", read::history, "The last ten minutes of a drive")
             .with_query(SINCE_TIME)
             .answers::<HistoryView>(200, "the history"),
+        Route::get(
+            "/api/v1/curves",
+            read::curves,
+            "The frequencies of all drives in the last ten minutes, in a few steps",
+        )
+        .answers::<CurvesView>(200, "a small curve of each drive"),
         Route::get("/api/v1/drives/{name}/faults", parameter::faults, "What a drive says of its faults")
             .answers::<Faults>(200, "the present faults, the alarms and the history")
             .or_problem(409)
@@ -376,6 +384,31 @@ fn commands() -> Vec<Route> {
             "/api/v1/groups/{name}/release",
             command::to_group::<Release>,
             "Gives control of a group back to panels or terminals",
+        ),
+        Route::command::<_, _, Selected<Start>>(
+            "/api/v1/selected/start",
+            command::to_selected::<Start>,
+            "Starts the drives that are named, each by itself",
+        ),
+        Route::command::<_, _, Selected<Stop>>(
+            "/api/v1/selected/stop",
+            command::stop_selected,
+            "Stops the drives that are named",
+        ),
+        Route::command::<_, _, Selected<NewSetpoint>>(
+            "/api/v1/selected/setpoint",
+            command::to_selected::<NewSetpoint>,
+            "Changes the setpoint of the drives that are named",
+        ),
+        Route::command::<_, _, Selected<Plain>>(
+            "/api/v1/selected/reset",
+            command::to_selected::<Reset>,
+            "Resets the present faults of the drives that are named",
+        ),
+        Route::command::<_, _, Selected<Plain>>(
+            "/api/v1/selected/release",
+            command::to_selected::<Release>,
+            "Gives control of the drives that are named back to panels or terminals",
         ),
         Route::command::<_, _, Plain>(
             "/api/v1/drives/{name}/save",

@@ -26,7 +26,8 @@ impl File {
 /// All of them.
 pub(super) fn files() -> Vec<File> {
     let served = SERVED.iter().map(|(path, content)| File { path, content: content.to_vec() });
-    let made = [("/", index()), ("/app.js", bundle::of(MODULES, "main.js"))];
+    let made =
+        [("/", index()), ("/app.js", bundle::of(MODULES, "main.js")), ("/more.js", bundle::more(LATER))];
     served.chain(made.map(|(path, text)| File { path, content: text.into_bytes() })).collect()
 }
 
@@ -51,6 +52,7 @@ files![
     "faults_fr.js",
     "findings_fr.js",
     "icon.svg",
+    "icon_alarm.svg",
     "page.css",
     "sentences_fr.js",
     "vendor/uplot.LICENSE",
@@ -60,32 +62,48 @@ files![
 
 files![
     MODULES: &str = include_str(""),
+    "alarm_words.js",
     "api.js",
     "ask.js",
+    "attention.js",
+    "curves.js",
     "demo.js",
     "dom.js",
+    "fold.js",
+    "follow.js",
+    "format.js",
+    "given.js",
+    "login.js",
+    "main.js",
+    "orders.js",
+    "overview.js",
+    "place.js",
+    "plant.js",
+    "row.js",
+    "search.js",
+    "selection.js",
+    "several.js",
+    "sort.js",
+    "stream.js",
+    "texts.js",
+    "tile.js",
+    "told.js",
+    "trouble.js",
+    "vocabulary.js",
+    "words.js",
+];
+
+files![
+    LATER: &str = include_str(""),
+    "alarms.js",
     "drive.js",
     "drive_faults.js",
     "drive_orders.js",
     "drive_tables.js",
     "events.js",
-    "follow.js",
-    "format.js",
     "line.js",
     "line_last.js",
-    "login.js",
-    "main.js",
-    "orders.js",
-    "overview.js",
-    "plant.js",
-    "row.js",
     "setpoint.js",
     "status_bits.js",
-    "stream.js",
-    "texts.js",
-    "told.js",
     "trend.js",
-    "trouble.js",
-    "vocabulary.js",
-    "words.js",
 ];

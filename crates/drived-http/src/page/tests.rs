@@ -9,7 +9,10 @@ use axum::{
 use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
 
-use super::{files::MODULES, *};
+use super::{
+    files::{LATER, MODULES},
+    *,
+};
 use drived_client as client;
 
 fn text_of(path: &str) -> String {
@@ -29,7 +32,7 @@ fn modules() -> impl Iterator<Item = (&'static str, &'static str)> {
         ("findings_fr.js", include_str!("web/findings_fr.js")),
         ("sentences_fr.js", include_str!("web/sentences_fr.js")),
     ];
-    MODULES.iter().copied().chain([("stop.js", STOP_SCRIPT)]).chain(french)
+    MODULES.iter().chain(LATER).copied().chain([("stop.js", STOP_SCRIPT)]).chain(french)
 }
 
 /// A file of the folder as it is written.
@@ -52,7 +55,7 @@ async fn every_file_of_the_folder_is_served_with_its_type_or_stands_in_one_that_
             fs::read_dir(folder).expect("it is a folder").map(|entry| entry.expect("it is listed").path());
         entries.filter(|path| path.is_file()).collect::<Vec<_>>()
     };
-    let (document, script) = (text_of("/"), text_of("/app.js"));
+    let (document, script) = (text_of("/"), text_of("/app.js") + &text_of("/more.js"));
     for path in listed(&folder).into_iter().chain(listed(&folder.join("vendor"))) {
         let name = path.strip_prefix(&folder).expect("it is below").to_str().expect("it is text");
         let content = fs::read(&path).expect("it is read");
@@ -62,8 +65,8 @@ async fn every_file_of_the_folder_is_served_with_its_type_or_stands_in_one_that_
                 assert!(document.contains(std::str::from_utf8(&content).expect("it is text")), "{name}");
                 continue;
             }
-            _ if MODULES.iter().any(|(module, _)| *module == name) => {
-                assert!(script.contains(&format!("'{name}': () => {{")), "{name}");
+            _ if MODULES.iter().chain(LATER).any(|(module, _)| *module == name) => {
+                assert!(script.contains(&format!("'{name}': (use, later) => {{")), "{name}");
                 continue;
             }
             _ => {}
@@ -214,6 +217,17 @@ fn what_troubles_a_drive_has_the_words_of_the_fleets_table_and_its_states_the_wo
         let remedy = format!("  '{}': '", kind.remedy().replace('\'', "\\'"));
         assert!(french.contains(&remedy), "{remedy}");
     }
+    // Those that are of no drive's own have their words in the table of alarms.
+    for kind in drive_fleet::alarms::AlarmKind::all() {
+        let own = drive_fleet::ConcernKind::ALL.iter().any(|concern| concern.word() == kind.word());
+        let row = format!("  alarm_{}: ['{}', '", kind.word(), kind.words());
+        assert!(own || texts.contains(&row), "{row}");
+        let remedy = format!("  '{}': '", kind.remedy().replace('\'', "\\'"));
+        assert!(french.contains(&remedy), "{remedy}");
+    }
+    for state in drive_fleet::alarms::AlarmState::ALL {
+        assert!(words.contains(&format!("  {state}: ['")), "{state}");
+    }
     for shows in drive_fleet::Shows::ALL {
         let word = shows.to_string();
         let (first, rest) = word.split_at(1);
@@ -226,7 +240,7 @@ fn what_troubles_a_drive_has_the_words_of_the_fleets_table_and_its_states_the_wo
 fn the_page_decides_of_no_drive_what_troubles_it_or_what_it_does() {
     for (path, text) in modules() {
         // The account of STOP ALL asks whose stop the fleet alarms.
-        if !["trouble.js", "main.js", "texts.js"].contains(&path) {
+        if !["trouble.js", "main.js", "texts.js", "alarm_words.js"].contains(&path) {
             assert!(!text.contains("concern"), "{path} reads what troubles a drive");
         }
         for decided in ["link === 'lost'", "link === 'connecting'", "stop.alarm", "stop?.alarm"] {

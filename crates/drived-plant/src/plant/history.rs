@@ -21,6 +21,8 @@ use drived_words::json::{milliseconds, unix};
 const STEP: Duration = Duration::from_millis(500);
 /// How many are kept.
 const KEPT: usize = 1_200;
+/// So many samples are one step of a small curve.
+const CURVE_STEP: usize = 30;
 /// Nothing fresh was known.
 const NOTHING: i32 = i32::MIN;
 
@@ -52,6 +54,16 @@ pub struct HistoryView {
     pub setpoint_hz: Vec<Option<f64>>,
     pub current_a: Vec<Option<f64>>,
     pub torque_percent: Vec<Option<f64>>,
+}
+
+/// The output frequencies of all drives in the last ten minutes, for a small curve of each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CurvesView {
+    pub step_ms: u64,
+    /// When the last step ended.
+    pub time_unix_ms: u64,
+    /// By drive, the newest last: what was known last in each step, `null` where nothing fresh was.
+    pub frequency_hz: BTreeMap<String, Vec<Option<f64>>>,
 }
 
 /// Samples every drive for as long as anybody holds the plant.
@@ -89,6 +101,23 @@ impl History {
                     torque: NOTHING,
                 });
             }
+        }
+    }
+
+    pub(super) fn curves(&self) -> CurvesView {
+        let rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let drives = rings.drives.iter().map(|(name, ring)| {
+            // From the newest on, so that the last step is a whole one.
+            let newest_first: Vec<&Sample> = ring.iter().rev().collect();
+            let steps = newest_first.chunks(CURVE_STEP).rev();
+            let curve =
+                steps.map(|step| step.iter().map(|sample| hertz(sample.frequency)).find(Option::is_some));
+            (name.to_string(), curve.map(Option::flatten).collect())
+        });
+        CurvesView {
+            step_ms: milliseconds(STEP) * CURVE_STEP as u64,
+            time_unix_ms: rings.times.back().map_or(0, |at| unix(*at)),
+            frequency_hz: drives.collect(),
         }
     }
 
@@ -133,6 +162,10 @@ impl Sample {
             torque: measured.and_then(|measured| measured.torque).map_or(NOTHING, Percent::hundredths),
         }
     }
+}
+
+fn hertz(count: i32) -> Option<f64> {
+    (count != NOTHING).then(|| f64::from(count) / 100.0)
 }
 
 fn count(value: Option<u32>) -> i32 {

@@ -17,6 +17,7 @@ mod watching;
 
 use std::{
     collections::HashMap,
+    env,
     sync::{Arc, PoisonError, RwLock},
 };
 
@@ -36,7 +37,7 @@ use self::views::{
 use self::{
     alarms::KeptAlarms,
     commands::{Log, Stopped},
-    history::{History, HistoryView},
+    history::{CurvesView, History, HistoryView},
     last::LastCommands,
     parameters::Words,
     progress::Progress,
@@ -125,6 +126,7 @@ impl Plant {
             daemon: DaemonView {
                 version: env!("CARGO_PKG_VERSION").into(),
                 started_unix_ms: self.0.started_unix_ms,
+                zone: zone(),
                 demo: self.0.demo,
                 rights: caller.rights,
                 caller: caller.name.clone(),
@@ -233,12 +235,23 @@ impl Plant {
         self.0.fleet.drive(name).map(|_| self.0.history.of(name, since_unix_ms))
     }
 
+    /// The frequencies of all drives in the last ten minutes, in a few steps each.
+    pub fn curves(&self) -> CurvesView {
+        self.0.history.curves()
+    }
+
     fn members(&self) -> impl Iterator<Item = (Arc<str>, DriveHandle)> {
         let fleet = self.fleet();
         fleet.lines().into_iter().flat_map(move |(name, _)| {
             fleet.drives_on(&name).into_iter().map(move |drive| (Arc::clone(&name), drive))
         })
     }
+}
+
+/// The zone of this host's clock by its name, as the log tells its times.
+fn zone() -> Option<String> {
+    let told = env::var("TZ").ok().map(|zone| zone.trim_start_matches(':').to_owned());
+    told.filter(|zone| !zone.is_empty()).or_else(|| iana_time_zone::get_timezone().ok())
 }
 
 impl Inner {

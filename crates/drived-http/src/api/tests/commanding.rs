@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::Frequency;
+use drive_core::{Frequency, State};
 use drive_fleet::{Band, DriveSettings, FrequencyLimits};
 use serde_json::json;
 use tokio::time::{Instant, sleep, timeout};
@@ -182,6 +182,43 @@ async fn a_client_that_goes_away_leaves_no_half_done_start() {
     assert!((0..3).all(|index| is_running(&plant, index)), "the whole group has started");
     let (_, told) = get(&plant.plant, "/api/v1/commands/group").await;
     assert_eq!((&told["outcome"], &told["confirmed"]), (&"confirmed".into(), &3.into()), "{told}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn drives_that_are_selected_are_commanded_each_by_itself_and_no_other() {
+    let plant = TestPlant::of(4).await;
+    plant.machines[1].trip(9);
+    let tripped = plant.plant.fleet().drive("pump 2").unwrap();
+    let _ = tripped
+        .wait_until(|seen| seen.status.as_ref().is_some_and(|seen| seen.value.state == State::Fault))
+        .await;
+    let three = json!(["pump 1", "pump 2", "pump 3", "pump 1"]);
+    let start = json!({"drives": three, "setpoint": {"frequency_hz": 30.0}});
+    let (status, told) = command(&plant.plant, "/api/v1/selected/start?wait=30s", &start).await;
+    // A group would have started nobody.
+    assert_eq!(status, StatusCode::CONFLICT, "{told}");
+    let outcomes = |told: &Value| {
+        let each = told["drives"].as_array().unwrap().iter();
+        each.map(|one| format!("{} {}", one["drive"], one["outcome"]).replace('"', "")).collect::<Vec<_>>()
+    };
+    assert_eq!(outcomes(&told), ["pump 1 confirmed", "pump 2 refused", "pump 3 confirmed"], "{told}");
+    assert_eq!(told["selected"], json!(["pump 1", "pump 2", "pump 3"]));
+    assert_eq!([0, 1, 2, 3].map(|number| is_running(&plant, number)), [true, false, true, false]);
+    // A stop is one whatever else it says, and leaves alone whom it does not name.
+    let stop = json!({"drives": ["pump 1", "nobody"], "mode": "no such mode", "more": 1});
+    let (status, told) = command(&plant.plant, "/api/v1/selected/stop?wait=30s", &stop).await;
+    assert_eq!((status, outcomes(&told)), (StatusCode::OK, vec!["pump 1 confirmed".to_owned()]), "{told}");
+    assert_eq!([0, 2].map(|number| is_running(&plant, number)), [false, true]);
+    for (body, expected) in [
+        (json!({}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"drives": []}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"drives": "pump 1"}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"drives": ["pump 1"], "more": 1}), StatusCode::UNPROCESSABLE_ENTITY),
+        (json!({"drives": ["pump 1", "nobody"]}), StatusCode::NOT_FOUND),
+    ] {
+        let (status, told) = command(&plant.plant, "/api/v1/selected/reset", &body).await;
+        assert_eq!(status, expected, "{body}: {told}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

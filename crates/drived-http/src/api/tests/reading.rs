@@ -202,6 +202,24 @@ async fn the_history_is_ten_minutes_long_and_no_longer() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_small_curve_of_every_drive_is_its_history_in_steps_with_gaps_where_nothing_was_known() {
+    let TestPlant { plant, machines, witnesses: _witnesses, .. } = TestPlant::of(2).await;
+    let drive = plant.fleet().drive("pump 1").unwrap();
+    assert!(drive.start_at(Direction::Forward, Frequency::from_hertz(20)).await.is_confirmed());
+    tokio::time::sleep(Duration::from_secs(300)).await;
+    machines[1].mute();
+    tokio::time::sleep(Duration::from_secs(310)).await;
+    let (_, curves) = get(&plant, "/api/v1/curves").await;
+    assert_eq!(curves["step_ms"], 15_000);
+    let of = |name: &str| curves["frequency_hz"][name].as_array().unwrap().clone();
+    assert_eq!([of("pump 1").len(), of("pump 2").len()], [40, 40]);
+    assert!(of("pump 1")[1..].iter().all(|hertz| *hertz == 20.0), "{curves}");
+    assert_eq!(of("pump 2")[5], 0.0);
+    // It is not what it was last that goes on.
+    assert!(of("pump 2")[22..].iter().all(Value::is_null), "{curves}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn the_faults_and_their_history_are_read_from_the_drive() {
     let TestPlant { plant, machines, witnesses: _witnesses, .. } = TestPlant::of(1).await;
     machines[0].trip(9);

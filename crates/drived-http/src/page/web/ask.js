@@ -33,19 +33,33 @@ export function ask(name, form) {
   return { close: value => dialog.close(value), closed };
 }
 
-/** Asks whether these drives are commanded; `true` when the answer is `yes`. Escape, Cancel and a stop meanwhile are a no. */
-export async function confirmed(drives, question, yes) {
-  const form = el('form', { method: 'dialog' },
-    el('p', {}, question),
-    el('div.buttons', {},
-      el('button', { value: 'no' }, t('cancel')),
-      el('button.primary', { value: 'yes' }, yes)));
-  const { close, closed } = ask(yes, form);
+/**
+ * Asks whether these drives are commanded, perhaps with a field to be filled; `true` when the answer is `yes`. Escape, Cancel and a
+ * stop meanwhile are a no.
+ */
+export async function confirmed(drives, question, yes, field) {
+  const { close, closed } = put(question, yes, field);
   const one = { drives, yes, close, since: daemonNow() };
   questions.add(one);
   const answer = await closed;
   questions.delete(one);
   return answer === 'yes';
+}
+
+/** Asks for what a form has; `true` when it was sent. No drive is commanded by it. */
+export async function filled(question, yes, ...fields) {
+  return await put(question, yes, ...fields).closed === 'yes';
+}
+
+function put(question, yes, ...fields) {
+  const form = el('form', { method: 'dialog' },
+    el('p', {}, question), ...fields,
+    el('div.buttons', {},
+      el('button', { value: 'no', formnovalidate: true }, t('cancel')),
+      el('button.primary', { value: 'yes' }, yes)));
+  const asked = ask(yes, form);
+  form.querySelector('input, textarea, select')?.focus();
+  return asked;
 }
 
 /** A stop of all was pressed here, or the daemon tells of this one: what was asked of its drives before is asked no more. */

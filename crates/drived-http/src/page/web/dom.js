@@ -46,6 +46,17 @@ export function arrange(parent, rows) {
   if (focused !== document.activeElement && parent.contains(focused)) focused.focus({ preventScroll: true });
 }
 
+/** The members of a list by their key, in the order in which the keys come first. */
+export function grouped(list, keyOf) {
+  const groups = new Map();
+  for (const one of list) {
+    const key = keyOf(one);
+    if (groups.has(key)) groups.get(key).push(one);
+    else groups.set(key, [one]);
+  }
+  return groups;
+}
+
 /** A table with a header row; `columns` are texts, or `[text, class]`. */
 export function table(caption, columns, rows, name = 'table') {
   return el(name, {},

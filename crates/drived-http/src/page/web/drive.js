@@ -6,6 +6,7 @@ import { faultPanel } from './drive_faults.js';
 import { ordersPanel } from './drive_orders.js';
 import { tablesPanel } from './drive_tables.js';
 import { MISSING, old, quantity } from './format.js';
+import { givenBy, lastSetpoint } from './given.js';
 import { age, plant, quality, takeDrive } from './plant.js';
 import { named, t } from './texts.js';
 import { trend } from './trend.js';
@@ -15,6 +16,7 @@ import { currentText, frequencyText, setpointOf, setpointText, stateWord } from 
 
 /** Measurements are read seldom: what is older than this says so, though it is the latest that there is. */
 const DATED_FROM_MS = 3_000;
+const SAID_MS = 12_000;
 
 const BIG = [
   ['frequency', drive => frequencyText(drive.status), 'status'],
@@ -42,6 +44,8 @@ export function drive(root, name) {
     el('p.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, turns), freshness);
   const remark = el('p.remark');
   const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('dd.since')));
+  const given = big[1].appendChild(el('dd.since'));
+  let setpoint = setpointText(setpointOf(shown));
   const trendPlace = el('section.panel.trend', { 'aria-label': t('trend') });
   const fault = faultPanel(name);
   const orders = ordersPanel(name);
@@ -76,7 +80,7 @@ export function drive(root, name) {
   }
 
   function update(names) {
-    if (!names.has('state') && !names.has(`drive ${name}`)) return;
+    if (!names.has('state') && !names.has(`drive ${name}`) && !names.has('event')) return;
     shown = plant.drives.get(name) ?? shown;
     const status = shown.status ?? {};
     const { severity, text, remedy: first } = trouble(shown);
@@ -94,10 +98,24 @@ export function drive(root, name) {
       setText(big[index].children[1], value(shown));
       setAttribute(big[index], 'data-quality', group ? qualityOf(group) : 'good');
     });
+    tellSetpoint();
     fault.update(shown);
     orders.update(shown);
     tables.update(shown);
     tick();
+  }
+
+  /** Somebody else's setpoint is said when it comes, and who gave the present one stands beside it. */
+  function tellSetpoint() {
+    setText(given, givenBy(name));
+    const now = setpointText(setpointOf(shown));
+    const by = lastSetpoint(name);
+    if (now === setpoint || !by || by.live === undefined) return;
+    setpoint = now;
+    if (by.caller === plant.daemon.caller || !by.live) return;
+    const note = el('p', {}, named(name, t('given_by_now', { who: by.caller, value: now })));
+    document.getElementById('outcomes').prepend(note);
+    setTimeout(() => note.remove(), SAID_MS);
   }
 
   function tick() {

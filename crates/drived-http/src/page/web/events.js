@@ -2,7 +2,9 @@
 
 import { arrange, download, el, setText } from './dom.js';
 import { clock, duration } from './format.js';
+import { here, keepAsked } from './place.js';
 import { plant } from './plant.js';
+import { found } from './search.js';
 import { language, named, t } from './texts.js';
 import { told } from './told.js';
 import { word } from './vocabulary.js';
@@ -15,14 +17,15 @@ const KINDS = {
   kind_command: event => event.kind === 'command',
   kind_alarm: event => event.alarm || (event.kind === 'command' && !['confirmed', 'pending'].includes(event.outcome)),
 };
-const asked = { kind: 'kind_all', search: '' };
 
 /** Shows the events in `root`. */
 export function events(root) {
+  const asked = { kind: '', search: '', ...Object.fromEntries(here().asked) };
+  if (!KINDS[asked.kind]) asked.kind = '';
   const rows = new WeakMap();
   const body = el('tbody');
   const count = el('p.hint', { role: 'status' });
-  const kind = el('select', { 'aria-label': t('kind'), onchange: () => ask({ kind: kind.value }) },
+  const kind = el('select', { 'aria-label': t('kind'), onchange: () => ask({ kind: kind.value === 'kind_all' ? '' : kind.value }) },
     ...Object.keys(KINDS).map(name => el('option', { value: name, selected: name === asked.kind }, t(name))));
   const search = el('input', { type: 'search', value: asked.search, placeholder: t('search'), 'aria-label': t('search'), oninput: () => ask({ search: search.value }) });
   const list = el('table.events', {}, el('thead', {}, el('tr', {}, ...COLUMNS.map(name => el('th', { scope: 'col' }, t(name))))), body);
@@ -34,21 +37,18 @@ export function events(root) {
 
   function ask(changes) {
     Object.assign(asked, changes);
+    keepAsked(asked);
     update();
   }
 
   function chosen() {
-    const words = asked.search.toLowerCase().split(/\s+/).filter(Boolean);
-    return plant.events.filter(KINDS[asked.kind]).filter(event => {
-      const text = cells(event).join(' ').toLowerCase();
-      return words.every(one => text.includes(one));
-    });
+    return found(plant.events.filter(KINDS[asked.kind || 'kind_all']), asked.search, event => cells(event).join(' '));
   }
 
   function update() {
-    const found = chosen();
-    setText(count, found.length ? String(found.length) : t('no_events'));
-    arrange(body, found.slice(0, SHOWN).map(event => {
+    const those = chosen();
+    setText(count, those.length ? String(those.length) : t('no_events'));
+    arrange(body, those.slice(0, SHOWN).map(event => {
       if (!rows.has(event)) rows.set(event, el('tr', {}, ...COLUMNS.map(name => el('td', { 'data-column': t(name) }))));
       const row = rows.get(event);
       row.className = KINDS.kind_alarm(event) ? 'in-trouble' : '';
@@ -71,7 +71,7 @@ export function events(root) {
 function cells(event) {
   const time = clock(event.time_unix_ms);
   if (event.kind !== 'command') return [time, event.drive ?? '', word(event.event), eventText(event), '', '', ''];
-  return [time, event.drive ?? '', word('command'), command(event), [event.caller, event.origin].filter(Boolean).join(', '),
+  return [time, event.drive ?? event.group ?? event.selected?.join(', ') ?? '', word('command'), command(event), [event.caller, event.origin].filter(Boolean).join(', '),
     event.text ? named(outcome(event.outcome), told(event.text)) : outcome(event.outcome),
     event.outcome === 'pending' ? '' : duration(event.took_ms)];
 }

@@ -46,7 +46,7 @@ function row({ time_unix_ms: time, slave, request, answer, result, took_ms: took
   const bad = !['ok', 'broadcast', 'put_aside', 'given_up'].includes(result);
   const name = slave === 0 ? '' : drives.get(slave) ?? '';
   return el(bad ? 'tr.in-trouble' : 'tr', {},
-    el('td', {}, `${clock(time)}${t('decimal')}${String(time % 1_000).padStart(3, '0')}`),
+    el('td', {}, clock(time, { thousandths: true })),
     el('td', {}, [slave, name].filter(part => part !== '').join(' · ')),
     el('td', {}, el('code', {}, request)),
     el('td', {}, el('code', {}, answer || MISSING)),

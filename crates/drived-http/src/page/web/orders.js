@@ -66,7 +66,7 @@ export function orderText(order) {
 
 /** Whether an order did what it asked for. */
 export function isDone(order) {
-  return order.outcome === 'confirmed';
+  return order.outcome === 'confirmed' || order.outcome === 'nothing';
 }
 
 function settled(order, answer) {

@@ -1,13 +1,14 @@
 // What is known of the plant: the state once, then what the events change. The views read it and are told of changes.
 
 import { read } from './api.js';
+import { useZone } from './format.js';
 import { follow } from './stream.js';
 
 const EVENTS_KEPT = 2_000;
 
 /** What the daemon has said; replaced and patched here alone. */
 export const plant = {
-  daemon: { rights: {} }, drives: new Map(), lines: new Map(), groups: [], events: [],
+  daemon: { rights: {} }, drives: new Map(), lines: new Map(), groups: [], alarms: new Map(), events: [],
   /** `reading`, `live`, `interrupted` (for less than 12 s), `resting` (the stream is closed for a stop), `silent`, `away` or `refused`. */
   connection: 'reading',
   /** When the daemon was heard last, by its own clock and by ours. */
@@ -22,7 +23,7 @@ let endStream;
 let due = false;
 let starts = 0;
 
-/** Calls `listener(names)` at most once a frame; `names` holds what has changed: `drive NAME`, `line NAME`, `event`, `state`. */
+/** Calls `listener(names)` at most once a frame; `names` holds what has changed: `drive NAME`, `line NAME`, `alarm`, `event`, `state`. */
 export function onChange(listener) {
   listeners.add(listener);
   return () => listeners.delete(listener);
@@ -103,6 +104,13 @@ export function takeDrive(drive) {
   tell(`drive ${drive.name}`);
 }
 
+/** An alarm as it is now; one at its end is kept no more. */
+export function takeAlarm(alarm) {
+  if (alarm.state === 'over') plant.alarms.delete(alarm.id);
+  else plant.alarms.set(alarm.id, alarm);
+  tell('alarm');
+}
+
 function takeState(state) {
   const receivedAt = performance.now();
   plant.revision = state.revision;
@@ -110,6 +118,8 @@ function takeState(state) {
   plant.groups = state.groups ?? [];
   plant.drives = new Map(state.drives.map(drive => [drive.name, Object.assign(drive, { receivedAt })]));
   plant.lines = new Map(state.lines.map(line => [line.name, line]));
+  plant.alarms = new Map((state.alarms ?? []).map(alarm => [alarm.id, alarm]));
+  useZone(state.daemon.zone);
   plant.beganUnixMs = state.time_unix_ms - receivedAt;
   plant.heardUnixMs = daemonNow();
   plant.connection = 'live';
@@ -133,6 +143,9 @@ function take(kind, data) {
     if (known) Object.assign(known, data);
     else keep({ kind, ...data });
     tell('event');
+  }
+  if (kind === 'alarm') {
+    takeAlarm(data);
   }
   if (kind === 'event') {
     keep({ kind, ...data });

@@ -36,6 +36,14 @@ export const SENTENCES_FR = {
   'the limits are in hertz, give the setpoint in hertz': 'les limites sont en hertz : donner la consigne en hertz',
   'the drive has limits: give the setpoint with the start': 'le variateur a des limites : donner la consigne avec le démarrage',
 
+  // What to do about alarms that are of no drive.
+  'look at its adapter or serial server, and at the plug': 'examiner son adaptateur ou son serveur série, et la prise',
+  'look at the motors, then at the cable of the line and at the supply of its drives': 'regarder les moteurs, puis le câble de la ligne et l’alimentation de ses variateurs',
+  'drived doctor says more': 'drived doctor en dit davantage',
+  'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
+  'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',
+  'look at its supply, its address and its cable': 'vérifier son alimentation, son adresse et son câble',
+
   // What happens to the daemon itself.
   'the audit log cannot be written: only stops are carried out': 'le journal d’audit ne peut pas être écrit : seuls les arrêts sont exécutés',
   'the audit log is written again': 'le journal d’audit est de nouveau écrit',

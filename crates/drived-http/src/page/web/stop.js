@@ -194,7 +194,7 @@
     if (phase !== 'taken') return why ? t('stop_busy', told) : status ? t('stop_unheard_via', told) : t('stop_unheard', told);
     // To those that are only read nothing was sent: they are named below.
     const sent = answer.drives.filter(one => one.counted !== 'refused');
-    const head = { count: sent.length, time: clock(answer.time_unix_ms) };
+    const head = { count: sent.length, time: (later.clock ?? clock)(answer.time_unix_ms) };
     if (account.sight) return `${many('stop_taken', head)}. ${t(account.sight)}`;
     if (alarmed.length) return `${many('stop_alarm', { count: alarmed.length })}. ${many('stop_taken', head)}`;
     return many(left().length ? 'stop_taken' : 'stop_done', head);
@@ -268,7 +268,7 @@
   }
 
   function clock(unixMs) {
-    return new Intl.DateTimeFormat(root.lang, { hour: '2-digit', minute: '2-digit', second: '2-digit', hourCycle: 'h23' }).format(new Date(unixMs));
+    return new Intl.DateTimeFormat(root.lang === 'fr' ? 'fr' : 'en-GB', { hour: '2-digit', minute: '2-digit', second: '2-digit', hourCycle: 'h23', timeZoneName: 'shortOffset' }).format(new Date(unixMs));
   }
 
   /** The language that was chosen here, else the first that the browser asks for and the page has. */

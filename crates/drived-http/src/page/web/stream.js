@@ -2,7 +2,7 @@
 
 const SILENT_AFTER_MS = 12_000;
 const AGAIN_MS = 1_000;
-const KINDS = ['drive', 'line', 'command', 'event', 'tick'];
+const KINDS = ['drive', 'line', 'command', 'event', 'alarm', 'tick'];
 
 /**
  * Follows the events after `revision`. `handlers`: `news(kind, data)`, `reset()` when the state must be read again,

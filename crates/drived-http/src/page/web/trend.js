@@ -2,9 +2,9 @@
 
 import { path, read } from './api.js';
 import { el, setText, table } from './dom.js';
-import { clock, quantity } from './format.js';
+import { clock, plainTime, quantity, zoneAt } from './format.js';
 import { daemonNow } from './plant.js';
-import { language, t } from './texts.js';
+import { t } from './texts.js';
 import { told } from './told.js';
 
 const KEPT_S = 600;
@@ -38,7 +38,7 @@ export function trend(root, name) {
   const windows = Object.entries(WINDOWS).map(([text, length]) =>
     el('button', { type: 'button', 'aria-pressed': String(length === seconds), onclick: event => choose(length, event.target) }, t(text)));
   const canvas = el('div.plots');
-  const said = el('p.hint', {}, t('trend_hint'));
+  const said = el('p.hint', {}, t('trend_hint', { zone: zoneAt() }));
   const rows = el('div.wide');
   const asTable = el('details', { ontoggle: writeTable }, el('summary', {}, t('trend_table')), rows);
   root.append(el('div.headline', {}, el('h2', {}, t('trend')), el('span.chips', {}, ...windows, pause)), canvas, said, asTable);
@@ -194,9 +194,8 @@ function axis(scale, side = 3) {
 }
 
 function timeAxis() {
-  const format = new Intl.DateTimeFormat(language(), { hour: '2-digit', minute: '2-digit', second: '2-digit', hourCycle: 'h23' });
   return { font: font(), stroke: colour('--ink-soft'), grid: { stroke: colour('--edge'), width: 1 }, ticks: { stroke: colour('--edge') }, space: 80,
-    values: (_, ticks) => ticks.map(seconds => format.format(new Date(seconds * 1000))) };
+    values: (_, ticks) => ticks.map(seconds => plainTime(seconds * 1000)) };
 }
 
 /** From zero to the largest value, at least `least`, so that noise is not shown as a movement. */

@@ -5,16 +5,18 @@ import { faultMeaning, told } from './told.js';
 import { word } from './vocabulary.js';
 
 /** How a drive stands that nothing troubles. */
-const NOTHING = { rank: Infinity, severity: 'none', text: '', remedy: '' };
+const NOTHING = { rank: Infinity, severity: 'none', text: '', alike: '', remedy: '' };
 
-/** `{rank, severity, text, remedy}`: 0 is the worst; the severity is `alarm`, `warning`, `note` or `none`. */
+/** `{rank, severity, text, alike, remedy}`: 0 is the worst; the severity is `alarm`, `warning`, `note` or `none`; `alike` is the text without what is each drive's own. */
 export function trouble(drive) {
   const [worst] = drive.concerns ?? [];
   if (!worst) return drive.control === false ? { ...NOTHING, text: t('only_read') } : NOTHING;
   const what = t(`concern_${worst.kind}`);
   // Who has taken control is told by one word of the API, and everything else by a sentence.
   const detail = worst.kind === 'control_taken' ? word(worst.detail) : told(worst.detail);
-  return { rank: worst.rank, severity: worst.severity, text: detail ? named(what, detail) : what, remedy: told(worst.remedy) };
+  const text = detail ? named(what, detail) : what;
+  // The same fault has the same detail; why a drive does not answer is told of each in other words.
+  return { rank: worst.rank, severity: worst.severity, text, alike: worst.kind === 'tripped' ? text : what, remedy: told(worst.remedy) };
 }
 
 /** Whether somebody should see to it; a note is none. */

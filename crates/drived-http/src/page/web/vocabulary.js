@@ -37,6 +37,14 @@ const WORDS = {
   expired: ['expired', 'expiré'],
   superseded: ['superseded by a later command', 'remplacé par un ordre ultérieur'],
   nothing: ['nothing to be done', 'rien à faire'],
+  // The life of an alarm.
+  unacknowledged: ['not acknowledged', 'non prise en compte'],
+  acknowledged: ['acknowledged', 'prise en compte'],
+  returned: ['over, not acknowledged', 'disparue, non prise en compte'],
+  gone: ['its drive has left the configuration', 'son variateur a quitté la configuration'],
+  shelved: ['shelved', 'mise de côté'],
+  suppressed: ['follows from another', 'découle d’une autre'],
+  over: ['over', 'terminée'],
   // Actions.
   start: ['Start', 'Démarrage'],
   stop: ['Stop', 'Arrêt'],

@@ -83,6 +83,22 @@ export function setpointOf(drive) {
   return drive.setpoint ?? (typeof reference === 'number' ? { frequency_hz: reference } : undefined);
 }
 
+/** By how much the output of a drive is off its setpoint, in hertz; `undefined` where it does not run or one of both is not known. */
+export function deviationOf(drive) {
+  const output = drive.status?.output_frequency_hz;
+  const setpoint = setpointOf(drive)?.frequency_hz;
+  const isKnown = typeof output === 'number' && typeof setpoint === 'number' && drive.status.state === 'running';
+  return isKnown ? output - setpoint : undefined;
+}
+
+/** The same with its sign. */
+export function deviationText(drive) {
+  const deviation = deviationOf(drive);
+  if (deviation === undefined) return '';
+  const text = quantity(Math.abs(deviation), 1, 'Hz');
+  return Math.abs(deviation) < 0.05 ? text : `${deviation < 0 ? '−' : '+'}${text}`;
+}
+
 /** A setpoint of the API. */
 export function setpointText(setpoint) {
   if (typeof setpoint?.frequency_hz === 'number') return quantity(setpoint.frequency_hz, 1, 'Hz');

@@ -70,6 +70,7 @@ impl Work {
             id,
             drive: None,
             group: None,
+            selected: Vec::new(),
             action: request.action.word(),
             command: request.action.text(),
             caller: caller.name.clone(),
@@ -99,6 +100,7 @@ impl Work {
         let parts = Mutex::new(members.iter().map(part).collect());
         let head = match &request.target {
             Target::Group(name) => CommandView { group: Some(name.clone()), ..head },
+            Target::Selected(names) => CommandView { selected: names.clone(), ..head },
             Target::Drive(_) | Target::All => head,
         };
         let request = request.clone();

@@ -56,6 +56,8 @@ pub struct Request {
 pub enum Target {
     Drive(String),
     Group(String),
+    /// These, each by itself: who has chosen them has made no group of them.
+    Selected(Vec<String>),
     All,
 }
 
@@ -238,6 +240,7 @@ impl Plant {
                 let group = groups.iter().find(|group| group.name == *name);
                 group.map(|group| group.drives.clone()).ok_or_else(|| Rejected::NoGroup(name.clone()))
             }
+            Target::Selected(names) => Ok(names.clone()),
             Target::All => Ok(self.fleet().drives().iter().map(|drive| drive.name().to_string()).collect()),
         }
     }

@@ -16,9 +16,12 @@ pub struct CommandView {
     /// The drive; absent where several are meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drive: Option<String>,
-    /// The group; absent where a drive, or all, are meant.
+    /// The group; absent where a drive, some that were selected, or all, are meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
+    /// The drives that were selected for it; absent where others are meant.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub selected: Vec<String>,
     pub action: ActionWord,
     /// The action in words.
     pub command: String,

@@ -48,6 +48,9 @@ pub struct StateView {
 pub struct DaemonView {
     pub version: Cow<'static, str>,
     pub started_unix_ms: u64,
+    /// The zone of its clock, such as `Europe/Paris`; absent where the host does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zone: Option<String>,
     /// Whether its drives are simulated.
     pub demo: bool,
     /// What the asker may do.

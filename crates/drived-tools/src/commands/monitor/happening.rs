@@ -62,6 +62,7 @@ impl Happening {
         let drive = match (&told.group, &told.drive) {
             (Some(group), _) => format!("group {}", escaped(group)),
             (None, Some(drive)) => escaped(drive),
+            (None, None) if !told.selected.is_empty() => format!("{} drives", told.selected.len()),
             (None, None) => "all drives".to_owned(),
         };
         let is_alarm =

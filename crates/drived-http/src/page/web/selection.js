@@ -1,0 +1,101 @@
+// The drives that somebody has chosen, and what he may do with all of them at once: each command says first for how many it is.
+
+import { confirmed } from './ask.js';
+import { el, setText } from './dom.js';
+import { quantity } from './format.js';
+import { command } from './orders.js';
+import { mayCommand, plant } from './plant.js';
+import { t } from './texts.js';
+
+const EXPIRES_MS = 5_000;
+const NAMED = 12;
+const STEP_HZ = 0.1;
+
+/** For which drives each command is one that is not refused. */
+const FITS = {
+  start: drive => mayCommand(drive) && drive.control && !drive.start_refused,
+  stop: drive => plant.daemon.rights.stop && drive.control,
+  setpoint: drive => mayCommand(drive) && drive.control,
+  reset: drive => mayCommand(drive) && drive.control && isTripped(drive),
+};
+
+/** Whether a drive has a fault that can be reset. */
+export function isTripped(drive) {
+  return drive.status?.state === 'fault' || Boolean(drive.fault);
+}
+
+/** Whether anything can be done with drives that are chosen. */
+export function mayChoose() {
+  return Boolean(plant.daemon.rights.stop || plant.daemon.rights.operate);
+}
+
+/** The bar for the chosen names, a set; `changed()` is called when it is emptied. Gives `element`, `update()`. */
+export function selectionBar(chosen, changed) {
+  const count = el('b', { role: 'status' });
+  const button = (action, act) => el('button', { type: 'button', 'data-order': action, onclick: act });
+  const buttons = {
+    start: button('start', askStart), stop: button('stop', () => give('stop')),
+    setpoint: button('setpoint', askSetpoint), reset: button('reset', askReset),
+  };
+  const none = el('button.quiet', { type: 'button', onclick: clear }, t('select_none'));
+  const element = el('div.selection', { role: 'group', 'aria-label': t('orders'), hidden: true }, count, ...Object.values(buttons), none);
+  return { element, update };
+
+  function update() {
+    for (const name of chosen) if (!plant.drives.has(name)) chosen.delete(name);
+    element.hidden = chosen.size === 0;
+    setText(count, chosen.size === 1 ? t('selected_one') : t('selected', { count: chosen.size }));
+    for (const [action, one] of Object.entries(buttons)) {
+      const fit = fitting(action);
+      one.hidden = fit.length === 0;
+      setText(one, t(`${action}_these`, { count: fit.length }));
+    }
+  }
+
+  function clear() {
+    chosen.clear();
+    changed();
+  }
+
+  function fitting(action) {
+    return [...chosen].filter(name => FITS[action](plant.drives.get(name)));
+  }
+
+  function give(action, body = {}, names = fitting(action)) {
+    const expiry = action === 'stop' ? {} : { expires_in_ms: EXPIRES_MS };
+    command(t('selected', { count: names.length }), action, `selected/${action}`, { drives: names, ...expiry, ...body });
+  }
+
+  async function askStart() {
+    const names = fitting('start');
+    if (await confirmed(names, question('confirm_start_these', names), t('start_these', { count: names.length }))) give('start', { direction: 'forward' }, names);
+  }
+
+  async function askReset() {
+    const names = fitting('reset');
+    if (await confirmed(names, question('confirm_reset_these', names), t('reset_these', { count: names.length }))) give('reset', {}, names);
+  }
+
+  async function askSetpoint() {
+    const all = fitting('setpoint');
+    const [low, high] = limitsOf(all);
+    const field = el('input', { type: 'number', step: STEP_HZ, min: low, max: high, required: true, inputmode: 'decimal' });
+    const said = t('limits_are', { low: quantity(low, 1), high: quantity(high, 1, 'Hz') });
+    const label = el('label.field', {}, `${t('setpoint')} (Hz). ${said}`, field);
+    if (!await confirmed(all, question('confirm_setpoint_these', all), t('set'), label)) return;
+    give('setpoint', { setpoint: { frequency_hz: Number(field.value) } }, all);
+  }
+
+  function question(text, names) {
+    const out = [...chosen].filter(name => !names.includes(name));
+    const listed = out.slice(0, NAMED).join(', ');
+    const told = out.length > NAMED ? t('and_more', { names: listed, count: out.length - NAMED }) : listed;
+    return [t(text, { count: names.length }), out.length && t('left_out', { names: told })].filter(Boolean).join(' ');
+  }
+}
+
+/** What every one of these may be given, in hertz. */
+function limitsOf(names) {
+  const limits = names.map(name => plant.drives.get(name).limits ?? {});
+  return [Math.max(0, ...limits.map(one => one.low_hz ?? 0)), Math.min(...limits.map(one => one.high_hz ?? 50))];
+}
